@@ -51,11 +51,11 @@ def one_joint() -> pin.Model:
 
 def compiled(scene: sp.Scene, q: Array, v: Array, names: Sequence[str] = ()) -> Callable[[], float]:
     """Seconds of Scene.dynamics_derivatives without its Python."""
-    _, parameters = scene.core_parameters(names)
+    _, parameters = scene._bind_parameters(names)
 
     def run() -> float:
         begin = time.perf_counter()
-        scene.core.dynamics_derivatives(q, v, None, parameters, CALLS)
+        scene._binding.dynamics_derivatives(q, v, None, parameters, CALLS)
         return (time.perf_counter() - begin) / CALLS
 
     return run

@@ -1,7 +1,7 @@
 """Robots that are kept with the results of a run: shown later from what is kept, and no other file.
 
 Kept are the description as it was read (a xacro file expanded, an MJCF with what it includes) and
-the meshes that show the robot. Whoever gives the results away may have changed both.
+the meshes that show the robot. Both may have been changed since.
 """
 
 from __future__ import annotations

@@ -33,10 +33,7 @@ def check_not_negative(name: str, value: object, unit: str = "") -> float:
 
 def check_finite(name: str, value: object) -> float:
     """Return `value` as a float; raise InvalidParameter unless it is one finite number."""
-    try:
-        array = as_floats(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidParameter(name, value, "must be a number") from None
+    array = _floats(name, value, "must be a number")
     if array.ndim:
         raise InvalidParameter(name, value, "must be one number")
     number = float(array)
@@ -47,10 +44,7 @@ def check_finite(name: str, value: object) -> float:
 
 def check_vector(name: str, value: object, size: int, what: str = "") -> Array:
     """Return a copy of `value` as an array (size,); raise InvalidParameter otherwise."""
-    try:
-        array = as_floats(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidParameter(name, value, f"must hold {size} numbers{what}") from None
+    array = _floats(name, value, f"must hold {size} numbers{what}")
     if array.shape != (size,):
         raise _wrong_shape(name, array.shape, f"({size},){what}")
     if not np.isfinite(array).all():
@@ -60,10 +54,7 @@ def check_vector(name: str, value: object, size: int, what: str = "") -> Array:
 
 def check_points(name: str, value: object) -> Array:
     """Return a copy of `value` as an array (n, 3); raise InvalidParameter otherwise."""
-    try:
-        array = as_floats(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidParameter(name, value, "must be an array of shape (n, 3)") from None
+    array = _floats(name, value, "must be an array of shape (n, 3)")
     if array.ndim != 2 or array.shape[1] != 3:
         raise _wrong_shape(name, array.shape, "(n, 3)")
     if not np.isfinite(array).all():
@@ -85,6 +76,13 @@ def check_each_positive(name: str, value: ArrayLike, count: int, unit: str = "")
         k = int(wrong[0])
         raise InvalidParameter(f"{name}[{k}]", float(array[k]), f"must be positive{_in(unit)}")
     return array
+
+
+def _floats(name: str, value: object, must: str) -> Array:
+    try:
+        return as_floats(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidParameter(name, value, must) from None
 
 
 def as_floats(value: object) -> Array:

@@ -6,8 +6,10 @@ import difflib
 import re
 import threading
 from collections.abc import Iterable
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -170,6 +172,14 @@ class MissingExtra(SphshellError, ImportError):
         )
         self.package = package
         self.extra = extra
+
+
+def import_extra(module: str, extra: str, purpose: str, package: str = "") -> ModuleType:
+    """Return an optional module; MissingExtra says what `purpose` needs its `package`."""
+    try:
+        return import_module(module)
+    except ImportError as missing:
+        raise MissingExtra(package or module.partition(".")[0], extra, purpose) from missing
 
 
 class UnusableExtra(MissingExtra):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.atomic import atomic_file, atomic_path
-from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError, SphshellError
+from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError, import_extra
 
 SUFFIXES = (".gif", ".mp4")
 COLORS = 256  # of a .gif
@@ -69,10 +69,7 @@ def write_film(path: Path, frames: Iterable[Pixels], fps: float, samples: Sequen
 
 
 def _write_gif(path: Path, frames: Iterator[Pixels], fps: float, samples: Sequence[Pixels]) -> Path:
-    try:
-        from PIL import Image
-    except ImportError as missing:
-        raise MissingExtra("pillow", "view", "a film as .gif") from missing
+    Image = import_extra("PIL.Image", "view", "a film as .gif", "pillow")
 
     # The same colors in all pictures: what stands still does not flicker, and takes no space.
     sheet = Image.fromarray(np.concatenate(samples))
@@ -85,12 +82,8 @@ def _write_gif(path: Path, frames: Iterator[Pixels], fps: float, samples: Sequen
     palette = Image.new("P", (1, 1))
     palette.putpalette(colors)
 
-    def reduced() -> Iterator[Image.Image]:
-        for frame in frames:
-            picture = Image.fromarray(frame)
-            yield picture.quantize(palette=palette, dither=Image.Dither.NONE)
-
-    pictures = list(reduced())
+    dither = Image.Dither.NONE
+    pictures = [Image.fromarray(one).quantize(palette=palette, dither=dither) for one in frames]
     ends = [round(100.0 * k / fps) for k in range(len(pictures) + 1)]
     durations = [10 * (end - start) for start, end in itertools.pairwise(ends)]
     with atomic_file(path) as file:
@@ -106,12 +99,9 @@ def _write_gif(path: Path, frames: Iterator[Pixels], fps: float, samples: Sequen
 
 
 def _write_mp4(path: Path, frames: Iterator[Pixels], size: tuple[int, int], fps: float) -> Path:
+    package = import_extra("imageio_ffmpeg", "video", "a film as .mp4", "imageio-ffmpeg")
     try:
-        from imageio_ffmpeg import get_ffmpeg_exe
-    except ImportError as missing:
-        raise MissingExtra("imageio-ffmpeg", "video", "a film as .mp4") from missing
-    try:
-        program = get_ffmpeg_exe()
+        program = package.get_ffmpeg_exe()
     except RuntimeError as missing:
         raise ResultError(path, f"a film as .mp4 needs ffmpeg: {missing}") from missing
 

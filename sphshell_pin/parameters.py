@@ -107,10 +107,13 @@ def parameter(
     return field(default=default, metadata=metadata)
 
 
-def same_parameter(kind: type, name: str) -> Any:
-    """Return the field of a dataclass that is the parameter `name` of `kind`."""
+def same_parameter(kind: type, name: str, default: object = None) -> Any:
+    """Return the field of a dataclass that is the parameter `name` of `kind`.
+
+    `default` takes the place of its default, unless it is None.
+    """
     (source,) = (one for one in dataclasses.fields(kind) if one.name == name)
-    return field(default=source.default, metadata=source.metadata)
+    return field(default=source.default if default is None else default, metadata=source.metadata)
 
 
 def parameters_of(kind: object) -> dict[str, Parameter]:
@@ -128,7 +131,7 @@ class Component:
     A direct subclass is a family (`class NormalLaw(Component)`). A class that belongs to it gives
     its type name in files, `class ImpactLaw(NormalLaw, kind="impact")`. Another way to state one
     names the family that it belongs to, `class Hertz(Component, kind="hertz", of=NormalLaw)`, and
-    returns what it states by `made`; if its kind is taken, files state that kind in this way.
+    returns what it states by `_build`; if its kind is taken, files state that kind in this way.
     """
 
     kind: ClassVar[str] = ""
@@ -175,7 +178,7 @@ class Component:
         """Return this with other values of parameters."""
         return dataclasses.replace(self, **values)
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         """Return the parameters in their order, as the compiled core takes them."""
         return [float(getattr(self, name)) for name in parameters_of(self)]
 
@@ -184,13 +187,13 @@ class Component:
         """Files that this names, as it names them: relative to the scenario."""
         return ()
 
-    def made(self, folder: Path = Path()) -> Any:
+    def _build(self, folder: Path = Path()) -> Any:
         """Return what this states; `folder` is where its files are. By default itself."""
         return self
 
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""
-        return {k: v for k, v in self.__dict__.items() if k != "core"}
+        return {k: v for k, v in self.__dict__.items() if k != "_binding"}
 
 
 if not TYPE_CHECKING:

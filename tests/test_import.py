@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import json
 import re
 import shutil
@@ -65,6 +66,19 @@ def test_public_names_exist() -> None:
         Simulation SemiImplicitEuler RungeKutta4 Result GravityCompensation JointPD
         CartesianImpedance"""
     assert set(contract.split()) <= set(sphshell_pin.__all__)
+
+
+def test_what_is_listed_is_public() -> None:
+    """`dir` lists names and parts; of an object no method of the compiled core's bindings."""
+    import sphshell_pin as sp
+
+    assert set(dir(sp)) == {*sp.__all__, *sp._PARTS, "__version__"}
+    for part in ("contact", "dynamics", "patches", "study.fit"):  # as type checkers see them
+        module = importlib.import_module(f"sphshell_pin.{part}")
+        assert set(module.__all__) == set(sp._NAMES[part].split())
+    shown = {name: set(dir(getattr(sp, name))) for name in sp.__all__}
+    private = {"alone", "core", "from_blocks", "made", "numbers", "to_core"}
+    assert {name: bad for name, attributes in shown.items() if (bad := attributes & private)} == {}
 
 
 NO_REDIRECT = "import sys; sys.meta_path = [f for f in sys.meta_path if isinstance(f, type)]; "

@@ -129,7 +129,7 @@ def test_an_open_run_says_why_not(trip: Trip) -> None:
 
 def test_a_compiled_core_says_why_not(trip: Trip) -> None:
     with pytest.raises(NotPicklable, match="send its Shell"):
-        trip(bumpy_scene().pairs[0].shell.core)
+        trip(bumpy_scene().pairs[0].shell._binding)
 
 
 def test_a_copy_of_a_scene_is_independent(trip: Trip) -> None:

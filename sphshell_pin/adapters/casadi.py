@@ -42,21 +42,43 @@ class _Found(NamedTuple):
     blocks: list[list[Array]]
 
 
-class _SceneFunction(casadi.Callback):
+class _Callback(casadi.Callback):
+    """A function with names for its inputs and outputs, as CasADi asks for them."""
+
+    _inputs: Sequence[str]
+    _outputs: Sequence[str]
+
+    def get_n_in(self) -> int:
+        """Return the number of inputs."""
+        return len(self._inputs)
+
+    def get_n_out(self) -> int:
+        """Return the number of outputs."""
+        return len(self._outputs)
+
+    def get_name_in(self, i: int) -> str:
+        """Return the name of an input."""
+        return self._inputs[i]
+
+    def get_name_out(self, i: int) -> str:
+        """Return the name of an output."""
+        return self._outputs[i]
+
+
+class _SceneFunction(_Callback):
     """A function of q, v, tau (nv,) and, where some are named, of parameters p.
 
     CasADi knows no manifolds. Its q is the displacement from `q0` (nq,) in the tangent space:
     Pinocchio's is pinocchio.integrate(model, q0, q).
     """
 
-    _outputs: tuple[str, ...]
-
     def __init__(
         self,
         scene: Scene,
-        q0: ArrayLike | None,
-        parameters: Iterable[str],
-        without_history: bool,
+        q0: ArrayLike | None = None,
+        *,
+        parameters: Iterable[str] = (),
+        without_history: bool = False,
     ) -> None:
         check_without_history(scene, without_history)
         super().__init__()
@@ -105,22 +127,6 @@ class _SceneFunction(casadi.Callback):
 
     # What follows is called by CasADi.
 
-    def get_n_in(self) -> int:
-        """Return the number of inputs."""
-        return len(self._inputs)
-
-    def get_n_out(self) -> int:
-        """Return the number of outputs."""
-        return len(self._outputs)
-
-    def get_name_in(self, i: int) -> str:
-        """Return the name of an input."""
-        return self._inputs[i]
-
-    def get_name_out(self, i: int) -> str:
-        """Return the name of an output."""
-        return self._outputs[i]
-
     def get_sparsity_in(self, i: int) -> casadi.Sparsity:
         """Return the size of an input."""
         return casadi.Sparsity.dense(self.length_of(i), 1)
@@ -150,7 +156,7 @@ class _SceneFunction(casadi.Callback):
         return jacobian
 
 
-class _Jacobian(casadi.Callback):
+class _Jacobian(_Callback):
     """All derivatives of a _SceneFunction, of its inputs and outputs."""
 
     def __init__(
@@ -163,25 +169,9 @@ class _Jacobian(casadi.Callback):
     ) -> None:
         super().__init__()
         self._function = function
-        self._inames, self._onames = list(inames), list(onames)
+        self._inputs, self._outputs = inames, onames
         self._sizes = [function.length_of(i) for i in range(function.get_n_in())]
         self.construct(name, opts)
-
-    def get_n_in(self) -> int:
-        """Return the number of inputs."""
-        return len(self._inames)
-
-    def get_n_out(self) -> int:
-        """Return the number of outputs."""
-        return len(self._onames)
-
-    def get_name_in(self, i: int) -> str:
-        """Return the name of an input."""
-        return self._inames[i]
-
-    def get_name_out(self, i: int) -> str:
-        """Return the name of an output."""
-        return self._onames[i]
 
     def get_sparsity_in(self, i: int) -> casadi.Sparsity:
         """Return the size of an input; the outputs of the function are not read."""
@@ -219,16 +209,6 @@ class ForwardDynamics(_SceneFunction):
 
     _outputs = ("acceleration",)
 
-    def __init__(
-        self,
-        scene: Scene,
-        q0: ArrayLike | None = None,
-        *,
-        parameters: Iterable[str] = (),
-        without_history: bool = False,
-    ) -> None:
-        super().__init__(scene, q0, parameters, without_history)
-
     def _find(self, scene: Scene, q: Array, v: Array, tau: Array) -> _Found:
         d = scene.dynamics_derivatives(q, v, tau, parameters=self.parameters)
         return _Found([d.acceleration], [[d.by_q, d.by_v, d.by_tau, d.by_parameters]])
@@ -255,7 +235,9 @@ class Step(_SceneFunction):
         self._integrator = simulation.integrator
         q, v = simulation.scene.check_state(simulation.scene.neutral)
         simulation.step_derivatives(q, v)  # refuses an integrator without fixed steps
-        super().__init__(simulation.scene, q0, parameters, without_history)
+        super().__init__(
+            simulation.scene, q0, parameters=parameters, without_history=without_history
+        )
 
     def _find(self, scene: Scene, q: Array, v: Array, tau: Array) -> _Found:
         simulation = Simulation(scene, self._integrator)

@@ -44,7 +44,46 @@ __all__ = ["ContactDynamics", "ContactForceResidual", "ContactStep", "FrameResid
 Array = NDArray[np.float64]
 
 
-class ContactDynamics(crocoddyl.DifferentialActionModelAbstract):
+class _Model:
+    """What the models share: a scene, torques by an actuation, and costs."""
+
+    def _take(
+        self,
+        scene: Scene,
+        state: crocoddyl.StateMultibody,
+        actuation: crocoddyl.ActuationModelAbstract,
+        costs: crocoddyl.CostModelSum,
+        without_history: bool,
+    ) -> None:
+        check_without_history(scene, without_history)
+        _check_state(scene, state)
+        _check_costs(scene, costs)
+        self.scene, self.actuation, self.costs = scene, actuation, costs
+        self._nq = scene.model.nq
+        # Torques are the controls.
+        self._full = isinstance(actuation, crocoddyl.ActuationModelFull)
+
+    def _evaluate(self, data: _Data, x: Array, u: Array, out: Array) -> None:
+        """Compute forces, costs, and the acceleration or the next state into `out`."""
+        if not self._full:
+            self.actuation.calc(data.actuation, x, u)
+        tau = u if self._full else data.tau
+        data.evaluator.calc(x[: self._nq], x[self._nq :], tau, out, data.forces)
+        self.costs.calc(data.costs, x, u)
+
+    def _differentiate(self, data: _Data, x: Array, u: Array) -> None:
+        """Compute the derivatives of what `_evaluate` has computed last."""
+        tau = u if self._full else data.tau
+        derivatives = data.by_state, data.by_tau, data.forces_by_state
+        data.evaluator.calc_diff(x[: self._nq], x[self._nq :], tau, *derivatives)
+        if not self._full:
+            self.actuation.calcDiff(data.actuation, x, u)
+            data.Fx[:] = data.by_state + data.by_tau @ data.actuation.dtau_dx
+            data.Fu[:] = data.by_tau @ data.actuation.dtau_du
+        self.costs.calcDiff(data.costs, x, u)
+
+
+class ContactDynamics(_Model, crocoddyl.DifferentialActionModelAbstract):
     """The motion of a scene, with Crocoddyl's costs.
 
     The acceleration and its derivatives are those of the scene: all of its pairs, on moving shells
@@ -72,16 +111,8 @@ class ContactDynamics(crocoddyl.DifferentialActionModelAbstract):
         *,
         without_history: bool = False,
     ) -> None:
-        check_without_history(scene, without_history)
-        _check_state(scene, state)
-        _check_costs(scene, costs)
+        self._take(scene, state, actuation, costs, without_history)
         super().__init__(state, actuation.nu, costs.nr)
-        self.scene = scene
-        self.actuation = actuation
-        self.costs = costs
-        self._nq = scene.model.nq
-        # Torques are the controls.
-        self._full = isinstance(actuation, crocoddyl.ActuationModelFull)
 
     def createData(self) -> _DynamicsData:
         """Return the memory of one node."""
@@ -89,35 +120,26 @@ class ContactDynamics(crocoddyl.DifferentialActionModelAbstract):
 
     def calc(self, data: _DynamicsData, x: Array, u: Array | None = None) -> None:
         """Compute acceleration, forces and costs; without u, as of a last node, no acceleration."""
-        q, v = x[: self._nq], x[self._nq :]
         if u is None:
+            q, v = x[: self._nq], x[self._nq :]
             data.evaluator.calc(q, v, data.no_torque, data.unused, data.forces)
             self.costs.calc(data.costs, x)
         else:
-            if not self._full:
-                self.actuation.calc(data.actuation, x, u)
-            tau = u if self._full else data.tau
-            data.evaluator.calc(q, v, tau, data.acceleration, data.forces)
-            self.costs.calc(data.costs, x, u)
+            self._evaluate(data, x, u, data.acceleration)
         data.cost = data.costs.cost
 
     def calcDiff(self, data: _DynamicsData, x: Array, u: Array | None = None) -> None:
         """Compute the derivatives of what `calc` has computed last."""
-        q, v = x[: self._nq], x[self._nq :]
-        slopes = data.by_state, data.by_tau, data.forces_by_state
         if u is None:
-            data.evaluator.calc_diff(q, v, data.no_torque, *slopes)
+            q, v = x[: self._nq], x[self._nq :]
+            derivatives = data.by_state, data.by_tau, data.forces_by_state
+            data.evaluator.calc_diff(q, v, data.no_torque, *derivatives)
             self.costs.calcDiff(data.costs, x)
-            return
-        data.evaluator.calc_diff(q, v, u if self._full else data.tau, *slopes)
-        if not self._full:
-            self.actuation.calcDiff(data.actuation, x, u)
-            data.Fx[:] = data.by_state + data.by_tau @ data.actuation.dtau_dx
-            data.Fu[:] = data.by_tau @ data.actuation.dtau_du
-        self.costs.calcDiff(data.costs, x, u)
+        else:
+            self._differentiate(data, x, u)
 
 
-class ContactStep(crocoddyl.ActionModelAbstract):
+class ContactStep(_Model, crocoddyl.ActionModelAbstract):
     """A step of a simulation under held torques, with Crocoddyl's costs: a node by itself.
 
     It makes the steps of `simulation`, with any integrator of a fixed dt, such as
@@ -139,17 +161,10 @@ class ContactStep(crocoddyl.ActionModelAbstract):
         without_history: bool = False,
     ) -> None:
         check_type("simulation", simulation, Simulation, "must be a sphshell_pin.Simulation")
-        self.scene = scene = simulation.scene
-        check_without_history(scene, without_history)
-        _check_state(scene, state)
-        _check_costs(scene, costs)
+        self._take(simulation.scene, state, actuation, costs, without_history)
         self.dt = check_fixed_step(simulation)
         super().__init__(state, actuation.nu, costs.nr)
         self.simulation = simulation
-        self.actuation = actuation
-        self.costs = costs
-        self._nq = scene.model.nq
-        self._full = isinstance(actuation, crocoddyl.ActuationModelFull)
 
     def createData(self) -> _StepData:
         """Return the memory of one node."""
@@ -157,94 +172,75 @@ class ContactStep(crocoddyl.ActionModelAbstract):
 
     def calc(self, data: _StepData, x: Array, u: Array | None = None) -> None:
         """Compute the next state, forces and costs; without u, as of a last node, it stays."""
-        q, v = x[: self._nq], x[self._nq :]
         if u is None:
+            q, v = x[: self._nq], x[self._nq :]
             data.last.calc(q, v, data.no_torque, data.unused, data.forces)
             data.following[:] = x
             self.costs.calc(data.costs, x)
             data.cost = data.costs.cost
-            return
-        if not self._full:
-            self.actuation.calc(data.actuation, x, u)
-        tau = u if self._full else data.tau
-        data.evaluator.calc(q, v, tau, data.following, data.forces)
-        self.costs.calc(data.costs, x, u)
-        data.cost = self.dt * data.costs.cost
+        else:
+            self._evaluate(data, x, u, data.following)
+            data.cost = self.dt * data.costs.cost
 
     def calcDiff(self, data: _StepData, x: Array, u: Array | None = None) -> None:
         """Compute the derivatives of what `calc` has computed last."""
-        q, v = x[: self._nq], x[self._nq :]
         if u is None:
-            data.last.calc_diff(q, v, data.no_torque, *data.last_slopes, data.forces_by_state)
+            q, v = x[: self._nq], x[self._nq :]
+            derivatives = (*data.last_derivatives, data.forces_by_state)
+            data.last.calc_diff(q, v, data.no_torque, *derivatives)
             self.costs.calcDiff(data.costs, x)
             return
-        slopes = data.by_state, data.by_tau, data.forces_by_state
-        data.evaluator.calc_diff(q, v, u if self._full else data.tau, *slopes)
-        if not self._full:
-            self.actuation.calcDiff(data.actuation, x, u)
-            data.Fx[:] = data.by_state + data.by_tau @ data.actuation.dtau_dx
-            data.Fu[:] = data.by_tau @ data.actuation.dtau_du
-        self.costs.calcDiff(data.costs, x, u)
-        for slope in data.cost_slopes:
-            np.multiply(slope, self.dt, out=slope)
+        self._differentiate(data, x, u)
+        for one in (data.Lx, data.Lu, data.Lxx, data.Lxu, data.Luu):
+            np.multiply(one, self.dt, out=one)
 
 
-class _Forces:
-    """Forces of a scene at one state, for the residuals of a cost."""
+class _Data:
+    """The memory of one node: actuation, costs, and the forces that their residuals read."""
 
-    def __init__(self, scene: Scene, nv: int) -> None:
-        rows = FORCES * len(scene.pairs)
-        self.forces = np.zeros((rows, 1))
-        self.forces_by_state = np.zeros((rows, 2 * nv))
+    evaluator: Evaluator | StepEvaluator
+    Fx: Array
+    Fu: Array
+
+    def _share(self, model: ContactDynamics | ContactStep, rows: int) -> None:
+        """Share memory with Crocoddyl; derivatives have `rows`."""
+        nv, forces = model.state.nv, FORCES * len(model.scene.pairs)
+        self.forces = np.zeros((forces, 1))
+        self.forces_by_state = np.zeros((forces, 2 * nv))
         self.no_torque, self.unused = np.zeros(nv), np.zeros(nv)
-
-    def lead(self, costs: crocoddyl.CostDataSum) -> None:
-        """Let the residuals read these forces."""
-        for cost in costs.costs.todict().values():
+        self.actuation = model.actuation.createData()
+        self.collector = crocoddyl.DataCollectorActuation(self.actuation)
+        self.costs = model.costs.createData(self.collector)
+        self.costs.shareMemory(self)
+        self.tau = self.actuation.tau
+        full = model._full
+        self.by_state = _matrix(self.Fx if full else np.zeros((rows, 2 * nv), order="F"), rows)
+        self.by_tau = _matrix(self.Fu if full else np.zeros((rows, nv), order="F"), rows)
+        for cost in self.costs.costs.todict().values():
             if isinstance(cost.residual, _ForceData):
                 cost.residual.follow(self)
 
 
-class _DynamicsData(crocoddyl.DifferentialActionDataAbstract, _Forces):
+class _DynamicsData(crocoddyl.DifferentialActionDataAbstract, _Data):
     """The memory of one node of a ContactDynamics."""
 
     def __init__(self, model: ContactDynamics) -> None:
-        crocoddyl.DifferentialActionDataAbstract.__init__(self, model)
-        nv = model.state.nv
-        _Forces.__init__(self, model.scene, nv)
+        super().__init__(model)
         self.evaluator = Evaluator(model.scene)
-        self.actuation = model.actuation.createData()
-        self.collector = crocoddyl.DataCollectorActuation(self.actuation)
-        self.costs = model.costs.createData(self.collector)
-        self.costs.shareMemory(self)
-        # These share the memory that Crocoddyl reads and writes.
-        self.acceleration, self.tau = self.xout, self.actuation.tau
-        full = model._full
-        self.by_state = _matrix(self.Fx if full else np.zeros((nv, 2 * nv), order="F"), nv)
-        self.by_tau = _matrix(self.Fu if full else np.zeros((nv, nv), order="F"), nv)
-        self.lead(self.costs)
+        self.acceleration = self.xout
+        self._share(model, model.state.nv)
 
 
-class _StepData(crocoddyl.ActionDataAbstract, _Forces):
+class _StepData(crocoddyl.ActionDataAbstract, _Data):
     """The memory of one node of a ContactStep."""
 
     def __init__(self, model: ContactStep) -> None:
-        crocoddyl.ActionDataAbstract.__init__(self, model)
+        super().__init__(model)
         nv = model.state.nv
-        _Forces.__init__(self, model.scene, nv)
         self.evaluator, self.last = StepEvaluator(model.simulation), Evaluator(model.scene)
-        self.last_slopes = np.zeros((nv, 2 * nv), order="F"), np.zeros((nv, nv), order="F")
-        self.actuation = model.actuation.createData()
-        self.collector = crocoddyl.DataCollectorActuation(self.actuation)
-        self.costs = model.costs.createData(self.collector)
-        self.costs.shareMemory(self)
-        # These share the memory that Crocoddyl reads and writes.
-        self.following, self.tau = self.xnext, self.actuation.tau
-        full = model._full
-        self.by_state = _matrix(self.Fx if full else np.zeros((2 * nv, 2 * nv), order="F"), 2 * nv)
-        self.by_tau = _matrix(self.Fu if full else np.zeros((2 * nv, nv), order="F"), 2 * nv)
-        self.cost_slopes = self.Lx, self.Lu, self.Lxx, self.Lxu, self.Luu
-        self.lead(self.costs)
+        self.last_derivatives = np.zeros((nv, 2 * nv), order="F"), np.zeros((nv, nv), order="F")
+        self.following = self.xnext
+        self._share(model, 2 * nv)
 
 
 class ContactForceResidual(crocoddyl.ResidualModelAbstract):
@@ -307,7 +303,7 @@ class _ForceData(crocoddyl.ResidualDataAbstract):
         self.model = model
         self.residual, self.by_state = self.r, _matrix(self.Rx, model.nr)
 
-    def follow(self, data: _Forces) -> None:
+    def follow(self, data: _Data) -> None:
         """Read the forces of a node."""
         names = [pair.name for pair in self.model.scene.pairs]
         first = FORCES * names.index(self.model.pair)
@@ -339,7 +335,7 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
         self.frame = frame
         self._joint, self._placement = scene.frame_in_joint(frame)
         self._nq = scene.model.nq
-        self._scene = scene.core
+        self._scene = scene._binding
         self.reference = reference
 
     @property

@@ -20,7 +20,7 @@ FORCES = 4
 def check_without_history(scene: Scene, without_history: bool) -> None:
     """Raise InvalidParameter for a scene whose friction remembers more than q and v."""
     check_type("scene", scene, Scene, "must be a sphshell_pin.Scene")
-    if without_history or not scene.core.bristle_size:
+    if without_history or not scene._binding.bristle_size:
         return
     names = [p.name for p in scene.pairs if p.friction is not None and p.friction.has_state]
     where = f"the friction of {', '.join(names)}" if names else "the dry friction in its joints"
@@ -53,7 +53,7 @@ class Evaluator:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._core = scene.core
+        self._core = scene._binding
 
     def calc(self, q: Array, v: Array, tau: Array, acceleration: Array, forces: Array) -> None:
         """Fill acceleration (nv,) and forces (FORCES pairs, 1)."""
@@ -70,7 +70,7 @@ class StepEvaluator:
     """The same of a fixed step of a simulation; forces are those where it begins."""
 
     def __init__(self, simulation: Simulation) -> None:
-        self._core = simulation.scene.core
+        self._core = simulation.scene._binding
         self._step = simulation.integrator.kind, step_of(simulation.integrator)
 
     def calc(self, q: Array, v: Array, tau: Array, following: Array, forces: Array) -> None:
@@ -81,5 +81,5 @@ class StepEvaluator:
         self, q: Array, v: Array, tau: Array, by_state: Array, by_tau: Array, forces_by_state: Array
     ) -> None:
         """Fill by_state (2 nv, 2 nv), by_tau (2 nv, nv), forces_by_state (FORCES pairs, 2 nv)."""
-        slopes = by_state, by_tau, forces_by_state
-        _core.differentiate_step_into(self._core, *self._step, q, v, tau, *slopes)
+        derivatives = by_state, by_tau, forces_by_state
+        _core.differentiate_step_into(self._core, *self._step, q, v, tau, *derivatives)

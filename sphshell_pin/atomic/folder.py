@@ -100,7 +100,7 @@ class AtomicFolder:
         finally:
             self._end()
 
-    def desk(self) -> Path:
+    def staging(self) -> Path:
         """Make the empty folder for the new files, and return it."""
         beside, inside = self._places()
         place = beside if self._may_leave() else inside
@@ -111,12 +111,12 @@ class AtomicFolder:
                 raise
             place = inside
             place.mkdir()
-        desk = place / _FILES
-        desk.mkdir()
-        return desk
+        staging = place / _FILES
+        staging.mkdir()
+        return staging
 
-    def replace(self, desk: Path, old: Iterable[str]) -> None:
-        """Replace the files called `old` by all files of the `desk`; other files stay.
+    def replace(self, staging: Path, old: Iterable[str]) -> None:
+        """Replace the files called `old` by all files of the `staging`; other files stay.
 
         A reader sees all old files or all new ones at any time, and every other file, unless the
         folder cannot be exchanged: a mount point, the working directory, a folder whose parent
@@ -130,27 +130,27 @@ class AtomicFolder:
         OSError
             The files cannot be put there; the old ones stay.
         """
-        for left in desk.glob(".*.writing"):  # an `atomic_file` that Ctrl-C ended at its start
+        for left in staging.glob(".*.writing"):  # an `atomic_file` that Ctrl-C ended at its start
             left.unlink()
-        new = sorted(os.listdir(desk))
+        new = sorted(os.listdir(staging))
         ours = {*new, *old}
         for name in ours:
             if (self._folder / name).is_dir():
                 raise IsADirectoryError(errno.EISDIR, f"{name} there is a folder")
         for name in new:
-            sync_file(desk / name)
+            sync_file(staging / name)
         beside, inside = self._places()
-        if desk.parent == beside:
+        if staging.parent == beside:
             _write_list(beside, new, old)
             try:
-                with _no_sweeps(self._folder) as locked, _no_sweeps(desk):
+                with _no_sweeps(self._folder) as locked, _no_sweeps(staging):
                     self._fixed = _CHANGES if locked else (_JOURNAL, _CHANGES)
-                    self._link_others(self._folder, desk, ours)
-                    sync_folder(desk)
-                    exchange(desk, self._folder)
+                    self._link_others(self._folder, staging, ours)
+                    sync_folder(staging)
+                    exchange(staging, self._folder)
             except OSError:
                 inside.mkdir()
-                shutil.move(desk, inside / _FILES)
+                shutil.move(staging, inside / _FILES)
                 for name in new:
                     sync_file(inside / _FILES / name)
             else:

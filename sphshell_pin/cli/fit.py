@@ -87,7 +87,7 @@ def fit(
         from sphshell_pin.study.fit import Experiment
         from sphshell_pin.study.fit import fit as fit_scenario
         from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
-        from sphshell_pin.study.fit.writing import check_places
+        from sphshell_pin.study.fit.writing import scenario_text
 
         changes = changes_of(set_, None, None)
         wanted = parse_wanted(param)
@@ -96,7 +96,8 @@ def fit(
         path = find_scenario(scenario)
         # Where no value can be written, it is said before the runs.
         free = free_parameters(wanted, read_scenario(path, changes), path)
-        check_places(path, [key for one in free for key in one.keys], changes)
+        starts = {key: repr(one.start) for one in free for key in one.keys}
+        scenario_text(path, {**changes, **starts}, path.parent)
         with _bar() as progress:
             found = fit_scenario(
                 scenario,

@@ -183,8 +183,8 @@ def _print_report(report: RunReport) -> None:
     )
     if energy["relative_residual"] > SUSPICIOUS_RESIDUAL:
         typer.echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
-    for doubt in report.doubts:
-        typer.echo(f"warning: {doubt}", err=True)
+    for warning in report.warnings:
+        typer.echo(f"warning: {warning}", err=True)
     if report.audit is not None:
         audited = make_table(
             "contact", "recorded", "on no face", "depth off", "rms", "normal off", "rms"

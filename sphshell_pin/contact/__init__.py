@@ -1,42 +1,46 @@
 """Contacts of a sphere with a shell, the laws of their forces, and their wrenches."""
 
-from sphshell_pin.contact import (
-    bristle,
-    foundation,
-    friction,
-    function_law,
-    hertz_law,
-    laws,
-    materials,
-    table_law,
+from sphshell_pin.contact.bristle import BristleFriction, MindlinFriction
+from sphshell_pin.contact.foundation import FoundationLaw, foundation_pressure
+from sphshell_pin.contact.friction import CoulombFriction, Friction
+from sphshell_pin.contact.function_law import FunctionLaw
+from sphshell_pin.contact.hertz_law import HertzLaw
+from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw
+from sphshell_pin.contact.materials import (
+    MATERIALS,
+    Material,
+    find_material,
+    friction_between,
+    restitution_between,
 )
-from sphshell_pin.contact.bristle import *  # noqa: F403
-from sphshell_pin.contact.foundation import *  # noqa: F403
-from sphshell_pin.contact.friction import *  # noqa: F403
-from sphshell_pin.contact.function_law import *  # noqa: F403
-from sphshell_pin.contact.hertz_law import *  # noqa: F403
-from sphshell_pin.contact.laws import *  # noqa: F403
-from sphshell_pin.contact.materials import *  # noqa: F403
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.contact.sphere import Sphere
-from sphshell_pin.contact.table_law import *  # noqa: F403
+from sphshell_pin.contact.table_law import TableLaw
 from sphshell_pin.contact.wrench import BristleState, contact_wrench
 from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 
 __all__ = [
+    "MATERIALS",
+    "BristleFriction",
     "BristleState",
     "ContactSet",
+    "CoulombFriction",
     "Feature",
+    "FoundationLaw",
+    "Friction",
+    "FunctionLaw",
+    "HertzLaw",
+    "HuntCrossleyLaw",
+    "ImpactLaw",
+    "Material",
     "Method",
+    "MindlinFriction",
     "NormalLaw",
     "Sphere",
+    "TableLaw",
     "contact_wrench",
+    "find_material",
+    "foundation_pressure",
+    "friction_between",
+    "restitution_between",
 ]
-__all__ += bristle.__all__
-__all__ += foundation.__all__
-__all__ += friction.__all__
-__all__ += function_law.__all__
-__all__ += hertz_law.__all__
-__all__ += laws.__all__
-__all__ += materials.__all__
-__all__ += table_law.__all__

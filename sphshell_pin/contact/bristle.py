@@ -10,9 +10,7 @@ from sphshell_pin.contact.friction import Coefficients
 from sphshell_pin.contact.materials import TwoMaterials
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import parameter
-
-__all__ = ["BristleFriction", "MindlinFriction"]
+from sphshell_pin.parameters import parameter, same_parameter
 
 # Bristles stick below this part of Stribeck's speed: almost nothing moves.
 STICKING_SHARE = 0.01
@@ -142,14 +140,7 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
     Materials 24 (1996) 229.
     """
 
-    v_stribeck: float = parameter(
-        0.01,
-        above=0,
-        unit="m/s",
-        label="Stribeck speed",
-        help="slip speed at which mu has come down from `mu_static` by 63 % of the way to "
-        "`mu_dynamic`",
-    )
+    v_stribeck: float = same_parameter(BristleFriction, "v_stribeck")
     damping_time: float = parameter(
         0.0,
         at_least=0,
@@ -158,9 +149,7 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
         help="of a damper beside the spring, `damping_time` times as large as the spring is stiff: "
         "2 / omega damps a motion at omega [rad/s] critically",
     )
-    torsional: bool = parameter(
-        False, help="True: also against spin about the normal, as a soft finger"
-    )
+    torsional: bool = same_parameter(BristleFriction, "torsional")
     rolling: float = parameter(
         0.0,
         at_least=0,
@@ -207,7 +196,7 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
         """True: the disc of contact depends on it."""
         return True
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         """Return the parameters as the compiled core takes them, moduli for the materials."""
         names = ["v_stribeck", "damping_time", "torsional", "rolling", "rolling_speed", "rings"]
         more = [float(getattr(self, name)) for name in names]

@@ -16,8 +16,6 @@ from sphshell_pin.parameters import parameter
 from sphshell_pin.shell.contact_set import Method
 from sphshell_pin.shell.shell import Shell
 
-__all__ = ["FoundationLaw", "foundation_pressure"]
-
 Floats = npt.NDArray[np.float64]
 
 
@@ -60,12 +58,12 @@ class FoundationLaw(NormalLaw, kind="foundation"):
         numbers = self.modulus, self.thickness, self.dissipation
         return _OnPlane(*numbers, check_positive("radius", radius, "m"))
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         """Return the parameters and no radius, as the compiled core takes them."""
         return [self.modulus, self.thickness, self.dissipation, 0.0]
 
     @property
-    def alone(self) -> _core.NormalLaw:
+    def _shapeless_binding(self) -> _core.NormalLaw:
         """Raise InvalidParameter: without a radius and a shell there is no overlap."""
         must = "needs a sphere and a shell: take law.on_plane(radius)"
         raise InvalidParameter("law", self, must)
@@ -93,12 +91,12 @@ class _OnPlane(FoundationLaw):
     def on_plane(self, radius: float) -> NormalLaw:
         return self
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         return [self.modulus, self.thickness, self.dissipation, self.radius]
 
     @property
-    def alone(self) -> _core.NormalLaw:
-        return self.core
+    def _shapeless_binding(self) -> _core.NormalLaw:
+        return self._binding
 
     # Deeper than the radius the closed form ends; what cannot stop the sphere comes out deeper.
     def depth_at(self, force: float) -> float:

@@ -14,16 +14,14 @@ from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Component, Named, parameter
 
-__all__ = ["CoulombFriction", "Friction"]
-
 
 class Friction(Component):
     """Base of the friction laws: `core`, the C++ binding, computes the forces."""
 
     @cached_property
-    def core(self) -> _core.FrictionLaw:
+    def _binding(self) -> _core.FrictionLaw:
         """The C++ binding of this law."""
-        return _core.FrictionLaw(self.kind, self.numbers())
+        return _core.FrictionLaw(self.kind, self._numbers())
 
     @property
     def text(self) -> str:
@@ -33,7 +31,7 @@ class Friction(Component):
     @property
     def has_state(self) -> bool:
         """Whether a contact has a stretch, which depends on what happened before."""
-        return self.core.has_state
+        return self._binding.has_state
 
     @property
     def state_size(self) -> int:
@@ -48,7 +46,7 @@ class Friction(Component):
     @property
     def needs_radius(self) -> bool:
         """Whether the forces depend on the radius of the sphere."""
-        return self.core.torsional
+        return self._binding.torsional
 
     def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return the time scale [s] of slow slip of `mass` [kg] along the surface under `load` [N].
@@ -60,7 +58,7 @@ class Friction(Component):
 
     def coefficient(self, slip_speed: float) -> float:
         """Return mu of steady sliding at `slip_speed` [m/s] >= 0."""
-        return self.core.coefficient(check_not_negative("slip_speed", slip_speed, "m/s"))
+        return self._binding.coefficient(check_not_negative("slip_speed", slip_speed, "m/s"))
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ class Coefficients(Friction):
 class NoFriction(Component, kind="none", of=Friction):
     """A frictionless contact."""
 
-    def made(self, folder: Path = Path()) -> None:
+    def _build(self, folder: Path = Path()) -> None:
         """Return None."""
 
 

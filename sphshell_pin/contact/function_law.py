@@ -20,8 +20,6 @@ from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter, NotPicklable, SlowLawWarning
 from sphshell_pin.parameters import Component, Parameter, parameter
 
-__all__ = ["FunctionLaw"]
-
 _RATE = 1e-6  # over which the damping at rest is a difference [m/s]
 
 
@@ -102,9 +100,9 @@ class FunctionLaw(NormalLaw, kind="function"):
         return new
 
     @cached_property
-    def core(self) -> _core.NormalLaw:
+    def _binding(self) -> _core.NormalLaw:
         """The C++ binding, which keeps the functions alive."""
-        numbers = self.numbers()
+        numbers = self._numbers()
         force = _routine("function", self.function, numbers, 3)
         energy = (0, None) if self._energy is None else _routine("energy", self._energy, numbers, 2)
         return _core.NormalLaw.of_function(numbers, *force, *energy)
@@ -161,7 +159,7 @@ class FunctionFile(Component, kind="function", of=NormalLaw):
         energy = load(self.energy, "energy") if self.energy else None
         return FunctionLaw(load(self.function, "function"), energy, self.parameters)
 
-    def made(self, folder: Path = Path()) -> FunctionLaw:
+    def _build(self, folder: Path = Path()) -> FunctionLaw:
         """Raise InvalidParameter: where a law is no contact's, no code is executed."""
         must = "must be no function here: laws of one's own are for contacts and sources"
         raise InvalidParameter("law", self.function, must)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -12,9 +12,7 @@ from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw, dissipation_fo
 from sphshell_pin.contact.materials import Material, TwoMaterials, restitution_between
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, parameter, same_parameter
-
-__all__ = ["HertzLaw"]
+from sphshell_pin.parameters import parameter
 
 
 @dataclass(frozen=True)
@@ -116,18 +114,18 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
             return ImpactLaw(stiffness, 1.5)
         return HuntCrossleyLaw.with_restitution(stiffness, 1.5, self.restitution, self.speed)
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         """Return E*, b, tau and the fixed scale, or 0, as the compiled core takes them."""
         scale = 0.0 if self.radius is None else 4 / 3 * math.sqrt(self.radius)
         return [self.modulus, self.dissipation, self.relaxation_time, scale]
 
     @property
-    def alone(self) -> _core.NormalLaw:
+    def _shapeless_binding(self) -> _core.NormalLaw:
         """The C++ binding; InvalidParameter without `radius`: the gap is not known."""
         if self.needs_shape:
             must = "must be given where nothing is touched: take law.on_plane(radius)"
             raise InvalidParameter("radius", None, must)
-        return self.core
+        return self._binding
 
     @property
     def text(self) -> str:
@@ -152,20 +150,9 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
 
 
 @dataclass(frozen=True)
-class Hertz(TwoMaterials, Component, kind="hertz", of=NormalLaw):
+class Hertz(HertzLaw, kind="hertz", of=NormalLaw):
     """Hertz's law as a scenario states it, see HertzLaw; with a radius see ImpactLaw.hertz."""
 
-    restitution: float | None = same_parameter(HertzLaw, "restitution")
-    speed: float | None = same_parameter(HertzLaw, "speed")
-    radius_2: float | None = parameter(
-        None,
-        above=0,
-        unit="m",
-        label="Hertz radius 2",
-        help="radius of the second body where it is a ball, too; without it a half-space",
-    )
-    loss_tangent: float | None = same_parameter(HertzLaw, "loss_tangent")
-    frequency: float | None = same_parameter(HertzLaw, "frequency")
     radius: float | None = parameter(
         None,
         above=0,
@@ -174,32 +161,27 @@ class Hertz(TwoMaterials, Component, kind="hertz", of=NormalLaw):
         help="of a constant stiffness: radius of the ball, or the effective one; without it the "
         "stiffness follows from the sphere and the curvature of what it touches",
     )
+    radius_2: float | None = parameter(
+        None,
+        above=0,
+        unit="m",
+        label="Hertz radius 2",
+        help="radius of the second body where it is a ball, too; without it a half-space",
+    )
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value outside its bounds, and for one of a pair."""
         super().__post_init__()
-        self._law()
         if self.radius is None and self.radius_2 is not None:
             raise InvalidParameter("radius_2", self.radius_2, "must be given with radius, or left")
 
-    def made(self, folder: Path = Path()) -> NormalLaw:
+    def _build(self, folder: Path = Path()) -> NormalLaw:
         """Return the law; with a radius a constant one, of Hunt and Crossley with a restitution."""
-        law = self._law()
+        values = {one.name: getattr(self, one.name) for one in fields(HertzLaw)}
+        law = HertzLaw(**values | {"radius": None})
         if self.radius is None:
             return law
         radius = self.radius
         if self.radius_2 is not None:
             radius *= self.radius_2 / (radius + self.radius_2)
         return law.on_plane(radius)
-
-    def _law(self) -> HertzLaw:
-        return HertzLaw(
-            self.young,
-            self.poisson,
-            self.young_2,
-            self.poisson_2,
-            self.restitution,
-            self.speed,
-            self.loss_tangent,
-            self.frequency,
-        )

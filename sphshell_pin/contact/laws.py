@@ -19,8 +19,6 @@ from sphshell_pin.units import (
 if TYPE_CHECKING:
     from sphshell_pin.contact.hertz_law import Hertz
 
-__all__ = ["HuntCrossleyLaw", "ImpactLaw"]
-
 
 @dataclass(frozen=True)
 class _PowerLaw(NormalLaw):
@@ -96,7 +94,7 @@ class ImpactLaw(_PowerLaw, kind="impact"):
 
         The stiffness is per length^e, so it converts by (meters per length)^-e: 1000^e from mm.
         """
-        return AdamsImpact(k, e, c, d, units).made()
+        return AdamsImpact(k, e, c, d, units)._build()
 
     @staticmethod
     def hertz(
@@ -122,9 +120,16 @@ class ImpactLaw(_PowerLaw, kind="impact"):
         # By its name in files: the module of Hertz imports this one.
         hertz = cast("type[Hertz]", NormalLaw.kinds["hertz"])
         stated = hertz(
-            young_1, poisson_1, young_2, poisson_2, restitution, speed, radius_2, radius=radius
+            young_1,
+            poisson_1,
+            young_2,
+            poisson_2,
+            restitution,
+            speed,
+            radius=radius,
+            radius_2=radius_2,
         )
-        return cast(ImpactLaw | HuntCrossleyLaw, stated.made())
+        return cast(ImpactLaw | HuntCrossleyLaw, stated._build())
 
     @property
     def text(self) -> str:
@@ -220,7 +225,7 @@ class AdamsImpact(Component, kind="adams", of=NormalLaw):
         """Unit of time."""
         return self.units.split("-")[2]
 
-    def made(self, folder: Path = Path()) -> ImpactLaw:
+    def _build(self, folder: Path = Path()) -> ImpactLaw:
         """Return the law in SI."""
         return ImpactLaw(
             adams_stiffness_to_si(self.k, self.e, self.units),

@@ -8,8 +8,6 @@ from functools import cached_property
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.parameters import Named, parameter
 
-__all__ = ["MATERIALS", "Material", "find_material", "friction_between", "restitution_between"]
-
 
 @dataclass(frozen=True)
 class Material:

@@ -25,14 +25,14 @@ class NormalLaw(Component):
     """
 
     @cached_property
-    def core(self) -> _core.NormalLaw:
+    def _binding(self) -> _core.NormalLaw:
         """The C++ binding of this law."""
-        return _core.NormalLaw(self.kind, self.numbers())
+        return _core.NormalLaw(self.kind, self._numbers())
 
     @property
-    def alone(self) -> _core.NormalLaw:
+    def _shapeless_binding(self) -> _core.NormalLaw:
         """The C++ binding, where depth and gap rate are all that is known."""
-        return self.core
+        return self._binding
 
     @property
     def text(self) -> str:
@@ -51,22 +51,24 @@ class NormalLaw(Component):
     @property
     def has_damping(self) -> bool:
         """Whether the force depends on the gap rate."""
-        return self.core.needs_rate
+        return self._binding.needs_rate
 
     def normal_force(self, depth: float, gap_rate: float = 0.0) -> float:
         """Return the push [N] at `depth` [m] (0 where not positive) and `gap_rate` [m/s].
 
         gap_rate = normal . relative velocity: negative while the bodies close.
         """
-        return self.alone.force(check_finite("depth", depth), check_finite("gap_rate", gap_rate))
+        return self._shapeless_binding.force(
+            check_finite("depth", depth), check_finite("gap_rate", gap_rate)
+        )
 
     def normal_stiffness(self, depth: float) -> float:
         """Return the slope of the elastic force at `depth` [m], in N/m (0 where not positive)."""
-        return self.alone.stiffness(check_finite("depth", depth))
+        return self._shapeless_binding.stiffness(check_finite("depth", depth))
 
     def energy(self, depth: float) -> float:
         """Return the elastic energy [J] stored at `depth` [m]."""
-        return self.alone.energy(check_finite("depth", depth))
+        return self._shapeless_binding.energy(check_finite("depth", depth))
 
     def depth_at(self, force: float) -> float:
         """Return the depth [m] at which the elastic part alone carries `force` [N]."""

@@ -13,8 +13,6 @@ from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Component, parameter
 
-__all__ = ["TableLaw"]
-
 
 @dataclass(frozen=True)
 class TableLaw(NormalLaw, kind="table"):
@@ -79,7 +77,7 @@ class TableLaw(NormalLaw, kind="table"):
         except InvalidParameter as error:
             raise InvalidParameter("file", str(path), f"is no table of a law: {error}") from None
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         """Return all depths, then all forces, as the compiled core takes them."""
         return [*self.depth, *self.force]
 
@@ -103,6 +101,6 @@ class TableFile(Component, kind="table", of=NormalLaw):
         """The csv file."""
         return (self.file,)
 
-    def made(self, folder: Path = Path()) -> TableLaw:
+    def _build(self, folder: Path = Path()) -> TableLaw:
         """Read the table."""
         return TableLaw.from_file(folder / self.file)

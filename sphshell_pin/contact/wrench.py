@@ -112,8 +112,8 @@ class _Contact:
             return _NOTHING
         spin = float(self.normal @ self.motion.angular)
         return _core.contact_force(
-            self.law.core,
-            None if self.friction is None else self.friction.core,
+            self.law._binding,
+            None if self.friction is None else self.friction._binding,
             self.depth,
             self.normal,
             self.motion.linear + np.cross(self.motion.angular, self.point),
@@ -159,7 +159,7 @@ def contact_wrench(
                 "rings", friction.state_size // 3, "must be 1: a BristleState has one"
             )
         if friction.needs_radius and not state.radius:
-            kind = "torsional" if friction.core.torsional else "Mindlin's"
+            kind = "torsional" if friction._binding.torsional else "Mindlin's"
             raise InvalidParameter("state.radius", 0.0, f"must be the sphere's, of {kind} friction")
         stretch = state.stretch_at(contact)
         push, drag, moment, _ = contact.force(stretch, state.radius, state.relaxation)
@@ -172,6 +172,6 @@ def _with_normal(stretch: Array, before: Array, contact: _Contact) -> Array:
     """Turn a stretch by the smallest rotation from the normal `before` to that of `contact`."""
     turn = pin.Quaternion.FromTwoVectors(before, contact.normal).matrix()
     turned = np.asarray(turn @ stretch)
-    if contact.friction is not None and contact.friction.core.torsional:
+    if contact.friction is not None and contact.friction._binding.torsional:
         return turned
     return turned - (turned @ contact.normal) * contact.normal

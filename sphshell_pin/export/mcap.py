@@ -23,7 +23,7 @@ from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
-from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.errors import ResultError, import_extra
 from sphshell_pin.export.cdr import Message, encode
 from sphshell_pin.export.frames import WORLD, Frames, quaternion
 from sphshell_pin.export.markers import (
@@ -79,15 +79,12 @@ def write_mcap(
 
     `command` goes into its metadata; `progress` gets the share that is done.
     """
-    try:
-        from mcap.writer import Writer
-    except ImportError:
-        raise MissingExtra("mcap", "mcap", "Result.to_mcap") from None
+    mcap = import_extra("mcap.writer", "mcap", "Result.to_mcap")
     run = _Run(result, scene_of(result, scene), start)
     path = Path(path)
     try:
         with atomic_file(path) as stream:
-            writer = Writer(stream)
+            writer = mcap.Writer(stream)
             writer.start(profile="ros2", library=f"sphshell_pin {_version('sphshell-pin')}")
             writer.add_metadata("sphshell_pin", run.about(command))
             if result.origin is not None:
@@ -108,7 +105,7 @@ def write_mcap(
                 writer.add_message(channels[topic], logged, data, published, counts[topic])
                 if progress is not None and topic == "/tf":
                     progress(counts[topic] / run.count)
-            writer.finish()  # type: ignore[no-untyped-call]
+            writer.finish()
     except OSError as error:
         raise ResultError(path, f"cannot be written: {error.strerror or error}") from error
     return path

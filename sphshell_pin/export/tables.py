@@ -12,7 +12,7 @@ from typing import Literal
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.scene import Scene
-from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.errors import ResultError, import_extra
 from sphshell_pin.tables import Table, csv_text
 
 Format = Literal["csv", "parquet"]
@@ -73,10 +73,10 @@ def write_folder(
     folder = Path(folder)
     try:
         with AtomicFolder(folder, last=every[0]) as place:
-            desk = place.desk()
+            staging = place.staging()
             for name, content in files.items():
-                (desk / name).write_bytes(content)
-            place.replace(desk, every)
+                (staging / name).write_bytes(content)
+            place.replace(staging, every)
     except FolderInUse as busy:
         raise ResultError(folder, f"{busy}: wait until it ends, or give another folder") from None
     except OSError as error:
@@ -85,11 +85,8 @@ def write_folder(
 
 
 def _parquet(table: Table, about: dict[str, str]) -> bytes:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise MissingExtra("pyarrow", "sweep", "a .parquet file") from None
+    pyarrow = import_extra("pyarrow", "sweep", "a .parquet file")
+    parquet = import_extra("pyarrow.parquet", "sweep", "a .parquet file")
     text = pyarrow.string()  # of an empty list it would be unknown
     columns = {
         name: pyarrow.array(one, text if isinstance(one, list) else None)
@@ -97,5 +94,5 @@ def _parquet(table: Table, about: dict[str, str]) -> bytes:
     }
     whole = pyarrow.table(columns).replace_schema_metadata({"sphshell_pin": json.dumps(about)})
     stream = io.BytesIO()
-    pyarrow.parquet.write_table(whole, stream, compression="zstd")
+    parquet.write_table(whole, stream, compression="zstd")
     return stream.getvalue()

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.atomic import write_whole
-from sphshell_pin.errors import MissingExtra
+from sphshell_pin.errors import import_extra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,11 +27,8 @@ def new_figure(width: float, height: float) -> Figure:
 
     Raises MissingExtra without matplotlib.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as missing:
-        raise MissingExtra("matplotlib", "view", "a figure") from missing
-    figure = Figure(figsize=(width, height), layout="constrained")
+    matplotlib = import_extra("matplotlib.figure", "view", "a figure")
+    figure: Figure = matplotlib.Figure(figsize=(width, height), layout="constrained")
     # A notebook shows it where it is the value of a cell, whatever backend it has.
     figure._repr_png_ = functools.partial(png, figure, 100)  # type: ignore[attr-defined]
     return figure

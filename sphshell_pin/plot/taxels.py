@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.errors import InvalidParameter, MissingExtra
+from sphshell_pin.errors import InvalidParameter, import_extra
 from sphshell_pin.films import check_film, write_film
 from sphshell_pin.plot.figure import new_figure, reading_unit
 
@@ -86,10 +86,7 @@ def _grid(images: TaxelImages) -> NDArray[np.float64]:
 def _frames(images: TaxelImages, fps: float, speed: float) -> NDArray[np.uint8]:
     """Return colors (frames, rows, columns, 3) of the taxels, latitude up."""
     forces = _grid(images)
-    try:
-        from matplotlib import colormaps
-    except ImportError as missing:
-        raise MissingExtra("matplotlib", "view", "a film of taxels") from missing
+    matplotlib = import_extra("matplotlib", "view", "a film of taxels")
     with np.errstate(over="ignore", invalid="ignore"):  # of times that no run has
         count = np.divide(images.t[-1] - images.t[0] + 1e-9, speed / fps)
     if not 0.0 <= count < MOST_FRAMES:
@@ -98,5 +95,5 @@ def _frames(images: TaxelImages, fps: float, speed: float) -> NDArray[np.uint8]:
     wanted = images.t[0] + np.arange(int(count) + 1) * (speed / fps)
     rows = np.minimum(np.searchsorted(images.t, wanted), len(images.t) - 1)
     share = forces[rows][:, ::-1] / (forces.max() or 1.0)
-    colors = colormaps[COLORS](np.maximum(share, 0.0))[..., :3] * 255.0
+    colors = matplotlib.colormaps[COLORS](np.maximum(share, 0.0))[..., :3] * 255.0
     return np.asarray(colors, np.uint8)

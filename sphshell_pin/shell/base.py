@@ -44,7 +44,7 @@ class ShellBase(Summarized):
     box: Floats
     size: float
     health: ShellHealth
-    core: _core.Shell
+    _binding: _core.Shell
 
     @classmethod
     def from_surface(
@@ -98,7 +98,7 @@ class ShellBase(Summarized):
         if self.element_face is not None and self.normals is not None and self.crease_angle > 0.0:
             cad_face, normals = self.element_face[triangle_element], self.normals.reshape(-1, 3)
         self._smooth: _core.Shell | None = None
-        self.core = _core.Shell(
+        self._binding = _core.Shell(
             vertices,
             triangles,
             triangle_element,
@@ -108,10 +108,10 @@ class ShellBase(Summarized):
             normals,
         )
         # The compiled surface has its own copies: these are views of them.
-        self.vertices = self.core.vertices
-        self.triangles = self.core.triangles
-        self.triangle_element = self.core.triangle_element
-        pinched = self.core.pinched_vertices
+        self.vertices = self._binding.vertices
+        self.triangles = self._binding.triangles
+        self.triangle_element = self._binding.triangle_element
+        pinched = self._binding.pinched_vertices
         self.health = self.health.labelled(
             pinched_vertices=len(pinched),
             pinched_at=tuple(self.vertices[pinched[0]].tolist()) if len(pinched) else None,
@@ -134,7 +134,7 @@ class ShellBase(Summarized):
         These may have vertices of their own: see "Exact faces" in docs/contact.md.
         """
         if method != "smooth":
-            return self.core
+            return self._binding
         if self._smooth is None:
             # With no smooth edges every element is flat, whatever normals came with it.
             given = self.normals if self.crease_angle > 0 else None
@@ -145,7 +145,7 @@ class ShellBase(Summarized):
             if self.finds_faces and given is not None and shapes is not None:
                 assert self.element_face is not None  # both come from CAD
                 known = self.element_face[self.triangle_element]
-            self._smooth = self.core.curve(
+            self._smooth = self._binding.curve(
                 given, exact, straight, self.rounding, self.finds_faces, known, shapes
             )
         return self._smooth
@@ -163,42 +163,42 @@ class ShellBase(Summarized):
     @property
     def num_elements(self) -> int:
         """Number of elements."""
-        return int(self.core.num_elements)
+        return int(self._binding.num_elements)
 
     @property
     def num_patches(self) -> int:
         """Number of patches: elements connected through smooth edges."""
-        return int(self.core.num_patches)
+        return int(self._binding.num_patches)
 
     @property
     def num_edges(self) -> int:
         """Number of edges; the diagonal inside a quad is none."""
-        return int(self.core.num_edges)
+        return int(self._binding.num_edges)
 
     @cached_property
     def element_patch(self) -> Ints:
         """(m,) patch of each element."""
-        return read_only(self.core.element_patch)
+        return read_only(self._binding.element_patch)
 
     @cached_property
     def edge_vertices(self) -> Ints:
         """(E, 2) ends of each edge."""
-        return read_only(self.core.edge_vertices)
+        return read_only(self._binding.edge_vertices)
 
     @cached_property
     def edge_class(self) -> Bytes:
         """(E,) 0 smooth, 1 crease, 2 boundary, 3 non-manifold."""
-        return read_only(self.core.edge_class)
+        return read_only(self._binding.edge_class)
 
     @cached_property
     def edge_angle(self) -> Floats:
         """(E,) turn of each edge [rad], positive where convex."""
-        return read_only(self.core.edge_angle)
+        return read_only(self._binding.edge_angle)
 
     @cached_property
     def triangle_normals(self) -> Floats:
         """(t, 3) unit normals by winding."""
-        return read_only(self.core.triangle_normals)
+        return read_only(self._binding.triangle_normals)
 
     def __getstate__(self) -> dict[str, object]:
         """Everything but the compiled surface, which is made again."""

@@ -114,8 +114,9 @@ def _number_at_best(
 
     What is smaller than `floor`, or than what differences can see, counts as that large.
     """
-    best: Finding | None = None
-    for step in (share * scale for share in _STEPS):
+
+    def with_step(share: float) -> Finding:
+        step = share * scale
         expected = differentiated(f, step, ahead=ahead)
         size = max(float(np.abs(expected).max(initial=0.0)), floor, _SEEN * rounding / step)
         off = np.abs(got - expected)
@@ -124,13 +125,19 @@ def _number_at_best(
             f"the accelerations by '{column}': entry {k} is {got[k]:.9g}, by differences "
             f"{expected[k]:.9g}"
         )
-        finding = Finding(float(off[k]) / size if size > 0.0 else float(off[k]), where)
-        if best is None or finding.error < best.error:
-            best = finding
-        if best.error <= _AGREED:
+        return Finding(float(off[k]) / size if size > 0.0 else float(off[k]), where)
+
+    return _best(with_step)
+
+
+def _best(with_step: Callable[[float], Finding]) -> Finding:
+    """Return the finding with the step that agrees best, of those that have to be tried."""
+    found: list[Finding] = []
+    for share in _STEPS:
+        found.append(with_step(share))
+        if found[-1].error <= _AGREED:
             break
-    assert best is not None
-    return best
+    return min(found, key=lambda one: one.error)
 
 
 def _at_best(scene: Scene, q: Array, v: Array, what: str, f: _Function, got: _Pair) -> Finding:
@@ -140,23 +147,16 @@ def _at_best(scene: Scene, q: Array, v: Array, what: str, f: _Function, got: _Pa
     deep = _depth(scene, q, v)
     fast = max(float(np.abs(v).max(initial=0.0)), 1e-2)
     rounding = _ROUNDING * float(np.abs(f(q, v)).max(initial=0.0))
-    best: Finding | None = None
-    for share in _STEPS:
+
+    def with_step(share: float) -> Finding:
         steps = share * deep, share * fast
         expected = differences(f, model, q, v, *steps)
-        finding = worst(
-            [
-                _compare(f"{what} by {'qv'[k]}", got[k], expected[k], rounding / steps[k], names)
-                for k in (0, 1)
-            ],
-            what,
+        parts = zip("qv", got, expected, steps, strict=True)
+        return worst(
+            [_compare(f"{what} by {x}", a, b, rounding / h, names) for x, a, b, h in parts], what
         )
-        if best is None or finding.error < best.error:
-            best = finding
-        if best.error <= _AGREED:
-            break
-    assert best is not None
-    return best
+
+    return _best(with_step)
 
 
 def differences(

@@ -322,11 +322,11 @@ def _write_folder(path: Path, stage: _Stage) -> None:
     """Replace the pictures of the folder at `path` by those of this run; other files stay."""
     try:
         with AtomicFolder(path, last=FRAME.format(1)) as folder:
-            desk = folder.desk()
+            staging = folder.staging()
             for number, picture in enumerate(stage.all(stage.picture), start=1):
-                (desk / FRAME.format(number)).write_bytes(picture)
+                (staging / FRAME.format(number)).write_bytes(picture)
             old = [one.name for one in path.glob("frame_*.png")]
-            folder.replace(desk, old)
+            folder.replace(staging, old)
     except FolderInUse as busy:
         raise ResultError(path, f"{busy}: wait until it ends") from None
     except OSError as fault:

@@ -63,7 +63,7 @@ def spheres(shell: sp.Shell, count: int, radius: float, seed: int = 0):
     )
     which = rng.choice(len(areas), count, p=areas / areas.sum())
     on = np.einsum("nk,nkx->nx", rng.dirichlet([1.0, 1.0, 1.0], count), corners[which])
-    away = 0.9 * shell.core.triangle_normals[which]
+    away = 0.9 * shell._binding.triangle_normals[which]
     aside = rng.normal(size=(count, 3))
     aside *= 0.6 / np.linalg.norm(aside, axis=1, keepdims=True)
     return on + radius * np.where(rng.random(count)[:, None] < 0.5, away, aside)

@@ -228,7 +228,7 @@ def cycle() -> weakref.ref[object]:
 
 
 def test_functions_live_as_long_as_the_core_and_cycles_are_collected() -> None:
-    core = python_law().core
+    core = python_law()._binding
     alive = cycle()
     gc.collect()
     assert alive() is None

@@ -59,7 +59,7 @@ def test_triangles_of_coarse_coordinates(triangles, center) -> None:
     assume(np.array_equal(shell.source_element, np.arange(len(elements))))
     for radius in (0.3, 1.1):
         # At pinched vertices each fan counts: tests/contact/test_pinched.py.
-        pinched = shell.vertices[shell.core.pinched_vertices]
+        pinched = shell.vertices[shell._binding.pinched_vertices]
         expected = [
             touch
             for touch in oracle.facets(np.array(center), radius, corners, owner)

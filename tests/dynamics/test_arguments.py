@@ -175,7 +175,7 @@ def test_of_frames_with_one_name_the_bodys_comes_first() -> None:
     assert model.frames[find_frame(model, "ball")].type == pin.FrameType.BODY
     pair = Scene(model).add_contact(Sphere(0.05, "ball"), plate(), law=LAW)
     assert pair.placement_i.translation == pytest.approx([0.2, 0, 0])
-    CartesianImpedance("ball", [[0, 0, 0]], 1.0, 1.0).to_core(Scene(model), free_q([0, 0, 1]))
+    CartesianImpedance("ball", [[0, 0, 0]], 1.0, 1.0)._bind(Scene(model), free_q([0, 0, 1]))
     with pytest.raises(FrameNotFound, match="ball"):
         find_frame(model, "bal")
 
@@ -200,7 +200,7 @@ def test_negative_gains(name: str) -> None:
     for wrong in (-1.0, [1.0, -1.0, 1.0]):
         gains = {"kp": 1.0, "kd": 1.0, name: wrong}
         with pytest.raises(InvalidParameter, match=f"{name}.*negative"):
-            JointPD(**gains).to_core(scene, ARM_Q)
+            JointPD(**gains)._bind(scene, ARM_Q)
 
 
 def test_q_ref_must_be_normalised() -> None:
@@ -211,7 +211,7 @@ def test_q_ref_must_be_normalised() -> None:
         CartesianImpedance("ball", [[0, 0, 0]], 1.0, 1.0, q_ref=2 * q),
     ):
         with pytest.raises(InvalidParameter, match=r"q_ref.*unit length"):
-            wrong.to_core(scene, q)
+            wrong._bind(scene, q)
 
 
 def test_an_impedance_without_a_shell_takes_no_place_of_one() -> None:

@@ -164,9 +164,9 @@ def test_rates_do_not_know_the_turn_of_the_shell() -> None:
     shell = sp.Shell(*meshes.random_plate(300, seed=2, size=2.0))
     scene = sp.Scene(model)
     law, bristle = models.linear_law(K, 300.0), sp.BristleFriction(0.5, 0.3, K, 30.0)
-    assert bristle.core.coefficient(0.02) == friction.coefficient(0.02)
+    assert bristle._binding.coefficient(0.02) == friction.coefficient(0.02)
     scene.add_contact(sp.Sphere(R, "ball"), shell, frame="disc", law=law, friction=bristle)
-    core = scene.core
+    core = scene._binding
     z = np.zeros(core.bristle_size)
     z[:3] = [3e-5, -1e-5, 0.0]
     rates = []

@@ -113,7 +113,7 @@ def assert_rate_jacobian(
     scene: Scene, q: Array, v: Array, z: Array, *, step: float = 1e-6, turning: float = 1e-6
 ) -> None:
     """`turning`: tolerance of how the bristles' rates change with q."""
-    core, model, nv = scene.core, scene.model, scene.model.nv
+    core, model, nv = scene._binding, scene.model, scene.model.nv
     tau = np.random.default_rng(1).normal(size=nv)
     by_q, by_v = differences(lambda q, v: core.rates(q, v, z, tau), model, q, v, step)
     got = core.rate_jacobian(q, v, z, tau)
@@ -346,7 +346,7 @@ def test_at_rest_by_default() -> None:
 
 
 def stretched(scene: Scene, size: float) -> Array:
-    z = np.zeros(scene.core.bristle_size)
+    z = np.zeros(scene._binding.bristle_size)
     # Of three contacts, where there is room for four.
     filled = len(z) // 4 * 3
     z[:filled] = size * np.random.default_rng(2).normal(size=filled)

@@ -46,7 +46,7 @@ def test_gains_and_posture_by_joint() -> None:
     assert controller.posture(model, start)[0] == 0.5
     for wrong in (sp.JointPD({"x": 3.0}, 1.0), sp.JointPD(1.0, 1.0, {"x": 0.5})):
         with pytest.raises(InvalidParameter, match=rf"joint 'x'.*{first}"):
-            wrong.to_core(sp.Scene(model), start)
+            wrong._bind(sp.Scene(model), start)
 
 
 def test_a_point_beside_the_frame_is_moved_as_a_frame_there() -> None:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import importlib
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.scenario import RunReport, build
+from sphshell_pin.scenario.live.live_run import LiveRun
+from sphshell_pin.scenario.running.replay import Replay
 from tests.models import LAW, ball, free_q, on_plate, plate
 
 
@@ -39,6 +43,17 @@ def test_names_of_a_pair(former: str, now: str) -> None:
     with pytest.warns(DeprecationWarning, match=now) as caught:
         assert getattr(pair, former) == getattr(pair, now)
     assert caught[0].filename == __file__
+
+
+def test_names_of_reports_and_live_runs() -> None:
+    live = LiveRun(build("sphere_on_shell"))
+    with pytest.warns(DeprecationWarning, match=r"LiveRun\.knobs.* it is called parameters"):
+        assert live.knobs == live.parameters != ()
+    with pytest.warns(DeprecationWarning, match=r"Replay\.knobs"):
+        assert object.__new__(Replay).knobs == ()
+    nothing = (None, None, Path(), (), (), (), None, None)
+    with pytest.warns(DeprecationWarning, match=r"RunReport\.doubts"):
+        assert RunReport(*nothing, ("too far",)).doubts == ("too far",)
 
 
 @pytest.mark.parametrize(

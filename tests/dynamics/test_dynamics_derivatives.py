@@ -317,11 +317,11 @@ def test_bristles_of_a_state() -> None:
     resting = scene.contacts(q, np.zeros(3), state=state)
     force, normal = resting.force_world[0], resting.normal_world[0]
     along = force - normal * (normal @ force)
-    z = np.zeros(scene.core.bristle_size)
+    z = np.zeros(scene._binding.bristle_size)
     z[:3] = -scene.pairs[0].placement.rotation.T @ along / BRISTLE.stiffness
     expected = differences.acceleration(scene, q, v, tau, state)
     scale = np.abs(expected).max()
-    found = scene.core.rates(q, v, z, tau)[:3]
+    found = scene._binding.rates(q, v, z, tau)[:3]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * scale)
     np.testing.assert_allclose(got.acceleration, expected, rtol=0, atol=1e-9 * scale)
     depth, errors = differences.depth_of(scene, q, v), {}
@@ -341,7 +341,7 @@ def test_bristles_of_a_state() -> None:
     for k, column in enumerate(got.parameters):
         errors[column] = differences.by_number(
             got.by_parameters[:, k],
-            lambda scene: scene.core.rates(q, v, z, tau)[:3],
+            lambda scene: scene._binding.rates(q, v, z, tau)[:3],
             scene,
             column,
             depth,

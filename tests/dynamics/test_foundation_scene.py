@@ -142,7 +142,7 @@ def test_bristle_holds_at_the_center_of_pressure() -> None:
     """Its rates and derivatives, but for the small turn of the center of pressure."""
     scene = free_ball(sp.Shell(*meshes.grid_plate(3, 3, size=4.0)), LAW, BRISTLE)
     q, v = free_q([0.1, 0.2, 0.9]), np.array([0.02, 0.01, -0.1, 0.01, 0.02, 0.1])
-    z = np.zeros(scene.core.bristle_size)
+    z = np.zeros(scene._binding.bristle_size)
     z[:3] = [1e-3, -2e-3, 0]
     assert_rate_jacobian(scene, q, v, z)
 

@@ -93,7 +93,7 @@ def test_normals_of_needles_do_not_depend_on_the_first_corner() -> None:
     exact /= np.linalg.norm(exact)
     for k in range(3):
         shell = sp.Shell(corners, [[k, (k + 1) % 3, (k + 2) % 3]])
-        normal = shell.core.triangle_normals[0]
+        normal = shell._binding.triangle_normals[0]
         assert abs(normal @ exact) == pytest.approx(1.0, abs=1e-15)
         assert np.linalg.norm(normal - np.sign(normal @ exact) * exact) < 1e-8
 

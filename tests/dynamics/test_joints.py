@@ -235,7 +235,7 @@ def everything() -> Scene:
     ],
 )
 def test_slopes_agree_with_differences(q: float, v: float, z: float) -> None:
-    core = everything().core
+    core = everything()._binding
     tau, start, h = np.array([0.4]), np.array([q, v, z]), 1e-6
 
     def rates(x: np.ndarray) -> np.ndarray:

@@ -109,18 +109,18 @@ def test_acceleration_is_that_of_the_model_reduced_by_hand(name: str) -> None:
     for _ in range(20):
         q = random.uniform(-0.3, 0.3, model.nq)
         v, tau = random.standard_normal(model.nv), random.standard_normal(model.nv)
-        z = 1e-4 * random.standard_normal(scene.core.bristle_size)
-        found = scene.core.rates(q, v, z, tau)[: model.nv]
+        z = 1e-4 * random.standard_normal(scene._binding.bristle_size)
+        found = scene._binding.rates(q, v, z, tau)[: model.nv]
         forces = scene.contacts(q, v)
         touched += len(forces.depth)
         q_full, v_full = matrix @ q + offset, matrix @ v
         mass = pin.crba(full, data, q_full)
         mass = np.triu(mass) + np.triu(mass, 1).T
-        z_full = np.zeros(free.core.bristle_size)
+        z_full = np.zeros(free._binding.bristle_size)
         z_full[: len(z)] = z
         bias = pin.nonLinearEffects(full, data, q_full, v_full)
         # What the contact adds, from the full model's own accelerations.
-        added = mass @ (free.core.rates(q_full, v_full, z_full, bias)[: full.nv])
+        added = mass @ (free._binding.rates(q_full, v_full, z_full, bias)[: full.nv])
         expected = np.linalg.solve(matrix.T @ mass @ matrix, tau + matrix.T @ (added - bias))
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * abs(expected).max())
     assert touched
@@ -131,7 +131,7 @@ def test_derivatives_agree_with_differences(name: str) -> None:
     make, tip, other = CASES[name]
     model, _ = make()
     scene, random, h = with_contact(model, tip, other), np.random.default_rng(5), 1e-6
-    core, nv = scene.core, model.nv
+    core, nv = scene._binding, model.nv
     for _ in range(3):
         q = random.uniform(-0.2, 0.2, model.nq)
         v, tau = 0.1 * random.standard_normal(nv), random.standard_normal(nv)

@@ -32,7 +32,7 @@ class Path:
 
     def at(self, z, depth: float, closing: float, slip, spin: float):  # type: ignore[no-untyped-def]
         velocity = np.array([*slip, -closing])
-        law, friction = LAW.core, self.friction.core
+        law, friction = LAW._binding, self.friction._binding
         rest = np.zeros(3)
         return _core.contact_force(law, friction, depth, UP, velocity, spin, rest, z, R, 1e-5)
 

@@ -122,7 +122,7 @@ def holder_of_a_pair() -> object:
     class Pair:
         def __init__(self) -> None:
             scene = sp.Scene(ball())
-            self.core = scene.add_contact_source(self.find, "ball", "universe", LAW).to_core()
+            self.core = scene.add_contact_source(self.find, "ball", "universe", LAW)._bind()
 
         def find(self, pose_i, pose_j):
             return some_contacts(0)
@@ -193,12 +193,12 @@ def test_many_contacts_of_a_source_cost_in_proportion() -> None:
 
 def test_the_core_refuses_arrays_of_other_lengths() -> None:
     scene = on_plate(ball(), LAW)
-    shell = scene.pairs[0].shell.core
+    shell = scene.pairs[0].shell._binding
     with pytest.raises(InvalidParameter, match="radii"):
         shell.contacts_batch(np.zeros((5, 3)), np.ones(2), 0, 1)
     with pytest.raises(InvalidParameter, match=r"curve\(\)"):
-        sp.Shell(shell.vertices, shell.triangles).core.contacts(np.zeros(3), 0.1, 2)
+        sp.Shell(shell.vertices, shell.triangles)._binding.contacts(np.zeros(3), 0.1, 2)
     with pytest.raises(InvalidParameter, match="q has shape"):
-        scene.core.contacts(np.zeros(3), np.zeros(6))
+        scene._binding.contacts(np.zeros(3), np.zeros(6))
     with pytest.raises(InvalidParameter, match="v has shape"):
-        scene.core.external_forces(Q, np.zeros(5))
+        scene._binding.external_forces(Q, np.zeros(5))

@@ -116,9 +116,9 @@ def test_a_fast_pad_passes_through_nothing(integrator, speed: float) -> None:  #
 
 def test_bristles_share_the_room_for_contacts_that_begin() -> None:
     # 16 spare slots of 3 numbers for the group, 4 for each pair alone.
-    assert scene_of(pad(), together=True).core.bristle_size == 48
-    assert scene_of(pad(), together=False).core.bristle_size == 64 * 4 * 3
-    assert scene_of(pad(1), together=True).core.bristle_size == 12
+    assert scene_of(pad(), together=True)._binding.bristle_size == 48
+    assert scene_of(pad(), together=False)._binding.bristle_size == 64 * 4 * 3
+    assert scene_of(pad(1), together=True)._binding.bristle_size == 12
 
 
 @pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(2e-5), sp.Adaptive(1e-7, 1e-9)])

@@ -145,25 +145,25 @@ def test_a_frame_of_the_world_is_refused() -> None:
         )
 
 
-def doubts(**more) -> str:
+def warnings_of(**more) -> str:
     scene = sp.Scene(models.arm())
     frame = scene.model.frames[scene.model.nframes - 1].name
     controller = sp.CartesianImpedance(frame, stiffness=50.0, damping=5.0, **more)
-    return " ".join(controller.doubts(scene, models.ARM_Q))
+    return " ".join(controller._setup_warnings(scene, models.ARM_Q))
 
 
 def test_a_path_through_a_body_and_a_tight_bend_are_said() -> None:
     box = sp.Shell(*meshes.cube(0.2), name="box")
     through = [[0.1, 0.03, 0.0], [-0.1, 0.03, 0.0]]
-    said = doubts(path=through, shell=box)
+    said = warnings_of(path=through, shell=box)
     assert "path jumps by" in said
     assert "is on another side" in said
-    assert doubts(path=[[0.1, 0.03, 0.0], [0.1, -0.03, 0.02]], shell=box, spline=True) == ""
+    assert warnings_of(path=[[0.1, 0.03, 0.0], [0.1, -0.03, 0.02]], shell=box, spline=True) == ""
     angles = np.linspace(0, 1.5 * np.pi, 60)
     ring = 0.002 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-    said = doubts(path=ring, spline=True, speed=0.5, acceleration=0.5)
+    said = warnings_of(path=ring, spline=True, speed=0.5, acceleration=0.5)
     assert "bends so much that its target goes at 0.0" in said
-    assert doubts(path=ring, spline=True, speed=0.5) == ""
+    assert warnings_of(path=ring, spline=True, speed=0.5) == ""
 
 
 def test_a_spline_through_a_circle_is_one() -> None:

@@ -150,7 +150,7 @@ def test_derivatives_agree_with_differences(law: str, friction: str) -> None:
 def test_the_jacobian_of_the_motion_agrees_with_differences(friction: str | None) -> None:
     scene = two_spheres(LAWS["impact"], FRICTIONS[friction] if friction else None)
     q, v = in_touch(4, spin=2.0)
-    core, model = scene.core, scene.model
+    core, model = scene._binding, scene.model
     z, tau = np.zeros(core.bristle_size), np.zeros(model.nv)
     if friction:
         z[:3] = 1e-5, -2e-5, 1e-5

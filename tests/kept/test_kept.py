@@ -1,4 +1,4 @@
-"""What results hold of their scene is what ran; whoever changes it gets an error, and no file."""
+"""What results hold of their scene is what ran; changes raise an error, no file is written."""
 
 from __future__ import annotations
 

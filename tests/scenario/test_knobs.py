@@ -195,9 +195,9 @@ def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
     assert (knob.value, knob.log) == (0.0, False)
     assert knob.low <= 0.0 < knob.high
     live = LiveRun(build(path))
-    (before,) = live.knobs
+    (before,) = live.parameters
     live.change(before.key, 0.0)
-    (after,) = live.knobs
+    (after,) = live.parameters
     assert (after.low, after.high, after.value) == (before.low, before.high, 0.0)
 
 
@@ -249,7 +249,7 @@ def test_a_word_acts_on_the_run_under_way(tmp_path):
     time, q = live.time, live.q.copy()
     live.change(METHOD, "facets")
     assert live.scene.pairs[0].method == "facets"
-    assert [one.value for one in live.knobs] == ["facets", 1e6]
+    assert [one.value for one in live.parameters] == ["facets", 1e6]
     assert live.time == time
     np.testing.assert_array_equal(live.q, q)
     for key, word, says in (

@@ -149,7 +149,7 @@ def test_a_scenario_of_other_contacts_is_refused(folder, tmp_path):
 
 
 def test_a_finished_run_has_nothing_to_turn(replay):
-    assert replay.knobs == () == replay.bodies
+    assert replay.parameters == () == replay.bodies
     with pytest.raises(SphshellError, match="finished"):
         replay.change("contact.ball-plate.law.stiffness", 1.0)
     with pytest.raises(SphshellError, match="finished"):

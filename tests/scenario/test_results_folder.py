@@ -35,10 +35,10 @@ def no_pictures(monkeypatch):
 def put(folder, text, last=LAST):
     """Write a results folder of two files, and return what is in it."""
     with AtomicFolder(folder, last=last, inner=["stopped"]) as place:
-        desk = place.desk()
+        staging = place.staging()
         for name in ("a", last):
-            (desk / name).write_text(text)
-        place.replace(desk, ["a", "b", last])
+            (staging / name).write_text(text)
+        place.replace(staging, ["a", "b", last])
     return {
         path.name: path.read_text(errors="replace") for path in folder.iterdir() if path.is_file()
     }

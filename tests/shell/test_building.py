@@ -53,7 +53,7 @@ def test_bytes_of_a_triangle() -> None:
     vertices, triangles = sheet()
     shell = Shell(vertices, triangles)
     shell.contacts(vertices[0], 0.05)
-    assert shell.core.bytes <= 550 * len(triangles)
+    assert shell._binding.bytes <= 550 * len(triangles)
 
 
 def test_arrays_outlive_their_shell() -> None:

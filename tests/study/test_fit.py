@@ -20,7 +20,7 @@ from sphshell_pin.study.fit import runs
 from sphshell_pin.study.fit.data import read_experiment
 from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.fit.quantities import quantities_of, row_step
-from sphshell_pin.study.fit.runs import Runs, ready
+from sphshell_pin.study.fit.runs import Runs, Trial
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
@@ -301,7 +301,7 @@ def test_rows_with_inexact_slopes_take_nothing_from_the_others():
 
 @pytest.mark.parametrize("columns", [[HEIGHT], [HEIGHT, FORCE]])
 def test_inexact_slopes_of_one_column_do_not_hide_what_another_says(columns):
-    """The height is measured itself; the pulses of the force are so short that slopes fail."""
+    """The height is measured itself; the pulses of the force are so short that derivatives fail."""
     height = "robot.ball.start.root_joint.2"
     t = np.linspace(0.0, 0.12, 601)
     law = {"contact.law.k": "2e3", "contact.law.c": "0.2"}
@@ -315,13 +315,15 @@ def test_inexact_slopes_of_one_column_do_not_hide_what_another_says(columns):
     found = sp.fit("sphere_on_shell", {"t [s]": t, **data}, [height], changes=start)
     assert found.determined
     assert found[height].value == pytest.approx(0.073, abs=2e-5)
-    sentence = f"the slopes of {force} of experiment 1 are inexact: intervals follow from the other"
+    sentence = (
+        f"the derivatives of {force} of experiment 1 are inexact: intervals follow from the other"
+    )
     said = [one.startswith(sentence) for one in found.remarks if "inexact" in one]
     assert said == [True] * (len(columns) - 1)
 
 
 def test_inexact_slopes_keep_the_value_and_are_said():
-    """The force alone feels the height, by slopes that are as long as their error."""
+    """The force alone feels the height, by derivatives that are as long as their error."""
     height = "robot.ball.start.root_joint.2"
     t = np.linspace(0.0, 0.12, 601)
     force = "pairs.ball-bowl.normal_force"
@@ -333,7 +335,9 @@ def test_inexact_slopes_keep_the_value_and_are_said():
     one = found[height]
     assert not one.determined
     assert one.value != one.start
-    assert any("slopes of what was measured by it are inexact" in said for said in found.remarks)
+    assert any(
+        "derivatives of what was measured by it are inexact" in said for said in found.remarks
+    )
     assert not any("changes nothing" in said for said in found.remarks)
 
 
@@ -359,13 +363,13 @@ def test_slopes_by_sensitivities_are_those_of_differences(bounce, monkeypatch):
     fixed.write_text(SCENARIO.replace("rtol = 1e-7", 'dt = 5e-5\nintegrator = "runge-kutta-4"'))
     data = sp.Experiment({"t [s]": t, **columns_of(fixed, t, names)})
     built = build(fixed)
-    trial = ready(built, read_experiment(data, 1, quantities_of(built), 0.25))
+    trial = Trial(built, read_experiment(data, 1, quantities_of(built), 0.25))
     free = free_parameters(list(TRUTH), built.scenario, fixed)
     x = np.array([one.to_x(one.start * 1.01) for one in free])
     ends = np.full(3, np.inf)
     monkeypatch.setattr(runs, "COST_OF_SENSITIVITIES", 0)
     followed = Runs([trial], free)
-    found = followed.slopes(x, -ends, ends, 1e-4)
+    found = followed.derivatives(x, -ends, ends, 1e-4)
     assert followed.count == 1
     for k in range(3):
         expected = followed.slope(x, k, -ends, ends, 1e-4, central=True)

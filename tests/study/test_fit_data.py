@@ -276,5 +276,12 @@ def test_values_are_written_in_place_whatever_the_form(tmp_path):
     assert was.model_copy(update={"shell": now.shell}) == now
     for comment in ("# 0.3", "# 1e5", "# 5 mm above the plate"):
         assert comment in target.read_text()
-    with pytest.raises(ScenarioError, match="state the key in it first"):
-        scenario_text(source, {"shell.plate.placement.xyz": "[0.0, 0.0, 1.0]"}, target.parent)
+    # A table that the file does not have is made; a key that no scenario may have is refused.
+    changes = {"shell.plate.placement.xyz": "[0.0, 0.0, 1.0]"}
+    target.write_text(scenario_text(source, changes, target.parent))
+    assert (
+        read_scenario(target).shell[0].placement
+        == read_scenario(source, changes).shell[0].placement
+    )
+    with pytest.raises(ScenarioError, match=r"shell\.plate\.depth"):
+        scenario_text(source, {"shell.plate.depth": "1.0"}, target.parent)

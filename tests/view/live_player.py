@@ -49,7 +49,7 @@ class BallPlayer:
         self.scene = SimpleNamespace(model=self.model, pairs=(pair,))
 
     @property
-    def knobs(self):
+    def parameters(self):
         return tuple(
             SimpleNamespace(
                 key=key, label=key, unit="", low=value / 10, high=value * 10, log=True, value=value
@@ -120,7 +120,7 @@ class FilmPlayer(BallPlayer):
 
     duration = 2.0
     bodies = ()
-    knobs = ()
+    parameters = ()
 
     def reset(self):
         super().reset()

@@ -148,7 +148,7 @@ def test_the_button_and_the_keys(opened):
 def test_a_slider_changes_what_the_simulation_uses(opened):
     live, tab = opened(LiveRun(build("sphere_on_shell")))
     law = live.player.scene.pairs[0].law
-    stiffness = next(k for k in live.player.knobs if k.label == "stiffness")
+    stiffness = next(k for k in live.player.parameters if k.label == "stiffness")
     tab.slide(f'[data-parameter="{stiffness.key}"]', 1.0)
     tab.wait(f"state.parameters['{stiffness.key}'] > {2 * stiffness.value}")
     changed = live.player.scene.pairs[0].law

@@ -61,7 +61,7 @@ class Controller(Component):
         if self.joints is not None:
             object.__setattr__(self, "joints", check_names("joints", self.joints))
 
-    def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
+    def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller for `scene`, started at q0 (nq,)."""
         raise NotImplementedError
 
@@ -113,11 +113,11 @@ class Controller(Component):
         """Return this controller with the shells that it names."""
         return self
 
-    def doubts(self, scene: Scene, q0: Array) -> list[str]:
+    def _setup_warnings(self, scene: Scene, q0: Array) -> list[str]:
         """Say what of the parameters is probably a mistake, for a start at q0 (nq,)."""
         return []
 
-    def doubts_after(self, result: Result) -> list[str]:
+    def _result_warnings(self, result: Result) -> list[str]:
         """Say what in a finished run shows that the parameters are probably a mistake."""
         return []
 
@@ -126,7 +126,7 @@ class Controller(Component):
 class NoController(Component, kind="none", of=Controller):
     """No joint torques."""
 
-    def made(self, folder: Path = Path()) -> None:
+    def _build(self, folder: Path = Path()) -> None:
         """Return None."""
 
 
@@ -148,7 +148,7 @@ class GravityCompensation(Controller, kind="gravity-compensation"):
 
     joints: Iterable[str] | None = None
 
-    def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
+    def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller."""
         return _core.GravityCompensation(self.actuated(scene.model))
 
@@ -169,7 +169,7 @@ class JointPD(Controller, kind="joint-pd"):
     gravity_compensation: bool = parameter(True, help="add the torques that carry the weight")
     joints: Iterable[str] | None = None
 
-    def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
+    def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller."""
         model = scene.model
         return _core.JointPd(

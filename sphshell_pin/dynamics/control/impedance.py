@@ -147,7 +147,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         shell, frame, placement = find_shell(self.shell)
         return replace(self, shell=shell, shell_frame=frame, placement=placement)
 
-    def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
+    def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller: resample the path, project it, find the frames."""
         model = scene.model
         frame_index = find_frame(model, self.frame)
@@ -169,10 +169,11 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             at = shell_pose.actInv(data.oMf[frame_index].act(np.asarray(self.offset)))
             if float((at - curve.points[0]) @ curve.normals[0]) < 0:
                 curve = replace(curve, normals=-curve.normals)
+        offset = pin.SE3(np.eye(3), np.array(self.offset, dtype=float))
         return _core.CartesianImpedance(
             num_joints=model.njoints,
             joint=int(frame.parentJoint),
-            frame=(frame.placement * self._moved_point()).homogeneous,
+            frame=(frame.placement * offset).homogeneous,
             path_joint=int(carrier.parentJoint),
             path_placement=(carrier.placement * placement).homogeneous,
             path=core_path(curve, timing),
@@ -187,9 +188,6 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             actuated=self.actuated(model),
             decoupled=self.decoupled,
         )
-
-    def _moved_point(self) -> pin.SE3:
-        return pin.SE3(np.eye(3), np.array(self.offset, dtype=float))
 
     def _shell_place(self, scene: Scene) -> tuple[str, pin.SE3]:
         """Return the frame that carries the path, and where the path's own frame is in it."""
@@ -219,7 +217,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         curve = Curve.through(points, shell, spline=self.spline)
         return curve, Timing.along(curve, self.lead_in, self.speed, self.acceleration, self.jerk)
 
-    def doubts(self, scene: Scene, q0: Array) -> list[str]:
+    def _setup_warnings(self, scene: Scene, q0: Array) -> list[str]:
         """Say where the path is off the shell or jumps on it, and bends that take the speed."""
         said: list[str] = []
         curve = self._motion()[0]
@@ -264,7 +262,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
                 )
         return said
 
-    def doubts_after(self, result: Result) -> list[str]:
+    def _result_warnings(self, result: Result) -> list[str]:
         """Say so if a controller that presses has touched nothing, or never came to its path."""
         scene, said = result.scene, list[str]()
         if scene is None or len(result.t) == 0:

@@ -19,7 +19,7 @@ from sphshell_pin.dynamics.scene.joint_components import moving_joints
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import Columns, columns
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog, sensor_columns
-from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.errors import ResultError, import_extra
 from sphshell_pin.summary import Detail, Fact, Summarized
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class Result(Summarized):
         return None if rows is None else replace(rows, result=self)
 
     @classmethod
-    def from_blocks(
+    def _from_blocks(
         cls,
         blocks: list[Columns],
         pairs: tuple[str, ...],
@@ -182,10 +182,7 @@ class Result(Summarized):
 
         Raises MissingExtra without pandas.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise MissingExtra("pandas", "tables", "Result.to_dataframe") from None
+        pandas = import_extra("pandas", "tables", "Result.to_dataframe")
         return pandas.DataFrame(self.contact_columns())
 
     def row_columns(self, scene: Scene | None = None) -> dict[str, ArrayLike]:

@@ -78,13 +78,13 @@ def start_run(
     duration = check_not_negative("duration", duration, "s")
     core_controller, hold = bind_controller(scene, integrator, controller, control_dt, q, sensors)
     if warn and isinstance(controller, Controller):
-        for doubt in controller.doubts(scene, q):
-            warnings.warn(doubt, SetupWarning, stacklevel=3)
+        for text in controller._setup_warnings(scene, q):
+            warnings.warn(text, SetupWarning, stacklevel=3)
     settings = run_settings(
         scene, integrator, duration, hold, record_dt=record_dt, record=record, t0=t0
     )
     pairs = core_pairs(scene, q, v, warn=warn, limited_dt=integrator.limited_dt)
-    joints = scene.joints.to_core(scene.model)
+    joints = scene.joints._bind(scene.model)
     core = _core.Simulation(
         scene.model, pairs, joints, core_controller, q, v, settings, sensors.core
     )
@@ -158,7 +158,7 @@ def bind_controller(
             "controller", controller, "is a class, not a controller: did you forget ()?"
         )
     if isinstance(controller, Controller):
-        return controller.to_core(scene, q0), control_dt or 0.0
+        return controller._bind(scene, q0), control_dt or 0.0
     if callable(controller):
         if not reads_sensors(controller):
             return wrap_callable(controller, scene.model), control_dt or dt
@@ -182,7 +182,7 @@ def core_pairs(
 
     `warn` as of `start_run`; `limited_dt` [s] is that of the run's integrator.
     """
-    pairs = [pair.to_core() for pair in scene.pairs]
+    pairs = [pair._bind() for pair in scene.pairs]
     # Only bristles need to know how fast an impact is.
     has_state = any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
     if not warn and not has_state:
@@ -248,7 +248,7 @@ def result_of(
         pairs=dict(zip(names, figures, strict=True)),
         joints=joint_figures(scene, summaries[len(names) :], core.limits),
     )
-    return Result.from_blocks([record], names, stats, scene, sensors)
+    return Result._from_blocks([record], names, stats, scene, sensors)
 
 
 def joint_figures(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sphshell_pin.parameters import Component, parameter
+from sphshell_pin.parameters import Component, parameter, same_parameter
 
 __all__ = [
     "Adaptive",
@@ -57,7 +57,7 @@ class LinearlyImplicitEuler(_FixedStep, kind="linearly-implicit-euler"):
     (with laws whose exponent is 1 or more).
     """
 
-    dt: float = parameter(1e-3, above=0, unit="s", label="time step", help="step")
+    dt: float = same_parameter(_FixedStep, "dt", 1e-3)
 
 
 @dataclass(frozen=True)
@@ -103,10 +103,4 @@ class Implicit(_ErrorControlled, kind="implicit"):
     Jacobian of dynamics and contact: for stiff contact that lasts, and for friction that sticks.
     """
 
-    rtol: float = parameter(
-        1e-5,
-        at_least=1e-13,
-        at_most=0.1,
-        label="relative tolerance",
-        help="error of a step over the size of the state",
-    )
+    rtol: float = same_parameter(_ErrorControlled, "rtol", 1e-5)

@@ -87,7 +87,7 @@ def roll_out(
         return Rollout(scene, integrator, core, plan, workers, wall_time, sensors)
 
     workers = max(min(workers, len(starts)), 1)
-    joints = scene.joints.to_core(scene.model)
+    joints = scene.joints._bind(scene.model)
     core = _core.Rollout(scene.model, workers)
     tasks = _Tasks(core, workers, progress, len(starts), plan.failures)
     try:

@@ -160,7 +160,7 @@ class OpenRun:
                 scene, simulation.integrator, controller, self._control_dt, start, self._sensors
             )
         pairs = core_pairs(scene, q, v, warn=False)
-        self._core.change(pairs, scene.joints.to_core(scene.model), core_controller)
+        self._core.change(pairs, scene.joints._bind(scene.model), core_controller)
         if core_controller is not None:
             self._controller = controller
         self.simulation = simulation
@@ -246,7 +246,7 @@ class OpenRun:
         # The core counts rows from the start of the run, a result from its own first one.
         record["contact_row"] = record["contact_row"] - first
         names = tuple(pair.name for pair in self.scene.pairs)
-        return Result.from_blocks([record], names, RunStats(), self.scene, self._sensors)
+        return Result._from_blocks([record], names, RunStats(), self.scene, self._sensors)
 
 
 def contacts_of(row: Result) -> SceneContacts:

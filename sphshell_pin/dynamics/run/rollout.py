@@ -23,12 +23,12 @@ from sphshell_pin.dynamics.scene.variations import Variations
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 from sphshell_pin.errors import (
     Interrupted,
-    MissingExtra,
     NotPicklable,
     RunFailed,
     SimulationDiverged,
     SphshellError,
     WeakLawWarning,
+    import_extra,
 )
 from sphshell_pin.summary import Detail, Fact, Summarized, names
 
@@ -187,10 +187,7 @@ class Rollout(Summarized, Sequence[Result]):
 
         What was varied and is no number is left out. Raises MissingExtra without pandas.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise MissingExtra("pandas", "tables", "Rollout.to_dataframe") from None
+        pandas = import_extra("pandas", "tables", "Rollout.to_dataframe")
         columns: dict[str, object] = {"run": np.arange(len(self))}
         for name, values in self.varied.items():
             array = np.asarray(values)

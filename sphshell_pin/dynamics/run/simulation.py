@@ -170,7 +170,10 @@ class Simulation(Summarized):
                 "has no fixed step to differentiate: take SemiImplicitEuler(dt), RungeKutta4(dt) "
                 "or LinearlyImplicitEuler(dt)",
             )
-        return self.scene.step_derivatives(self.integrator.kind, dt, q, v, tau, parameters, state)
+        columns, core = self.scene._bind_parameters(parameters, state)
+        at = self.scene._at(state)
+        found = at.step_derivatives(self.integrator.kind, dt, q, v, tau, core)
+        return StepDerivatives(*found, columns)
 
     def rollout(
         self,

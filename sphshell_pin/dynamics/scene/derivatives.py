@@ -165,7 +165,7 @@ def _core_parameter(
 def _core_pair(
     scene: Scene, pair: ContactPair, at: int, start: tuple[Array, Array] | None
 ) -> _core.Pair:
-    core = pair.to_core()
+    core = pair._bind()
     if start is not None and pair.friction is not None and pair.friction.has_state:
         pairs = (*scene.pairs[:at], pair, *scene.pairs[at + 1 :])
         figures = explain_pairs(scene.with_pairs(pairs), *start)

@@ -219,7 +219,7 @@ class JointComponents:
         same = all(list(getattr(self, one)) == list(getattr(other, one)) for one in WHICH)
         return same and self.stopped_joints(model) == other.stopped_joints(model)
 
-    def to_core(self, model: pin.Model) -> _core.JointEffects | None:
+    def _bind(self, model: pin.Model) -> _core.JointEffects | None:
         """Build the C++ binding for `model`; None where nothing is modelled but armature.
 
         NameNotFound lists the joints; InvalidParameter names a joint that cannot have what is said.
@@ -234,7 +234,7 @@ class JointComponents:
             self._each(model, "speed", math.inf),
         )
         for _, in_q, in_v, end, sign, law in self._stops(model):
-            core.add_stop(in_q, in_v, end, sign, law.core)
+            core.add_stop(in_q, in_v, end, sign, law._binding)
         for dry in self.springs(model):
             core.add_friction(dry.index, dry.torque, dry.stiffness, dry.damping, dry.relaxation)
         return core
@@ -358,7 +358,7 @@ def joint_inertia(model: pin.Model) -> Array:
 def check_joints(joints: object, model: pin.Model, lock: Iterable[str]) -> JointComponents:
     """Return `joints` (None: nothing) for a scene of `model` in which `lock` are held.
 
-    NameNotFound and InvalidParameter as of JointComponents.to_core.
+    NameNotFound and InvalidParameter as of JointComponents._bind.
     """
     if joints is None:
         return JointComponents()
@@ -369,7 +369,7 @@ def check_joints(joints: object, model: pin.Model, lock: Iterable[str]) -> Joint
         "must be JointComponents: JointComponents.from_model(model)",
     )
     kept = given.without(lock)
-    kept.to_core(model)
+    kept._bind(model)
     kept.with_armature(model)
     return kept
 

@@ -24,6 +24,7 @@ _OFF = 1e-6
 _SUMMED_SQUARE = ("damping", "armature")
 _LIMITS_OF_POSITION = ("lowerPositionLimit", "upperPositionLimit")
 _LIMITS_OF_RATE = ("upperVelocityLimit", "lowerVelocityLimit")
+_LIMITS_OF_EFFORT = ("lowerEffortLimit", "upperEffortLimit")
 
 
 @dataclass(frozen=True)
@@ -216,21 +217,13 @@ def _sum_up(
     at = made.joints[made.getJointId(leader)].idx_v
     from_v = {name: model.joints[model.getJointId(name)].idx_v for name in seen}
     for what in _SUMMED_SQUARE:
-        values = np.array(getattr(made, what))
         of = np.asarray(getattr(model, what))
-        values[at] = sum(a**2 * of[from_v[name]] for name, (a, _) in seen.items())
-        setattr(made, what, values)
+        _put(made, [what], at, [sum(a**2 * of[from_v[name]] for name, (a, _) in seen.items())])
     lower, upper = np.asarray(model.lowerDryFrictionLimit), np.asarray(model.upperDryFrictionLimit)
-    new_lower, new_upper = (
-        np.array(made.lowerDryFrictionLimit),
-        np.array(made.upperDryFrictionLimit),
-    )
-    new_lower[at], new_upper[at] = 0.0, 0.0
-    for name, (a, _) in seen.items():
-        low, high = sorted((a * lower[from_v[name]], a * upper[from_v[name]]))
-        new_lower[at] += low
-        new_upper[at] += high
-    made.lowerDryFrictionLimit, made.upperDryFrictionLimit = new_lower, new_upper
+    ends = [
+        sorted((a * lower[from_v[name]], a * upper[from_v[name]])) for name, (a, _) in seen.items()
+    ]
+    _put(made, ("lowerDryFrictionLimit", "upperDryFrictionLimit"), at, np.sum(ends, axis=0))
 
 
 def _take_limits(
@@ -239,23 +232,19 @@ def _take_limits(
     """Give the coordinate of `leader`, q = a * q_root + b, the limits of `root`."""
     a, b = rule
     new, old = made.joints[made.getJointId(leader)], model.joints[model.getJointId(root)]
-    if new.nq == 1:
-        with np.errstate(over="ignore"):
-            ends = [a * getattr(model, name)[old.idx_q] + b for name in _LIMITS_OF_POSITION]
-        for name, end in zip(_LIMITS_OF_POSITION, sorted(ends), strict=True):
-            values = np.array(getattr(made, name))
-            values[new.idx_q] = end
-            setattr(made, name, values)
-    for name in _LIMITS_OF_RATE:
-        values = np.array(getattr(made, name))
-        with np.errstate(over="ignore"):
-            values[new.idx_v] = abs(a) * getattr(model, name)[old.idx_v]
-        setattr(made, name, values)
     with np.errstate(over="ignore"):
-        efforts = sorted(
-            getattr(model, name)[old.idx_v] / a for name in ("lowerEffortLimit", "upperEffortLimit")
-        )
-    for name, end in zip(("lowerEffortLimit", "upperEffortLimit"), efforts, strict=True):
-        values = np.array(getattr(made, name))
-        values[new.idx_v] = end
-        setattr(made, name, values)
+        if new.nq == 1:
+            ends = sorted(a * getattr(model, name)[old.idx_q] + b for name in _LIMITS_OF_POSITION)
+            _put(made, _LIMITS_OF_POSITION, new.idx_q, ends)
+        rates = [abs(a) * getattr(model, name)[old.idx_v] for name in _LIMITS_OF_RATE]
+        _put(made, _LIMITS_OF_RATE, new.idx_v, rates)
+        efforts = sorted(getattr(model, name)[old.idx_v] / a for name in _LIMITS_OF_EFFORT)
+        _put(made, _LIMITS_OF_EFFORT, new.idx_v, efforts)
+
+
+def _put(model: pin.Model, names: Sequence[str], at: int, values: Iterable[float]) -> None:
+    """Write an entry of each of the arrays called `names` of a model."""
+    for name, value in zip(names, values, strict=True):
+        array = np.array(getattr(model, name))
+        array[at] = value
+        setattr(model, name, array)

@@ -141,7 +141,7 @@ class ContactPair(Summarized):
             ("none" if self.friction is None else self.friction.text),
         )
 
-    def to_core(self) -> _core.Pair:
+    def _bind(self) -> _core.Pair:
         """Build the C++ binding of this pair."""
         source = None
         if self.find is not None:
@@ -158,8 +158,8 @@ class ContactPair(Summarized):
             shell=None if self.shell is None else self.shell.core_for(self.method),
             source=source,
             method=int(Method.from_name(self.method)),
-            law=self.law.core,
-            friction=None if self.friction is None else self.friction.core,
+            law=self.law._binding,
+            friction=None if self.friction is None else self.friction._binding,
         )
         core.group = self.group
         return core

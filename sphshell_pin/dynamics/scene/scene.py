@@ -14,7 +14,6 @@ from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.scene.derivatives import (
     ContactForceDerivatives,
     DynamicsDerivatives,
-    StepDerivatives,
     core_parameters,
 )
 from sphshell_pin.dynamics.scene.explain import Explanation, explain_scene
@@ -118,7 +117,7 @@ class Scene(SceneParts):
         `parameters` and `state` as in `dynamics_derivatives`; what is approximate is said in
         `contact_derivatives`.
         """
-        columns, core = self.core_parameters(parameters, state)
+        columns, core = self._bind_parameters(parameters, state)
         found = self._at(state).contact_force_derivatives(q, v, core)
         return ContactForceDerivatives.from_core(*found, self._model.nv, columns)
 
@@ -148,29 +147,11 @@ class Scene(SceneParts):
         Raises NameNotFound for a parameter that the scene does not have, InvalidParameter for
         wrong sizes.
         """
-        columns, core = self.core_parameters(parameters, state)
+        columns, core = self._bind_parameters(parameters, state)
         found = self._at(state).dynamics_derivatives(q, v, tau, core)
         return DynamicsDerivatives(*found, columns)
 
-    def step_derivatives(
-        self,
-        integrator: str,
-        dt: float,
-        q: ArrayLike,
-        v: ArrayLike | None,
-        tau: ArrayLike | None,
-        parameters: Collection[str],
-        state: SceneState | None,
-    ) -> StepDerivatives:
-        """Return the derivatives of a step `dt` [s] of the integrator of that kind.
-
-        See Simulation.step_derivatives.
-        """
-        columns, core = self.core_parameters(parameters, state)
-        found = self._at(state).step_derivatives(integrator, dt, q, v, tau, core)
-        return StepDerivatives(*found, columns)
-
-    def core_parameters(
+    def _bind_parameters(
         self, parameters: Collection[str], state: SceneState | None = None
     ) -> tuple[tuple[str, ...], list[_core.Parameter]]:
         """Return the columns of the `parameters`, and each as the core takes it."""
@@ -190,7 +171,7 @@ class Scene(SceneParts):
 
     def _at(self, state: SceneState | None) -> _core.Scene | _core.SceneState:
         if state is None:
-            return self.core
+            return self._binding
         check_type("state", state, SceneState, "must be a SceneState: scene.state(q, v)")
         return state.core_of(self)
 

@@ -273,20 +273,20 @@ class SceneParts(Summarized):
         self._core = None
 
     @property
-    def core(self) -> _core.Scene:
+    def _binding(self) -> _core.Scene:
         """The C++ binding, built when first needed."""
         if self._core is None:
-            self._core = _core.Scene(**self.core_parts([p.to_core() for p in self._pairs]))
+            self._core = _core.Scene(**self._binding_parts([p._bind() for p in self._pairs]))
         return self._core
 
-    def core_parts(self, pairs: list[_core.Pair]) -> CoreParts:
+    def _binding_parts(self, pairs: list[_core.Pair]) -> CoreParts:
         """Return what the core makes a scene or its state of, with `pairs`."""
         shown = self.model
         return {
             "model": self._model,
             "shown": shown,
             "pairs": pairs,
-            "joints": self._joints.to_core(self._model),
+            "joints": self._joints._bind(self._model),
             "convert": partial(_converted, self._model, shown, self.lock),
         }
 

@@ -43,12 +43,12 @@ class SceneState(Summarized):
         self._pairs = scene.pairs
         self.start = scene.check_state(scene.neutral if q is None else q, v)
         """Where it began: q (nq,), v (nv,)."""
-        cores = [pair.to_core() for pair in scene.pairs]
+        cores = [pair._bind() for pair in scene.pairs]
         if any(pair.friction and pair.friction.has_state for pair in scene.pairs):
             figures = explain_pairs(scene, *self.start)
             for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
                 core.relaxation = relaxation_time(pair, figure)
-        self._core = _core.SceneState(**scene.core_parts(cores))
+        self._core = _core.SceneState(**scene._binding_parts(cores))
         if q is not None:
             self._core.advance(*self.start, 0.0)
 

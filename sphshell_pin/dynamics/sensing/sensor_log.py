@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import read_only
-from sphshell_pin.errors import MissingExtra, NameNotFound
+from sphshell_pin.errors import NameNotFound, import_extra
 from sphshell_pin.summary import Fact, Summarized
 
 if TYPE_CHECKING:
@@ -67,10 +67,7 @@ class SensorLog(Summarized):
 
         Raises MissingExtra without pandas.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise MissingExtra("pandas", "tables", "SensorLog.to_dataframe") from None
+        pandas = import_extra("pandas", "tables", "SensorLog.to_dataframe")
         columns = {"t [s]": self.t, "sampled [s]": self.sampled}
         columns |= dict(zip(self.columns, self.values.T, strict=True))
         return pandas.DataFrame(columns)

@@ -18,7 +18,7 @@ from sphshell_pin.dynamics.scene.models import find_frame, find_joint
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import Columns
 from sphshell_pin.dynamics.sensing.sensor_log import Readings, SensorLog, split_logs
-from sphshell_pin.dynamics.sensing.subtree_inertia import beyond, frames_beyond
+from sphshell_pin.dynamics.sensing.subtree_inertia import frames_of_subtree, subtree_of
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Component, parameter
 
@@ -51,7 +51,7 @@ class Sensor(Component):
         """Return the names of the values of a reading, with their units."""
         raise NotImplementedError
 
-    def to_core(self, scene: Scene) -> _core.Sensor:
+    def _bind(self, scene: Scene) -> _core.Sensor:
         """Build the C++ binding for `scene`.
 
         Raises FrameNotFound, NameNotFound and InvalidParameter for what the scene does not have.
@@ -126,7 +126,7 @@ class ForceTorqueSensor(_Analog, kind="force-torque"):
 
     def _measured(self, scene: Scene) -> _core.Sensor:
         check_name("frame", self.frame)
-        part = beyond(scene, self.frame)
+        part = subtree_of(scene, self.frame)
         pairs_i, pairs_j = (
             [
                 k
@@ -256,8 +256,8 @@ class ContactSwitch(Sensor, kind="contact-switch"):
     @staticmethod
     def _frames(scene: Scene, name: str) -> frozenset[int]:
         if scene.model.frames[find_frame(scene.model, name)].type == pin.FrameType.OP_FRAME:
-            return frozenset(frames_beyond(scene.model, name))
-        return beyond(scene, name).frames
+            return frozenset(frames_of_subtree(scene.model, name))
+        return subtree_of(scene, name).frames
 
     def reading(self, values: NDArray[np.float64]) -> bool:
         """Return whether it is closed."""
@@ -267,12 +267,12 @@ class ContactSwitch(Sensor, kind="contact-switch"):
 class SensorSet:
     """The sensors of a simulation, bound to the scene of a run.
 
-    Raises what `Sensor.to_core` raises; the text names the sensor.
+    Raises what `Sensor._bind` raises; the text names the sensor.
     """
 
     def __init__(self, sensors: tuple[Sensor, ...], scene: Scene) -> None:
         self.sensors = sensors
-        self.core = [sensor.to_core(scene) for sensor in sensors]
+        self.core = [sensor._bind(scene) for sensor in sensors]
         self._columns = [sensor.columns(scene) for sensor in sensors]
         self._widths = np.array([len(one) for one in self._columns], dtype=int)
         self._spans = [

@@ -15,7 +15,7 @@ _ATTACHED = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT, pin.FrameType.BODY)
 
 
 @dataclass(frozen=True)
-class Beyond:
+class Subtree:
     """All that hangs on one joint of a scene beyond a frame on it.
 
     `joint` carries the frame, at `placement`; `inertia` of what moves with this joint, in the
@@ -30,7 +30,7 @@ class Beyond:
     frames: frozenset[int]
 
 
-def beyond(scene: Scene, name: str) -> Beyond:
+def subtree_of(scene: Scene, name: str) -> Subtree:
     """Return what hangs beyond the frame `name`: its link, and all that is attached to that.
 
     The file says what is attached to what, before joints are locked. Of a body that it does not
@@ -53,7 +53,7 @@ def beyond(scene: Scene, name: str) -> Beyond:
             "is a point on a link, where the model attaches nothing: name a link or a joint, "
             "what hangs beyond it is measured",
         )
-    inside = frames_beyond(whole, name)
+    inside = frames_of_subtree(whole, name)
     joint = int(frame.parentJoint)
     everything = _carries_all(whole, name)
     if everything:
@@ -99,10 +99,10 @@ def beyond(scene: Scene, name: str) -> Beyond:
         )
     )
     inertia = here.placement.act(total) if total.mass > 0 else total
-    return Beyond(int(here.parentJoint), here.placement, inertia, tuple(sorted(children)), frames)
+    return Subtree(int(here.parentJoint), here.placement, inertia, tuple(sorted(children)), frames)
 
 
-def frames_beyond(model: pin.Model, name: str) -> set[int]:
+def frames_of_subtree(model: pin.Model, name: str) -> set[int]:
     """Return the frames on the joint of the frame `name` that are attached to it, itself too."""
     first = find_frame(model, name)
     joint = model.frames[first].parentJoint

@@ -195,7 +195,7 @@ def build_scenario(
                 source.frame_i,
                 source.frame_j,
                 law,
-                source.friction.made(path.parent),
+                source.friction._build(path.parent),
                 name=source.name,
             )
     q0, v0 = restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
@@ -261,8 +261,8 @@ def explain_built(built: Built) -> Explanation:
     said = built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
     if not isinstance(built.controller, Controller):
         return said
-    doubts = built.controller.doubts(built.scene, built.q0)
-    return replace(said, warnings=(*said.warnings, *doubts))
+    setup = built.controller._setup_warnings(built.scene, built.q0)
+    return replace(said, warnings=(*said.warnings, *setup))
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
@@ -302,7 +302,7 @@ def _build_law(
     with blamed_on(path, key):
         if isinstance(stated, FunctionFile):
             return stated.loaded(lambda where, field: load(where, f"{key}.law.{field}"))
-        made: NormalLaw = stated.made(path.parent)
+        made: NormalLaw = stated._build(path.parent)
         return made
 
 
@@ -331,7 +331,7 @@ def _add_contact(
         several = spheres_of(contact, assembly, carrier)
     with blamed_on(path, key), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
-        friction = contact.friction.made(path.parent)
+        friction = contact.friction._build(path.parent)
         if contact.sphere is not None:
             sphere = to_sphere(contact.sphere)
             scene.add_contact(
@@ -355,7 +355,7 @@ def _build_sensors(stated: Sequence[Component], scene: sp.Scene, path: Path) -> 
         with blamed_on(path, item_key("sensor", stated, i)):
             assert isinstance(one, Sensor)
             # A wrong frame or joint is reported now, not when the run starts.
-            one.to_core(scene)
+            one._bind(scene)
     with blamed_on(path, "sensor"):
         return check_sensors(stated)
 
@@ -380,13 +380,13 @@ def _build_controller(
             function = load(stated.function, "controller.function")
             check_callable(function)
             return function
-        controller: Controller | None = stated.made(path.parent)
+        controller: Controller | None = stated._build(path.parent)
         if controller is None:
             return None
         controller = controller.in_scenario(find_shell)
         try:
             # A wrong frame, joint or size is reported now, not when the run starts.
-            controller.to_core(scene, q0)
+            controller._bind(scene, q0)
         except InvalidParameter as error:
             name = error.name.partition(".")[0].partition("[")[0]
             known = name in parameters_of(stated)

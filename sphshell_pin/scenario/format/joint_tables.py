@@ -70,7 +70,7 @@ def _limits(
         stated = JointComponents.from_model(model, ["limits"]).limits.get(name)
     law: NormalLaw | None = None if stated is None else stated.law
     if section.stop is not None:
-        law = section.stop.made(folder)
+        law = section.stop._build(folder)
     if law is None:
         raise SphshellError(
             "needs the law of its stops, `stop = { type = ... }`: the robot's file states no "

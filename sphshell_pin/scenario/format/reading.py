@@ -108,18 +108,34 @@ def change_scenario(
         A key or a value that no scenario may have.
     """
     data = scenario.model_dump(exclude_unset=True)
-    for key, text in changes.items():
+    change_data(data, {key: _parse_value(text) for key, text in changes.items()}, scenario, path)
+    return _validated(data, path)
+
+
+def change_data(
+    data: dict[str, Toml],
+    changes: Mapping[str, Toml],
+    scenario: Scenario,
+    path: str | PathLike[str],
+) -> None:
+    """Put values in place of those of `data`, which the file of `scenario` at `path` gives.
+
+    Raises
+    ------
+    ScenarioError
+        A key that no scenario may have.
+    """
+    for key, value in changes.items():
         whole = _with_table(key, data)
         if whole != key:
-            raise ScenarioError(path, key, f"unknown key; did you mean '{whole}'?", text)
-        _change(data, key, _parse_value(text), path, scenario)
+            raise ScenarioError(path, key, f"unknown key; did you mean '{whole}'?", value)
+        _change(data, key, value, path, scenario)
     if "run.integrator" in changes:
         # Another kind of integrator has no use for the step or the tolerances of the file's.
-        kind = Integrator.kinds.get(changes["run.integrator"].strip("\"'"))
+        kind = Integrator.kinds.get(str(changes["run.integrator"]))
         for key in set(STEPPING) - set(parameters_of(kind)):
             if f"run.{key}" not in changes:
                 data["run"].pop(key, None)
-    return _validated(data, path)
 
 
 def _with_table(key: str, data: Mapping[str, Toml]) -> str:

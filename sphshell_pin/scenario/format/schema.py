@@ -8,7 +8,7 @@ them when it stands alone, `robot/name` as soon as there are several robots.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import (
     AfterValidator,
@@ -294,8 +294,8 @@ class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integ
         """Return the integrator."""
         kind = Integrator.kinds[self.integrator]
         values = {name: getattr(self, name) for name in parameters_of(kind)}
-        made: Integrator = kind(**{k: v for k, v in values.items() if v is not None}).made()
-        return made
+        made = kind(**{k: v for k, v in values.items() if v is not None})
+        return cast(Integrator, made)
 
 
 class KnobSection(Section):

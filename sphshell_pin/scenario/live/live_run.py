@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_finite, check_not_negative, check_positive, check_vector
+from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.run.advance import AnyController, step_of
@@ -60,7 +61,7 @@ class LiveRun:
         self.title = built.scenario.title or built.name
         self.start = 0.0
         self._user = _core.OneUser("LiveRun")
-        self._knobs = live_parameters(built)
+        self._parameters = live_parameters(built)
         self._aims: dict[str, float] = {}
         self._targets: tuple[Target, ...] | None = None
         self._patches = "patch" in built.scenario.run.record
@@ -133,9 +134,11 @@ class LiveRun:
         return self._fault or self._run.ended
 
     @property
-    def knobs(self) -> tuple[LiveParameter, ...]:
+    def parameters(self) -> tuple[LiveParameter, ...]:
         """The parameters of the scenario with a slider, with their present values."""
-        return self._knobs
+        return self._parameters
+
+    knobs = renamed("knobs", "parameters")
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -237,7 +240,7 @@ class LiveRun:
 
     @one_at_a_time
     def change(self, key: str, value: float | str) -> None:
-        """Set the number, or a word of a knob with choices, at the dotted `key` of the scenario.
+        """Set the number or choice at the dotted `key` of the scenario.
 
         Raises
         ------
@@ -255,7 +258,7 @@ class LiveRun:
     def _change(self, key: str, value: float | str) -> None:
         before = self.built
         if isinstance(value, str):
-            words = next((knob.choices for knob in self._knobs if knob.key == key), ())
+            words = next((one.choices for one in self._parameters if one.key == key), ())
             if value not in words:
                 valid = f"one of {', '.join(words)}" if words else "a number"
                 raise InvalidParameter(key, value, f"must be {valid}")
@@ -276,10 +279,10 @@ class LiveRun:
         self.built = after
         self._targets = None
         # Their ranges stay those of the start: they do not wander with the values.
-        self._knobs = tuple(
-            replace(knob, value=str(now) if knob.choices else float(now))
-            for knob in self._knobs
-            for now in [look_up(after.scenario, knob.key, after.path).value]
+        self._parameters = tuple(
+            replace(one, value=str(now) if one.choices else float(now))
+            for one in self._parameters
+            for now in [look_up(after.scenario, one.key, after.path).value]
         )
 
     def _go_on(self, run: OpenRun) -> None:

@@ -1,7 +1,7 @@
 """What is kept of a scenario with its results: its robots, surfaces and tables, as they were used.
 
 So a finished run can be shown on any machine, and no file is read but that of the results. What is
-kept may have been changed by whoever gives it away: indices are checked, nothing is executed.
+kept may have been changed since: indices are checked, nothing is executed.
 """
 
 from __future__ import annotations

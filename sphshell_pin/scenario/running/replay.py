@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
@@ -98,7 +99,8 @@ class Replay:
         self._exchanged = self.result.energy.exchanged_until
         self._time, self._row, self._given = self.start, 0, 0
 
-    knobs: tuple[LiveParameter, ...] = ()
+    parameters: tuple[LiveParameter, ...] = ()
+    knobs = renamed("knobs", "parameters")
     bodies: tuple[str, ...] = ()
 
     @property

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
@@ -73,8 +74,9 @@ class RunReport:
     """Why the run ended early: Interrupted or SimulationDiverged."""
     audit: CadAudit | None = None
     """Differences of the contacts from those on the exact CAD faces, if that was asked for."""
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     """What in the run shows that the scenario is probably a mistake; one sentence each."""
+    doubts = renamed("doubts", "warnings")
 
 
 def run_scenario(
@@ -134,27 +136,27 @@ def run_built(
             place = held.enter_context(_results_folder(folder))
         audit = compare_with_cad(built, result) if audit_cad else None
         try:
-            desk = place.desk()
-            result.save(desk / "run.npz", home=folder)
-            write_contacts(desk / "contacts.csv", result, audit)
+            staging = place.staging()
+            result.save(staging / "run.npz", home=folder)
+            write_contacts(staging / "contacts.csv", result, audit)
             if result.sensors:
-                write_sensors(desk / "sensors.csv", result)
-            interrupted = _draw(built, result, desk, notes, recording=recording)
-            _write_summary(desk, built, result, verdicts, stopped, audit)
-            files = tuple(folder / name for name in RESULTS if (desk / name).exists())
+                write_sensors(staging / "sensors.csv", result)
+            interrupted = _draw(built, result, staging, notes, recording=recording)
+            _write_summary(staging, built, result, verdicts, stopped, audit)
+            files = tuple(folder / name for name in RESULTS if (staging / name).exists())
             if folder / RECORDING not in files and (folder / RECORDING).exists():
                 notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
-            place.replace(desk, RESULTS)
+            place.replace(staging, RESULTS)
         except OSError as error:
             raise _not_written(folder, error) from None
     if fault is not None:
         raise fault
     if interrupted:
         raise KeyboardInterrupt(f"the results are in {folder}, but not all pictures of them")
-    doubts = _beyond_hertz(result)
+    said = _beyond_hertz(result)
     if stopped is None and isinstance(built.controller, Controller):
-        doubts = (*doubts, *built.controller.doubts_after(result))
-    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit, doubts)
+        said = (*said, *built.controller._result_warnings(result))
+    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit, said)
 
 
 def _beyond_hertz(result: Result) -> tuple[str, ...]:
@@ -183,7 +185,7 @@ def simulate(
     run = built.scenario.run
     try:
         with warnings.catch_warnings():
-            for kind in (WeakLawWarning, SetupWarning):  # explain_built and doubts report them
+            for kind in (WeakLawWarning, SetupWarning):  # explain_built and the report say them
                 warnings.simplefilter("ignore", kind)
             result = built.simulation.run(
                 built.q0,
@@ -248,7 +250,9 @@ def _holds_complete(folder: Path) -> bool:
         return any((folder / name).exists() for name in RESULTS)
 
 
-def _draw(built: Built, result: Result, desk: Path, notes: list[str], *, recording: bool) -> bool:
+def _draw(
+    built: Built, result: Result, staging: Path, notes: list[str], *, recording: bool
+) -> bool:
     """Write the pictures; note which of them cannot be made, as the numbers matter more.
 
     Returns whether Ctrl-C ended it. Raises ResultError for one that cannot be written.
@@ -258,16 +262,16 @@ def _draw(built: Built, result: Result, desk: Path, notes: list[str], *, recordi
     def write_recording() -> None:
         speed, title = scenario.run.recording_speed, scenario.title
         view = result.view(built.scene, built.visual_model, speed=speed, title=title)
-        view.save(desk / RECORDING)
+        view.save(staging / RECORDING)
 
     def write_wear() -> None:
         if scenario.run.wear is not None:
             from sphshell_pin.patches.wear import save_wear, wear_maps
 
-            save_wear(wear_maps(result, scenario.run.wear, built.scene), desk)
+            save_wear(wear_maps(result, scenario.run.wear, built.scene), staging)
 
     writers: dict[str, Callable[[], object]] = {
-        "figures": lambda: result.save_figures(desk, built.scene),
+        "figures": lambda: result.save_figures(staging, built.scene),
         "wear": write_wear,
         RECORDING: write_recording,
     }
@@ -302,7 +306,7 @@ def write_sensors(path: str | PathLike[str], result: Result) -> None:
 
 
 def _write_summary(
-    desk: Path,
+    staging: Path,
     built: Built,
     result: Result,
     verdicts: Iterable[Verdict],
@@ -332,11 +336,11 @@ def _write_summary(
             "coal": coal.__version__,
             "numpy": np.__version__,
         },
-        "files": {name: _digest(desk / name) for name in RESULTS if (desk / name).exists()},
+        "files": {name: _digest(staging / name) for name in RESULTS if (staging / name).exists()},
         "settings": origin_of(built).settings,
     }
     text = json.dumps(_plain(summary), indent=2, allow_nan=False)
-    (desk / SUMMARY).write_text(text + "\n", encoding="utf-8")
+    (staging / SUMMARY).write_text(text + "\n", encoding="utf-8")
 
 
 def _digest(path: Path) -> str:

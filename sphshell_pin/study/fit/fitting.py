@@ -21,7 +21,7 @@ from sphshell_pin.study.fit.data import Experiment, Source, read_experiment
 from sphshell_pin.study.fit.parameters import Free, Wanted, free_parameters
 from sphshell_pin.study.fit.quantities import quantities_of
 from sphshell_pin.study.fit.report import Fit
-from sphshell_pin.study.fit.runs import Trial, ready
+from sphshell_pin.study.fit.runs import Trial
 from sphshell_pin.study.fit.search import Progress, Search
 
 Data = Source | Experiment | Sequence[Source | Experiment]
@@ -127,7 +127,7 @@ def _trials(
             sigma=sigma,
         )
         used |= {column.name for column in read.columns}
-        trials.append(ready(built, read))
+        trials.append(Trial(built, read))
     for name in sigma or {}:
         if name not in used:
             must = f"names no column; there are: {', '.join(sorted(used))}"

@@ -33,7 +33,7 @@ class Quantity:
     unit: str
     at: Callable[[Result, Array], Array]
     """Its values (n,) in a result at the times (n,) [s]; nan before the first one."""
-    slopes: Callable[[Result, Array], Array] | None = None
+    derivatives: Callable[[Result, Array], Array] | None = None
     """Its derivatives (n, p) by what the result has sensitivities of; None: by differences only."""
 
 
@@ -80,7 +80,7 @@ def _at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
     return at
 
 
-def _slopes_at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
+def _derivatives_at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
     """Interpolate rows (n, p) as `_at_rows` does."""
 
     def at(result: Result, t: Array) -> Array:
@@ -100,7 +100,11 @@ def _of_joints(built: Built) -> list[Quantity]:
                 unit = unit_of(joint.shortname(), kind, i)
                 # A coordinate whose rate is its speed has the derivatives of the tangent space.
                 plain = kind == "v" or joint.nq == joint.nv
-                moved = _slopes_at_rows(_state_slopes(kind, joint.idx_v + i)) if plain else None
+                moved = (
+                    _derivatives_at_rows(_state_derivatives(kind, joint.idx_v + i))
+                    if plain
+                    else None
+                )
                 out.append(Quantity(label, unit, _at_rows(_state(kind, first + i)), moved))
     return out
 
@@ -109,7 +113,7 @@ def _state(kind: str, column: int) -> Callable[[Result], Array]:
     return lambda result: np.asarray(getattr(result, kind)[:, column])
 
 
-def _state_slopes(kind: str, column: int) -> Callable[[Result], Array]:
+def _state_derivatives(kind: str, column: int) -> Callable[[Result], Array]:
     return lambda result: np.asarray(getattr(result.sensitivities, kind)[:, column])
 
 
@@ -135,7 +139,7 @@ def _of_pairs(built: Built) -> list[Quantity]:
         names = {"normal_force": "N", "depth": "m"}
         names |= {f"{part}_{a}": "N" for part in ("force", "friction_force") for a in "xyz"}
         for name, unit in names.items():
-            moved = _slopes_at_rows(_pair_slopes(k, name))
+            moved = _derivatives_at_rows(_pair_derivatives(k, name))
             label = f"pairs.{pair.name}.{name}"
             out.append(Quantity(label, unit, _at_rows(_of_pair(k, name)), moved))
     return out
@@ -162,7 +166,7 @@ def _of_pair(pair: int, name: str) -> Callable[[Result], Array]:
     return of
 
 
-def _pair_slopes(pair: int, name: str) -> Callable[[Result], Array]:
+def _pair_derivatives(pair: int, name: str) -> Callable[[Result], Array]:
     """Return the derivatives of `_of_pair`'s rows."""
 
     def of(result: Result) -> Array:

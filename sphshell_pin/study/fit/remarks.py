@@ -32,7 +32,8 @@ def remarks_on(
 ) -> list[str]:
     """Return what is to be said of a fit; `tolerance` is the relative error of its runs.
 
-    `still` (p,) are parameters that change nothing, `inexact` columns whose slopes were left out.
+    `still` (p,) are parameters that change nothing, `inexact` columns whose derivatives
+    were left out.
     """
     out = []
     if not converged:
@@ -46,8 +47,8 @@ def remarks_on(
         if len(names) > _MOST_NAMES:
             names[_MOST_NAMES:] = [f"{len(names) - _MOST_NAMES} more"]
         out.append(
-            f"the slopes of {' and '.join(names)} are inexact: intervals follow from the other "
-            "columns alone, and are rather too wide; a smaller run.rtol or run.dt may help"
+            f"the derivatives of {' and '.join(names)} are inexact: intervals follow from the "
+            "other columns alone, and are rather too wide; a smaller run.rtol or run.dt may help"
         )
     out += [
         f"{one.key} stands at its bound, {one.value:.6g} {one.unit}".rstrip()
@@ -76,8 +77,10 @@ def _undetermined(
         if math.isinf(one.low) and math.isinf(one.high):
             why = "a change of it changes nothing that was measured"
             if not still[k]:
-                why = "the slopes of what was measured by it are inexact, so it has no interval, "
-                why += "and others' take it for known; a smaller run.rtol or run.dt may help"
+                why = (
+                    "the derivatives of what was measured by it are inexact, so it has no "
+                    "interval, and others' take it for known; a smaller run.rtol or run.dt may help"
+                )
         elif free[k].log or one.low <= 0.0 <= one.high:
             why = f"they do not tell it from 0, and allow up to {one.high:.4g} {one.unit}"
             if free[k].log:

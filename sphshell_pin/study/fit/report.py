@@ -153,8 +153,7 @@ class Fit(Summarized):
 
         Comments stay; names of files beside the scenario are written relative to the new place.
 
-        Raises ScenarioError where a value has no place in the file, ResultError where it cannot be
-        written.
+        Raises ResultError where it cannot be written.
         """
         return write_whole(path, self.scenario_text(Path(path).parent, changes).encode())
 

@@ -1,10 +1,11 @@
-"""The runs of a fit: what the scenario says at values of the parameters, and its slopes."""
+"""The runs of a fit: what the scenario says at values of the parameters, and its derivatives."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +38,15 @@ COST_OF_SENSITIVITIES = 8
 
 @dataclass(frozen=True)
 class Trial:
-    """An experiment ready to run: its scenario as `built`, its data, the time between rows [s]."""
+    """An experiment ready to run: its scenario as `built`, and its data."""
 
     built: Built
     data: Measured
-    row_step: float
+
+    @cached_property
+    def row_step(self) -> float:
+        """Time between rows [s]."""
+        return row_step(self.data.t)
 
     @property
     def size(self) -> int:
@@ -144,7 +149,7 @@ class Runs:
             parts.append(values)
         return np.concatenate(parts)
 
-    def slopes(self, x: Array, low: Array, high: Array, step: float) -> Array:
+    def derivatives(self, x: Array, low: Array, high: Array, step: float) -> Array:
         """Return the derivatives (N, p) of the predicted values by x.
 
         They follow from sensitivities of the runs where all parameters and columns have them, else
@@ -158,7 +163,7 @@ class Runs:
         )
 
     def _by_sensitivities(self, x: Array) -> Array | None:
-        """Return `slopes` by one run of each experiment; None where these cannot follow them."""
+        """Return `derivatives` by one run of each experiment; None where that is impossible."""
         names = [name for several in self._names for name in several]
         rates = [one.rate(value) for one, value in zip(self.free, x.tolist(), strict=True)]
         parts = []
@@ -166,8 +171,8 @@ class Runs:
             for trial in self.trials:
                 result, t = self.result(trial, x, names), trial.data.t
                 for column in trial.data.columns:
-                    assert column.quantity.slopes is not None
-                    parts.append(column.quantity.slopes(result, t[column.rows]))
+                    assert column.quantity.derivatives is not None
+                    parts.append(column.quantity.derivatives(result, t[column.rows]))
         except Interrupted:
             raise
         except SphshellError:
@@ -177,8 +182,8 @@ class Runs:
         for several, rate in zip(self._names, rates, strict=True):
             out.append(rate * whole[:, first : first + len(several)].sum(axis=1))
             first += len(several)
-        slopes = np.column_stack(out)
-        return slopes if np.isfinite(slopes).all() else None
+        derivatives = np.column_stack(out)
+        return derivatives if np.isfinite(derivatives).all() else None
 
     def slope(
         self, x: Array, k: int, low: Array, high: Array, step: float, *, central: bool
@@ -229,7 +234,7 @@ def _sensitivity_names(
     Fields of a law or friction have them where the scenario states them as the pair has them.
     """
     quantities = [column.quantity for trial in trials for column in trial.data.columns]
-    if any(quantity.slopes is None for quantity in quantities):
+    if any(quantity.derivatives is None for quantity in quantities):
         return ()
     built = trials[0].built
     pairs = {pair.name: pair for pair in built.scene.pairs}
@@ -250,8 +255,3 @@ def _quiet(sensor: Sensor) -> Sensor:
     """Return a sensor without noise: the data have their own."""
     noise = [one.name for one in fields(sensor) if one.name.endswith("noise")]
     return replace(sensor, **dict.fromkeys(noise, 0.0)) if noise else sensor  # type: ignore[arg-type]
-
-
-def ready(built: Built, data: Measured) -> Trial:
-    """Return the experiment with the rows that its data need."""
-    return Trial(built, data, row_step(data.t))

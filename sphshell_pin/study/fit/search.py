@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.errors import MissingExtra
+from sphshell_pin.errors import import_extra
 from sphshell_pin.study.fit.data import Column
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.remarks import remarks_on
@@ -31,7 +29,8 @@ _SMALL_ERROR, _MOST_HALVINGS = 0.01, 8
 _STAGES = (0.125, 0.25, 0.5)
 # A value feels the parameters if its slope is so large a part of the largest.
 _FELT = 1e-3
-# Slopes of fewer values may agree by chance: such columns are judged with others of their name.
+# Derivatives of fewer values may agree by chance: such columns are judged with others of their
+# name.
 _FEW = 10
 # How far the first step may go in x.
 _FIRST_STEP = 0.5
@@ -52,6 +51,10 @@ class _Part:
     @property
     def t(self) -> Array:
         return self.trial.data.t[self.column.rows]
+
+    @property
+    def has_sigma(self) -> bool:
+        return self.column.sigma is not None
 
 
 class Search:
@@ -77,9 +80,10 @@ class Search:
                 begin = end
         self.measured = np.concatenate([part.column.values for part in self.parts])
         self.given = np.concatenate(
-            [np.full(part.at.stop - part.at.start, self._has_sigma(part)) for part in self.parts]
+            [np.full(len(part.column.values), part.has_sigma) for part in self.parts]
         )
-        self.sigma = self._first_sigma()
+        means = [np.full_like(one.column.values, one.column.values.mean()) for one in self.parts]
+        self.sigma = self._pooled(self.measured - np.concatenate(means), 1.0)
 
     def run(self) -> None:
         """Search; weights that are not given are estimated from the residuals, and it goes on."""
@@ -101,7 +105,7 @@ class Search:
 
     def _settle(self) -> None:
         """Go to the least residuals from where the search is, with weights that fit them."""
-        names = {part.name for part in self.parts if not self._has_sigma(part)}
+        names = {part.name for part in self.parts if not part.has_sigma}
         # The weight of all data together changes nothing.
         rounds = _MOST_ROUNDS if len(names) > 1 or (names and self.given.any()) else 1
         for _ in range(rounds):
@@ -112,7 +116,7 @@ class Search:
 
     def report(self, scenario: str, level: float) -> Fit:
         """Return the fit at the values found."""
-        jacobian, error, still = self._final_slopes()
+        jacobian, error, still = self._final_derivatives()
         groups, called = self._groups()
         dof = len(self.measured) - len(self.free)
         factor = student_factor(dof, level)
@@ -212,8 +216,8 @@ class Search:
 
         Values before these are taken, too: the parameters do nothing to them.
         """
-        slopes = self._slopes(self.x)
-        felt = np.linalg.norm(slopes, axis=1)
+        derivatives = self._derivatives(self.x)
+        felt = np.linalg.norm(derivatives, axis=1)
         use = np.zeros(len(felt))
         for trial in self.runs.trials:
             parts = [part for part in self.parts if part.trial is trial]
@@ -226,7 +230,7 @@ class Search:
 
     def _minimize(self, use: Array | float = 1.0) -> None:
         """Make the residuals least, each times `use`."""
-        optimize = _scipy_optimize()
+        optimize = import_extra("scipy.optimize", "fit", "a fit")
         tolerance = self.runs.tolerance
         # A value at its bound would hold the search there.
         inner = np.clip(self.x, self.low + _inset(self.low), self.high - _inset(self.high))
@@ -235,7 +239,7 @@ class Search:
         found = optimize.least_squares(
             lambda x: use * self._residuals(start + x),
             np.zeros(len(start)),
-            jac=lambda x: -self._slopes(start + x, use),
+            jac=lambda x: -self._derivatives(start + x, use),
             bounds=(self.low - start, self.high - start),
             method="trf",
             x_scale=_FIRST_STEP,
@@ -262,13 +266,15 @@ class Search:
         self._misfit = float(np.sqrt(np.mean(residuals**2)))
         return np.asarray(residuals)
 
-    def _slopes(self, x: Array, use: Array | float = 1.0) -> Array:
+    def _derivatives(self, x: Array, use: Array | float = 1.0) -> Array:
         """Return the derivatives (N, p) of the weighted predicted values, each times `use`."""
-        slopes = self.runs.slopes(x, self.low, self.high, forward_step(self.runs.tolerance))
-        return np.asarray(slopes * (use / self.sigma)[:, None])
+        derivatives = self.runs.derivatives(
+            x, self.low, self.high, forward_step(self.runs.tolerance)
+        )
+        return np.asarray(derivatives * (use / self.sigma)[:, None])
 
-    def _final_slopes(self) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return the weighted slopes (N, p) at the solution, their error, and which x do nothing.
+    def _final_derivatives(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the weighted derivatives (N, p) at the solution, their error, which x do nothing.
 
         The error is by how much differences over one step and over twice the step differ, and a
         column's step is halved as long as that makes it less. An error of truncation is a third of
@@ -277,7 +283,7 @@ class Search:
         column's slope is longer than twice that does nothing; of any other, an error that is as
         long as the slope leaves open what it does.
         """
-        slopes, errors, still = [], [], []
+        derivatives, errors, still = [], [], []
         values = self.runs.predict(self.x)
         assert values is not None
         rounding = self.runs.tolerance * np.abs(values) / self.sigma
@@ -294,13 +300,13 @@ class Search:
                 if not np.linalg.norm(less) < np.linalg.norm(error):
                     break
                 near, error = nearer, less
-            slopes.append(near)
+            derivatives.append(near)
             least = rounding / step
             errors.append(np.maximum(np.abs(error), least))
             # Of each column: one of large values would hide what another feels.
             lengths = [np.linalg.norm([near[one.at], least[one.at]], axis=1) for one in self.parts]
             still.append(all(length <= 2.0 * noise for length, noise in lengths))
-        return np.column_stack(slopes), np.column_stack(errors), np.array(still)
+        return np.column_stack(derivatives), np.column_stack(errors), np.array(still)
 
     def _slope(self, k: int, step: float) -> Array:
         return self.runs.slope(self.x, k, self.low, self.high, step, central=True) / self.sigma
@@ -308,20 +314,6 @@ class Search:
     def _tell(self, count: int) -> None:
         if self._progress is not None:
             self._progress(count, self._misfit)
-
-    def _has_sigma(self, part: _Part) -> bool:
-        return part.column.sigma is not None
-
-    def _first_sigma(self) -> Array:
-        """Return the given deviations; else the root of the mean square of what is measured."""
-        return self._pooled(self.measured - self._centers(), 1.0)
-
-    def _centers(self) -> Array:
-        """Return for each value the mean of its column."""
-        out = np.zeros(len(self.measured))
-        for part in self.parts:
-            out[part.at] = self.measured[part.at].mean()
-        return out
 
     def _estimated_sigma(self) -> Array:
         values = self.runs.predict(self.x)
@@ -356,7 +348,7 @@ class Search:
                 part.column.values,
                 values[part.at],
                 self.sigma[part.at],
-                self._has_sigma(part),
+                part.has_sigma,
             )
             for part in self.parts
         )
@@ -397,10 +389,3 @@ def _fitted(one: Free, x: float, span: tuple[float, float], *, held: bool) -> Fi
     determined = from_zero and not (low <= one.low and high >= one.high)
     low, high = max(low, one.low), min(high, one.high)
     return Fitted(one.name, one.unit, one.start, value, low, high, determined)
-
-
-def _scipy_optimize() -> ModuleType:
-    try:
-        return import_module("scipy.optimize")
-    except ImportError:
-        raise MissingExtra("scipy", "fit", "a fit") from None

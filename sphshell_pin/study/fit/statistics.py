@@ -20,7 +20,7 @@ class Spread:
     """Of p parameters x: `covariance` (p, p), infinite on the diagonal of undetermined ones.
 
     `blind` (k, p) are changes of x, of length 1, along which the data say nothing. `left_out` are
-    the groups of rows that say nothing of some x, as their slopes are inexact.
+    the groups of rows that say nothing of some x, as their derivatives are inexact.
     """
 
     covariance: Array
@@ -47,9 +47,9 @@ class Spread:
 def spread_of(jacobian: Array, error: Array, groups: NDArray[np.intp] | None = None) -> Spread:
     """Return what the Jacobian (N, p) of weighted residuals determines; `error` is its own error.
 
-    `groups` (N,) numbers groups of rows, of which one may have exact slopes and another not. Rows
-    add to J^T J what is not negative: what some of them determine, all determine, and at least as
-    well. So where all together leave something open, the groups with most of the error are left
+    `groups` (N,) numbers groups of rows, of which one may have exact derivatives and another not.
+    Rows add to J^T J what is not negative: what some of them determine, all determine, and at least
+    as well. So where all together leave something open, the groups with most of the error are left
     out if the others then determine more.
     """
     groups = np.zeros(len(jacobian), dtype=np.intp) if groups is None else groups

@@ -32,7 +32,7 @@ class Distribution(Component):
         raise NotImplementedError
 
     def __str__(self) -> str:
-        return f"{self.kind}({','.join(f'{one:.12g}' for one in self.numbers())})"
+        return f"{self.kind}({','.join(f'{one:.12g}' for one in self._numbers())})"
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,11 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from sphshell_pin.errors import MissingExtra
+from sphshell_pin.errors import import_extra
 from sphshell_pin.scenario.format.schema import Scenario
 
 if TYPE_CHECKING:
@@ -78,10 +77,7 @@ def need(module: str) -> ModuleType:
     MissingExtra
         It is not installed.
     """
-    try:
-        return import_module(module)
-    except ImportError as missing:
-        raise MissingExtra(module.partition(".")[0], "sweep", "a sweep") from missing
+    return import_extra(module, "sweep", "a sweep")
 
 
 def digest_settings(scenario: Scenario) -> str:

@@ -91,7 +91,8 @@ def plan_sweep(
     """Check all runs of a sweep, see `sweep`, and return what it will do."""
     design = None
     if dist is None:
-        _refuse_without_dist(
+        _refuse(
+            "is for uncertain inputs: say them with dist",
             sample=sample,
             n=n,
             seed=seed,
@@ -109,7 +110,8 @@ def plan_sweep(
             )
         given = axes_of(vary)
     else:
-        _refuse_with_dist(vary=vary, together=together)
+        must = "is for values in a grid, dist for a sample: leave one of the two out"
+        _refuse(must, vary=vary, together=together)
         design = design_of(dist, sample, n, seed=seed, indices=indices, tornado=tornado)
         given = design.axes
         if band_steps is not None and not bands:
@@ -187,18 +189,10 @@ def plan_sweep(
     return Plan(axes, points, runs, digests, tuple(figures), job, head, design, units)
 
 
-def _refuse_without_dist(**given: object) -> None:
+def _refuse(must: str, **given: object) -> None:
     for name, value in given.items():
         if value:
-            raise InvalidParameter(name, value, "is for uncertain inputs: say them with dist")
-
-
-def _refuse_with_dist(**given: object) -> None:
-    for name, value in given.items():
-        if value:
-            raise InvalidParameter(
-                name, value, "is for values in a grid, dist for a sample: leave one of the two out"
-            )
+            raise InvalidParameter(name, value, must)
 
 
 def _check_medians(design: Design, scenario: Scenario, path: Path) -> None:

@@ -323,7 +323,7 @@ class Live:
                 self._seek(event["t"])
 
     def _change(self, key: str, value: float | str) -> None:
-        keys = [knob.key for knob in self.player.knobs]
+        keys = [one.key for one in self.player.parameters]
         if key not in keys:
             raise NameNotFound("parameter", key, "this run", keys)
         before = self.player.time
@@ -402,7 +402,7 @@ class Live:
     # The panel
 
     def _read_parameters(self) -> dict[str, float | str]:
-        return {knob.key: knob.value for knob in self.player.knobs}
+        return {one.key: one.value for one in self.player.parameters}
 
     def _state(self) -> Json:
         player, contacts = self.player, self.player.contacts

@@ -64,7 +64,7 @@ class Player(Protocol):
         """Energy that changed form since the start [J]."""
 
     @property
-    def knobs(self) -> tuple[LiveParameter, ...]:
+    def parameters(self) -> tuple[LiveParameter, ...]:
         """The parameters with sliders, with their present values."""
 
     @property

@@ -155,7 +155,7 @@ def test_flat_elements_beside_curved_ones(change: str) -> None:
     given = fillet()
     assert mean_edge(given[0], given[1]) < 1
     shell = Shell(given[0], given[1], normals=given[2])
-    assert shell.core.num_patches == 1
+    assert shell._binding.num_patches == 1
     changed = fillet(seed=7) if change.startswith("other") else split_flat(*given)
     other = Shell(changed[0], changed[1], normals=changed[2])
     rng = np.random.default_rng(6)

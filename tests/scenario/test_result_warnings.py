@@ -42,7 +42,7 @@ def test_a_sound_scenario_earns_none(scenario):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         result = built.simulation.run(built.q0, built.v0, 0.3, built.controller, record_dt=0.01)
-    assert built.controller.doubts_after(result) == []
+    assert built.controller._result_warnings(result) == []
 
 
 def test_a_path_that_is_off_the_part(scenario):
@@ -78,7 +78,7 @@ def test_a_start_beyond_a_limit(scenario):
 def test_a_press_on_nothing_and_a_target_out_of_reach(scenario):
     built = build(scenario, AWAY)
     result, _ = simulate(replace(built, scenario=build(scenario, {**AWAY, **SHORT}).scenario))
-    nothing, far = built.controller.doubts_after(result)
+    nothing, far = built.controller._result_warnings(result)
     assert nothing.startswith("nothing was touched, though the controller presses with")
     # Across the normal, as the force acts along it.
     (pair,), model = built.scene.pairs, built.scene.model
