@@ -111,10 +111,7 @@ def test_derivatives_are_those_of_the_twin(friction) -> None:
     assert_derivatives(own, BALL, MOVES)
     numbers = (
         ["ball-plate.law.k", "ball-plate.law.b"],
-        [
-            "ball-plate.law.stiffness",
-            "ball-plate.law.dissipation",
-        ],
+        ["ball-plate.law.stiffness", "ball-plate.law.dissipation"],
     )
     found, exact = (
         scene.dynamics_derivatives(BALL, MOVES, np.zeros(6), parameters=names)

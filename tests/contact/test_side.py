@@ -10,11 +10,7 @@ from tests.contact.helpers import positions, shell_of
 from tests.oracle import contacts as oracle
 from tests.oracle.geometry import corners_of
 
-CLOSED = {
-    "cube": meshes.cube(),
-    "icosphere": meshes.icosphere(1),
-    "quads": meshes.cube(quads=True),
-}
+CLOSED = {"cube": meshes.cube(), "icosphere": meshes.icosphere(1), "quads": meshes.cube(quads=True)}
 
 
 @pytest.mark.slow
