@@ -113,7 +113,7 @@ def test_ctrl_c(options: str) -> None:
         assert child.stdout is not None
         assert child.stderr is not None
         assert child.stdout.readline().strip() == "started"
-        time.sleep(1.0)
+        time.sleep(0.3)
         child.send_signal(signal.SIGINT)
         try:
             said, faults = child.communicate(timeout=20)
