@@ -119,7 +119,7 @@ def test_force_of_a_coarse_tessellation_is_that_of_elliptical_hertz(name, share)
     assert 0.25 < surface.longest_side < 0.345  # diagonals included
     shell, rng = surface.shell(), np.random.default_rng(1)
     scene = ball_scene(shell, share, LAW)
-    for _ in range(40):
+    for _ in range(12):
         u, v = surface.inside(rng)
         x, n = surface.point(u, v), surface.normal(u, v)
         low, high = surface.curvatures(u, v)
@@ -160,7 +160,7 @@ def test_without_normals_the_surface_is_nearly_met(name) -> None:
     shell, rng = surface.shell(exact=False), np.random.default_rng(1)
     scene = ball_scene(shell, 0.5, LAW)
     errors = []
-    for _ in range(40):
+    for _ in range(15):
         u, v = surface.inside(rng, 0.4)
         x, n = surface.point(u, v), surface.normal(u, v)
         low, high = surface.curvatures(u, v)
