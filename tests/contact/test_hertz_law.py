@@ -169,26 +169,6 @@ def test_without_normals_the_surface_is_nearly_met(name) -> None:
     assert np.abs(errors).max() < 3e-3
 
 
-@pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid", "inside a cylinder"])
-@pytest.mark.parametrize("friction", [None, sp.BristleFriction(0.5, 0.4, 1e4, 1.0)])
-def test_derivatives_are_those_of_the_forces(name, friction) -> None:
-    surface = SURFACES[name]
-    law = sp.HertzLaw(YOUNG, POISSON, restitution=0.8, speed=1.0)
-    scene = ball_scene(surface.shell(), 0.3, law, friction=friction)
-    u, v = (0.3 * a + 0.7 * b for a, b in surface.spans)
-    x, n = surface.point(u, v), surface.normal(u, v)
-    q = np.array([*(x + 0.297 * n), 0, 0, 0, 1])
-    motion = np.array([0.1, -0.2, 0.3, 0.4, 0.2, -0.1])
-    found, _ = scene.contact_derivatives(q, motion)
-    step, expected = 1e-6, np.zeros((6, 6))
-    for i in range(6):
-        change = step * np.eye(6)[i]
-        for sign in (1, -1):
-            moved = pin.integrate(scene.model, q, sign * change)
-            expected[:, i] += sign / (2 * step) * scene.external_forces(moved, motion)[1].vector
-    assert np.allclose(found, expected, atol=1e-6 * np.abs(expected).max())
-
-
 @pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid"])
 def test_energy_closes_where_the_curvature_changes_along_the_path(name) -> None:
     surface = SURFACES[name]

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from sphshell_pin import (
     BristleFriction,
     CoulombFriction,
-    HertzLaw,
     HuntCrossleyLaw,
     ImpactLaw,
     Scene,
@@ -25,10 +24,8 @@ from tests.dynamics.test_external_forces import CASES, Case
 from tests.models import (
     ARM_Q,
     JOINTS,
-    add_body,
     arm,
     ball,
-    empty,
     free_q,
     plate,
     two_free_bodies,
@@ -191,25 +188,12 @@ def test_arm_on_a_plate(law: str, friction: str) -> None:
 
 
 @pytest.mark.parametrize("friction", FRICTIONS)
-@pytest.mark.parametrize("law", LAWS)
-def test_arm_in_a_bowl(law: str, friction: str) -> None:
-    assert_derivatives(arm_on(*bowl(), law, friction), ARM_Q, ARM_V)
-
-
-@pytest.mark.parametrize("friction", FRICTIONS)
 @pytest.mark.parametrize("surface", SURFACES)
 def test_ball_on_curved_surfaces(surface: str, friction: str) -> None:
     scene = free_ball(shell_of(surface, 0.6), friction=friction)
     for seed, center in enumerate(SURFACES[surface].probes(3, 0.04, seed=3)[0]):
         v = 0.3 * np.random.default_rng(seed).normal(size=6)
         assert_derivatives(scene, turned(free_q(center), seed), v)
-
-
-@pytest.mark.parametrize("friction", FRICTIONS)
-@pytest.mark.parametrize("law", LAWS)
-def test_on_a_shell_that_moves(law: str, friction: str) -> None:
-    scene = two_free_bodies(LAWS[law], FRICTIONS[friction])
-    assert_derivatives(scene, *two_free_state())
 
 
 def three_contacts(friction: str) -> tuple[Scene, Array, Array]:
@@ -225,22 +209,6 @@ def test_with_a_saddle(friction: str) -> None:
     contacts = scene.contacts(q, v)
     assert np.sign(contacts.normal_force).tolist() == [1, 1, -1]
     assert_derivatives(scene, q, v, step=1e-7)
-
-
-def test_contacts_shown_as_one() -> None:
-    shell = Shell(*meshes.v_groove(np.radians(0.1), size=8.0, cells=2), crease_angle=1e-5)
-    center = np.array([4e-4, 0.3, 0.97])
-    found = shell.contacts(center, 1.0)
-    assert found.weight.tolist() == [1.0]
-    assert found.terms.weight.tolist() == [1.0, 1.0, -1.0]
-    assert_derivatives(free_ball(shell, friction="none"), free_q(center), np.full(6, 0.1))
-
-
-@pytest.mark.parametrize("method", ["smooth", "facets"])
-@pytest.mark.parametrize("center", [[1.2, 1.15, 0.1], [1.2, 1.2, 1.1], [0.2, 0.3, 1.9]])
-def test_at_edges_and_corners(center: list[float], method: str) -> None:
-    scene = free_ball(Shell(*meshes.cube(2.0)), friction="bristle", method=method)
-    assert_derivatives(scene, turned(free_q(center), 2), np.full(6, 0.1))
 
 
 def test_pushed_back_through_a_sheet() -> None:
@@ -284,22 +252,6 @@ def test_joints_whose_axes_turn(joint: str, tree: str, monkeypatch: pytest.Monke
         case = Case(i, j, tree, seed)
         assert_derivatives(case.scene, case.q, case.v)
         assert_rate_jacobian(case.scene, case.q, case.v, np.zeros(0))
-
-
-def test_only_the_shell_moves() -> None:
-    model = empty()
-    add_body(model, "ball", pin.JointModelFreeFlyer())
-    scene = Scene(model)
-    scene.add_contact(
-        sphere=Sphere(0.05, frame="universe", offset=(0.1, 0.2, 0.04)),
-        shell=plate(),
-        frame="ball",
-        law=LAWS["impact"],
-        friction=FRICTIONS["coulomb"],
-    )
-    q = pin.integrate(model, free_q([0.0, 0.0, 0.0]), np.array([0.1, 0.1, 0, 0.1, -0.05, 1]))
-    assert len(scene.contacts(q, np.full(6, 0.1))) == 1
-    assert_derivatives(scene, q, np.full(6, 0.1))
 
 
 def test_contact_source_is_held_in_frame_j() -> None:
@@ -384,20 +336,6 @@ class TestRatesOfBristles:
             assert_rate_jacobian(
                 scene, q, v, stretched(scene, stretch), turning=left_out(friction, stretch)
             )
-
-
-@pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
-def test_friction_on_the_ellipses_of_hertz(friction: str) -> None:
-    """Mindlin's disc follows the curvature of the shell, with its slopes."""
-    law = HertzLaw(1e5, 0.3, restitution=0.8, speed=1.0)
-    for name in ("dome", "torus inside", "wavy above"):
-        scene = Scene(ball(radius=1.0))
-        sphere = Sphere(1.0, frame="ball")
-        scene.add_contact(sphere, shell_of(name, 0.6), law=law, friction=FRICTIONS[friction])
-        q = turned(free_q(SURFACES[name].probes(1, 0.04, seed=3)[0][0]), 1)
-        v = 0.3 * np.random.default_rng(3).normal(size=6)
-        assert_derivatives(scene, q, v)
-        assert_rate_jacobian(scene, q, v, stretched(scene, 1e-4), turning=1e-2)
 
 
 def test_pairs_add_up() -> None:
