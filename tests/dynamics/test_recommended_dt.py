@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.scene.explain import relaxation_time, weakness
 from sphshell_pin.errors import SetupWarning
 from tests import models
 
@@ -145,6 +147,9 @@ def test_steps_that_are_short_enough_earn_no_warning() -> None:
     scene = falling(ELASTIC["linear"])
     q, v = [RADIUS], [-SPEED]
     dt = scene.explain(q, v).recommended_dt
+    for share, count in ((1.0001, 0), (1.0002, 1)):
+        said = scene.explain(q, v, dt=share * dt).warnings
+        assert sum("recommended" in one for one in said) == count
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(q, v, 10 * dt)
@@ -210,3 +215,151 @@ def test_the_gap_is_on_the_side_of_the_shell(side: str, gaps: tuple[float, float
     scene = models.on_plate(models.slider(), ELASTIC["linear"], shell=models.plate(side=side))
     found = [scene.explain([z]).pairs[0].gap for z in (0.06, -0.06)]
     assert found == pytest.approx(gaps)
+
+
+def two_bodies(joint: type) -> sp.Scene:
+    """Bodies "one", of 1 kg and 0.3 m above, and "two", of 3 kg."""
+    model = models.empty(9.81)
+    for name, mass, z in (("one", 1.0, 0.3), ("two", 3.0, 0.0)):
+        inertia = models.pin.Inertia.FromSphere(mass, RADIUS)
+        at = models.pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))
+        models.add_body(model, name, joint(), placement=at, inertia=inertia)
+    return sp.Scene(model)
+
+
+def test_two_bodies_have_the_reduced_mass_and_the_relative_speed() -> None:
+    scene, law = two_bodies(models.pin.JointModelPZ), ELASTIC["linear"]
+    scene.add_contact(sp.Sphere(0.05, "one"), sp.Sphere(0.08, "two"), law=law)
+    scene.add_contact(sp.Sphere(0.05, "two"), sp.Sphere(0.08, "one"), law=law, name="turned")
+    for pair in scene.explain([0.0, 0.0], [-0.7, 0.2]).pairs:
+        found = (pair.gap, pair.effective_mass, pair.approach_speed)
+        assert found == pytest.approx((0.17, 0.75, max(0.9, math.sqrt(2 * 9.81 * 0.17))), rel=1e-9)
+        weight = 0.75 * 9.81
+        assert pair.resting_depth == pytest.approx(law.depth_at(weight), rel=1e-9)
+    # Of one center: pushed apart along z.
+    pair = scene.explain([-0.3, 0.0], [-0.7, 0.2]).pairs[0]
+    found = (pair.gap, pair.effective_mass, pair.approach_speed)
+    assert found == pytest.approx((-0.13, 0.75, 0.9), rel=1e-9)
+
+
+@pytest.mark.parametrize("side", ["both", "outside", "inside"])
+def test_a_shell_that_moves_is_met_in_its_own_frame(side: str) -> None:
+    """And where the center lies on the surface the normal is the surface's."""
+    model = models.empty(0.0)
+    turn = models.pin.SE3(models.pin.utils.rpyToMatrix(0.0, math.pi / 2, 0.0), np.zeros(3))
+    for name, mass in (("ball", 1.0), ("table", 3.0)):
+        inertia = models.pin.Inertia.FromSphere(mass, RADIUS)
+        models.add_body(model, name, models.pin.JointModelPX(), inertia=inertia)
+    scene = sp.Scene(model)
+    shell = models.plate(side=side)
+    sphere = sp.Sphere(RADIUS, "ball", (0.02, 0.0, 0.0))
+    scene.add_contact(sphere, shell, "table", turn, law=ELASTIC["linear"])
+    for x in (0.03, -0.02):
+        pair = scene.explain([x, 0.0], [-0.3, 0.2]).pairs[0]
+        height = x + 0.02
+        distance = -height if side == "inside" else height
+        found = (pair.gap, pair.effective_mass, pair.approach_speed)
+        assert found == pytest.approx((distance - RADIUS, 0.75, 0.5), rel=1e-9)
+
+
+def source(points: list, depths: list) -> sp.Scene:
+    scene = sp.Scene(models.slider(0.0, MASS))
+    normals = np.tile([0.0, 0.6, 0.8], (len(depths), 1))
+    find = lambda i, j: (np.array(points), normals, depths)  # noqa: E731
+    scene.add_contact_source(find, "ball", "universe", law=sp.ImpactLaw(1e5, 1.0), name="own")
+    return scene
+
+
+def test_a_source_counts_where_it_is_deepest() -> None:
+    scene = source([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], [1e-3, 4e-3])
+    pair = scene.explain([0.0], [-SPEED]).pairs[0]
+    # The slide holds the ball across: along the normal it weighs 1 / 0.8^2 of its mass.
+    found = (pair.gap, pair.effective_mass, pair.approach_speed)
+    assert found == pytest.approx((-4e-3, MASS / 0.64, 0.8 * SPEED), rel=1e-12)
+    assert math.isnan(pair.depth_limit_speed)
+    nothing = source([], []).explain([0.0])
+    pair = nothing.pairs[0]
+    assert all(map(math.isnan, (pair.gap, pair.effective_mass, pair.contact_time)))
+    assert (pair.shortest_time, nothing.recommended_dt) == (math.inf, 1e-3)
+
+
+def test_what_cannot_move_along_the_normal_has_no_time_scales() -> None:
+    """A slide along the plate: only its friction rings."""
+    model = models.empty()
+    inertia = models.pin.Inertia.FromSphere(MASS, RADIUS)
+    models.add_body(model, "ball", models.pin.JointModelPX(), inertia=inertia)
+    scene = models.on_plate(model, ELASTIC["linear"])
+    explained = scene.explain()
+    assert math.isnan(explained.pairs[0].effective_mass)
+    assert explained.recommended_dt == 1e-3
+    assert any("neither body can move along the normal" in one for one in explained.warnings)
+    scene.replace_pair("ball-plate", friction=sp.BristleFriction(0.5, 0.5, 1e6))
+    found = scene.explain().pairs[0].shortest_time
+    assert found == pytest.approx(math.pi * math.sqrt(MASS / 1e6), rel=1e-9)
+
+
+def test_a_lever_weighs_by_its_arm() -> None:
+    """A link of inertia I on a hinge, its tip L away: I / L^2, at L w."""
+    model = models.empty(0.0)
+    inertia = models.pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.2, 0.3]))
+    tip = models.pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.06]))
+    at = models.pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.0]))
+    joint = models.pin.JointModelRY()
+    models.add_body(model, "ball", joint, placement=at, inertia=inertia, frame=tip)
+    pair = models.on_plate(model, ELASTIC["linear"]).explain([0.0], [0.5]).pairs[0]
+    found = (pair.gap, pair.effective_mass, pair.approach_speed)
+    assert found == pytest.approx((0.01, 0.2 / 0.4**2, 0.4 * 0.5), rel=1e-9)
+
+
+@pytest.mark.parametrize("speed", [0.02, 2.0])
+def test_the_disc_of_mindlin_is_that_of_both_spheres(speed: float) -> None:
+    """At the larger of the depths of the start and of the impact."""
+    scene, law = two_bodies(models.pin.JointModelTranslation), sp.ImpactLaw(1e6, 1.0)
+    friction = sp.BristleFriction.mindlin(0.4, None, 1e9, 0.4)
+    scene.add_contact(sp.Sphere(0.2, "one"), sp.Sphere(0.1, "two"), law=law, friction=friction)
+    for pressed in (-1e-3, 1e-3):
+        q, v = [0.0, 0.0, -pressed, 0.0, 0.0, 0.0], [0.0, 0.0, -speed, 0.0, 0.0, 0.0]
+        pair = scene.explain(q, v).pairs[0]
+        disc = math.sqrt(max(pair.impact_depth, pressed) / (1 / 0.2 + 1 / 0.1))
+        expected = friction.slip_time(0.75, 1.0, disc)
+        assert pair.shortest_time == pytest.approx(expected, rel=1e-9)
+
+
+def test_joints_have_scales_of_their_own() -> None:
+    """Half a period of a stop at the joint's speed limit, and of the spring of dry friction."""
+    model = models.slider(0.0, MASS)
+    name = str(model.names[1])
+
+    def scale(**parts: object) -> float:
+        joints = sp.JointComponents(**{key: {name: value} for key, value in parts.items()})
+        return joints.time_scales(model).get(name, math.inf)
+
+    stop = sp.JointLimits(-1.0, 1.0, sp.ImpactLaw(1e6, 2.0))
+    dry = sp.JointFriction(3.0, stiffness=4e4)
+    law, ring = stop.law, math.pi * math.sqrt(MASS / 4e4)
+
+    def impact(speed: float) -> float:
+        return law.contact_time(law.depth_of(0.5 * MASS * speed**2), speed)
+
+    assert scale(damping=3.0) == math.inf
+    assert scale(friction=dry) == pytest.approx(ring, rel=1e-12)
+    assert scale(limits=stop, speed=2.0) == pytest.approx(impact(2.0), rel=1e-12)
+    assert scale(limits=stop, speed=0.01) == pytest.approx(impact(0.01), rel=1e-12)
+    assert scale(limits=stop, speed=0.01, friction=dry) == pytest.approx(ring, rel=1e-12)
+    assert scale(limits=stop, speed=50.0, friction=dry) == pytest.approx(impact(50.0), rel=1e-12)
+
+
+def test_relaxation_and_weakness_follow_the_speed_that_the_law_can_stop() -> None:
+    for stiffness in (1e4, 1e12):
+        pair = (scene := falling(sp.ImpactLaw(stiffness, 1.0))).pairs[0]
+        limit = RADIUS * math.sqrt(stiffness / MASS)
+        figures = scene.explain([RADIUS], [-(1 - 1e-9) * limit]).pairs[0]
+        assert weakness(pair, figures) is None
+        expected = min(0.02 * math.pi * math.sqrt(MASS / stiffness), 2e-5)
+        assert relaxation_time(pair, figures) == pytest.approx(expected, rel=1e-9)
+        figures = scene.explain([RADIUS], [-(1 + 1e-9) * limit]).pairs[0]
+        assert "the law cannot stop the sphere" in str(weakness(pair, figures))
+        assert weakness(pair, replace(figures, impact_depth=RADIUS)) is not None
+        assert relaxation_time(pair, replace(figures, depth_limit_speed=math.nan)) == 2e-5
+    own = source([[0.0, 0.0, 0.0]], [1e-3])
+    assert relaxation_time(own.pairs[0], own.explain([0.0]).pairs[0]) == 2e-5
