@@ -85,6 +85,20 @@ def test_the_shortest_of_impact_oscillation_and_decay(load: float, damping: floa
     assert law.shortest_time(MASS, SPEED, load) == pytest.approx(min(scales), rel=1e-9)
 
 
+def test_a_soft_law_under_a_light_load() -> None:
+    soft = sp.ImpactLaw(1e-3, 2.0)
+    depth = soft.depth_of(0.5 * MASS * SPEED**2)
+    stiffness = soft.normal_stiffness(soft.depth_at(0.9))
+    half = math.pi * math.sqrt(MASS / stiffness)
+    assert 0 < stiffness < 1
+    assert half < soft.contact_time(depth, SPEED)
+    assert soft.shortest_time(MASS, SPEED, 0.9) == pytest.approx(half, rel=1e-9)
+    linear = sp.ImpactLaw(0.1, 1.0)
+    expected = math.pi * math.sqrt(MASS / 0.1)
+    assert linear.shortest_time(MASS, SPEED, 0.0) == pytest.approx(expected, rel=1e-9)
+    assert sp.TableLaw([0.0, 1.0], [0.0, 1.0]).decay_time(MASS, 0.5) == math.inf
+
+
 def test_a_law_that_cannot_carry_the_load_has_its_other_scales() -> None:
     layer = sp.FoundationLaw(1e6, 0.05).on_plane(0.05)
     most = layer.normal_force(0.05)
@@ -102,12 +116,16 @@ def test_slow_slip_of_coulomb_friction() -> None:
     friction = sp.CoulombFriction(0.4, 0.3, 1e-3, 1e-2)
     # mu (3 - s^2) s / 2 with s = v / v_static: a damper of 1.5 mu N / v_static.
     assert friction.slip_time(MASS, 50.0, 1.0) == pytest.approx(20 * MASS * 1e-3 / (1.5 * 0.4 * 50))
+    light = friction.slip_time(MASS, 0.5, 1.0)
+    assert light == pytest.approx(100 * friction.slip_time(MASS, 50.0, 1.0))
     assert friction.slip_time(MASS, 0.0, 1.0) == math.inf
     assert friction.slip_time(MASS, -1.0, 1.0) == math.inf
     assert sp.CoulombFriction(0.0, 0.0).slip_time(MASS, 50.0, 1.0) == math.inf
 
 
 def test_bristles_ring_or_decay() -> None:
+    soft = sp.BristleFriction(0.4, 0.3, 0.5)
+    assert soft.slip_time(MASS, 50.0, 1.0) == pytest.approx(math.pi * math.sqrt(MASS / 0.5))
     half = math.pi * math.sqrt(MASS / 1e5)
     for damping in (0.0, 100.0, 1e4):
         scales = [half, *([20 * MASS / damping] if damping else [])]
@@ -130,4 +148,6 @@ def test_bristles_of_mindlin_follow_the_disc() -> None:
         rolls = sp.BristleFriction.mindlin(0.4, None, *RUBBER, rolling=0.02, rolling_speed=speed)
         expected = min(half, 20 * MASS * speed / (1.5 * 0.02 * load))
         assert rolls.slip_time(MASS, load, disc) == pytest.approx(expected, rel=1e-14)
+        light = min(half, 20 * MASS * speed / (1.5 * 0.02 * 0.5))
+        assert rolls.slip_time(MASS, 0.5, disc) == pytest.approx(light, rel=1e-14)
         assert rolls.slip_time(MASS, 0.0, disc) == pytest.approx(half, rel=1e-14)
