@@ -12,14 +12,7 @@ from sphshell_pin.plot import plot_contact_map, plot_result
 from sphshell_pin.plot.contact_map import element_values
 from sphshell_pin.plot.on_shell import eye_direction
 from tests.test_plot import texts
-from tests.view.stand_ins import (
-    a_result,
-    a_scene,
-    ball_configuration,
-    ball_model,
-    ball_on_plate,
-    contact_pair,
-)
+from tests.view import stand_ins
 
 
 def grid(cells=4, size=1.0):
@@ -38,10 +31,12 @@ def grid(cells=4, size=1.0):
 
 def on(shell, rows, pairs=("tip",), t=(0.0, 1.0, 3.0, 4.0)):
     """Result and scene of a ball with these contacts on `shell`."""
-    model = ball_model()
-    scene = a_scene(model, *(contact_pair(model, "ball", 0.05, shell, name=n) for n in pairs))
-    q = np.tile(ball_configuration(np.zeros(3)), (len(t), 1))
-    return a_result(t, q, rows, pairs), scene
+    model = stand_ins.ball_model()
+    scene = stand_ins.a_scene(
+        model, *(stand_ins.contact_pair(model, "ball", 0.05, shell, name=n) for n in pairs)
+    )
+    q = np.tile(stand_ins.ball_configuration(np.zeros(3)), (len(t), 1))
+    return stand_ins.a_result(t, q, rows, pairs), scene
 
 
 def painted(axis, collection=0):
@@ -172,7 +167,7 @@ def test_a_fine_mesh_is_colored_as_wide_as_a_line(monkeypatch):
 
 
 def test_what_cannot_be_drawn_is_reported():
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     with pytest.raises(ResultError, match="no scene"):
         plot_contact_map(result)
     with pytest.raises(NameNotFound, match="impulse"):
@@ -192,7 +187,7 @@ def test_what_cannot_be_drawn_is_reported():
     ],
 )
 def test_what_passed_between_the_rows_is_reported(figures, said):
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     rest = dict.fromkeys(("impulse", "peak_force_time", "max_depth", "max_depth_time"), 0.0)
     result.stats = RunStats(pairs={"ball": PairFigures(**figures, **rest, touches=1)})
     for quantity in ("impulse", "time"):
@@ -204,7 +199,7 @@ def test_what_passed_between_the_rows_is_reported(figures, said):
 
 @pytest.mark.slow
 def test_a_notebook_gets_a_picture():
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     for kind in ("overview", "force", "energy", "path", "map"):
         png = plot_result(result, kind, scene)._repr_png_()
         assert png.startswith(b"\x89PNG")

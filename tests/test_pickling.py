@@ -19,10 +19,7 @@ from tests import meshes, models
 
 Trip = Callable[[Any], Any]
 
-LAWS = (
-    sp.ImpactLaw(3e5, 1.7, 120.0, 2e-4),
-    sp.HuntCrossleyLaw(4e6, 1.5, 0.3),
-)
+LAWS = (sp.ImpactLaw(3e5, 1.7, 120.0, 2e-4), sp.HuntCrossleyLaw(4e6, 1.5, 0.3))
 FRICTIONS = (
     sp.CoulombFriction(0.5, 0.3, 0.01, 0.1),
     sp.BristleFriction(0.5, 0.4, 1e5, 1e2, 1e-3, torsional=True),

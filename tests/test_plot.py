@@ -4,18 +4,8 @@ import sys
 import numpy as np
 import pytest
 
+from sphshell_pin import plot
 from sphshell_pin.errors import MissingExtra, ResultError
-from sphshell_pin.plot import (
-    MOST_PAIRS,
-    MOST_POINTS,
-    NO_CONTACT,
-    PairSeries,
-    plot_contact_path,
-    plot_energy,
-    plot_force_and_depth,
-    plot_result,
-    save_figures,
-)
 from tests.view.stand_ins import (
     a_result,
     a_scene,
@@ -49,7 +39,7 @@ def test_the_figures_are_written_and_not_blank(tmp_path):
     from PIL import Image
 
     scene, result = ball_on_plate()
-    paths = save_figures(result, tmp_path / "new", scene)
+    paths = plot.save_figures(result, tmp_path / "new", scene)
     assert [path.name for path in paths] == [
         "force_and_depth.png",
         "energy.png",
@@ -64,15 +54,17 @@ def test_the_figures_are_written_and_not_blank(tmp_path):
 
 def test_axes_carry_their_units():
     scene, result = ball_on_plate()
-    assert {"force [N]", "largest depth [mm]", "time [s]"} <= labels(plot_force_and_depth(result))
-    assert {"x of the shell [m]", "y of the shell [m]", "normal force [N]"} <= labels(
-        plot_contact_path(result, scene)
+    assert {"force [N]", "largest depth [mm]", "time [s]"} <= labels(
+        plot.plot_force_and_depth(result)
     )
-    assert {"x of the world [mm]", "z of the world [mm]"} <= labels(plot_contact_path(result))
+    assert {"x of the shell [m]", "y of the shell [m]", "normal force [N]"} <= labels(
+        plot.plot_contact_path(result, scene)
+    )
+    assert {"x of the world [mm]", "z of the world [mm]"} <= labels(plot.plot_contact_path(result))
     energetic = a_result(
         [0, 1], np.zeros((2, 8)), kinetic=np.array([0, 2e-3]), residual=np.array([0, 3e-9])
     )
-    assert {"energy [mJ]", "residual [nJ]"} <= labels(plot_energy(energetic))
+    assert {"energy [mJ]", "residual [nJ]"} <= labels(plot.plot_energy(energetic))
 
 
 def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
@@ -81,7 +73,7 @@ def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
         {"row": 1, "normal_force": 3.0, "friction_force_world": [-1.0, 0, 0], "depth": 2e-3},
         {"row": 2, "pair": 1, "normal_force": 9.0},
     ]
-    series = PairSeries.of(a_result([0, 1, 2], np.zeros((3, 8)), rows, ("one", "two")), 0)
+    series = plot.PairSeries.of(a_result([0, 1, 2], np.zeros((3, 8)), rows, ("one", "two")), 0)
     np.testing.assert_array_equal(series.normal, [0, 5, 0])
     np.testing.assert_array_equal(series.friction, [0, 0, 0])
     np.testing.assert_array_equal(series.depth, [0, 2e-3, 0])
@@ -93,17 +85,21 @@ def test_contacts_that_share_the_load_are_counted_in_the_figure():
     shared = [*alone, {"row": 1, "depth": 1e-3}]
     for rows, drawn in ((alone, False), (shared, True)):
         result = a_result([0, 1, 2], np.zeros((3, 8)), rows, ("tip",))
-        for figure in (plot_force_and_depth(result), plot_result(result)):
+        for figure in (plot.plot_force_and_depth(result), plot.plot_result(result)):
             assert ("contacts at once" in labels(figure)) == drawn
-    counts = plot_force_and_depth(result).axes[-1].lines[0].get_ydata()
+    counts = plot.plot_force_and_depth(result).axes[-1].lines[0].get_ydata()
     np.testing.assert_array_equal(counts, [1, 2, 1])
 
 
 def test_a_run_without_contact_is_told_in_words(tmp_path):
     result = without_contact()
-    for figure in (plot_force_and_depth(result), plot_contact_path(result), plot_result(result)):
-        assert NO_CONTACT in texts(figure)
-    assert len(save_figures(result, tmp_path)) == 3
+    for figure in (
+        plot.plot_force_and_depth(result),
+        plot.plot_contact_path(result),
+        plot.plot_result(result),
+    ):
+        assert plot.NO_CONTACT in texts(figure)
+    assert len(plot.save_figures(result, tmp_path)) == 3
 
 
 @pytest.mark.slow
@@ -111,8 +107,8 @@ def test_a_single_instant_of_contact_is_drawn(tmp_path):
     scene, _ = ball_on_plate()
     q = np.tile(ball_configuration([0, 0, 0.05]), (2, 1))
     result = a_result([0, 1], q, [{"row": 1, "point_world": [0.1, 0.2, 0.0]}], ("ball",))
-    assert len(save_figures(result, tmp_path, scene)) == 4
-    assert len(save_figures(result, tmp_path)) == 3
+    assert len(plot.save_figures(result, tmp_path, scene)) == 4
+    assert len(plot.save_figures(result, tmp_path)) == 3
 
 
 def test_the_path_on_a_wall_is_seen_from_the_side_of_its_normal():
@@ -122,7 +118,7 @@ def test_the_path_on_a_wall_is_seen_from_the_side_of_its_normal():
     rows = [
         {"row": k, "point_world": [0, 0.1 * k, 0.2], "normal_world": [-1.0, 0, 0]} for k in range(3)
     ]
-    axis = plot_contact_path(a_result([0, 1, 2], q, rows), scene).axes[0]
+    axis = plot.plot_contact_path(a_result([0, 1, 2], q, rows), scene).axes[0]
     elevation, azimuth = np.deg2rad([axis.elev, axis.azim])
     assert np.cos(elevation) * np.cos(azimuth) < -0.8
 
@@ -130,7 +126,7 @@ def test_the_path_on_a_wall_is_seen_from_the_side_of_its_normal():
 def test_colours_serve_the_usual_forces_not_one_impact():
     scene, result = ball_on_plate()
     result.contacts.normal_force[0] = 4000.0
-    bar = plot_contact_path(result, scene).axes[-1]
+    bar = plot.plot_contact_path(result, scene).axes[-1]
     assert 4.0 < bar.get_ylim()[1] < 10.0
 
 
@@ -147,7 +143,7 @@ def test_every_shell_has_its_own_picture_and_every_pair_its_name():
         for k in range(6)
     ]
     q = np.tile(ball_configuration(np.zeros(3)), (5, 1))
-    figure = plot_contact_path(a_result(np.arange(5), q, rows, names), a_scene(model, *pairs))
+    figure = plot.plot_contact_path(a_result(np.arange(5), q, rows, names), a_scene(model, *pairs))
     written = " ".join(texts(figure))
     assert all(name in written for name in names)
     assert all(f"on plate {k}" in written for k in range(3))
@@ -155,28 +151,28 @@ def test_every_shell_has_its_own_picture_and_every_pair_its_name():
 
 @pytest.mark.slow
 def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
-    count = MOST_PAIRS + 3
+    count = plot.MOST_PAIRS + 3
     rows = [{"row": 1, "pair": k, "normal_force": 1.0 + k} for k in range(count)]
     names = [f"pair {k}" for k in range(count)]
-    written = texts(plot_force_and_depth(a_result([0, 1], np.zeros((2, 8)), rows, names)))
+    written = texts(plot.plot_force_and_depth(a_result([0, 1], np.zeros((2, 8)), rows, names)))
     assert "pair 0" not in written
     assert f"pair {count - 1}" in written
     assert any("3 pairs with smaller forces left out" in text for text in written)
 
 
 def test_many_pairs_leave_the_overview_and_the_path_readable():
-    count = MOST_PAIRS + 3
+    count = plot.MOST_PAIRS + 3
     rows = [
         {"row": 1, "pair": k, "normal_force": 1.0 + k, "point_world": [0.1 * k, 0, 0]}
         for k in range(count)
     ]
     names = [f"pair {k}" for k in range(count)]
     result = a_result([0, 1], np.zeros((2, 8)), rows, names)
-    for figure in (plot_result(result), plot_contact_path(result)):
+    for figure in (plot.plot_result(result), plot.plot_contact_path(result)):
         written = " ".join(texts(figure))
         assert "pair 0" not in written
         assert f"pair {count - 1}" in written
-    assert "3 pairs with smaller forces left out" in " ".join(texts(plot_result(result)))
+    assert "3 pairs with smaller forces left out" in " ".join(texts(plot.plot_result(result)))
 
 
 def test_a_long_run_keeps_its_one_row_peak():
@@ -185,8 +181,8 @@ def test_a_long_run_keeps_its_one_row_peak():
     result.contacts = a_result(
         [0], [[0]], [{"row": 123_457, "normal_force": 77.0, "depth": 1e-3}]
     ).contacts
-    line = plot_force_and_depth(result).axes[0].lines[0]
-    assert len(line.get_xdata()) <= MOST_POINTS + 2
+    line = plot.plot_force_and_depth(result).axes[0].lines[0]
+    assert len(line.get_xdata()) <= plot.MOST_POINTS + 2
     assert line.get_ydata().max() == 77.0
 
 
@@ -194,7 +190,7 @@ def test_potential_energy_is_shown_from_where_it_started():
     result = without_contact()
     result.energy.potential = np.linspace(1000.0, 1001.0, 5)
     line = next(
-        line for line in plot_energy(result).axes[0].lines if "potential" in line.get_label()
+        line for line in plot.plot_energy(result).axes[0].lines if "potential" in line.get_label()
     )
     assert line.get_ydata()[0] == 0.0
 
@@ -202,13 +198,13 @@ def test_potential_energy_is_shown_from_where_it_started():
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(ResultError, match=r"force_and_depth\.png"):
-        save_figures(without_contact(), tmp_path / "file")
+        plot.save_figures(without_contact(), tmp_path / "file")
 
 
 def test_without_matplotlib_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingExtra, match=r"sphshell-pin\[view\]"):
-        plot_result(without_contact())
+        plot.plot_result(without_contact())
 
 
 @pytest.mark.slow

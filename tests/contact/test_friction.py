@@ -50,8 +50,7 @@ def test_creep_speed(share: float, creep: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "name"),
-    [((0.1, 0.3, 0.1, 1.0), "mu_dynamic"), ((0.3, 0.1, 0.1, 0.1), "v_dynamic")],
+    ("values", "name"), [((0.1, 0.3, 0.1, 1.0), "mu_dynamic"), ((0.3, 0.1, 0.1, 0.1), "v_dynamic")]
 )
 def test_values_that_do_not_fit_together_are_refused(values, name: str) -> None:
     with pytest.raises(InvalidParameter) as caught:

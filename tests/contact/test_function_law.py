@@ -13,13 +13,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import (
-    InvalidParameter,
-    NotPicklable,
-    ScenarioError,
-    SlowLawWarning,
-    SphshellError,
-)
+from sphshell_pin import errors
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.testing import assert_derivatives
@@ -48,7 +42,7 @@ C_LAW = sp.FunctionLaw(FORCE(force), ENERGY(energy), NUMBERS)
 
 
 def python_law(function=force, numbers=NUMBERS):
-    with pytest.warns(SlowLawWarning, match=r"numba\.cfunc"):
+    with pytest.warns(errors.SlowLawWarning, match=r"numba\.cfunc"):
         return sp.FunctionLaw(function, parameters=numbers)
 
 
@@ -111,10 +105,7 @@ def test_derivatives_are_those_of_the_twin(friction) -> None:
     assert_derivatives(own, BALL, MOVES)
     numbers = (
         ["ball-plate.law.k", "ball-plate.law.b"],
-        [
-            "ball-plate.law.stiffness",
-            "ball-plate.law.dissipation",
-        ],
+        ["ball-plate.law.stiffness", "ball-plate.law.dissipation"],
     )
     found, exact = (
         scene.dynamics_derivatives(BALL, MOVES, np.zeros(6), parameters=names)
@@ -171,9 +162,11 @@ def test_no_number_is_refused(wrong) -> None:
     ]
     for law, what in zip(laws, ("force", "force", "energy"), strict=True):
         simulation = sp.Simulation(models.on_plate(models.slider(), law))
-        with pytest.raises(SphshellError, match=rf"the {what} of a FunctionLaw is {wrong} at dep"):
+        with pytest.raises(
+            errors.SphshellError, match=rf"the {what} of a FunctionLaw is {wrong} at dep"
+        ):
             simulation.run([0.0499], None, 0.01)
-    with pytest.raises(InvalidParameter, match="function returns 'a', must return a number"):
+    with pytest.raises(errors.InvalidParameter, match="function returns 'a', must return a number"):
         python_law(lambda depth, rate, p: "a", {}).normal_force(1.0)
 
 
@@ -194,12 +187,12 @@ OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
     ],
 )
 def test_wrong_arguments_are_refused(arguments, said) -> None:
-    with pytest.raises(InvalidParameter, match=said):
+    with pytest.raises(errors.InvalidParameter, match=said):
         sp.FunctionLaw(*arguments)
 
 
 def test_what_is_no_law_is_told_of_it() -> None:
-    with pytest.raises(InvalidParameter, match=r"FunctionLaw\(function\).*docs/laws.md"):
+    with pytest.raises(errors.InvalidParameter, match=r"FunctionLaw\(function\).*docs/laws.md"):
         models.on_plate(models.ball(), force)
 
 
@@ -209,7 +202,7 @@ def test_copies_and_pickles() -> None:
     law = C_LAW.changed(k=2e6)
     assert (law.k, C_LAW.k) == (2e6, 1e6)
     assert "k 2e+06" in law.text
-    with pytest.raises(NotPicklable, match="C function"):
+    with pytest.raises(errors.NotPicklable, match="C function"):
         pickle.dumps(models.on_plate(models.ball(), C_LAW))
     again = pickle.loads(pickle.dumps(python_law()))
     assert again == python_law()
@@ -240,7 +233,7 @@ def test_a_scenario_names_a_function_which_looking_does_not_execute(tmp_path) ->
     code += "    return p[0] * d * math.sqrt(d) * (1 - p[1] * r)\n"
     (tmp_path / "own.py").write_text(code.replace("'ran'", repr(str(tmp_path / "ran"))))
     path = write(tmp_path, DROP.replace(LAW_LINE, STATED))
-    with pytest.warns(SlowLawWarning):
+    with pytest.warns(errors.SlowLawWarning):
         built = build(path)
     law = built.scene.pairs[0].law
     assert isinstance(law, sp.FunctionLaw)
@@ -250,8 +243,8 @@ def test_a_scenario_names_a_function_which_looking_does_not_execute(tmp_path) ->
     replay = Replay(result, path)
     replay.advance(0.01)
     assert not (tmp_path / "ran").exists()
-    with pytest.raises(SphshellError, match=r"law\.function: 'own.py:force' was not loaded"):
+    with pytest.raises(errors.SphshellError, match=r"law\.function: 'own.py:force' was not loaded"):
         replay.scene.pairs[0].law.normal_force(1e-3)
-    with pytest.raises(ScenarioError, match="no such file") as caught:
+    with pytest.raises(errors.ScenarioError, match="no such file") as caught:
         build(write(tmp_path, DROP.replace(LAW_LINE, STATED.replace("own", "other"))))
     assert caught.value.key == "contact.ball-plate.law.function"

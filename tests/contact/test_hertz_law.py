@@ -119,7 +119,7 @@ def test_force_of_a_coarse_tessellation_is_that_of_elliptical_hertz(name, share)
     assert 0.25 < surface.longest_side < 0.345  # diagonals included
     shell, rng = surface.shell(), np.random.default_rng(1)
     scene = ball_scene(shell, share, LAW)
-    for _ in range(40):
+    for _ in range(12):
         u, v = surface.inside(rng)
         x, n = surface.point(u, v), surface.normal(u, v)
         low, high = surface.curvatures(u, v)
@@ -160,33 +160,13 @@ def test_without_normals_the_surface_is_nearly_met(name) -> None:
     shell, rng = surface.shell(exact=False), np.random.default_rng(1)
     scene = ball_scene(shell, 0.5, LAW)
     errors = []
-    for _ in range(40):
+    for _ in range(15):
         u, v = surface.inside(rng, 0.4)
         x, n = surface.point(u, v), surface.normal(u, v)
         low, high = surface.curvatures(u, v)
         expected, *_ = hertz_contact(0.5 * (2 + low), 0.5 * (2 + high), MODULUS, 0.01)
         errors.append(force_on(scene, x + 0.49 * n).linear @ n / expected - 1)
     assert np.abs(errors).max() < 3e-3
-
-
-@pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid", "inside a cylinder"])
-@pytest.mark.parametrize("friction", [None, sp.BristleFriction(0.5, 0.4, 1e4, 1.0)])
-def test_derivatives_are_those_of_the_forces(name, friction) -> None:
-    surface = SURFACES[name]
-    law = sp.HertzLaw(YOUNG, POISSON, restitution=0.8, speed=1.0)
-    scene = ball_scene(surface.shell(), 0.3, law, friction=friction)
-    u, v = (0.3 * a + 0.7 * b for a, b in surface.spans)
-    x, n = surface.point(u, v), surface.normal(u, v)
-    q = np.array([*(x + 0.297 * n), 0, 0, 0, 1])
-    motion = np.array([0.1, -0.2, 0.3, 0.4, 0.2, -0.1])
-    found, _ = scene.contact_derivatives(q, motion)
-    step, expected = 1e-6, np.zeros((6, 6))
-    for i in range(6):
-        change = step * np.eye(6)[i]
-        for sign in (1, -1):
-            moved = pin.integrate(scene.model, q, sign * change)
-            expected[:, i] += sign / (2 * step) * scene.external_forces(moved, motion)[1].vector
-    assert np.allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid"])

@@ -44,7 +44,7 @@ def test_a_contact_set_is_what_it_says(mesh, center, radius: float) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.lists(st.tuples(place, place, place), min_size=1, max_size=8), place)
 def test_triangles_of_coarse_coordinates(triangles, center) -> None:
     """Coordinates in thousandths make coplanar, touching and crossing elements likely."""

@@ -10,11 +10,7 @@ from tests.contact.helpers import positions, shell_of
 from tests.oracle import contacts as oracle
 from tests.oracle.geometry import corners_of
 
-CLOSED = {
-    "cube": meshes.cube(),
-    "icosphere": meshes.icosphere(1),
-    "quads": meshes.cube(quads=True),
-}
+CLOSED = {"cube": meshes.cube(), "icosphere": meshes.icosphere(1), "quads": meshes.cube(quads=True)}
 
 
 @pytest.mark.slow
@@ -26,7 +22,7 @@ def test_same_set_as_the_definition(name: str, side: str) -> None:
     corners, owner = corners_of(vertices, elements)
     count = 0
     for radius in (0.1, 0.3):
-        for center in positions(vertices, elements, radius, 60, seed=2):
+        for center in positions(vertices, elements, radius, 24, seed=2):
             if np.abs(center - shell.closest_points(center[None]).points[0]).max() < 1e-9:
                 continue  # on the surface the side is undecided
             expected = oracle.facets(center, radius, corners, owner, side)
@@ -42,7 +38,7 @@ def test_same_set_as_the_definition(name: str, side: str) -> None:
             assert not why, f"{name}, {side}, center {center.tolist()}: {why}"
             assert not len(found) or oracle.normal_error(found, expected) <= 1e-10
             count += len(found)
-    assert count > 50
+    assert count > 20
 
 
 def test_plate_pushes_up_from_below() -> None:

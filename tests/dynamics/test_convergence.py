@@ -8,30 +8,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin import (
-    CoulombFriction,
-    ImpactLaw,
-    RungeKutta4,
-    Scene,
-    SemiImplicitEuler,
-    Simulation,
-    Sphere,
-)
-from tests.models import (
-    ball,
-    free_q,
-    linear_law,
-    on_plate,
-    plate,
-    slider,
-    two_free_bodies,
-    two_free_state,
-)
+import sphshell_pin as sp
+from tests import models
 from tests.oracle.laws import hunt_crossley_restitution
 
 MM, RADIUS = 1e-3, 0.05
-SMOOTH_FRICTION = CoulombFriction(0.3, 0.1, 20.0, 40.0)
-STEPPERS = [(SemiImplicitEuler, 1), (RungeKutta4, 4)]
+SMOOTH_FRICTION = sp.CoulombFriction(0.3, 0.1, 20.0, 40.0)
+STEPPERS = [(sp.SemiImplicitEuler, 1), (sp.RungeKutta4, 4)]
 
 
 def order_of(model: pin.Model, results) -> float:
@@ -46,10 +29,12 @@ def order_of(model: pin.Model, results) -> float:
 
 def rolling(integrator, steps: int, damping: float = 20.0, friction=SMOOTH_FRICTION):
     """Ball deep in a plate that slides, spins and bobs without ever leaving it."""
-    scene = on_plate(ball(), linear_law(4000.0, damping), friction, radius=RADIUS)
-    q0 = free_q([-0.1, 0.03, RADIUS - 0.004])
+    scene = models.on_plate(
+        models.ball(), models.linear_law(4000.0, damping), friction, radius=RADIUS
+    )
+    q0 = models.free_q([-0.1, 0.03, RADIUS - 0.004])
     v0 = np.array([1.0, -0.5, 0.05, 20.0, 30.0, -10.0])
-    result = Simulation(scene, integrator(dt=0.1 / steps)).run(q0, v0, 0.1)
+    result = sp.Simulation(scene, integrator(dt=0.1 / steps)).run(q0, v0, 0.1)
     assert not [e for e in result.events if e.kind == "lift_off"]
     return scene.model, result
 
@@ -64,11 +49,11 @@ def test_order_of_a_ball_rolling_on_a_plate(integrator, order: int) -> None:
 
 @pytest.mark.parametrize(("integrator", "order"), STEPPERS)
 def test_order_with_both_bodies_tumbling(integrator, order: int) -> None:
-    scene = two_free_bodies(linear_law(2000.0, 5.0), SMOOTH_FRICTION)
-    q0, v0 = two_free_state()
+    scene = models.two_free_bodies(models.linear_law(2000.0, 5.0), SMOOTH_FRICTION)
+    q0, v0 = models.two_free_state()
     steps = 200 if order == 1 else 20
     runs = [
-        Simulation(scene, integrator(dt=0.02 / (steps * k))).run(q0, v0, 0.02) for k in (1, 2, 4)
+        sp.Simulation(scene, integrator(dt=0.02 / (steps * k))).run(q0, v0, 0.02) for k in (1, 2, 4)
     ]
     assert order_of(scene.model, runs) == pytest.approx(order, abs=0.3)
 
@@ -92,10 +77,10 @@ def test_energy_residual_falls_at_the_order(integrator, order, friction, damping
 def test_linear_oscillation_against_the_closed_form() -> None:
     """Mass on an undamped linear plate: z = z_rest + A cos(omega t) while in touch."""
     stiffness, sag = 4000.0, 9.81 / 4000.0
-    scene = on_plate(slider(), linear_law(stiffness), radius=RADIUS)
+    scene = models.on_plate(models.slider(), models.linear_law(stiffness), radius=RADIUS)
     start, omega = 0.5 * sag, stiffness**0.5
     q0 = np.array([RADIUS - sag + start])
-    result = Simulation(scene, RungeKutta4(dt=1e-4)).run(q0, np.zeros(1), 0.2)
+    result = sp.Simulation(scene, sp.RungeKutta4(dt=1e-4)).run(q0, np.zeros(1), 0.2)
     exact = RADIUS - sag + start * np.cos(omega * result.t)
     assert result.q[:, 0] == pytest.approx(exact, abs=1e-5 * sag)
 
@@ -103,17 +88,17 @@ def test_linear_oscillation_against_the_closed_form() -> None:
 @pytest.mark.parametrize(
     ("law", "depth_mm"),
     [
-        (ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s"), 0.0150671588506),
-        (ImpactLaw(1e8, 2.2, 150.0, 1e-4), 0.652221338485),
+        (sp.ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s"), 0.0150671588506),
+        (sp.ImpactLaw(1e8, 2.2, 150.0, 1e-4), 0.652221338485),
     ],
 )
-def test_resting_depth(law: ImpactLaw, depth_mm: float) -> None:
+def test_resting_depth(law: sp.ImpactLaw, depth_mm: float) -> None:
     """1 kg let go a little above its rest settles at (m g / k)^(1/e)."""
-    scene = on_plate(slider(), law, radius=RADIUS)
+    scene = models.on_plate(models.slider(), law, radius=RADIUS)
     q0 = np.array([RADIUS - 0.9 * depth_mm * MM])
     slow = depth_mm > 0.1
     dt, duration = (2e-5, 0.6) if slow else (1e-5, 0.15)
-    result = Simulation(scene, RungeKutta4(dt=dt)).run(q0, np.zeros(1), duration)
+    result = sp.Simulation(scene, sp.RungeKutta4(dt=dt)).run(q0, np.zeros(1), duration)
     assert (RADIUS - result.q[-1, 0]) / MM == pytest.approx(depth_mm, rel=1e-9)
     assert abs(result.v[-1, 0]) < 1e-10
     assert scene.contacts(result.q[-1], result.v[-1]).normal_force == pytest.approx(
@@ -126,10 +111,10 @@ def test_resting_depth(law: ImpactLaw, depth_mm: float) -> None:
 )
 def test_restitution_of_impact(speed_mm: float, restitution: float, deepest_mm: float) -> None:
     """1 kg against a fixed plane with ADAMS's defaults, no gravity."""
-    law = ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s")
-    scene = on_plate(slider(gravity=0.0), law, radius=RADIUS)
+    law = sp.ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s")
+    scene = models.on_plate(models.slider(gravity=0.0), law, radius=RADIUS)
     v0 = np.array([-speed_mm * MM])
-    result = Simulation(scene, RungeKutta4(dt=1e-6)).run(np.array([RADIUS + 1e-6]), v0, 4e-3)
+    result = sp.Simulation(scene, sp.RungeKutta4(dt=1e-6)).run(np.array([RADIUS + 1e-6]), v0, 4e-3)
     assert result.v[-1, 0] / (speed_mm * MM) == pytest.approx(restitution, abs=1e-4)
     deepest = result.stats.pairs["ball-plate"].max_depth
     assert deepest / MM == pytest.approx(deepest_mm, abs=1e-5)
@@ -137,11 +122,11 @@ def test_restitution_of_impact(speed_mm: float, restitution: float, deepest_mm: 
 
 @pytest.mark.parametrize("restitution", [0.3, 0.8])
 def test_restitution_of_hertz_with_hunt_crossley(restitution: float) -> None:
-    law = ImpactLaw.hertz(RADIUS, 1e8, 0.3, 1e8, 0.3, restitution=restitution, speed=0.5)
-    scene = on_plate(slider(gravity=0.0), law, radius=RADIUS)
+    law = sp.ImpactLaw.hertz(RADIUS, 1e8, 0.3, 1e8, 0.3, restitution=restitution, speed=0.5)
+    scene = models.on_plate(models.slider(gravity=0.0), law, radius=RADIUS)
     q0 = np.array([RADIUS + 1e-6])
     for speed in (0.5, 0.2):
-        result = Simulation(scene, RungeKutta4(dt=5e-6)).run(q0, np.array([-speed]), 0.06)
+        result = sp.Simulation(scene, sp.RungeKutta4(dt=5e-6)).run(q0, np.array([-speed]), 0.06)
         expected = hunt_crossley_restitution(speed, law.dissipation)
         assert result.v[-1, 0] / speed == pytest.approx(expected, abs=1e-5)
         if speed == 0.5:
@@ -150,24 +135,24 @@ def test_restitution_of_hertz_with_hunt_crossley(restitution: float) -> None:
 
 def test_turntable_ball_is_dragged_along() -> None:
     """A frictionless table leaves a resting ball at rest; friction drags it in the rim's sense."""
-    model = ball()
+    model = models.ball()
     index = model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "table_joint")
     model.appendBodyToJoint(index, pin.Inertia.FromSphere(5.0, 0.3), pin.SE3.Identity())
     model.addFrame(pin.Frame("table", index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     ends = {}
-    for name, friction in (("none", None), ("coulomb", CoulombFriction(0.3, 0.1, 0.1, 1.0))):
-        scene = Scene(model)
+    for name, friction in (("none", None), ("coulomb", sp.CoulombFriction(0.3, 0.1, 0.1, 1.0))):
+        scene = sp.Scene(model)
         scene.add_contact(
-            sphere=Sphere(RADIUS, frame="ball"),
-            shell=plate(),
+            sphere=sp.Sphere(RADIUS, frame="ball"),
+            shell=models.plate(),
             frame="table",
-            law=linear_law(4000.0, 20.0),
+            law=models.linear_law(4000.0, 20.0),
             friction=friction,
             method="facets",
         )
-        q0 = np.concatenate([free_q([0.2, 0.0, RADIUS - 9.81 / 4000.0]), [1.0, 0.0]])
+        q0 = np.concatenate([models.free_q([0.2, 0.0, RADIUS - 9.81 / 4000.0]), [1.0, 0.0]])
         v0 = np.concatenate([np.zeros(6), [2 * np.pi]])
-        ends[name] = Simulation(scene, RungeKutta4(dt=1e-4)).run(q0, v0, 0.05)
+        ends[name] = sp.Simulation(scene, sp.RungeKutta4(dt=1e-4)).run(q0, v0, 0.05)
     assert ends["none"].q[-1, :2] == pytest.approx([0.2, 0.0], abs=1e-12)
     assert ends["none"].v[-1, 6] == pytest.approx(2 * np.pi, rel=1e-12)
     assert ends["coulomb"].q[-1, 1] > 1e-4

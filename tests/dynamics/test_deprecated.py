@@ -32,11 +32,7 @@ def test_a_law_that_nobody_states() -> None:
 
 @pytest.mark.parametrize(
     ("former", "now"),
-    [
-        ("frame", "frame_j"),
-        ("sphere_placement", "placement_i"),
-        ("shell_placement", "placement_j"),
-    ],
+    [("frame", "frame_j"), ("sphere_placement", "placement_i"), ("shell_placement", "placement_j")],
 )
 def test_names_of_a_pair(former: str, now: str) -> None:
     pair = on_plate(ball(), LAW).pairs[0]

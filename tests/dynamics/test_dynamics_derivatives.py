@@ -14,9 +14,13 @@ from tests import differences, meshes, models
 from tests.contact.smooth.surfaces import SURFACES, shell_of
 from tests.dynamics.test_contact_derivatives import (
     ARM_V,
+    BRISTLES,
     FRICTIONS,
+    assert_rate_jacobian,
     bowl,
     free_ball,
+    left_out,
+    stretched,
     three_contacts,
     turned,
 )
@@ -69,7 +73,11 @@ def moving(law, friction) -> State:  # type: ignore[no-untyped-def]
 def assert_derivatives(
     scene: sp.Scene, q: Array, v: Array, *, tolerance: float = 1e-6, depth: float | None = None
 ) -> sp.DynamicsDerivatives:
-    """Every column against differences of ABA, relative to the column's largest entry."""
+    """Every column against differences of ABA, relative to the column's largest entry.
+
+    The contact forces F alone are differentiated by `contact_derivatives`: of F = rnea(q, v, a) -
+    tau that is exact algebra.
+    """
     model = scene.model
     tau = np.random.default_rng(1).normal(size=model.nv)
     names = differences.names_of(scene)
@@ -108,6 +116,16 @@ def assert_derivatives(
         )
     wrong = {name: error for name, error in errors.items() if not error <= tolerance}
     assert not wrong
+    supports = model.supports.tolist()
+    depth_first = all(model.parents[j] in supports[j - 1] for j in range(1, model.njoints))
+    if depth_first and not (scene.joints.kinds() or list(model.mimicking_joints)):
+        data = model.createData()
+        pin.computeRNEADerivatives(model, data, q, v, got.acceleration)
+        inertia = np.triu(data.M) + np.triu(data.M, 1).T
+        whole = data.dtau_dq + inertia @ got.by_q, data.dtau_dv + inertia @ got.by_v
+        size = max(np.abs(one).max() for one in (*whole, data.dtau_dq, data.dtau_dv))
+        for of_force, by in zip(scene.contact_derivatives(q, v), whole, strict=True):
+            np.testing.assert_allclose(of_force, by, rtol=0, atol=1e-10 * size)
     return got
 
 
@@ -129,18 +147,15 @@ def test_every_friction(make: Callable[..., State], friction: str) -> None:
 
 @pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
 def test_friction_on_the_ellipses_of_hertz(friction: str) -> None:
+    """Mindlin's disc follows the curvature of the shell, with its slopes."""
     law = sp.HertzLaw(1e5, 0.3, restitution=0.8, speed=1.0)
     for name in ("dome", "torus inside", "wavy above"):
-        scene = sp.Scene(models.ball(radius=1.0))
-        scene.add_contact(
-            sp.Sphere(1.0, "ball"),
-            shell_of(name, 0.6),
-            law=law,
-            friction=FRICTIONS[friction],
-            name="ball",
-        )
+        scene = free_ball(shell_of(name, 0.6), friction=friction, name="ball")
+        scene.replace_pair("ball", law=law)
         q = turned(free_q(SURFACES[name].probes(1, 0.04, seed=3)[0][0]), 1)
-        assert_derivatives(scene, q, 0.3 * np.random.default_rng(3).normal(size=6))
+        v = 0.3 * np.random.default_rng(3).normal(size=6)
+        assert_derivatives(scene, q, v)
+        assert_rate_jacobian(scene, q, v, stretched(scene, 1e-4), turning=1e-2)
 
 
 @pytest.mark.parametrize("method", ["smooth", "facets"])
@@ -171,18 +186,23 @@ def test_a_cluster_shown_as_one(friction: str, tolerance: float) -> None:
     """With friction it acts as one contact, right but for the square of the normals' angle."""
     shell = sp.Shell(*meshes.v_groove(np.radians(0.1), size=8.0, cells=2), crease_angle=1e-5)
     scene = free_ball(shell, friction=friction, name="ball")
+    found = shell.contacts(np.array([4e-4, 0.3, 0.97]), 1.0)
+    assert (found.weight.tolist(), found.terms.weight.tolist()) == ([1.0], [1.0, 1.0, -1.0])
     # What merges changes on the distance from the edge.
     q, v = free_q([4e-4, 0.3, 0.97]), np.full(6, 0.1)
     assert_derivatives(scene, q, v, depth=4e-4, tolerance=tolerance)
 
 
 @pytest.mark.parametrize("law", ["impact", "hertz, two materials"])
-@pytest.mark.parametrize("friction", ["coulomb", "mindlin"])
+@pytest.mark.parametrize("friction", FRICTIONS)
 def test_two_spheres(law: str, friction: str) -> None:
     scene = two_spheres(LAWS[law], FRICTIONS[friction])
     got = assert_derivatives(scene, *in_touch(3))
     assert "balls.other_sphere.offset.z" in got.parameters
     assert not [name for name in got.parameters if "placement" in name]
+    if law == "impact" and friction in BRISTLES:
+        z, turning = stretched(scene, 2e-6), left_out(friction, 1e-2)
+        assert_rate_jacobian(scene, *in_touch(4, spin=2.0), z, turning=turning)
 
 
 def test_two_pairs_that_touch_at_once() -> None:

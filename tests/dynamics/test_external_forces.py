@@ -9,13 +9,7 @@ import pytest
 from sphshell_pin import CoulombFriction, ImpactLaw, Scene, Shell, Sphere
 from tests import meshes
 from tests.models import JOINTS, add_body, ball, empty, free_q, on_plate
-from tests.oracle import laws
-from tests.oracle.mechanics import (
-    force_on_i,
-    generalised_force_by_virtual_work,
-    point_velocity,
-    world_motion,
-)
+from tests.oracle import laws, mechanics
 
 RADIUS, DEPTH = 0.08, 0.01
 K, E, C, D = 5e4, 1.5, 30.0, 2e-3
@@ -76,8 +70,8 @@ class Case:
         self.normal = rotation[:, 2]
         self.point = center - (RADIUS - DEPTH) * self.normal
         pose = pin.SE3(rotation, self.point - rotation @ np.append(rng.uniform(-0.1, 0.1, 2), 0.0))
-        self.motions = [world_motion(model, data, k) for k in (self.i, self.j)]
-        relative = [point_velocity(motion, self.point) for motion in self.motions]
+        self.motions = [mechanics.world_motion(model, data, k) for k in (self.i, self.j)]
+        relative = [mechanics.point_velocity(motion, self.point) for motion in self.motions]
         if self.normal @ (relative[0] - relative[1]) > 0:  # closing keeps the law off its clamp
             self.v = -self.v
             self.motions = [-motion for motion in self.motions]
@@ -92,7 +86,7 @@ class Case:
             friction=FRICTION,
             method="facets",
         )
-        self.force = force_on_i(
+        self.force = mechanics.force_on_i(
             self.point,
             self.normal,
             DEPTH,
@@ -136,7 +130,7 @@ def test_aba_with_external_forces(joint_i: str, joint_j: str, tree: str, seed: i
     scale = np.abs(expected).max() + np.linalg.norm(case.force)
     assert np.abs(got - expected).max() <= 1e-10 * scale
 
-    virtual = generalised_force_by_virtual_work(
+    virtual = mechanics.generalised_force_by_virtual_work(
         case.model, case.q, case.point, {case.i: case.force, case.j: -case.force}
     )
     assert virtual == pytest.approx(generalised, abs=1e-8 * np.linalg.norm(case.force))
@@ -151,7 +145,9 @@ def test_columns_of_contacts(joint_i: str, joint_j: str, tree: str, seed: int) -
     assert contacts.depth == pytest.approx([DEPTH], abs=1e-12)
     assert contacts.point_world == pytest.approx(case.point[None], abs=1e-12)
     assert contacts.normal_world == pytest.approx(case.normal[None], abs=1e-11)
-    slip = point_velocity(case.motions[0], case.point) - point_velocity(case.motions[1], case.point)
+    slip = mechanics.point_velocity(case.motions[0], case.point) - mechanics.point_velocity(
+        case.motions[1], case.point
+    )
     rate = slip @ case.normal
     assert contacts.slip_velocity_world[0] == pytest.approx(slip - rate * case.normal, abs=1e-10)
     assert contacts.normal_force == pytest.approx([normal_force(DEPTH, rate)], rel=1e-10)

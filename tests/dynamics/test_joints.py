@@ -10,23 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin import (
-    Adaptive,
-    BristleFriction,
-    HuntCrossleyLaw,
-    ImpactLaw,
-    Implicit,
-    JointComponents,
-    JointFriction,
-    JointLimits,
-    JointPD,
-    Result,
-    RungeKutta4,
-    Scene,
-    SemiImplicitEuler,
-    Simulation,
-    Sphere,
-)
+import sphshell_pin as sp
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario.format.build import build
@@ -57,18 +41,20 @@ def joint_of(model: pin.Model) -> str:
     return str(model.names[1])
 
 
-def residual(result: Result) -> float:
+def residual(result: sp.Result) -> float:
     return float(np.abs(result.energy.residual).max() / result.energy.exchanged)
 
 
-def stops(law: ImpactLaw | HuntCrossleyLaw, upper: float = 0.5) -> JointComponents:
-    return JointComponents(limits={"hinge": JointLimits(-1.0, upper, law)})
+def stops(law: sp.ImpactLaw | sp.HuntCrossleyLaw, upper: float = 0.5) -> sp.JointComponents:
+    return sp.JointComponents(limits={"hinge": sp.JointLimits(-1.0, upper, law)})
 
 
-@pytest.mark.parametrize("integrator", [Adaptive(1e-9, 1e-11), Implicit(1e-9, 1e-11)])
-def test_a_link_bounces_off_its_stop_as_the_closed_form(integrator: Adaptive | Implicit) -> None:
-    scene = Scene(link(), joints=stops(ImpactLaw(STIFFNESS, 1.0)))
-    result = Simulation(scene, integrator).run([0.0], [2.0], 1.0)
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-9, 1e-11), sp.Implicit(1e-9, 1e-11)])
+def test_a_link_bounces_off_its_stop_as_the_closed_form(
+    integrator: sp.Adaptive | sp.Implicit,
+) -> None:
+    scene = sp.Scene(link(), joints=stops(sp.ImpactLaw(STIFFNESS, 1.0)))
+    result = sp.Simulation(scene, integrator).run([0.0], [2.0], 1.0)
     rate = math.sqrt(STIFFNESS / INERTIA)
     off = 0.25 + math.pi / rate
     touch, lift_off = result.events
@@ -84,34 +70,36 @@ def test_a_link_bounces_off_its_stop_as_the_closed_form(integrator: Adaptive | I
 
 
 def test_the_lower_stop_is_the_mirror_image() -> None:
-    law = HuntCrossleyLaw(STIFFNESS, 1.5, 0.3)
-    joints = JointComponents(limits={"hinge": JointLimits(-0.5, 0.5, law)})
+    law = sp.HuntCrossleyLaw(STIFFNESS, 1.5, 0.3)
+    joints = sp.JointComponents(limits={"hinge": sp.JointLimits(-0.5, 0.5, law)})
     up, down = (
-        Simulation(Scene(link(), joints=joints), RungeKutta4(1e-3)).run([0.0], [v], 0.5)
+        sp.Simulation(sp.Scene(link(), joints=joints), sp.RungeKutta4(1e-3)).run([0.0], [v], 0.5)
         for v in (2.0, -2.0)
     )
     np.testing.assert_array_equal(up.q, -down.q)
 
 
 def test_a_damped_stop_throws_back_at_its_restitution() -> None:
-    law = HuntCrossleyLaw.with_restitution(STIFFNESS, 1.0, 0.6, 2.0)
-    for integrator in (Adaptive(1e-9, 1e-11), Implicit(1e-8, 1e-10)):
-        result = Simulation(Scene(link(), joints=stops(law)), integrator).run([0.0], [2.0], 0.6)
+    law = sp.HuntCrossleyLaw.with_restitution(STIFFNESS, 1.0, 0.6, 2.0)
+    for integrator in (sp.Adaptive(1e-9, 1e-11), sp.Implicit(1e-8, 1e-10)):
+        result = sp.Simulation(sp.Scene(link(), joints=stops(law)), integrator).run(
+            [0.0], [2.0], 0.6
+        )
         assert result.v[-1, 0] == pytest.approx(-1.2, abs=1e-6)
         assert residual(result) < 1e-7
 
 
 def test_fixed_steps_bounce_too() -> None:
-    scene = Scene(link(), joints=stops(ImpactLaw(STIFFNESS, 1.0)))
-    for integrator, error in ((SemiImplicitEuler(1e-4), 0.02), (RungeKutta4(1e-4), 1e-3)):
-        result = Simulation(scene, integrator).run([0.0], [2.0], 0.5)
+    scene = sp.Scene(link(), joints=stops(sp.ImpactLaw(STIFFNESS, 1.0)))
+    for integrator, error in ((sp.SemiImplicitEuler(1e-4), 0.02), (sp.RungeKutta4(1e-4), 1e-3)):
+        result = sp.Simulation(scene, integrator).run([0.0], [2.0], 0.5)
         assert result.v[-1, 0] == pytest.approx(-2.0, rel=error)
 
 
 def test_damping_and_armature_decay_as_the_closed_form() -> None:
-    joints = JointComponents(damping={"hinge": 0.3}, armature={"hinge": 0.05})
-    scene = Scene(link(), joints=joints)
-    result = Simulation(scene, Adaptive(1e-11, 1e-13)).run([0.0], [1.0], 2.0)
+    joints = sp.JointComponents(damping={"hinge": 0.3}, armature={"hinge": 0.05})
+    scene = sp.Scene(link(), joints=joints)
+    result = sp.Simulation(scene, sp.Adaptive(1e-11, 1e-13)).run([0.0], [1.0], 2.0)
     expected = np.exp(-0.3 / (INERTIA + 0.05) * result.t)
     np.testing.assert_allclose(result.v[:, 0], expected, rtol=1e-8)
     lost = 0.5 * (INERTIA + 0.05) * (1.0 - expected[-1] ** 2)
@@ -119,27 +107,27 @@ def test_damping_and_armature_decay_as_the_closed_form() -> None:
 
 
 @pytest.mark.parametrize(
-    "integrator", [Adaptive(1e-6, 1e-8), Implicit(1e-6, 1e-8), SemiImplicitEuler(1e-3)]
+    "integrator", [sp.Adaptive(1e-6, 1e-8), sp.Implicit(1e-6, 1e-8), sp.SemiImplicitEuler(1e-3)]
 )
 def test_dry_friction_holds_99_percent_for_a_minute_without_creep(
-    integrator: Adaptive | Implicit | SemiImplicitEuler,
+    integrator: sp.Adaptive | sp.Implicit | sp.SemiImplicitEuler,
 ) -> None:
     model = slider()
     weight = 2.0 * 9.81
-    friction = JointFriction(weight / 0.99)
-    scene = Scene(model, joints=JointComponents(friction={joint_of(model): friction}))
-    result = Simulation(scene, integrator).run([1.0], None, 60.0, record_dt=1.0)
+    friction = sp.JointFriction(weight / 0.99)
+    scene = sp.Scene(model, joints=sp.JointComponents(friction={joint_of(model): friction}))
+    result = sp.Simulation(scene, integrator).run([1.0], None, 60.0, record_dt=1.0)
     # The load comes on at once, and the spring gives way by a part of a millimeter.
     assert result.q[1, 0] == pytest.approx(1.0, abs=2e-3)
     assert np.ptp(result.q[1:, 0]) < 1e-10
 
 
-@pytest.mark.parametrize("integrator", [Adaptive(1e-8, 1e-10), Implicit(1e-8, 1e-10)])
-def test_dry_friction_slides_at_101_percent(integrator: Adaptive | Implicit) -> None:
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)])
+def test_dry_friction_slides_at_101_percent(integrator: sp.Adaptive | sp.Implicit) -> None:
     model = slider()
     weight = 2.0 * 9.81
-    joints = JointComponents(friction={joint_of(model): JointFriction(weight / 1.01)})
-    result = Simulation(Scene(model, joints=joints), integrator).run([1.0], None, 1.0)
+    joints = sp.JointComponents(friction={joint_of(model): sp.JointFriction(weight / 1.01)})
+    result = sp.Simulation(sp.Scene(model, joints=joints), integrator).run([1.0], None, 1.0)
     # All of the limit acts once the spring has given way.
     acceleration = np.diff(result.v[-2:, 0]) / np.diff(result.t[-2:])
     assert acceleration[0] == pytest.approx(-9.81 * (1 - 1 / 1.01), rel=1e-6)
@@ -147,8 +135,8 @@ def test_dry_friction_slides_at_101_percent(integrator: Adaptive | Implicit) -> 
 
 
 def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
-    joints = JointComponents(friction={"hinge": JointFriction(0.3)})
-    result = Simulation(Scene(link(9.81), joints=joints), Adaptive(1e-8, 1e-10)).run(
+    joints = sp.JointComponents(friction={"hinge": sp.JointFriction(0.3)})
+    result = sp.Simulation(sp.Scene(link(9.81), joints=joints), sp.Adaptive(1e-8, 1e-10)).run(
         [0.8], None, 6.0
     )
     # Three half swings of a pendulum lose four fifths of its height.
@@ -159,15 +147,17 @@ def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
 
 
 def test_torques_are_cut_at_the_effort_limit_and_the_result_says_when() -> None:
-    joints = JointComponents(effort={"hinge": 5.0}, speed={"hinge": 3.0})
-    scene = Scene(link(), joints=joints)
+    joints = sp.JointComponents(effort={"hinge": 5.0}, speed={"hinge": 3.0})
+    scene = sp.Scene(link(), joints=joints)
     asked: list[float] = []
 
     def push(t: float, *_: object) -> list[float]:
         asked.append(20.0 * (1 - t))
         return asked[-1:]
 
-    result = Simulation(scene, RungeKutta4(1e-3)).run([0.0], [0.0], 0.9, push, control_dt=0.01)
+    result = sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(
+        [0.0], [0.0], 0.9, push, control_dt=0.01
+    )
     # 5 N m until t = 0.75, then what is asked for, held over 0.01 s.
     speed = 5.0 * 0.75 / INERTIA
     assert result.v[750, 0] == pytest.approx(speed, rel=1e-9)
@@ -184,29 +174,31 @@ def test_events_of_limits_name_the_joint_that_met_them() -> None:
     model = pin.buildSampleModelManipulator()
     model.gravity.setZero()
     for name in list(model.names)[1:]:
-        joints = JointComponents(effort={name: 1.0}, speed={name: 0.05})
+        joints = sp.JointComponents(effort={name: 1.0}, speed={name: 0.05})
         column = model.joints[model.getJointId(name)].idx_v
         torque = np.where(np.arange(model.nv) == column, 1.5, 0.0)
-        run = Simulation(Scene(model, joints=joints), RungeKutta4(1e-3))
+        run = sp.Simulation(sp.Scene(model, joints=joints), sp.RungeKutta4(1e-3))
         result = run.run(pin.neutral(model), None, 0.5, lambda *_, torque=torque: torque)
         assert {event.kind for event in result.events} == {"effort_limit", "speed_limit"}
         assert {event.pair for event in result.events} == {name}
 
 
 def test_efforts_may_differ_by_direction() -> None:
-    scene = Scene(link(), joints=JointComponents(effort={"hinge": (-2.0, 5.0)}))
+    scene = sp.Scene(link(), joints=sp.JointComponents(effort={"hinge": (-2.0, 5.0)}))
     for asked, got in ((10.0, 5.0), (-10.0, -2.0), (1.0, 1.0)):
-        result = Simulation(scene, RungeKutta4(1e-3)).run(
+        result = sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(
             [0.0], [0.0], 0.1, lambda *_, asked=asked: [asked], control_dt=0.1
         )
         assert result.v[-1, 0] == pytest.approx(0.1 * got / INERTIA, rel=1e-9)
 
 
 def test_a_controller_at_its_effort_limit_keeps_the_energy_residual() -> None:
-    controller = JointPD(50.0, 5.0, [1.0])
-    free = Simulation(Scene(link(9.81)), Adaptive(1e-8, 1e-10)).run([0.0], None, 1.0, controller)
-    joints = JointComponents(effort={"hinge": 5.0})
-    cut = Simulation(Scene(link(9.81), joints=joints), Adaptive(1e-8, 1e-10)).run(
+    controller = sp.JointPD(50.0, 5.0, [1.0])
+    free = sp.Simulation(sp.Scene(link(9.81)), sp.Adaptive(1e-8, 1e-10)).run(
+        [0.0], None, 1.0, controller
+    )
+    joints = sp.JointComponents(effort={"hinge": 5.0})
+    cut = sp.Simulation(sp.Scene(link(9.81), joints=joints), sp.Adaptive(1e-8, 1e-10)).run(
         [0.0], None, 1.0, controller
     )
     assert cut.stats.joints["hinge"].cut_time > 0.05
@@ -214,15 +206,15 @@ def test_a_controller_at_its_effort_limit_keeps_the_energy_residual() -> None:
     assert residual(cut) < 1e-7
 
 
-def everything() -> Scene:
+def everything() -> sp.Scene:
     model = link(9.81)
-    joints = JointComponents(
-        limits={"hinge": JointLimits(-0.2, 0.2, HuntCrossleyLaw(80.0, 1.3, 0.4))},
+    joints = sp.JointComponents(
+        limits={"hinge": sp.JointLimits(-0.2, 0.2, sp.HuntCrossleyLaw(80.0, 1.3, 0.4))},
         damping={"hinge": 0.2},
-        friction={"hinge": JointFriction(0.5, stiffness=30.0, damping=0.4)},
+        friction={"hinge": sp.JointFriction(0.5, stiffness=30.0, damping=0.4)},
         armature={"hinge": 0.03},
     )
-    return Scene(model, joints=joints)
+    return sp.Scene(model, joints=joints)
 
 
 @pytest.mark.parametrize(
@@ -255,7 +247,7 @@ def test_your_own_loop_makes_the_same_motion() -> None:
     data = model.createData()
     q, v = np.array([0.1]), np.array([1.5])
     state = scene.state(q, v)
-    expected = Simulation(scene, SemiImplicitEuler(dt)).run(q, v, 0.2)
+    expected = sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(q, v, 0.2)
     for _ in range(2000):
         tau = scene.joint_forces(q, v, state=state)
         v = v + dt * pin.aba(model, data, q, v, tau)
@@ -267,48 +259,50 @@ def test_your_own_loop_makes_the_same_motion() -> None:
 
 def test_springs_of_joints_and_bristles_of_contacts_live_side_by_side() -> None:
     """Contacts that come and go reorder the state that both share."""
-    dry = JointComponents(
-        friction={"one_joint": JointFriction(0.4), "two_joint": JointFriction(0.2)}
+    dry = sp.JointComponents(
+        friction={"one_joint": sp.JointFriction(0.4), "two_joint": sp.JointFriction(0.2)}
     )
-    scene = Scene(models.arm(), joints=dry)
+    scene = sp.Scene(models.arm(), joints=dry)
     scene.add_contact(
-        Sphere(0.05, frame="ball"),
+        sp.Sphere(0.05, frame="ball"),
         models.plate(),
-        law=HuntCrossleyLaw(1e6, 1.5, 0.2),
-        friction=BristleFriction(0.5, 0.4, 1e4, 1.0, 1e-2),
+        law=sp.HuntCrossleyLaw(1e6, 1.5, 0.2),
+        friction=sp.BristleFriction(0.5, 0.4, 1e4, 1.0, 1e-2),
     )
-    for integrator in (Adaptive(1e-7, 1e-9), Implicit(1e-7, 1e-9)):
-        result = Simulation(scene, integrator).run(models.ARM_Q, [1.0, 0.0, 0.0], 1.0)
+    for integrator in (sp.Adaptive(1e-7, 1e-9), sp.Implicit(1e-7, 1e-9)):
+        result = sp.Simulation(scene, integrator).run(models.ARM_Q, [1.0, 0.0, 0.0], 1.0)
         assert next(iter(result.stats.pairs.values())).touches > 1
         assert residual(result) < 1e-5
         assert result.v[-1, 0] == pytest.approx(0.0, abs=1e-9)  # it sticks
 
 
 def test_a_model_states_its_joints() -> None:
-    joints = JointComponents.from_model(link())
+    joints = sp.JointComponents.from_model(link())
     limits = joints.limits["hinge"]
     assert (limits.lower, limits.upper) == (-1.0, 1.2)
     assert joints.damping == {"hinge": 0.7}
-    assert joints.friction == {"hinge": JointFriction(0.3)}
+    assert joints.friction == {"hinge": sp.JointFriction(0.3)}
     assert joints.effort == {"hinge": 5.0}
     assert joints.speed == {"hinge": 3.0}
     # At its highest speed the joint goes 0.01 rad into the stop, or less if its motor is strong.
     energy = 0.5 * INERTIA * 3.0**2
     assert limits.law.depth_of(energy) <= 0.01 * (1 + 1e-9)
-    assert JointComponents.from_model(link(), ["damping"]).kinds() == ("damping",)
+    assert sp.JointComponents.from_model(link(), ["damping"]).kinds() == ("damping",)
     with pytest.raises(NameNotFound, match=r"'drag'.*damping"):
-        JointComponents.from_model(link(), ["drag"])
+        sp.JointComponents.from_model(link(), ["drag"])
 
 
 def test_zeros_and_missing_limits_are_not_stated() -> None:
     text = URDF.replace('effort="5" velocity="3"', 'effort="0" velocity="0"')
     text = text.replace('lower="-1" upper="1.2"', 'lower="0" upper="0"')
     text = text.replace('damping="0.7" friction="0.3"', 'damping="0" friction="0"')
-    assert not JointComponents.from_model(pin.buildModelFromXML(text)).kinds()
+    assert not sp.JointComponents.from_model(pin.buildModelFromXML(text)).kinds()
 
 
 def test_explain_lists_what_is_modelled_and_what_is_left_out() -> None:
-    text = str(Scene(link(), joints=JointComponents.from_model(link(), ["damping"])).explain())
+    text = str(
+        sp.Scene(link(), joints=sp.JointComponents.from_model(link(), ["damping"])).explain()
+    )
     modelled, absent = text.split("Not modeled:")
     assert "damping of 'hinge'" in modelled
     assert "position limits that the robot's file states, of 'hinge'" in absent
@@ -316,27 +310,29 @@ def test_explain_lists_what_is_modelled_and_what_is_left_out() -> None:
 
 
 def test_an_open_run_takes_over_new_numbers_of_joints() -> None:
-    scenes = [Scene(link(), joints=JointComponents(damping={"hinge": c})) for c in (0.0, 2.0)]
-    run = OpenRun(Simulation(scenes[0], Adaptive(1e-8)), [0.0], [1.0], record_dt=0.01)
+    scenes = [sp.Scene(link(), joints=sp.JointComponents(damping={"hinge": c})) for c in (0.0, 2.0)]
+    run = OpenRun(sp.Simulation(scenes[0], sp.Adaptive(1e-8)), [0.0], [1.0], record_dt=0.01)
     run.advance(0.1)
     assert run.change(scenes[1])
     after = run.advance(0.2)
     assert after.v[-1, 0] == pytest.approx(math.exp(-2.0 * 0.2 / INERTIA), rel=1e-4)
-    assert not run.change(Scene(link()))
+    assert not run.change(sp.Scene(link()))
 
 
 def test_results_with_joints_are_saved_and_loaded(tmp_path: Path) -> None:
-    scene = Scene(link(), joints=stops(ImpactLaw(STIFFNESS, 1.0)))
-    result = Simulation(scene, Adaptive(1e-6)).run([0.0], [2.0], 0.5)
-    loaded = Result.load(result.save(tmp_path / "run.npz"))
+    scene = sp.Scene(link(), joints=stops(sp.ImpactLaw(STIFFNESS, 1.0)))
+    result = sp.Simulation(scene, sp.Adaptive(1e-6)).run([0.0], [2.0], 0.5)
+    loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
     assert loaded.stats.joints == result.stats.joints
     assert loaded.events == result.events
-    again = Simulation(pickle.loads(pickle.dumps(scene)), Adaptive(1e-6)).run([0.0], [2.0], 0.5)
+    again = sp.Simulation(pickle.loads(pickle.dumps(scene)), sp.Adaptive(1e-6)).run(
+        [0.0], [2.0], 0.5
+    )
     np.testing.assert_array_equal(again.q, result.q)
 
 
 def test_a_rollout_makes_the_same_runs() -> None:
-    simulation = Simulation(everything(), Adaptive(1e-7))
+    simulation = sp.Simulation(everything(), sp.Adaptive(1e-7))
     alone = simulation.run([0.1], [2.0], 0.3)
     (one, other) = simulation.rollout([[0.1]] * 2, [[2.0]] * 2, 0.3, threads=2)
     np.testing.assert_array_equal(one.q[-1], alone.q[-1])
@@ -358,16 +354,16 @@ def test_wrong_components_are_refused(
     joints: dict[str, object], error: type[Exception], words: str
 ) -> None:
     with pytest.raises(error, match=words):
-        Scene(link(), joints=JointComponents(**joints))  # type: ignore[arg-type]
+        sp.Scene(link(), joints=sp.JointComponents(**joints))  # type: ignore[arg-type]
 
 
 def test_ranges_belong_to_angles_and_lengths() -> None:
     model = models.ball()
-    limits = JointLimits(-1.0, 1.0, ImpactLaw(1.0, 1.0))
+    limits = sp.JointLimits(-1.0, 1.0, sp.ImpactLaw(1.0, 1.0))
     with pytest.raises(InvalidParameter, match="is a joint without a range"):
-        Scene(model, joints=JointComponents(limits={joint_of(model): limits}))
+        sp.Scene(model, joints=sp.JointComponents(limits={joint_of(model): limits}))
     with pytest.raises(InvalidParameter, match="lower below upper"):
-        JointLimits(1.0, 1.0, ImpactLaw(1.0, 1.0))
+        sp.JointLimits(1.0, 1.0, sp.ImpactLaw(1.0, 1.0))
 
 
 def test_a_scenario_states_joints(tmp_path: Path) -> None:
@@ -398,7 +394,7 @@ key = "joint.hinge.friction"
     assert joints.damping == {"hinge": 0.05}
     limits = joints.limits["hinge"]
     assert (limits.lower, limits.upper) == (-1.0, 0.3)
-    assert limits.law == HuntCrossleyLaw(400.0, 1.0)
+    assert limits.law == sp.HuntCrossleyLaw(400.0, 1.0)
     result = built.simulation.run(built.q0, built.v0, 1.0, built.controller)
     assert result.stats.joints["hinge"].stops >= 1
     assert residual(result) < 1e-4

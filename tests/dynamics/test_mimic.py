@@ -7,19 +7,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from sphshell_pin import (
-    Adaptive,
-    BristleFriction,
-    CoulombFriction,
-    HuntCrossleyLaw,
-    Implicit,
-    JointComponents,
-    JointPD,
-    Scene,
-    Shell,
-    Simulation,
-    Sphere,
-)
+import sphshell_pin as sp
 from tests import meshes
 
 Array = NDArray[np.float64]
@@ -79,15 +67,15 @@ def reduction(model: pin.Model, full: pin.Model) -> tuple[Array, Array]:
     return matrix, offset
 
 
-def with_contact(model: pin.Model, tip: str, other: str) -> Scene:
+def with_contact(model: pin.Model, tip: str, other: str) -> sp.Scene:
     """A sphere on one finger against a shell on the other, which always touch."""
-    scene = Scene(model)
+    scene = sp.Scene(model)
     scene.add_contact(
-        Sphere(0.5, frame=tip, offset=(0.02, 0.01, 0.03)),
-        Shell(*meshes.grid_plate(4, 4, 2.0)),
+        sp.Sphere(0.5, frame=tip, offset=(0.02, 0.01, 0.03)),
+        sp.Shell(*meshes.grid_plate(4, 4, 2.0)),
         frame=other,
-        law=HuntCrossleyLaw(1e4, 1.5, 0.3),
-        friction=BristleFriction(0.5, 0.4, 1e4, 1.0, 1e-2),
+        law=sp.HuntCrossleyLaw(1e4, 1.5, 0.3),
+        friction=sp.BristleFriction(0.5, 0.4, 1e4, 1.0, 1e-2),
     )
     return scene
 
@@ -153,7 +141,7 @@ def test_derivatives_agree_with_differences(name: str) -> None:
 def test_derivatives_without_contact_are_exact(name: str) -> None:
     """Against differences of order 4; the acceleration is quadratic in v and linear in tau."""
     model, _ = CASES[name][0]()
-    scene, random, h = Scene(model), np.random.default_rng(6), 3e-4
+    scene, random, h = sp.Scene(model), np.random.default_rng(6), 3e-4
     for _ in range(3):
         q = random.uniform(-0.3, 0.3, model.nq)
         v, tau = random.standard_normal(model.nv), random.standard_normal(model.nv)
@@ -171,23 +159,25 @@ def test_derivatives_without_contact_are_exact(name: str) -> None:
                 np.testing.assert_allclose(derivative[:, k], slope, rtol=0, atol=1e-9 * scale)
 
 
-@pytest.mark.parametrize("integrator", [Adaptive(1e-8, 1e-10), Implicit(1e-7, 1e-9)])
-def test_a_closing_grasp_keeps_its_energy(integrator: Adaptive | Implicit) -> None:
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-7, 1e-9)])
+def test_a_closing_grasp_keeps_its_energy(integrator: sp.Adaptive | sp.Implicit) -> None:
     model, full = gripper()
-    scene = Scene(model)
-    box = Shell(*meshes.cube(0.02))
+    scene = sp.Scene(model)
+    box = sp.Shell(*meshes.cube(0.02))
     # The right finger, of the smaller ratio, reaches less far.
     for side, radius in (("left", 0.006), ("right", 0.0095)):
         scene.add_contact(
-            Sphere(radius, frame=f"{side}_pad", offset=(0.0, 0.0, 0.02)),
+            sp.Sphere(radius, frame=f"{side}_pad", offset=(0.0, 0.0, 0.02)),
             box,
             placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.078])),
-            law=HuntCrossleyLaw(1e6, 1.5, 0.5),
-            friction=CoulombFriction(0.5, 0.4, 0.01, 0.1),
+            law=sp.HuntCrossleyLaw(1e6, 1.5, 0.5),
+            friction=sp.CoulombFriction(0.5, 0.4, 0.01, 0.1),
             name=side,
         )
-    control = JointPD({"left_knuckle_joint": 2.0, "lift": 500.0}, 0.02, {"left_knuckle_joint": 0.9})
-    result = Simulation(scene, integrator).run(np.zeros(model.nq), None, 0.5, control)
+    control = sp.JointPD(
+        {"left_knuckle_joint": 2.0, "lift": 500.0}, 0.02, {"left_knuckle_joint": 0.9}
+    )
+    result = sp.Simulation(scene, integrator).run(np.zeros(model.nq), None, 0.5, control)
     figures = result.stats.pairs
     assert figures["left"].touches
     assert figures["right"].touches
@@ -203,11 +193,11 @@ def test_a_closing_grasp_keeps_its_energy(integrator: Adaptive | Implicit) -> No
 
 def test_joint_components_act_on_the_joint_that_is_mimicked() -> None:
     model, _ = gripper()
-    joints = JointComponents.from_model(model)
+    joints = sp.JointComponents.from_model(model)
     assert set(joints.limits) == {"lift", "left_knuckle_joint"}
-    scene = Scene(model, joints=joints)
-    result = Simulation(scene, Adaptive(1e-7)).run(
-        np.zeros(2), [0.0, 8.0], 1.0, JointPD({"lift": 500.0}, {"lift": 1.0})
+    scene = sp.Scene(model, joints=joints)
+    result = sp.Simulation(scene, sp.Adaptive(1e-7)).run(
+        np.zeros(2), [0.0, 8.0], 1.0, sp.JointPD({"lift": 500.0}, {"lift": 1.0})
     )
     assert result.stats.joints["left_knuckle_joint"].stops
     assert np.abs(result.energy.residual).max() < 1e-5 * result.energy.exchanged

@@ -17,15 +17,7 @@ import pytest
 import trimesh
 
 import sphshell_pin as sp
-from sphshell_pin.errors import (
-    DeepStart,
-    InvalidParameter,
-    NameNotFound,
-    RolloutInterrupted,
-    RunFailed,
-    SimulationDiverged,
-    WeakLawWarning,
-)
+from sphshell_pin import errors
 from tests import models
 
 G = 9.81
@@ -186,13 +178,13 @@ def test_a_failed_run_is_noted_and_the_rest_kept() -> None:
     simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
     rollout = simulation.rollout([[0.5], [1.5], [2.5], [0.01], [0.6]], None, 0.1, controller=touchy)
     assert list(rollout.failures) == [1, 2, 3]
-    assert isinstance(rollout.failures[1], SimulationDiverged)
+    assert isinstance(rollout.failures[1], errors.SimulationDiverged)
     assert rollout.failures[1].t == rollout.t[1] < 0.1
     broken = rollout.failures[2]
-    assert isinstance(broken, RunFailed)
+    assert isinstance(broken, errors.RunFailed)
     assert "ValueError: too high for me" in str(broken)
-    assert isinstance(rollout.failures[3], DeepStart)
-    with pytest.raises(DeepStart):
+    assert isinstance(rollout.failures[3], errors.DeepStart)
+    with pytest.raises(errors.DeepStart):
         rollout[3]
     for run, height in ((0, 0.5), (4, 0.6)):
         assert rollout.q[run, 0] == pytest.approx(height - 0.5 * G * 0.1 * (0.1 + 1e-3))
@@ -208,7 +200,7 @@ def test_controllers_are_checked_before_anything_runs() -> None:
 
     simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
     controllers = [ask] * 199 + [sp.JointPD(-1.0, 1.0)]
-    with pytest.raises(InvalidParameter, match="controller of run 199"):
+    with pytest.raises(errors.InvalidParameter, match="controller of run 199"):
         simulation.rollout(np.full((200, 1), 0.1), None, 0.01, threads=1, controller=controllers)
     assert not asked
 
@@ -275,34 +267,34 @@ def test_deep_starts_in_a_solid_are_seen_as_run_sees_them() -> None:
     rollout = simulation.rollout(q0s, None, 1e-3)
     assert list(rollout.failures) == [2, 3]
     for run in (2, 3):
-        with pytest.raises(DeepStart, match=re.escape(str(rollout.failures[run]))):
+        with pytest.raises(errors.DeepStart, match=re.escape(str(rollout.failures[run]))):
             simulation.run(q0s[run], None, 1e-3)
 
 
 def test_a_law_too_weak_is_told_once() -> None:
     simulation = sp.Simulation(slider_scene(models.LAW), sp.Adaptive())
     laws = [sp.ImpactLaw(k, 1.0) for k in (1e6, 1e2, 1e2)]
-    with pytest.warns(WeakLawWarning, match="in 2 of 3 runs, the first of them run 1"):
+    with pytest.warns(errors.WeakLawWarning, match="in 2 of 3 runs, the first of them run 1"):
         simulation.rollout([R + 0.01], [-5.0], 0.05, vary={f"{PAIR}.law": laws})
 
 
 @pytest.mark.parametrize(
     ("vary", "fault", "sentence"),
     [
-        ({"tip.law.stifness": [1.0] * 3}, NameNotFound, "tip.law.stiffness"),
-        ({"top.law": [None] * 3}, NameNotFound, "tip.law"),
-        ({"tip.law.stiffness": [1e5, -1.0, 1e5]}, InvalidParameter, "of run 1"),
-        ({"tip.law.stiffness": [1e5, 1e6]}, InvalidParameter, "(3,)"),
-        ({"tip.law.stiffness": ["a", "b", "c"]}, InvalidParameter, "3 numbers"),
-        ({"tip.sphere.offset": [0.0, 0.0, 0.0]}, InvalidParameter, "(3, 3)"),
-        ({"tip.placement": [np.eye(4)] * 3}, InvalidParameter, "pinocchio.SE3"),
-        ({"tip.law": 3}, InvalidParameter, "list of 3 values"),
-        ({"tip.law": [3, 3, 3]}, InvalidParameter, "is FunctionLaw(function)"),
-        ({"tip.law": {1: 2, 3: 4, 5: 6}}, InvalidParameter, "list of 3 values"),
-        ({"tip.law.stiffness": np.array(1e5)}, InvalidParameter, "(3,)"),
-        ({"tip.law.stiffness": [10**400] * 3}, InvalidParameter, "3 numbers"),
-        ({3: [1.0] * 3}, InvalidParameter, "map names to n values"),
-        ("tip.law", InvalidParameter, "map names to n values"),
+        ({"tip.law.stifness": [1.0] * 3}, errors.NameNotFound, "tip.law.stiffness"),
+        ({"top.law": [None] * 3}, errors.NameNotFound, "tip.law"),
+        ({"tip.law.stiffness": [1e5, -1.0, 1e5]}, errors.InvalidParameter, "of run 1"),
+        ({"tip.law.stiffness": [1e5, 1e6]}, errors.InvalidParameter, "(3,)"),
+        ({"tip.law.stiffness": ["a", "b", "c"]}, errors.InvalidParameter, "3 numbers"),
+        ({"tip.sphere.offset": [0.0, 0.0, 0.0]}, errors.InvalidParameter, "(3, 3)"),
+        ({"tip.placement": [np.eye(4)] * 3}, errors.InvalidParameter, "pinocchio.SE3"),
+        ({"tip.law": 3}, errors.InvalidParameter, "list of 3 values"),
+        ({"tip.law": [3, 3, 3]}, errors.InvalidParameter, "is FunctionLaw(function)"),
+        ({"tip.law": {1: 2, 3: 4, 5: 6}}, errors.InvalidParameter, "list of 3 values"),
+        ({"tip.law.stiffness": np.array(1e5)}, errors.InvalidParameter, "(3,)"),
+        ({"tip.law.stiffness": [10**400] * 3}, errors.InvalidParameter, "3 numbers"),
+        ({3: [1.0] * 3}, errors.InvalidParameter, "map names to n values"),
+        ("tip.law", errors.InvalidParameter, "map names to n values"),
     ],
 )
 def test_wrong_variations_say_what_and_where(vary, fault, sentence) -> None:
@@ -329,7 +321,7 @@ def test_wrong_variations_say_what_and_where(vary, fault, sentence) -> None:
     ],
 )
 def test_wrong_starts_say_what_and_where(q0s, v0s, more, sentence) -> None:
-    with pytest.raises(InvalidParameter) as caught:
+    with pytest.raises(errors.InvalidParameter) as caught:
         sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s, v0s, **{"duration": 0.1, **more})
     assert sentence in str(caught.value)
 
@@ -364,7 +356,7 @@ def test_ctrl_c_keeps_what_is_done() -> None:
             os.kill(os.getpid(), signal.SIGINT)
 
     pressed: list[float] = []
-    with pytest.raises(RolloutInterrupted) as caught:
+    with pytest.raises(errors.RolloutInterrupted) as caught:
         simulation.rollout(q0s, v0s, 0.2, threads=2, progress=interrupt)
     rollout = caught.value.rollout
     done = [run for run in range(400) if run not in rollout.failures]

@@ -14,56 +14,26 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin import (
-    GravityCompensation,
-    JointPD,
-    Result,
-    RungeKutta4,
-    Scene,
-    SemiImplicitEuler,
-    Simulation,
-    Sphere,
-)
+import sphshell_pin as sp
+from sphshell_pin import errors
 from sphshell_pin.dynamics.result.result_parts import Event, Kept, Origin
-from sphshell_pin.errors import (
-    DeepStart,
-    FrameNotFound,
-    InvalidParameter,
-    MissingExtra,
-    NameNotFound,
-    ResultError,
-    SimulationDiverged,
-)
-from tests.models import (
-    ARM_Q,
-    FRICTION,
-    LAW,
-    add_body,
-    arm,
-    ball,
-    empty,
-    free_q,
-    linear_law,
-    on_plate,
-    plate,
-    slider,
-)
+from tests import models
 
 RADIUS = 0.05
-START = free_q([0.1, -0.05, RADIUS + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20.0, 5.0])
+START = models.free_q([0.1, -0.05, RADIUS + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20.0, 5.0])
 ROOT = Path(__file__).parents[2]
 
 
-def bouncing(integrator=None) -> Simulation:
-    scene = on_plate(ball(), LAW, FRICTION)
-    return Simulation(scene, integrator or SemiImplicitEuler(dt=1e-4))
+def bouncing(integrator=None) -> sp.Simulation:
+    scene = models.on_plate(models.ball(), models.LAW, models.FRICTION)
+    return sp.Simulation(scene, integrator or sp.SemiImplicitEuler(dt=1e-4))
 
 
 def test_a_diverging_run_keeps_what_it_computed() -> None:
     """Explicit damping with dt kd / m = 1e4 multiplies the speed at every step."""
-    sim = Simulation(Scene(slider()), SemiImplicitEuler(dt=1e-2))
-    controller = JointPD(kp=np.zeros(1), kd=np.full(1, 1e6), q_ref=np.array([0.5]))
-    with pytest.raises(SimulationDiverged) as caught:
+    sim = sp.Simulation(sp.Scene(models.slider()), sp.SemiImplicitEuler(dt=1e-2))
+    controller = sp.JointPD(kp=np.zeros(1), kd=np.full(1, 1e6), q_ref=np.array([0.5]))
+    with pytest.raises(errors.SimulationDiverged) as caught:
         sim.run(np.array([0.5]), np.array([0.1]), 100.0, controller)
     result = caught.value.result
     assert 0.0 < caught.value.t < 100.0
@@ -78,7 +48,7 @@ def test_a_controller_that_answers_nan_stops_the_run() -> None:
     def controller(t, q, v, contacts):
         return np.full(6, np.nan if t > 0.005 else 0.0)
 
-    with pytest.raises((SimulationDiverged, InvalidParameter)):
+    with pytest.raises((errors.SimulationDiverged, errors.InvalidParameter)):
         bouncing().run(*START, 0.02, controller, control_dt=1e-3)
 
 
@@ -113,7 +83,7 @@ def test_ctrl_c(options: str) -> None:
         assert child.stdout is not None
         assert child.stderr is not None
         assert child.stdout.readline().strip() == "started"
-        time.sleep(1.0)
+        time.sleep(0.3)
         child.send_signal(signal.SIGINT)
         try:
             said, faults = child.communicate(timeout=20)
@@ -136,13 +106,13 @@ def test_ctrl_c(options: str) -> None:
     ],
 )
 def test_wrong_state(q, v, name: str) -> None:
-    with pytest.raises(InvalidParameter) as caught:
+    with pytest.raises(errors.InvalidParameter) as caught:
         bouncing().run(q, v, 0.1)
     assert caught.value.name in (name, f"{name}0")
 
 
 def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
-    model = empty()
+    model = models.empty()
     mixed = pin.JointModelComposite(pin.JointModelPX())
     mixed.addJoint(pin.JointModelRUBZ(), pin.SE3.Identity())
     parts = {
@@ -155,8 +125,8 @@ def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
     }
     parent = 0
     for name, (joint, _) in parts.items():
-        parent = add_body(model, name, joint, parent)
-    scene = Scene(model)
+        parent = models.add_body(model, name, joint, parent)
+    scene = sp.Scene(model)
     for name, (_, part) in parts.items():
         if part is None:
             continue
@@ -164,51 +134,53 @@ def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
         for scale in (0.0, 0.9, 2.0):
             q = pin.neutral(model)
             q[joint.idx_q : joint.idx_q + joint.nq][part] *= scale
-            with pytest.raises(InvalidParameter, match=f"'{name}_joint'.*unit length") as caught:
+            with pytest.raises(
+                errors.InvalidParameter, match=f"'{name}_joint'.*unit length"
+            ) as caught:
                 scene.check_state(q)
             assert np.linalg.norm(caught.value.value) == pytest.approx(scale)
             assert len(caught.value.value) == part.stop - part.start
 
 
 def test_wrong_state_in_a_scene_call() -> None:
-    scene = on_plate(ball(), LAW)
+    scene = models.on_plate(models.ball(), models.LAW)
     for call in (scene.external_forces, scene.contacts):
-        with pytest.raises(InvalidParameter, match="q"):
+        with pytest.raises(errors.InvalidParameter, match="q"):
             call(np.zeros(6), np.zeros(6))
-        with pytest.raises(InvalidParameter, match="v"):
+        with pytest.raises(errors.InvalidParameter, match="v"):
             call(START[0], np.zeros(5))
 
 
 @pytest.mark.parametrize("duration", [-1.0, float("nan"), float("inf")])
 def test_wrong_duration(duration: float) -> None:
-    with pytest.raises(InvalidParameter, match="duration"):
+    with pytest.raises(errors.InvalidParameter, match="duration"):
         bouncing().run(*START, duration)
 
 
-@pytest.mark.parametrize("stepper", [SemiImplicitEuler, RungeKutta4])
+@pytest.mark.parametrize("stepper", [sp.SemiImplicitEuler, sp.RungeKutta4])
 @pytest.mark.parametrize("dt", [0.0, -1e-3, float("nan"), float("inf")])
 def test_wrong_dt(stepper, dt: float) -> None:
-    with pytest.raises(InvalidParameter, match="dt"):
+    with pytest.raises(errors.InvalidParameter, match="dt"):
         stepper(dt=dt)
 
 
 def test_deep_start() -> None:
-    with pytest.raises(DeepStart) as caught:
-        bouncing().run(free_q([0, 0, 0.4 * RADIUS]), np.zeros(6), 0.1)
+    with pytest.raises(errors.DeepStart) as caught:
+        bouncing().run(models.free_q([0, 0, 0.4 * RADIUS]), np.zeros(6), 0.1)
     assert caught.value.pair == "ball-plate"
     assert caught.value.depth == pytest.approx(0.6 * RADIUS)
     assert caught.value.radius == RADIUS
 
 
 def test_unknown_frame_lists_the_valid_ones() -> None:
-    scene = Scene(ball())
+    scene = sp.Scene(models.ball())
     for frames in ({"sphere": "bll", "frame": "universe"}, {"sphere": "ball", "frame": "ground"}):
-        with pytest.raises(FrameNotFound) as caught:
+        with pytest.raises(errors.FrameNotFound) as caught:
             scene.add_contact(
-                sphere=Sphere(RADIUS, frame=frames["sphere"]),
-                shell=plate(),
+                sphere=sp.Sphere(RADIUS, frame=frames["sphere"]),
+                shell=models.plate(),
                 frame=frames["frame"],
-                law=LAW,
+                law=models.LAW,
             )
         assert {"ball", "universe"} <= set(caught.value.valid)
         assert "ball" in str(caught.value)
@@ -216,18 +188,18 @@ def test_unknown_frame_lists_the_valid_ones() -> None:
 
 
 def test_unknown_locked_joint_lists_the_valid_ones() -> None:
-    with pytest.raises(NameNotFound) as caught:
-        Scene(arm(), lock=["elbow"])
+    with pytest.raises(errors.NameNotFound) as caught:
+        sp.Scene(models.arm(), lock=["elbow"])
     assert "two_joint" in caught.value.valid
 
 
 def test_a_failed_run_leaves_the_simulation_usable() -> None:
     sim = bouncing()
     before = sim.run(*START, 0.05)
-    with pytest.raises(InvalidParameter):
+    with pytest.raises(errors.InvalidParameter):
         sim.run(np.zeros(3), np.zeros(6), 0.1)
-    with pytest.raises(DeepStart):
-        sim.run(free_q([0, 0, 0.01]), np.zeros(6), 0.1)
+    with pytest.raises(errors.DeepStart):
+        sim.run(models.free_q([0, 0, 0.01]), np.zeros(6), 0.1)
     assert np.array_equal(sim.run(*START, 0.05).q, before.q)
 
 
@@ -238,8 +210,8 @@ def test_a_python_controller_is_called_every_control_dt_and_held() -> None:
         calls.append((t, q.copy(), v.copy(), len(contacts.depth)))
         return np.array([float(len(calls))])
 
-    scene = on_plate(slider(gravity=0.0, mass=2.0), LAW)
-    sim = Simulation(scene, SemiImplicitEuler(dt=1e-3))
+    scene = models.on_plate(models.slider(gravity=0.0, mass=2.0), models.LAW)
+    sim = sp.Simulation(scene, sp.SemiImplicitEuler(dt=1e-3))
     result = sim.run(np.array([1.0]), np.zeros(1), 0.1, controller, control_dt=1e-2)
     assert [c[0] for c in calls] == pytest.approx(np.arange(10) * 1e-2, abs=1e-12)
     held = np.repeat(np.arange(1.0, 11.0), 10) / 2.0 * 1e-3
@@ -256,9 +228,9 @@ def test_a_python_controller_sees_contacts() -> None:
         seen.append(float(contacts.normal_force.sum()))
         return np.zeros(1)
 
-    scene = on_plate(slider(), linear_law(4000.0))
+    scene = models.on_plate(models.slider(), models.linear_law(4000.0))
     rest = np.array([RADIUS - 9.81 / 4000.0])
-    sim = Simulation(scene, SemiImplicitEuler(dt=1e-3))
+    sim = sp.Simulation(scene, sp.SemiImplicitEuler(dt=1e-3))
     sim.run(rest, np.zeros(1), 0.01, controller, control_dt=2e-3)
     assert seen == pytest.approx([9.81] * 5, rel=1e-9)
 
@@ -266,21 +238,21 @@ def test_a_python_controller_sees_contacts() -> None:
 def test_a_python_controller_equals_the_built_in_one() -> None:
     """Joint PD without gravity compensation, evaluated at every step."""
     kp, kd = np.array([40.0, 40.0, 20.0]), np.array([2.0, 2.0, 1.0])
-    scene = on_plate(arm(), LAW, FRICTION)
-    sim = Simulation(scene, SemiImplicitEuler(dt=1e-3))
-    goal = ARM_Q + np.array([0.1, 0.2, -0.1])
-    built_in = JointPD(kp, kd, goal, gravity_compensation=False)
-    a = sim.run(ARM_Q, np.zeros(3), 0.3, built_in)
+    scene = models.on_plate(models.arm(), models.LAW, models.FRICTION)
+    sim = sp.Simulation(scene, sp.SemiImplicitEuler(dt=1e-3))
+    goal = models.ARM_Q + np.array([0.1, 0.2, -0.1])
+    built_in = sp.JointPD(kp, kd, goal, gravity_compensation=False)
+    a = sim.run(models.ARM_Q, np.zeros(3), 0.3, built_in)
     b = sim.run(
-        ARM_Q, np.zeros(3), 0.3, lambda t, q, v, c: kp * (goal - q) - kd * v, control_dt=1e-3
+        models.ARM_Q, np.zeros(3), 0.3, lambda t, q, v, c: kp * (goal - q) - kd * v, control_dt=1e-3
     )
     assert b.q == pytest.approx(a.q, abs=1e-9)
 
 
 def test_gravity_compensation_holds_still() -> None:
-    sim = Simulation(on_plate(arm(), LAW), RungeKutta4(dt=1e-3))
-    result = sim.run(ARM_Q, np.zeros(3), 0.5, GravityCompensation())
-    assert result.q[-1] == pytest.approx(ARM_Q, abs=1e-10)
+    sim = sp.Simulation(models.on_plate(models.arm(), models.LAW), sp.RungeKutta4(dt=1e-3))
+    result = sim.run(models.ARM_Q, np.zeros(3), 0.5, sp.GravityCompensation())
+    assert result.q[-1] == pytest.approx(models.ARM_Q, abs=1e-10)
 
 
 def test_an_error_in_a_controller_comes_through() -> None:
@@ -294,11 +266,11 @@ def test_an_error_in_a_controller_comes_through() -> None:
 
 
 def test_a_controller_of_the_wrong_size_is_named() -> None:
-    with pytest.raises(InvalidParameter):
+    with pytest.raises(errors.InvalidParameter):
         bouncing().run(*START, 0.1, lambda t, q, v, c: np.zeros(5), control_dt=1e-2)
 
 
-def same(a: Result, b: Result) -> None:
+def same(a: sp.Result, b: sp.Result) -> None:
     for name in ("t", "q", "v"):
         assert np.array_equal(getattr(a, name), getattr(b, name)), name
     for name in (
@@ -329,7 +301,7 @@ def same(a: Result, b: Result) -> None:
     assert a.events == b.events
 
 
-@pytest.mark.parametrize("stepper", [SemiImplicitEuler, RungeKutta4])
+@pytest.mark.parametrize("stepper", [sp.SemiImplicitEuler, sp.RungeKutta4])
 def test_repeated_runs_are_bit_identical(stepper) -> None:
     sim = bouncing(stepper(dt=1e-4))
     first, again = sim.run(*START, 0.3), sim.run(*START, 0.3)
@@ -371,7 +343,7 @@ def test_rows_of_a_result() -> None:
 def test_a_table_without_pandas_names_the_extra_that_brings_it(monkeypatch) -> None:
     result = bouncing().run(*START, 0.01)
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(MissingExtra, match=r"sphshell-pin\[tables\]"):
+    with pytest.raises(errors.MissingExtra, match=r"sphshell-pin\[tables\]"):
         result.to_dataframe()
 
 
@@ -379,18 +351,18 @@ def test_save_and_load(tmp_path: Path) -> None:
     result = bouncing().run(*START, 0.1)
     path = tmp_path / "run.npz"
     result.save(path)
-    loaded = Result.load(path)
+    loaded = sp.Result.load(path)
     same(result, loaded)
     assert loaded.scene is None
     assert loaded.stats == result.stats
-    with pytest.raises(ResultError):
-        Result.load(tmp_path / "nothing.npz")
+    with pytest.raises(errors.ResultError):
+        sp.Result.load(tmp_path / "nothing.npz")
     (tmp_path / "text.npz").write_text("not an archive")
-    with pytest.raises(ResultError):
-        Result.load(tmp_path / "text.npz")
+    with pytest.raises(errors.ResultError):
+        sp.Result.load(tmp_path / "text.npz")
 
 
-def _with(result: Result, part: str, **values: object) -> Result:
+def _with(result: sp.Result, part: str, **values: object) -> sp.Result:
     return replace(result, **{part: replace(getattr(result, part), **values)})
 
 
@@ -419,14 +391,14 @@ def _with(result: Result, part: str, **values: object) -> Result:
 )
 def test_what_load_would_refuse_is_not_written(tmp_path: Path, change, said: str) -> None:
     path = tmp_path / "run.npz"
-    with pytest.raises(ResultError, match=rf"run\.npz: cannot write the results: .*{said}"):
+    with pytest.raises(errors.ResultError, match=rf"run\.npz: cannot write the results: .*{said}"):
         change(bouncing().run(*START, 0.1)).save(path)
     assert not path.exists()
 
 
 def test_a_file_of_version_0_1_is_read() -> None:
     """It calls the ids of contacts numbers."""
-    result = Result.load(Path(__file__).parents[1] / "data" / "run_of_version_0_1.npz")
+    result = sp.Result.load(Path(__file__).parents[1] / "data" / "run_of_version_0_1.npz")
     assert (len(result.t), result.stats.steps, result.stats.integrator) == (
         11,
         200,
@@ -440,44 +412,46 @@ def test_a_file_of_version_0_1_is_read() -> None:
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_unwritable_folder(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
-    with pytest.raises(ResultError):
+    with pytest.raises(errors.ResultError):
         bouncing().run(*START, 0.01).save(tmp_path / "run.npz")
 
 
 def test_saving_into_a_missing_folder_is_a_clear_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(ResultError):
+    with pytest.raises(errors.ResultError):
         bouncing().run(*START, 0.01).save(tmp_path / "file" / "run.npz")
 
 
 def test_lock_equals_the_model_reduced_by_hand() -> None:
-    model = arm()
+    model = models.arm()
     locked = model.getJointId("two_joint")
     q_lock = np.array([0.0, 1.9, 0.0])
-    by_hand = on_plate(pin.buildReducedModel(model, [locked], q_lock), LAW, FRICTION)
-    scene = Scene(model, lock=["two_joint"], q_lock=q_lock)
+    by_hand = models.on_plate(
+        pin.buildReducedModel(model, [locked], q_lock), models.LAW, models.FRICTION
+    )
+    scene = sp.Scene(model, lock=["two_joint"], q_lock=q_lock)
     scene.add_contact(
-        sphere=Sphere(RADIUS, frame="ball"),
-        shell=plate(),
+        sphere=sp.Sphere(RADIUS, frame="ball"),
+        shell=models.plate(),
         frame="universe",
-        law=LAW,
-        friction=FRICTION,
+        law=models.LAW,
+        friction=models.FRICTION,
         method="facets",
         name="ball-plate",
     )
     assert scene.model.nq == 2
     q0, v0 = np.array([0.3, 0.5]), np.array([1.0, 0.0])
-    a, b = (Simulation(s, RungeKutta4(dt=1e-3)).run(q0, v0, 0.4) for s in (by_hand, scene))
+    a, b = (sp.Simulation(s, sp.RungeKutta4(dt=1e-3)).run(q0, v0, 0.4) for s in (by_hand, scene))
     assert len(a.contacts.depth) > 0
     same(a, b)
 
 
 def test_the_scene_keeps_its_own_model() -> None:
-    model = ball()
-    scene = on_plate(model, LAW)
+    model = models.ball()
+    scene = models.on_plate(model, models.LAW)
     model.gravity.linear = np.zeros(3)
     model.inertias[1] = pin.Inertia.FromSphere(50.0, RADIUS)
-    result = Simulation(scene, SemiImplicitEuler(dt=1e-3)).run(
-        free_q([0, 0, 1.0]), np.zeros(6), 0.1
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(dt=1e-3)).run(
+        models.free_q([0, 0, 1.0]), np.zeros(6), 0.1
     )
     assert result.v[-1, 2] == pytest.approx(-0.981, rel=1e-9)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
@@ -28,6 +29,7 @@ from tests.sensitivities import (
     every_integrator,
     thrown,
 )
+from tests.studies import mostly_studies
 
 Array = NDArray[np.float64]
 
@@ -61,15 +63,10 @@ def test_a_bounce_by_all_numbers_of_a_law(law: str) -> None:
     case.check([*names, f"{PAIR}.sphere.radius", "v0"], bounces=1, error=100.0)
 
 
-@every_integrator
-def test_an_oblique_bounce_with_coulomb_friction(integrator: str) -> None:
-    case = thrown(IMPACT, COULOMB, INTEGRATORS[integrator])
-    names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.v_static", "v0"]
-    case.check(names, bounces=1)
-
-
 @pytest.mark.slow
-@every_integrator
+@pytest.mark.parametrize(
+    "integrator", mostly_studies(INTEGRATORS, lambda one: one in ("adaptive", "semi-implicit"))
+)
 def test_an_oblique_bounce_by_everything(integrator: str) -> None:
     case = thrown(HUNT, COULOMB, INTEGRATORS[integrator])
     case.check([*differences.names_of(case.scene), "q0", "v0"], bounces=1)
@@ -85,18 +82,20 @@ def test_an_oblique_bounce_with_bristles(integrator: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("integrator", "tolerance"), [(sp.Implicit(1e-10), 1e-5), (sp.Adaptive(1e-11), 1e-4)], ids=str
+    ("friction", "integrator"),
+    mostly_studies(
+        product(["soft finger", "mindlin", "rings"], ["implicit", "adaptive"]),
+        lambda both: (both[0] == "mindlin") == (both[1] == "implicit"),
+    ),
 )
-@pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
-def test_an_oblique_bounce_with_other_bristles(
-    friction: str, integrator: object, tolerance: float
-) -> None:
+def test_an_oblique_bounce_with_other_bristles(friction: str, integrator: str) -> None:
     """Stiff springs: explicit steps know less of them."""
     law = sp.HertzLaw(2e7, 0.3, restitution=0.7, speed=0.5)
-    case = thrown(law, FRICTIONS[friction], integrator)
+    stiff = integrator == "implicit"
+    case = thrown(law, FRICTIONS[friction], sp.Implicit(1e-10) if stiff else sp.Adaptive(1e-11))
     names = ["ball.law.young", "ball.friction.mu_static", "v0"]
     # Of friction that only sticks the coefficient does not matter, and errors of runs are all.
-    case.check(names, bounces=1, tolerance=tolerance, error=100.0)
+    case.check(names, bounces=1, tolerance=1e-5 if stiff else 1e-4, error=100.0)
 
 
 @pytest.mark.parametrize("method", ["smooth", "facets"])
@@ -161,8 +160,13 @@ def sampled(t: float, q: Array, v: Array, contacts: object) -> Array:
     return -30.0 * (q - 0.06) - 2.0 * v + 10.0
 
 
-@every_integrator
-@pytest.mark.parametrize("control_dt", [None, 2e-3])
+@pytest.mark.parametrize(
+    ("control_dt", "integrator"),
+    mostly_studies(
+        product([None, 2e-3], INTEGRATORS),
+        lambda both: both[1] == "adaptive" or both in ((None, "runge-kutta"), (2e-3, "implicit")),
+    ),
+)
 def test_a_controller_of_the_package(control_dt: float | None, integrator: str) -> None:
     scene = sp.Scene(models.arm())
     plate = models.plate()
@@ -214,7 +218,7 @@ def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     case.check(["q0", "v0", "ball.law.stiffness", "ball.sphere.radius"], bounces=1)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-9)], ids=str)
 def test_the_panda_on_the_blade(integrator: object) -> None:
     """The scenario's impedance controller, 50 ms from before the touch."""

@@ -41,10 +41,7 @@ def test_the_filter_is_of_first_order(integrator, share):
     """-3 dB and -45 degrees at the cutoff; far from the rate of sampling too."""
     frequency = 50.0
     cutoff = frequency / share
-    sensors = [
-        torque("fast", rate=4000, cutoff=cutoff),
-        torque("slow", rate=90, cutoff=cutoff),
-    ]
+    sensors = [torque("fast", rate=4000, cutoff=cutoff), torque("slow", rate=90, cutoff=cutoff)]
     if share < 1:
         sensors = sensors[:1]
     skip = 5 / cutoff

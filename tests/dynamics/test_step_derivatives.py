@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
@@ -28,6 +29,7 @@ from tests.dynamics.test_mimic import CASES as MIMIC
 from tests.dynamics.test_mimic import with_contact
 from tests.dynamics.test_two_spheres import in_touch, two_spheres
 from tests.models import ARM_Q, two_free_bodies, two_free_state
+from tests.studies import mostly_studies
 
 Array = NDArray[np.float64]
 
@@ -113,9 +115,15 @@ def assert_step(
     return got
 
 
+# Slow ones on a shell that moves are studies.
+STEPS = mostly_studies(
+    product([in_bowl, moving], ["impact", "hunt-crossley", "hertz, two materials", "foundation"]),
+    lambda both: both[0] is in_bowl or both[1] == "impact",
+)
+
+
 @every_stepper
-@pytest.mark.parametrize("law", ["impact", "hunt-crossley", "hertz, two materials", "foundation"])
-@pytest.mark.parametrize("make", [in_bowl, moving])
+@pytest.mark.parametrize(("make", "law"), STEPS)
 def test_a_touching_step(make, law: str, stepper: str) -> None:  # type: ignore[no-untyped-def]
     scene, q, v = make(LAWS[law], COULOMB)
     assert_step(scene, STEPPERS[stepper], q, v)
@@ -141,7 +149,7 @@ def test_joint_components(stepper: str) -> None:
 
 
 @every_stepper
-@pytest.mark.parametrize("name", MIMIC)
+@pytest.mark.parametrize("name", mostly_studies(MIMIC, lambda name: name != "panda"))
 def test_mimic_joints(name: str, stepper: str) -> None:
     make, tip, other = MIMIC[name]
     scene = with_contact(make()[0], tip, other)

@@ -15,12 +15,8 @@ from sphshell_pin import testing
 from sphshell_pin.errors import DeepStart, InvalidParameter
 from tests import models
 from tests.dynamics.test_contact_derivatives import (
-    BRISTLES,
     FRICTIONS,
     LAWS,
-    assert_close,
-    differences,
-    generalised_force,
 )
 
 Array = NDArray[np.float64]
@@ -128,44 +124,6 @@ def test_torsion_is_symmetric_and_that_of_the_disc_of_both_radii() -> None:
     radius = R * OTHER / (R + OTHER)
     limit = 0.5 * law.normal_force(depth) * 3 * math.pi / 16 * math.sqrt(radius * depth)
     assert np.allclose(moments, -limit, rtol=1e-12)
-
-
-@pytest.mark.parametrize("friction", FRICTIONS)
-@pytest.mark.parametrize("law", LAWS)
-def test_derivatives_agree_with_differences(law: str, friction: str) -> None:
-    scene = two_spheres(LAWS[law], FRICTIONS[friction])
-    q, v = in_touch(3, spin=2.0)
-
-    def force(q: Array, v: Array) -> Array:
-        return generalised_force(scene, q, v)
-
-    by_q, by_v = scene.contact_derivatives(q, v)
-    for got, expected in zip(
-        (by_q, by_v), differences(force, scene.model, q, v, 1e-6), strict=True
-    ):
-        assert_close(got, expected, 2e-6)
-
-
-@pytest.mark.parametrize("friction", [None, *BRISTLES])
-def test_the_jacobian_of_the_motion_agrees_with_differences(friction: str | None) -> None:
-    scene = two_spheres(LAWS["impact"], FRICTIONS[friction] if friction else None)
-    q, v = in_touch(4, spin=2.0)
-    core, model = scene._binding, scene.model
-    z, tau = np.zeros(core.bristle_size), np.zeros(model.nv)
-    if friction:
-        z[:3] = 1e-5, -2e-5, 1e-5
-    got = core.rate_jacobian(q, v, z, tau)
-    step = 1e-6
-    columns = []
-    for u in step * np.eye(model.nv):
-        ahead, behind = (pin.integrate(model, q, sign * u) for sign in (1, -1))
-        columns.append((core.rates(ahead, v, z, tau) - core.rates(behind, v, z, tau)) / (2 * step))
-    for u in step * np.eye(model.nv):
-        columns.append((core.rates(q, v + u, z, tau) - core.rates(q, v - u, z, tau)) / (2 * step))
-    # The rates of q in its tangent space are v; of the rest only accelerations are compared, as the
-    # turning of a bristle with its normal is linearised with the contact held.
-    expected = np.transpose(columns)[: model.nv]
-    assert_close(got[: model.nv, : 2 * model.nv], expected, 1e-5)
 
 
 # Two identical glass spheres at 10 m/s each (Chung and Ooi, Granular Matter 13 (2011) 643, test 1:

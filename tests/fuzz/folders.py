@@ -17,17 +17,9 @@ import numpy as np
 from sphshell_pin import robots
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
+from tests.fuzz import tables
 from tests.fuzz.meshes import SHAPES, WRITERS, Mesh, damaged_mesh
 from tests.fuzz.mutate import LARGEST, NUMBERS, alter, damage
-from tests.fuzz.tables import (
-    PRESS,
-    damaged_journal,
-    damaged_npz,
-    damaged_toml,
-    damaged_xml,
-    pack,
-    reproducible,
-)
 from tests.kept import scenes
 
 DATA = Path(__file__).parents[1] / "data"
@@ -77,21 +69,21 @@ def xacro_corpus() -> tuple[bytes, ...]:
     parts = {"finger_description/package.xml", "finger_description/urdf/finger.xacro"}
     more = {name: (home / name).read_bytes() for name in sorted(parts | {"lengths.yaml"})}
     return tuple(
-        pack({"robot.xacro": p.read_bytes(), **more}) for p in sorted(home.glob("*.xacro"))
+        tables.pack({"robot.xacro": p.read_bytes(), **more}) for p in sorted(home.glob("*.xacro"))
     )
 
 
 @functools.cache
 def srdf_corpus() -> tuple[bytes, ...]:
     finger = (robots.URDF_FOLDER / "three_link_finger.urdf").read_bytes()
-    return (pack({"robot.urdf": finger, "robot.srdf": POSES.encode()}),)
+    return (tables.pack({"robot.urdf": finger, "robot.srdf": POSES.encode()}),)
 
 
 @functools.cache
 def include_corpus() -> tuple[bytes, ...]:
     home = DATA / "mjcf"
     parts = {f"parts/{p.name}": p.read_bytes() for p in sorted((home / "parts").iterdir())}
-    return (pack({"robot.xml": (home / "included.xml").read_bytes(), **parts}),)
+    return (tables.pack({"robot.xml": (home / "included.xml").read_bytes(), **parts}),)
 
 
 @functools.cache
@@ -99,7 +91,7 @@ def package_corpus() -> tuple[bytes, ...]:
     home = DATA / "xacro" / "finger_description"
     robot = ROBOT.replace("MESH", "package://finger_description/meshes/cube.stl").encode()
     parts = {name: (home / name).read_bytes() for name in ("package.xml", "meshes/cube.stl")}
-    return (pack({"robot.urdf": robot, **parts}),)
+    return (tables.pack({"robot.urdf": robot, **parts}),)
 
 
 @functools.cache
@@ -132,7 +124,7 @@ def mesh_corpus() -> tuple[bytes, ...]:
             robot = text.replace("MESH", f"mesh{suffix}")
             if suffix == ".dae":  # whose mass only a further package can tell
                 robot = robot.replace("<geom ", f"{INERTIAL}<geom ")
-            made.append(pack({name: robot.encode(), f"mesh{suffix}": data}))
+            made.append(tables.pack({name: robot.encode(), f"mesh{suffix}": data}))
     return tuple(made)
 
 
@@ -142,9 +134,14 @@ _BY_ROBOTS = (".stl", ".obj", ".ply", ".off")
 @functools.cache
 def law_corpus() -> tuple[bytes, ...]:
     law = 'type = "table", file = "law.csv"'
-    start, stop = PRESS.index('type = "hertz"'), PRESS.index(' }\nfriction = { type = "bristle"')
-    scenario = PRESS[:start] + law + PRESS[stop:]
-    return (pack({"law.toml": scenario.encode(), "law.csv": b"depth,force\n0,0\n1e-3,10\n"}),)
+    start, stop = (
+        tables.PRESS.index('type = "hertz"'),
+        tables.PRESS.index(' }\nfriction = { type = "bristle"'),
+    )
+    scenario = tables.PRESS[:start] + law + tables.PRESS[stop:]
+    return (
+        tables.pack({"law.toml": scenario.encode(), "law.csv": b"depth,force\n0,0\n1e-3,10\n"}),
+    )
 
 
 def fit_corpus() -> tuple[bytes, ...]:
@@ -161,8 +158,8 @@ def results_corpus() -> tuple[bytes, ...]:
         scenario.write_text(scenes.SCENARIO)
         changes = {"run.record": '["patch", "torque"]', "run.record_dt": "4e-3"}
         result, _ = simulate(build(scenario, changes))
-        run = reproducible(result.save(home / "run.npz"))
-        return (pack({"run.npz": run}),)
+        run = tables.reproducible(result.save(home / "run.npz"))
+        return (tables.pack({"run.npz": run}),)
 
 
 def damaged_csv(rng: random.Random, data: bytes) -> bytes:
@@ -206,7 +203,7 @@ def damaged_folder(rng: random.Random, data: bytes) -> bytes:
             del files[name]
         else:
             files[name] = files[rng.choice(sorted(files))]
-    return pack(files)
+    return tables.pack(files)
 
 
 def damaged(
@@ -229,12 +226,12 @@ def mesh_by(write: Callable[[Mesh], bytes]) -> Structure:
 
 STRUCTURES: dict[str, Structure] = {
     **{suffix: mesh_by(write) for suffix, write in WRITERS.values()},
-    **dict.fromkeys((".xml", ".urdf", ".xacro", ".srdf", ".dae"), damaged_xml),
+    **dict.fromkeys((".xml", ".urdf", ".xacro", ".srdf", ".dae"), tables.damaged_xml),
     **dict.fromkeys((".json", ".gltf"), damaged_json),
     ".zip": damaged_folder,
-    ".npz": damaged_npz,
-    ".toml": damaged_toml,
-    ".journal": damaged_journal,
+    ".npz": tables.damaged_npz,
+    ".toml": tables.damaged_toml,
+    ".journal": tables.damaged_journal,
     ".csv": damaged_csv,
 }
 """By suffix: what changes the structure of a file."""

@@ -16,7 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.oracle.geometry import Array, closest_on_triangles, dot, feature_normal, norm
+from tests.oracle.geometry import (
+    Array,
+    closest_on_triangles,
+    cross,
+    dot,
+    feature_normal,
+    gaps,
+    norm,
+)
 
 # All relative to the size of the problem (largest coordinate met): on the same point, must, may.
 SAME_POINT = 1e-9
@@ -58,32 +66,30 @@ def _nudges(center: Array, points: Array, corners: Array, size: float) -> list[l
     tries = [corners.mean(axis=1) - points]
     for k in range(3):
         side = corners[:, k - 2] - corners[:, k]
-        inward = np.cross(np.cross(side, corners[:, k - 1] - corners[:, k]), side)
+        inward = cross(cross(side, corners[:, k - 1] - corners[:, k]), side)
         at_corner = norm(corners - points[:, None]).min(axis=1) <= SAME_POINT * size
         along = np.where(at_corner[:, None], side, 0)
         tries += [along, -along, inward]
-    found: list[list[Array]] = [[] for _ in points]
-    for direction in tries:
-        length = norm(direction)
-        step = NUDGE * size * direction / np.where(length > 0, length, 1)[:, None]
-        there = closest_on_triangles(center + step, corners)
-        follows = (length > 0) & (norm(there - points - step) <= 0.1 * NUDGE * size)
-        for k in np.flatnonzero(follows):
-            found[k].append(step[k])
-    return found
+    directions = np.array(tries)
+    length = norm(directions)
+    steps = NUDGE * size * directions / np.where(length > 0, length, 1)[..., None]
+    all_corners = np.tile(corners, (len(tries), 1, 1))
+    there = closest_on_triangles((center + steps).reshape(-1, 3), all_corners)
+    off = norm(there.reshape(steps.shape) - points - steps)
+    follows = (length > 0) & (off <= 0.1 * NUDGE * size)
+    return [list(steps[follows[:, k], k]) for k in range(len(points))]
 
 
 def _some_nudge_holds(
     center: Array, point: Array, nudges: list[Array], near: Array, size: float
 ) -> bool:
     """True where a center within rounding of `center` has a local minimum beside `point`."""
-    for step in nudges:
-        there = point + step
-        holders = near[norm(there - closest_on_triangles(there, near)) <= ON_SURFACE * size]
-        slack = ((holders - there) * (center - point)).sum(axis=2)
-        if not _descends(slack / size**2, 1e-17):
-            return True
-    return False
+    if not nudges:
+        return False
+    there = point + np.array(nudges)
+    held = gaps(there, near) <= ON_SURFACE * size
+    slack = ((near - there[:, None, None]) * (center - point)).sum(axis=3).max(axis=2)
+    return bool((~held | (slack <= 1e-17 * size**2)).all(axis=1).any())
 
 
 def _touch(center, point, elements, *, sure, depth, group=0, normal=None) -> Touch:  # type: ignore[no-untyped-def]
@@ -126,8 +132,8 @@ def facets(
     corners, owner = corners[reached], owner[reached]
     found: list[Touch] = []
     points = points[reached]
-    for point, nudges in zip(points, _nudges(center, points, corners, size), strict=True):
-        gap = norm(point - closest_on_triangles(point, corners))
+    every = zip(points, gaps(points, corners), _nudges(center, points, corners, size), strict=True)
+    for point, gap, nudges in every:
         away = center - point
         slack = ((corners - point) * away).sum(axis=2).max(axis=1) / size**2
         possible = not _descends(slack[gap <= 1e-13 * size], DOUBTFUL)

@@ -126,10 +126,7 @@ def test_what_the_check_of_expressions_misses_is_in_a_process_that_writes_nothin
 def test_xacro_expressions_compute(tmp_path):
     path = tmp_path / "r.xacro"
     head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-    names = [
-        "${'a'.upper() + str(max([round(x) for x in (1.2, 3.7)]))}",
-        "$(eval 'b2')",
-    ]
+    names = ["${'a'.upper() + str(max([round(x) for x in (1.2, 3.7)]))}", "$(eval 'b2')"]
     links = "".join(f'<link name="{name}"/>' for name in names)
     joint = (
         '<joint name="j" type="revolute"><parent link="A4"/><child link="b2"/>'

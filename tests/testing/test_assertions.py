@@ -8,29 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin import (
-    Adaptive,
-    BristleFriction,
-    CoulombFriction,
-    ImpactLaw,
-    RungeKutta4,
-    Scene,
-    Shell,
-    Simulation,
-    Sphere,
-)
+import sphshell_pin as sp
+from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, WeakLawWarning
-from sphshell_pin.testing import (
-    assert_contacts_found,
-    assert_derivatives,
-    assert_energy_kept,
-    assert_forces_balance,
-    assert_lossless_energy_kept,
-    assert_momentum_kept,
-    assert_no_contact_missed,
-    assert_not_passed_through,
-    assert_wrenches_cancel,
-)
 from sphshell_pin.testing.triangles import crossed, distances, pieces
 from tests import meshes
 from tests.contact.smooth.surfaces import shell_of
@@ -48,13 +28,13 @@ from tests.models import (
 )
 from tests.oracle.geometry import closest_on_triangles
 
-LAW = ImpactLaw(4e4, 1.5, 20.0, 2e-2)
-FRICTION = CoulombFriction(0.3, 0.1, 0.1, 1.0)
+LAW = sp.ImpactLaw(4e4, 1.5, 20.0, 2e-2)
+FRICTION = sp.CoulombFriction(0.3, 0.1, 0.1, 1.0)
 ARM_V = np.array([0.3, 0.2, -0.4])
-EVERY_FRICTION = [None, FRICTION, BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05)]
+EVERY_FRICTION = [None, FRICTION, sp.BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05)]
 
 
-def arm_scene(kind=Scene, friction=FRICTION):
+def arm_scene(kind=sp.Scene, friction=FRICTION):
     """Arm whose tip is 5 mm deep in a plate that stands askew."""
     model, data = arm(), arm().createData()
     pin.framesForwardKinematics(model, data, ARM_Q)
@@ -62,7 +42,7 @@ def arm_scene(kind=Scene, friction=FRICTION):
     rotation = meshes.random_rotation(3)
     scene = kind(model)
     scene.add_contact(
-        Sphere(0.05, "ball"),
+        sp.Sphere(0.05, "ball"),
         plate(),
         placement=pin.SE3(rotation, tip - rotation @ np.array([0.0, 0.0, 0.045])),
         law=LAW,
@@ -72,7 +52,7 @@ def arm_scene(kind=Scene, friction=FRICTION):
     return scene
 
 
-class Weaker(Scene):
+class Weaker(sp.Scene):
     """Tells one joint's wrench a millionth too small."""
 
     def external_forces(self, q, v=None):
@@ -82,7 +62,7 @@ class Weaker(Scene):
         return forces
 
 
-class InTheWorld(Scene):
+class InTheWorld(sp.Scene):
     """Tells the wrenches in the world's axes, as who forgets that they belong to the joint."""
 
     def external_forces(self, q, v=None):
@@ -94,7 +74,7 @@ class InTheWorld(Scene):
         return forces
 
 
-class Stiffer(Scene):
+class Stiffer(sp.Scene):
     """Tells one entry of a derivative a hundred-thousandth too large."""
 
     entry = 0
@@ -110,12 +90,14 @@ class Stiffer(Scene):
 @pytest.mark.parametrize("friction", EVERY_FRICTION)
 def test_a_right_scene_passes(friction) -> None:
     scene = arm_scene(friction=friction)
-    assert assert_forces_balance(scene, ARM_Q, ARM_V, tau=np.array([1.0, -2.0, 3.0])) < 1e-12
-    assert assert_derivatives(scene, ARM_Q, ARM_V) < 1e-6
-    assert assert_contacts_found(scene, ARM_Q) < 1e-12
+    assert (
+        testing.assert_forces_balance(scene, ARM_Q, ARM_V, tau=np.array([1.0, -2.0, 3.0])) < 1e-12
+    )
+    assert testing.assert_derivatives(scene, ARM_Q, ARM_V) < 1e-6
+    assert testing.assert_contacts_found(scene, ARM_Q) < 1e-12
     free = two_free_bodies(LAW, friction)
-    assert assert_wrenches_cancel(free, *two_free_state()) < 1e-13
-    assert assert_derivatives(free, *two_free_state()) < 1e-6
+    assert testing.assert_wrenches_cancel(free, *two_free_state()) < 1e-13
+    assert testing.assert_derivatives(free, *two_free_state()) < 1e-6
 
 
 @pytest.mark.parametrize("kind", [Weaker, InTheWorld])
@@ -123,14 +105,14 @@ def test_a_wrong_wrench_is_told(kind) -> None:
     with pytest.raises(
         AssertionError, match=r"forces do not balance: \S+ \(at most 1e-08\), joint"
     ):
-        assert_forces_balance(arm_scene(kind), ARM_Q, ARM_V)
+        testing.assert_forces_balance(arm_scene(kind), ARM_Q, ARM_V)
     right = two_free_bodies(LAW, FRICTION)
     wrong = kind(right.model)
     pair = right.pairs[0]
     frame, placement = pair.frame_j, pair.placement
     wrong.add_contact(pair.sphere, pair.shell, frame, placement, LAW, FRICTION, "facets")
     with pytest.raises(AssertionError, match=r"action and reaction differ.*leave a force of \("):
-        assert_wrenches_cancel(wrong, *two_free_state())
+        testing.assert_wrenches_cancel(wrong, *two_free_state())
 
 
 @pytest.mark.parametrize("entry", [0, 1])
@@ -139,25 +121,25 @@ def test_a_wrong_derivative_is_told(entry: int) -> None:
     scene.entry = entry
     match = f"the contact forces by {'qv'[entry]}: of joint .* by joint"
     with pytest.raises(AssertionError, match=match):
-        assert_derivatives(scene, ARM_Q, ARM_V)
+        testing.assert_derivatives(scene, ARM_Q, ARM_V)
 
 
 def test_scenes_that_say_nothing_are_refused() -> None:
     with pytest.raises(InvalidParameter, match="touches the universe"):
-        assert_wrenches_cancel(arm_scene(), ARM_Q)
+        testing.assert_wrenches_cancel(arm_scene(), ARM_Q)
     massless = arm()
     massless.inertias[3] = pin.Inertia.Zero()
     with pytest.raises(InvalidParameter, match="mass matrix is singular"):
-        assert_forces_balance(on_plate(massless, LAW), ARM_Q)
+        testing.assert_forces_balance(on_plate(massless, LAW), ARM_Q)
     with pytest.raises(InvalidParameter, match=r"tau has shape \(2,\)|tau = \(2,\)"):
-        assert_forces_balance(arm_scene(), ARM_Q, tau=np.zeros(2))
+        testing.assert_forces_balance(arm_scene(), ARM_Q, tau=np.zeros(2))
 
 
 def test_a_single_joint_has_matrices_too() -> None:
     scene = on_plate(slider(), LAW)
     q, v = np.array([0.049]), np.array([-0.1])
-    assert assert_forces_balance(scene, q, v) < 1e-12
-    assert assert_derivatives(scene, q, v) < 1e-6
+    assert testing.assert_forces_balance(scene, q, v) < 1e-12
+    assert testing.assert_derivatives(scene, q, v) < 1e-6
     # Closed form: F = k d^e - c STEP(d) v, so dF/dv = -c STEP(d).
     step = 0.001 / 2e-2
     by_v = scene.contact_derivatives(q, v)[1]
@@ -165,45 +147,45 @@ def test_a_single_joint_has_matrices_too() -> None:
 
 
 def closed_run(integrator, law=LAW, friction=FRICTION):
-    return Simulation(two_free_bodies(law, friction), integrator).run(*two_free_state(), 0.02)
+    return sp.Simulation(two_free_bodies(law, friction), integrator).run(*two_free_state(), 0.02)
 
 
 def test_momentum_of_a_closed_system_is_kept() -> None:
-    assert assert_momentum_kept(closed_run(Adaptive(1e-9))) < 1e-7
+    assert testing.assert_momentum_kept(closed_run(sp.Adaptive(1e-9))) < 1e-7
     # Of order 4: a coarse step is told, with where and how much.
     with pytest.raises(AssertionError, match=r"momentum is not kept.*at t = .* impulse is"):
-        assert_momentum_kept(closed_run(RungeKutta4(5e-3)), tolerance=1e-9)
+        testing.assert_momentum_kept(closed_run(sp.RungeKutta4(5e-3)), tolerance=1e-9)
 
 
 def test_momentum_that_creeps_in_is_told() -> None:
-    result = closed_run(Adaptive(1e-9))
+    result = closed_run(sp.Adaptive(1e-9))
     push = np.zeros(12)
     push[0] = 1e-5
     crept = replace(result, v=result.v + np.linspace(0, 1, len(result.t))[:, None] * push)
     with pytest.raises(AssertionError, match="momentum is not kept"):
-        assert_momentum_kept(crept)
+        testing.assert_momentum_kept(crept)
 
 
 def test_open_systems_have_no_momentum_to_keep() -> None:
-    run = Simulation(arm_scene(), Adaptive()).run(ARM_Q, ARM_V, 1e-3)
+    run = sp.Simulation(arm_scene(), sp.Adaptive()).run(ARM_Q, ARM_V, 1e-3)
     with pytest.raises(InvalidParameter, match="gravity"):
-        assert_momentum_kept(run)
-    far = Simulation(two_free_bodies(LAW), Adaptive()).run(*two_free_state(-1.0), 1e-3)
+        testing.assert_momentum_kept(run)
+    far = sp.Simulation(two_free_bodies(LAW), sp.Adaptive()).run(*two_free_state(-1.0), 1e-3)
     with pytest.raises(InvalidParameter, match="nothing touched"):
-        assert_momentum_kept(far)
+        testing.assert_momentum_kept(far)
     with pytest.raises(InvalidParameter, match="must know its scene"):
-        assert_momentum_kept(replace(far, scene=None))
+        testing.assert_momentum_kept(replace(far, scene=None))
 
 
 def test_energy_is_kept() -> None:
-    run = Simulation(arm_scene(), Adaptive(1e-9)).run(ARM_Q, ARM_V, 0.05)
-    assert assert_energy_kept(run) < 1e-6
+    run = sp.Simulation(arm_scene(), sp.Adaptive(1e-9)).run(ARM_Q, ARM_V, 0.05)
+    assert testing.assert_energy_kept(run) < 1e-6
     lossless = on_plate(ball(), linear_law(1e4))
-    drop = Simulation(lossless, Adaptive(1e-9)).run(free_q([0, 0, 0.06]), np.zeros(6), 0.2)
+    drop = sp.Simulation(lossless, sp.Adaptive(1e-9)).run(free_q([0, 0, 0.06]), np.zeros(6), 0.2)
     assert len(drop.contacts)
-    assert assert_lossless_energy_kept(drop) < 1e-7
+    assert testing.assert_lossless_energy_kept(drop) < 1e-7
     with pytest.raises(InvalidParameter, match="without damping, friction"):
-        assert_lossless_energy_kept(run)
+        testing.assert_lossless_energy_kept(run)
 
 
 def test_a_source_that_makes_energy_is_told() -> None:
@@ -220,22 +202,22 @@ def test_a_source_that_makes_energy_is_told() -> None:
 
     results = []
     for source in (honest, find):
-        scene = Scene(ball())
+        scene = sp.Scene(ball())
         scene.add_contact_source(source, "ball", "universe", linear_law(1e4))
         v = np.array([1.0, 0, 0, 0, 0, 0])
-        results.append(Simulation(scene, Adaptive(1e-9)).run(free_q([0, 0, 0.06]), v, 0.3))
+        results.append(sp.Simulation(scene, sp.Adaptive(1e-9)).run(free_q([0, 0, 0.06]), v, 0.3))
         assert len(results[-1].contacts)
-    assert assert_energy_kept(results[0]) < 1e-6
+    assert testing.assert_energy_kept(results[0]) < 1e-6
     with pytest.raises(AssertionError, match=r"energy does not add up.*J too much.*changed form"):
-        assert_energy_kept(results[1])
+        testing.assert_energy_kept(results[1])
     with pytest.raises(AssertionError, match="energy does not add up"):
-        assert_lossless_energy_kept(results[1])
+        testing.assert_lossless_energy_kept(results[1])
 
 
 class Holed:
     """A shell whose search loses the contacts on some elements."""
 
-    def __init__(self, shell: Shell, lost: range) -> None:
+    def __init__(self, shell: sp.Shell, lost: range) -> None:
         self.shell, self.lost = shell, lost
 
     def __getattr__(self, name: str):
@@ -266,74 +248,74 @@ class Swallows(Holed):
         return np.arange(len(found)) == 0
 
 
-GROOVE = Shell(*meshes.v_groove(np.radians(80), size=8.0, cells=4))
+GROOVE = sp.Shell(*meshes.v_groove(np.radians(80), size=8.0, cells=4))
 
 
 @pytest.mark.parametrize("surface", ["bowl", "plate", "groove", "icosphere"])
 @pytest.mark.parametrize("method", ["facets", "elements"])
 def test_nothing_is_missed_on_right_shells(surface: str, method: str) -> None:
     shell = {
-        "bowl": lambda: Shell(*meshes.bowl()),
+        "bowl": lambda: sp.Shell(*meshes.bowl()),
         "plate": plate,
         "groove": lambda: GROOVE,
-        "icosphere": lambda: Shell(*meshes.icosphere(2)),
+        "icosphere": lambda: sp.Shell(*meshes.icosphere(2)),
     }[surface]()
-    assert assert_no_contact_missed(shell, 0.3, method=method) < 1e-12
+    assert testing.assert_no_contact_missed(shell, 0.3, method=method) < 1e-12
 
 
 def test_smooth_shells_need_room_for_their_bulge() -> None:
     shell = shell_of("bowl", 0.6)
-    error = assert_no_contact_missed(shell, 0.3, method="smooth", tolerance=0.5)
+    error = testing.assert_no_contact_missed(shell, 0.3, method="smooth", tolerance=0.5)
     assert error > 1e-6
     with pytest.raises(AssertionError):
-        assert_no_contact_missed(shell, 0.3, method="smooth", tolerance=0.1 * error)
+        testing.assert_no_contact_missed(shell, 0.3, method="smooth", tolerance=0.1 * error)
 
 
 def test_a_hole_in_the_search_is_told() -> None:
     shell = Holed(plate(count=40), range(0, 40))
     with pytest.raises(AssertionError, match=r"depth .* m is missed at element \d+ \(center \("):
-        assert_no_contact_missed(shell, 0.1)
+        testing.assert_no_contact_missed(shell, 0.1)
 
 
 def test_a_second_contact_that_is_swallowed_is_told() -> None:
     """Both flanks of a groove, in one piece, and two sheets one above the other, in two."""
     below, elements = meshes.grid_plate(4, 4)
     both = np.concatenate([below, below + np.array([0.0, 0.0, 0.2])])
-    sheets = Shell(both, np.concatenate([elements, elements + len(below)]))
+    sheets = sp.Shell(both, np.concatenate([elements, elements + len(below)]))
     for shell, place, radius, message in (
         (GROOVE, [0.0, 0.3, 0.75], 0.6, r"deep at its inside, but no contact"),
         (sheets, [0.01, 0.02, 0.09], 0.15, r"deep in a piece of \d+ triangles, but no contact"),
     ):
         assert len(shell.contacts(place, radius, "facets")) == 2
-        assert_no_contact_missed(shell, radius, [place])
+        testing.assert_no_contact_missed(shell, radius, [place])
         with pytest.raises(AssertionError, match=message):
-            assert_no_contact_missed(Swallows(shell, range(0)), radius, [place])
+            testing.assert_no_contact_missed(Swallows(shell, range(0)), radius, [place])
 
 
 def test_a_ghost_is_told() -> None:
     with pytest.raises(AssertionError, match=r"off the surface, its depth .* wrong"):
-        assert_no_contact_missed(Ghosts(plate(), range(0)), 0.1)
+        testing.assert_no_contact_missed(Ghosts(plate(), range(0)), 0.1)
 
 
 def test_one_sided_shells_are_refused() -> None:
     with pytest.raises(InvalidParameter, match="must be 'both'"):
-        assert_no_contact_missed(plate(side="outside"), 0.1)
+        testing.assert_no_contact_missed(plate(side="outside"), 0.1)
 
 
 def test_a_sphere_that_passes_is_told() -> None:
-    weak = Simulation(on_plate(ball(), linear_law(1.0)), Adaptive())
+    weak = sp.Simulation(on_plate(ball(), linear_law(1.0)), sp.Adaptive())
     v = np.array([0, 0, -3.0, 0, 0, 0])
     with pytest.warns(WeakLawWarning):
         through = weak.run(free_q([0, 0, 0.1]), v, 0.1)
     with pytest.raises(AssertionError, match=r"passed through.*by its event at t = .*element \d+"):
-        assert_not_passed_through(through)
+        testing.assert_not_passed_through(through)
     # The run itself need not know: nothing stops a sphere in a scene without contacts.
     scene = on_plate(ball(), linear_law(1e5))
-    free = replace(Simulation(Scene(ball()), Adaptive()).run(free_q([0, 0, 0.1]), v, 0.1))
+    free = replace(sp.Simulation(sp.Scene(ball()), sp.Adaptive()).run(free_q([0, 0, 0.1]), v, 0.1))
     with pytest.raises(AssertionError, match=r"passed through.*'ball-plate', element \d+"):
-        assert_not_passed_through(replace(free, scene=scene))
-    stopped = Simulation(scene, Adaptive()).run(free_q([0, 0, 0.1]), v, 0.1)
-    assert assert_not_passed_through(stopped) == 0.0
+        testing.assert_not_passed_through(replace(free, scene=scene))
+    stopped = sp.Simulation(scene, sp.Adaptive()).run(free_q([0, 0, 0.1]), v, 0.1)
+    assert testing.assert_not_passed_through(stopped) == 0.0
 
 
 def test_distances_are_those_of_the_oracle() -> None:

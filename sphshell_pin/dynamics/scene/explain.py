@@ -435,4 +435,4 @@ def _count(number: int, noun: str) -> str:
 def _round_down(x: float) -> float:
     """Round to the next lower 1, 2 or 5 times a power of ten."""
     scale = 10.0 ** math.floor(math.log10(x))
-    return max(f for f in (1, 2, 5) if f * scale <= x * (1 + 1e-12)) * scale
+    return max(f for f in (1, 2, 5, 10) if f * scale <= x * (1 + 1e-12)) * scale

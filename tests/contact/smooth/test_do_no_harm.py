@@ -22,7 +22,7 @@ from tests.contact.smooth.parts import (
 )
 from tests.contact.smooth.surfaces import SURFACES, mean_edge, shell_of
 
-COUNT = 100  # of each family
+COUNT = 50  # of each family
 
 
 @pytest.mark.slow

@@ -119,11 +119,11 @@ def work(shell, path) -> tuple[float, float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CURVED)
 def test_no_work_round_closed_paths(name: str) -> None:
-    """Forty paths on each of five surfaces; the quadrature's error falls with its step."""
+    """Fifteen paths on each of five surfaces; the quadrature's error falls with its step."""
     shell = shell_of(name, 0.3)
     rng = np.random.default_rng(8)
     lost = {100: [], 400: []}
-    for _ in range(40):
+    for _ in range(15):
         path = closed_path(name, rng, 400)
         for points, found in lost.items():
             done, size = work(shell, path[:: 400 // points])

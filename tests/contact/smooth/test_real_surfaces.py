@@ -46,7 +46,7 @@ SOME = {
 # other, two pieces of the surface touch in a line that is no side: what the sphere holds of one may
 # come to be nearest where the other one is, and no link is there that takes as much.
 CROSSED = {
-    "manifold_openscad-nonmanifold-crash.obj": "elements cross or overlap: no side joins them",
+    "manifold_openscad-nonmanifold-crash.obj": "elements cross or overlap: no side joins them"
 }
 
 

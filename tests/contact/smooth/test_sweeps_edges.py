@@ -9,17 +9,8 @@ import pytest
 
 from sphshell_pin import Shell
 from tests import meshes
+from tests.contact.smooth import sweeps
 from tests.contact.smooth.surfaces import SURFACES, can
-from tests.contact.smooth.sweeps import (
-    DEPTHS,
-    LIMIT,
-    UP,
-    assert_as_defined,
-    assert_continuous,
-    changes,
-    segment,
-    sweep,
-)
 from tests.contact.smooth.test_potential import query
 from tests.contact.smooth.test_true_edges import cone
 from tests.studies import mostly_studies
@@ -123,7 +114,7 @@ def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0
                 high = middle
         along = rng.normal(size=3)
         along *= reach / np.linalg.norm(along)
-        path = segment(place + low * out - along, place + low * out + along, 9)
+        path = sweeps.segment(place + low * out - along, place + low * out + along, 9)
         # At the surface itself no normal is defined, and behind it a one-sided shell pushes back.
         distance = shell.closest_points(path).distances
         if (sign * distance if sign else distance).min() > 0.7:
@@ -147,8 +138,8 @@ EDGED = mostly_studies(EDGED, SOME_EDGED.__contains__)
 def test_edges(kind: str, exact: bool) -> None:
     """Curved creases, borders, and bodies with plane sides."""
     shell = edged(kind, exact)
-    for depth in DEPTHS:
-        assert_continuous(shell, along_edges(shell, depth, 9), depth, 5)
+    for depth in sweeps.DEPTHS:
+        sweeps.assert_continuous(shell, along_edges(shell, depth, 9), depth, 5)
 
 
 def star(kind: str, facets: int, slope: float):
@@ -168,7 +159,7 @@ def lowered(shell, center, depth: float):
     for _ in range(12):
         found = query(shell, center)
         lift = (found.depth[0] - depth) / found.normal[0, 2] if len(found) else -0.05
-        center = center + lift * UP
+        center = center + lift * sweeps.UP
         if 0 <= abs(lift) < 1e-9:
             break
     return center
@@ -181,7 +172,7 @@ def over_vertex(shell, depth: float):
     for aside in (1e-3, 0.02, 0.1):
         turn = rng.uniform(0, 2 * np.pi)
         along = np.array([np.cos(turn), np.sin(turn), 0.0])
-        foot = aside * np.array([-along[1], along[0], 0.0]) + UP
+        foot = aside * np.array([-along[1], along[0], 0.0]) + sweeps.UP
         path = foot + 0.6 * (share * abs(share))[:, None] * along
         if aside == 0.02:
             yield path + (lowered(shell, foot, depth) - foot)
@@ -208,26 +199,28 @@ def assert_jumps_as_defined(shell, paths, depth: float) -> None:
     """The potential does not jump, and the force only where that of the definition does: where
     passes close a ring round a pit and two are equally high, either may be the last."""
     for path in paths:
-        pairs = sweep(shell, path)
-        for pair, (force, potential) in zip(pairs, changes(shell, pairs, depth), strict=True):
-            assert potential <= LIMIT, (potential, pair[0].tolist())
-            if force > LIMIT:
+        pairs = sweeps.sweep(shell, path)
+        for pair, (force, potential) in zip(
+            pairs, sweeps.changes(shell, pairs, depth), strict=True
+        ):
+            assert potential <= sweeps.LIMIT, (potential, pair[0].tolist())
+            if force > sweeps.LIMIT:
                 # A little off the tie, which round-off decides.
                 off = 1e-10 * (pair[1] - pair[0]) / np.linalg.norm(pair[1] - pair[0])
-                assert_as_defined(shell, [pair[0] - off, pair[1] + off], depth)
+                sweeps.assert_as_defined(shell, [pair[0] - off, pair[1] + off], depth)
 
 
 @pytest.mark.parametrize(("kind", "facets", "slope"), STARS)
 def test_vertices(kind: str, facets: int, slope: float) -> None:
     """Pyramids from outside and inside, and saddles of up and down folds, all creases."""
     shell = Shell(*star(kind, facets, slope), crease_angle=np.radians(0.3))
-    for depth in DEPTHS:
+    for depth in sweeps.DEPTHS:
         paths = list(over_vertex(shell, depth))
         if kind == "pit":
             assert_jumps_as_defined(shell, paths, depth)
         else:
-            assert_continuous(shell, paths, depth)
-        assert_as_defined(shell, [path[k] for path in paths for k in (3, 6)], depth)
+            sweeps.assert_continuous(shell, paths, depth)
+        sweeps.assert_as_defined(shell, [path[k] for path in paths for k in (3, 6)], depth)
 
 
 @pytest.mark.parametrize(("kind", "facets", "slope"), SMOOTH_STARS)
@@ -239,21 +232,21 @@ def test_vertices_that_count_as_smooth(kind: str, facets: int, slope: float) -> 
     normals = np.cross(b - a, c - a)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     shell = Shell(vertices, triangles, normals=np.repeat(normals[:, None], 3, axis=1))
-    for depth in DEPTHS:
+    for depth in sweeps.DEPTHS:
         for path in over_vertex(shell, depth):
-            pairs = sweep(shell, path)
-            change = changes(shell, pairs, depth)[:, 1 if kind == "pit" else 0]
-            assert change.max() <= LIMIT, (change.max(), pairs[change.argmax()][0].tolist())
+            pairs = sweeps.sweep(shell, path)
+            change = sweeps.changes(shell, pairs, depth)[:, 1 if kind == "pit" else 0]
+            assert change.max() <= sweeps.LIMIT, (change.max(), pairs[change.argmax()][0].tolist())
 
 
 def test_corner_of_a_box() -> None:
     """Three walls at right angles, touched one, two and three at a time."""
     shell = edged("box")
     rng = np.random.default_rng(6)
-    for depth in DEPTHS:
+    for depth in sweeps.DEPTHS:
         corner = 2.0 - (1 - depth) * np.ones(3)
         along = rng.normal(size=(6, 3))
         along *= 0.02 / np.linalg.norm(along, axis=1)[:, None]
-        paths = [segment(corner - d, corner + 0.8 * d, 9) for d in along]
-        assert_continuous(shell, paths, depth)
-        assert_as_defined(shell, [c for path in paths for c in path[:4]], depth)
+        paths = [sweeps.segment(corner - d, corner + 0.8 * d, 9) for d in along]
+        sweeps.assert_continuous(shell, paths, depth)
+        sweeps.assert_as_defined(shell, [c for path in paths for c in path[:4]], depth)

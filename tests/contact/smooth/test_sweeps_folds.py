@@ -9,11 +9,7 @@ import pytest
 
 from sphshell_pin import Shell
 from tests import meshes
-from tests.contact.smooth.sweeps import (
-    DEPTHS,
-    assert_as_defined,
-    assert_continuous,
-)
+from tests.contact.smooth.sweeps import DEPTHS, assert_as_defined, assert_continuous
 from tests.studies import mostly_studies
 
 pytestmark = pytest.mark.slow

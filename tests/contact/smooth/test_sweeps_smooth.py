@@ -10,14 +10,7 @@ import pytest
 
 from tests.contact.helpers import force_sum
 from tests.contact.smooth.surfaces import SURFACES, shell_of
-from tests.contact.smooth.sweeps import (
-    DEPTHS,
-    UP,
-    about,
-    assert_continuous,
-    borders,
-    segment,
-)
+from tests.contact.smooth.sweeps import DEPTHS, UP, about, assert_continuous, borders, segment
 from tests.contact.smooth.test_potential import query
 from tests.studies import mostly_studies
 

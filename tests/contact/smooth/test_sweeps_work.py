@@ -7,9 +7,7 @@ import pytest
 
 from sphshell_pin import Shell
 from tests.contact.smooth.surfaces import shell_of
-from tests.contact.smooth.sweeps import (
-    work_error,
-)
+from tests.contact.smooth.sweeps import work_error
 from tests.contact.smooth.test_sweeps_edges import along_edges, edged, over_vertex, star
 from tests.contact.smooth.test_sweeps_folds import KINDS, fold, fold_paths
 from tests.contact.smooth.test_sweeps_smooth import SMOOTH, rolled

@@ -202,7 +202,7 @@ def test_pieces_of_polyhedra(name: str, radius: float) -> None:
     shell = shell_of(mesh, **({} if crease is None else {"crease_angle": crease}))
     rng = np.random.default_rng(0)
     seen = 0
-    for center in positions(*mesh, radius, 150, seed=7):
+    for center in positions(*mesh, radius, 60, seed=7):
         # At the surface itself a normal is not defined.
         if abs(shell.closest_points([center]).distances[0]) < 1e-3 * radius:
             continue
@@ -218,4 +218,4 @@ def test_pieces_of_polyhedra(name: str, radius: float) -> None:
             beside = center + 1e-9 * rng.normal(size=3)
             forces.append(potential_and_force(shell.vertices, shell.triangles, beside, radius)[1])
         seen += len(found) > 0
-    assert seen > 50
+    assert seen > 20
