@@ -113,7 +113,7 @@ def test_a_killed_sample_resumes_to_the_same_bytes(scenario):
 
 @pytest.mark.slow
 def test_ishigamis_indices_by_the_command(tmp_path):
-    """The same as of the function alone; `python -m tests.study.sampling_survival` has n = 4096."""
+    """The same as of the function alone."""
     scenario, out = write_ishigami(tmp_path), tmp_path / "ishigami.parquet"
     dist = [f"--dist={key}={one}" for key, one in DIST.items()]
     options = ["--sample", "sobol", "--n", 32, "--indices", "--workers", 0, "--out", out]
