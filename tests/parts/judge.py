@@ -69,7 +69,7 @@ class Verdict:
     forces : smallest and largest on planes
     lost : touches of planes that are not found
     ok : what `health` says; seconds : of processor time to load and curve it
-    recognized : share of the triangles in faces that were found, None where none are looked for
+    recognized : share of the triangles in faces that were found
     found : by CAD face; None of a file with other triangles
     """
 
@@ -87,7 +87,7 @@ class Verdict:
     lost: dict[str, int]
     ok: bool
     seconds: float
-    recognized: float | None = None
+    recognized: float
     found: Found | None = field(default=None, repr=False)
 
     @property
