@@ -1,7 +1,5 @@
 """The command export: files beside the run, times as people write them, one sentence a fault."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

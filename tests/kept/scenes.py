@@ -1,7 +1,5 @@
 """A scenario of which every part is a file, code or both: its results must not need any of them."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

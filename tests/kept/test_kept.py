@@ -1,7 +1,5 @@
 """What results hold of their scene is what ran; whoever changes it gets an error, and no file."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import hashlib

@@ -3,8 +3,6 @@
 python -m tests.parts [--count 300] [--seed 1] [--only 123 peg] [--show] [--write]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -1,7 +1,5 @@
 """What one file of a part costs: errors of distances, and of forces on planes."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The verdicts as tables: rows of texts, the headings first."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The study of mesh files measures what it says: its solids, its exact distances, its files."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

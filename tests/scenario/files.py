@@ -1,7 +1,5 @@
 """Small scenario files for the tests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 DROP = """

@@ -1,7 +1,5 @@
 """Input that is allowed and probably a mistake earns a warning, in all commands that meet it."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

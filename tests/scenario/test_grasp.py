@@ -1,7 +1,5 @@
 """A hand about a part: forces in closed form, distances, and drafts that are run."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Knobs say what may be turned; a rebuilt scenario differs in what was turned and in no more."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

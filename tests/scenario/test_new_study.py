@@ -1,7 +1,5 @@
 """A cross-section of the study of new scenarios: each works in its own run, or is refused."""
 
-from __future__ import annotations
-
 import pytest
 
 from sphshell_pin.benchmarks.new_study import DATA, ask, read_once, sections

@@ -1,7 +1,5 @@
 """A new scenario works: it touches, holds its force, and keeps links off the part."""
 
-from __future__ import annotations
-
 import re
 import time
 from dataclasses import replace

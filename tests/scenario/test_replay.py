@@ -1,7 +1,5 @@
 """A finished run is played again: from its file, in the scene that it came from."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import shutil

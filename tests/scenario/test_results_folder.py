@@ -1,7 +1,5 @@
 """A folder in the hands of one process: who else may write there, and what stays of others."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl

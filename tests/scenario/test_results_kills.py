@@ -1,7 +1,5 @@
 """What is left when a process ends at any of its file operations: whole old or whole new files."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import hashlib

@@ -1,7 +1,5 @@
 """A run's folder: whole files or none, told early when unwritable, kept when interrupted."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

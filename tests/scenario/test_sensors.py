@@ -1,7 +1,5 @@
 """Sensors in scenario files: tables, keys, results."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

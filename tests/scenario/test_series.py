@@ -1,7 +1,5 @@
 """Curves for charts: values and units of what a live run and a finished one record."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

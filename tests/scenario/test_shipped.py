@@ -1,7 +1,5 @@
 """The shipped scenarios come out as they expect."""
 
-from __future__ import annotations
-
 import pytest
 
 from sphshell_pin.errors import MissingExtra

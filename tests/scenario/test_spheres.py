@@ -1,7 +1,5 @@
 """The spheres of a contact: one, those of a list, those of the collision geometry; on spheres."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

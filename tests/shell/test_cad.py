@@ -1,7 +1,5 @@
 """CAD files: what is read, what it is called, in which unit, and what is refused."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Runs over each other: differences against closed forms, names matched, times interpolated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

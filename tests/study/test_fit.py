@@ -1,7 +1,5 @@
 """Fits: closed forms of values and intervals, coverage, and what the data do not determine."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

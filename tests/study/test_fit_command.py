@@ -1,7 +1,5 @@
 """The command that fits: what it prints and writes, and its exit codes."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

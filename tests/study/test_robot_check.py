@@ -1,7 +1,5 @@
 """Whole robots: the shipped ones pass, hard ones are told of honestly, wrong physics fails."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The command sweep with uncertain inputs: what it prints, writes, and how it resumes."""
 
-from __future__ import annotations
-
 import signal
 
 import numpy as np

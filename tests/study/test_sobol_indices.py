@@ -1,7 +1,5 @@
 """Sobol indices and tornado of tables: against closed forms, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

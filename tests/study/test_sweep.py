@@ -1,7 +1,5 @@
 """Sweeps: the closed form of what is swept, and that nothing that happens shows in the table."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """The command sweep: killed, interrupted, and taken up again; and what it prints."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """A result in a notebook: the recording as the value of a cell."""
 
-from __future__ import annotations
-
 import dataclasses
 import html
 import re
