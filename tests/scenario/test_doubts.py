@@ -16,6 +16,8 @@ from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
 from tests.scenario.files import DROP, write
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 SHORT = {"run.duration": "1e-4"}
 OFF = {"controller.path": "[[0, 0, 0], [0.5, 2.0, 0.0]]"}
 AWAY = {"shell.box.placement.xyz": "[3.0, 2.0, -3.0]"}

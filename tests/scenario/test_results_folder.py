@@ -24,12 +24,6 @@ from tests.test_cli import call
 LAST = "summary.json"
 
 
-@pytest.fixture
-def no_pictures(monkeypatch):
-    """Runs draw nothing, for speed."""
-    monkeypatch.setattr("sphshell_pin.plot.save_figures", lambda *_, **__: [])
-
-
 def put(folder, text, last=LAST):
     """Write a results folder of two files, and return what is in it."""
     with AtomicFolder(folder, last=last, inner=["stopped"]) as place:

@@ -12,6 +12,8 @@ from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, run_scenario
 from tests.scenario.files import write
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 LAW = 'law = { type = "hunt-crossley", stiffness = 1e6, dissipation = 0.5 }\n'
 TWO_BALLS = f"""
 title = "A ball falls on a ball"

@@ -15,6 +15,8 @@ from sphshell_pin.study.compare import Curve, Measured, compare, measured, table
 from tests.export.runs import finger_run, turntable_run
 from tests.scenario.files import DROP, write
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 
 @pytest.fixture(scope="module")
 def finger():
