@@ -25,6 +25,7 @@ def scenario(tmp_path_factory):
     return write(tmp_path_factory.mktemp("sampling"))
 
 
+@pytest.mark.slow
 def test_a_sample_is_told_and_drawn(scenario):
     out = scenario.parent / "told.parquet"
     options = ["--sample", "sobol", "--n", 8, "--indices", "--tornado", "--bands", DEPTH]

@@ -17,6 +17,7 @@ def covers(found, kind, exact):
     return (found[f"{kind}_low"] <= exact) & (exact <= found[f"{kind}_high"])
 
 
+@pytest.mark.slow
 def test_the_indices_of_ishigamis_function():
     found = sobol_indices(ishigami_table(N), "f")
     assert found.index.tolist() == KEYS
