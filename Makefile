@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick studies lint format bench report robots hard-cases work-precision rollouts \
-  real-surfaces new-study parts fuzz kills sweep-survival sampling-survival sanitize wheel notebooks docs docs-serve clean
+  real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
 
 help:
 	@sed -nE 's/^([a-z-]+):.* ## (.*)/make \1\t\2/p' Makefile | expand -t 22
@@ -109,12 +109,6 @@ fuzz: $(VENV)/.test ## damaged files, folders of robots and results for every re
 
 kills: $(VENV)/.test ## kill run, fit, render and sweep at any moment, fill disks
 	$(BIN)/python -m tests.scenario.kills
-
-sweep-survival: $(VENV)/.test ## 500 runs five ways, workers killed and the sweep resumed: same bytes
-	$(BIN)/python -m tests.study.sweep_survival
-
-sampling-survival: $(VENV)/.test ## 4096 sampled runs, Ishigami's indices, killed and resumed: 10 minutes
-	$(BIN)/python -m tests.study.sampling_survival
 
 sanitize: $(VENV)/.test ## run tests with checks of memory, undefined behavior and data races
 	.ci/sanitize address

@@ -1,8 +1,10 @@
-"""One browser for all tests."""
+"""One browser for all tests, and runs without pictures."""
 
 import shutil
 
 import pytest
+
+from tests.scenario.files import without_pictures
 
 # Software rendering, on machines that have no graphics card.
 FLAGS = [
@@ -25,3 +27,10 @@ def browser():
         running = driver.chromium.launch(executable_path=program, args=FLAGS)
         yield running
         running.close()
+
+
+@pytest.fixture
+def no_pictures():
+    """Runs draw nothing."""
+    with without_pictures():
+        yield

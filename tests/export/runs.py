@@ -1,7 +1,5 @@
 """Short runs to export: a finger with sensors, and a free ball on a turntable."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -1,7 +1,5 @@
 """The command export: files beside the run, times as people write them, one sentence a fault."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import sphshell_pin as sp
 from sphshell_pin.cli import app
 from sphshell_pin.cli.export import beside, nanoseconds
 from sphshell_pin.errors import InvalidParameter
-from tests.scenario.files import write
+from tests.scenario.files import without_pictures, write
 
 
 def call(*arguments):
@@ -23,7 +21,8 @@ def call(*arguments):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
-    printed = call("run", write(folder), "--out", folder / "drop", "--no-recording")
+    with without_pictures():
+        printed = call("run", write(folder), "--out", folder / "drop", "--no-recording")
     assert printed.exit_code == 0, printed.output
     return folder
 

@@ -1,7 +1,5 @@
 """MCAP files read back by the library's own reader and by another one: every number, every time."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections import defaultdict

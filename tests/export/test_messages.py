@@ -1,7 +1,5 @@
 """The messages are those of ROS 2: definitions by their hashes, bytes by another implementation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore

@@ -1,7 +1,5 @@
 """Tables of a run: every number is read back exactly, columns have their units."""
 
-from __future__ import annotations
-
 import csv
 import json
 import sys

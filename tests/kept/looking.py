@@ -5,8 +5,6 @@ Run as a program: `looking.py REPOSITORY OUTPUT SCENARIO`. A hook of the interpr
 that is executed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib.util
 import io

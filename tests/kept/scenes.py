@@ -1,11 +1,10 @@
 """A scenario of which every part is a file, code or both: its results must not need any of them."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
 from sphshell_pin.scenario import run_scenario, shipped_scenarios
+from tests.scenario.files import without_pictures
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -159,7 +158,8 @@ def write(home: Path) -> Path:
 def run(home: Path) -> Path:
     """Run it; return the folder of its results. What it read is worse than gone afterwards."""
     out = home / "results"
-    run_scenario(write(home), out, recording=False)
+    with without_pictures():
+        run_scenario(write(home), out, recording=False)
     (home / "arm" / "arm.urdf.xacro").write_text(f"{HEAD}<link name='a${{1 / 0}}'/></robot>")
     (home / "executed").unlink()
     return out

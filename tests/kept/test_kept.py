@@ -1,7 +1,5 @@
 """What results hold of their scene is what ran; changes raise an error, no file is written."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import hashlib

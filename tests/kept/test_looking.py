@@ -1,7 +1,5 @@
 """Looking at results reads no file but theirs, starts no program and executes no code."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

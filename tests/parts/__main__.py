@@ -1,17 +1,12 @@
 """Generate parts, write them as files, and compare what is read with their exact CAD faces.
 
 python -m tests.parts [--count 300] [--seed 1] [--only 123 peg] [--show] [--write]
-python -m tests.parts --files FOLDER
 """
 
-from __future__ import annotations
-
 import argparse
-import json
 import sys
 import time
 from collections import Counter
-from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -21,10 +16,8 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from sphshell_pin.benchmarks.measured import Measured, write
 from tests.parts import tables
 from tests.parts.cad_mesh import KINDS
-from tests.parts.earlier import against
 from tests.parts.files import KINDS_OF_FILE
 from tests.parts.judge import METHODS, Part, Verdict, distance_errors, loaded, random_part
-from tests.parts.real import press_on_files
 from tests.parts.running import Outcome, run
 from tests.parts.solids import FAMILIES, family_of, random_solid
 
@@ -32,9 +25,6 @@ from tests.parts.solids import FAMILIES, family_of, random_solid
 def main() -> int:
     """Run, print and write; return 1 where a file is refused."""
     options = arguments()
-    if options.files:
-        print(press_on_files(options.files))
-        return 0
     kinds = tuple(kind for kind in KINDS_OF_FILE if kind not in options.without)
     if "decimated" in kinds and find_spec("fast_simplification") is None:
         print("No decimated files: they need fast-simplification (pip install fast-simplification)")
@@ -55,11 +45,6 @@ def main() -> int:
     failed = Counter(f"{family_of(one.number)}: {one.skipped}" for one in outcomes if one.skipped)
     print(f"\n{len(outcomes)} parts, {failed.total()} skipped {dict(failed)}")
     print(f"{time.perf_counter() - begin:.0f} s")
-    if options.against:
-        print(against(options.against, verdicts))
-    if options.json:
-        rows = [asdict(verdict) for verdict in verdicts]
-        options.json.write_text(json.dumps(rows, default=np.ndarray.tolist), encoding="utf-8")
     if options.write:
         command = f"python -m tests.parts --count {options.count} --seed {options.seed} --write"
         text = (
@@ -80,10 +65,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--without", nargs="+", default=[], help="kinds of files to leave out")
     parser.add_argument("--show", action="store_true", help="where the errors are")
     parser.add_argument("--keep", type=Path, help="folder for the STEP files of the parts")
-    parser.add_argument("--json", type=Path, help="all figures, to a file")
-    parser.add_argument("--against", type=Path, help="figures of an earlier run to compare with")
     parser.add_argument("--write", action="store_true", help="write docs/measured/mesh_parts.json")
-    parser.add_argument("--files", type=Path, help="a folder of files to press on, instead")
     options = parser.parse_args()
     unknown = {*options.without} - {*KINDS_OF_FILE}
     if unknown:
@@ -122,7 +104,7 @@ def sections(verdicts: list[Verdict]) -> list[Measured]:
     ]
     for name, group in tables.groups(verdicts, "file"):
         faces = tables.by_face(group)
-        if faces and (name == first or any(v.recognized is not None for v in group)):
+        if faces:
             found.append(Measured(f"Triangles by their CAD face: {name}", table=faces))
     return [*found, Measured("The worst", table=tables.worst(verdicts))]
 

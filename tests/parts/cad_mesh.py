@@ -1,7 +1,5 @@
 """Triangles of a solid's faces as OpenCASCADE meshes them, with what CAD knows of each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Each function writes a file [mm] and returns its path and the triangles of it, a
 the mesh, or -1 where it has others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

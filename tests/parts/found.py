@@ -47,14 +47,14 @@ class Found:
 def recognized_faces(shell: Shell) -> Ints:
     """Row in `shell.faces` (t,) of the face found at each triangle, -1 where none is."""
     row = np.full(shell.num_elements, -1)
-    for k, face in enumerate(getattr(shell, "faces", ())):
+    for k, face in enumerate(shell.faces):
         row[face.elements] = k
     return row[shell.triangle_element]
 
 
-def share_recognized(shell: Shell) -> float | None:
-    """Share of the triangles, None of a shell that looks for no faces."""
-    return float((recognized_faces(shell) >= 0).mean()) if hasattr(shell, "faces") else None
+def share_recognized(shell: Shell) -> float:
+    """Share of the triangles in faces that were found."""
+    return float((recognized_faces(shell) >= 0).mean())
 
 
 def faces_found(shell: Shell, mesh: CadMesh, rows: Ints) -> Found:
@@ -63,7 +63,7 @@ def faces_found(shell: Shell, mesh: CadMesh, rows: Ints) -> Found:
     cad = mesh.kind[source]
     face = recognized_faces(shell)
     there = face >= 0
-    kinds = np.array([*(KINDS.index(one.kind) for one in getattr(shell, "faces", ())), -1])
+    kinds = np.array([*(KINDS.index(one.kind) for one in shell.faces), -1])
     cosine = turns(shell, mesh, source).min(axis=1)
     pieces = np.unique(np.stack([mesh.face[source], face, cad])[:, there], axis=1)
     _, first = np.unique(pieces[0], return_index=True)

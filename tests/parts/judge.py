@@ -1,7 +1,5 @@
 """What one file of a part costs: errors of distances, and of forces on planes."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -69,7 +67,7 @@ class Verdict:
     forces : smallest and largest on planes
     lost : touches of planes that are not found
     ok : what `health` says; seconds : of processor time to load and curve it
-    recognized : share of the triangles in faces that were found, None where none are looked for
+    recognized : share of the triangles in faces that were found
     found : by CAD face; None of a file with other triangles
     """
 
@@ -87,7 +85,7 @@ class Verdict:
     lost: dict[str, int]
     ok: bool
     seconds: float
-    recognized: float | None = None
+    recognized: float
     found: Found | None = field(default=None, repr=False)
 
     @property

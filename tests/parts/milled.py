@@ -1,7 +1,5 @@
 """Families of milled and molded parts: mostly planes, with fillets, chamfers, bores, ribs [mm]."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tests.parts import occ

@@ -1,7 +1,5 @@
 """OpenCASCADE's operations on solids, in a few words each [mm]."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 from typing import Any

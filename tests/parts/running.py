@@ -1,7 +1,5 @@
 """Parts one after the other, in a process of their own: OpenCASCADE may crash it."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor

@@ -1,7 +1,5 @@
 """Random solids, one for each number: a family in turn, with random sizes and place."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The verdicts as tables: rows of texts, the headings first."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -69,7 +67,6 @@ def summary(verdicts: list[Verdict]) -> list[str]:
     worse = [verdict for verdict in kept if verdict.worse]
     ratio = np.exp(np.mean([np.log(verdict.ratio) for verdict in kept]))
     planes = [verdict for verdict in kept if verdict.touches]
-    shares = [verdict.recognized for verdict in kept if verdict.recognized is not None]
     seconds, triangles = sum(v.seconds for v in kept), sum(v.triangles for v in kept)
     not_ok = sum(not verdict.ok for verdict in kept)
     return [
@@ -86,7 +83,7 @@ def summary(verdicts: list[Verdict]) -> list[str]:
         f"{sum(v.wrong_signs['smooth'] for v in kept)} / "
         f"{sum(v.wrong_signs['facets'] for v in kept)}",
         f"{not_ok} ({sum(not verdict.ok for verdict in worse)})",
-        f"{np.mean(shares):.2f}" if shares else "-",
+        f"{np.mean([v.recognized for v in kept]):.2f}",
         f"{1e6 * seconds / triangles:.1f}",
     ]
 
@@ -104,23 +101,20 @@ def largest_ratio(verdict: Verdict) -> float:
 
 
 def by_face(verdicts: list[Verdict]) -> Rows:
-    """One row for each kind of CAD face; the last columns need faces that were found."""
+    """One row for each kind of CAD face."""
     found = [v.found for v in verdicts if v.found is not None and not v.spoiled]
-    looked = any(verdict.recognized is not None for verdict in verdicts)
     if not found:
         return []
     whole = sum(found[1:], start=found[0])
-    return [FACE_COLUMNS, *([kind, *_faces(whole, k, looked)] for k, kind in enumerate(KINDS))]
+    return [FACE_COLUMNS, *([kind, *_faces(whole, k)] for k, kind in enumerate(KINDS))]
 
 
-def _faces(found: Found, k: int, looked: bool) -> list[str]:
+def _faces(found: Found, k: int) -> list[str]:
     def share(part: int, whole: int, digits: int = 4) -> str:
         return f"{part / whole:.{digits}f}" if whole else "-"
 
     count, taken = int(found.triangles[k]), int(found.recognized[k])
     cells = [str(count), share(int(found.off[k]), count)]
-    if not looked:
-        return [*cells, *["-"] * (len(FACE_COLUMNS) - 3)]
     parts = (found.same, found.recognized_off, found.recognized_exact)
     pieces = share(int(found.pieces[k]), int(found.faces[k]), 2)
     return [*cells, share(taken, count), *(share(int(part[k]), taken) for part in parts), pieces]
@@ -154,9 +148,9 @@ def line(verdict: Verdict) -> str:
     v = verdict
     remark = "spoiled" if v.spoiled else "WORSE" if v.worse else ""
     force = f"planes {forces([v], 'smooth')}, {v.lost['smooth']} lost" if v.touches else ""
-    share = "" if v.recognized is None else f"recognized {v.recognized:.2f}"
     return (
         f"{v.number:4d} {v.family:18s} {v.file:18s} {v.triangles:6d} largest "
         f"{v.largest['smooth']:.1e} flat {v.largest['facets']:.1e} mean {v.mean['smooth']:.1e} "
-        f"flat {v.mean['facets']:.1e} {force} {share} {'' if v.ok else 'not ok'} {remark}"
+        f"flat {v.mean['facets']:.1e} {force} recognized {v.recognized:.2f} "
+        f"{'' if v.ok else 'not ok'} {remark}"
     ).rstrip()

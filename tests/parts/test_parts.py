@@ -1,22 +1,14 @@
 """The study of mesh files measures what it says: its solids, its exact distances, its files."""
 
-from __future__ import annotations
-
-import json
-from dataclasses import asdict
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import trimesh
 
-from sphshell_pin import Shell
 from tests.oracle.cad import ExactShape
 from tests.parts import tables
 from tests.parts.__main__ import chosen, sections
 from tests.parts.cad_mesh import KINDS, area_vectors, joined, meshed_faces
-from tests.parts.earlier import against
 from tests.parts.files import KINDS_OF_FILE
 from tests.parts.found import Found, faces_found
 from tests.parts.judge import (
@@ -27,7 +19,6 @@ from tests.parts.judge import (
     loaded,
     random_part,
 )
-from tests.parts.real import judged_file, planes_of
 from tests.parts.running import outcome
 from tests.parts.solids import FAMILIES, family_of, random_solid
 from tests.parts.truth import ExactFaces
@@ -144,6 +135,7 @@ def verdict(number: int, curved: float, flat: float, lost: int = 0) -> Verdict:
         lost={"smooth": lost, "facets": 0},
         ok=True,
         seconds=0.01,
+        recognized=1.0,
         found=Found(*(np.ones(6, int) for _ in range(8))),
     )
 
@@ -160,16 +152,6 @@ def test_tables_count_what_is_worse() -> None:
         assert len({len(row) for row in section.table}) == 1
 
 
-def test_runs_are_compared(tmp_path: Path) -> None:
-    path = tmp_path / "then.json"
-    then = [verdict(0, 1e-3, 1e-3), verdict(1, 4e-3, 1e-3), verdict(5, 1.0, 1e-3)]
-    path.write_text(json.dumps([asdict(one) for one in then], default=np.ndarray.tolist))
-    text = against(path, [verdict(0, 2e-3, 1e-3), verdict(1, 1e-3, 1e-3)])
-    cells = text.splitlines()[-1].split(" | ")
-    assert cells[1:5] == ["2", "1", "1", "0"]
-    assert cells[5:] == [f"{0.5**0.5:.3f}", "0 |"]
-
-
 def test_only_takes_numbers_and_families() -> None:
     assert chosen(3, []) == [0, 1, 2]
     assert chosen(60, ["7", "rounded_box"]) == [7, 0, 26, 52]
@@ -181,14 +163,3 @@ def test_a_part_that_fails_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("tests.parts.running.random_part", fails)
     assert outcome(5, 1, ()).skipped == "RuntimeError: StdFail_NotDone"
-
-
-def test_planes_of_a_file_are_pressed_on(tmp_path: Path) -> None:
-    path = tmp_path / "block.stl"
-    trimesh.creation.box((0.3, 0.2, 0.1)).export(path)
-    assert np.bincount(planes_of(Shell.from_file(path, unit="mm"))).tolist() == [2] * 6
-    found = judged_file(path)
-    assert (found.planes, found.triangles) == (6, 12)
-    assert len(found.forces) > 100
-    np.testing.assert_allclose(found.forces, 1.0, rtol=1e-2)
-    assert found.off == 0.0

@@ -6,8 +6,6 @@ mesh, whose own error is measured: the surface below every face that comes nearl
 projected on, and a place is dropped if one is nearer, within the face or not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Families of turned, bent and free-form parts [mm]."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tests.parts import occ

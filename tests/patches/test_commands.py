@@ -47,7 +47,7 @@ def test_wear_needs_patches(tmp_path):
         build(path)
 
 
-def test_a_run_without_patches_has_no_taxels(tmp_path):
+def test_a_run_without_patches_has_no_taxels(tmp_path, no_pictures):
     out = tmp_path / "out"
     assert call("run", write(tmp_path), "--out", out, "--no-recording").exit_code == 0
     assert not (out / "wear.png").exists()

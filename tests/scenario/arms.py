@@ -1,7 +1,5 @@
 """A scenario with an arm of two hinges and a controller, for tests of what moves it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 LINK = """

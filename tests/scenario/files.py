@@ -1,8 +1,7 @@
-"""Small scenario files for the tests."""
-
-from __future__ import annotations
+"""Small scenario files for the tests, and runs of them without pictures."""
 
 from pathlib import Path
+from unittest.mock import patch
 
 DROP = """
 title = "a ball falls on a box"
@@ -71,3 +70,8 @@ def write(folder: Path, text: str = DROP, name: str = "drop.toml") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def without_pictures():
+    """Return a context in which runs draw nothing: that takes longer than all the rest of them."""
+    return patch("sphshell_pin.plot.save_figures", lambda *_, **__: [])

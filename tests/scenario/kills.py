@@ -7,8 +7,6 @@ runs them on small file systems in memory (where it may mount them). Returns 1 i
 found.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -4,8 +4,6 @@ The list of operations is not written by hand: a hook of the interpreter's audit
 file opened for writing and every change of a name, and the calls without an event are wrapped.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

@@ -18,6 +18,8 @@ from sphshell_pin.shell.cad import CadOptions, require_kernel
 from tests.scenario.files import DROP, write
 from tests.shell import cad_shapes as shapes
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 RADIUS = 0.012
 PRIMITIVE = (
     'primitive = { type = "box", size = [0.2, 0.2, 0.02] }\nplacement = { xyz = [0, 0, -0.01] }'

@@ -1,7 +1,5 @@
 """Several robots in one model: names, placements, start values, locked joints."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A scenario file becomes a scene: what it names is found, or a fault names what would be valid."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What a first user meets: surfaces before the tip, parts of a file, names nearly right, Ctrl-C."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

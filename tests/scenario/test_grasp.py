@@ -1,7 +1,5 @@
 """A hand about a part: forces in closed form, distances, and drafts that are run."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np
@@ -191,7 +189,10 @@ def test_what_is_out_of_reach_is_not_touched(tmp_path):
     assert hand.close_on(np.zeros(6), shell, far, GAP) is None
 
 
-@pytest.mark.parametrize("surface", ["box", "cylinder", "sphere"])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "surface", mostly_studies(["box", "cylinder", "sphere"], lambda one: one != "cylinder")
+)
 def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
     made = new_scenario(
         gripper(tmp_path), surface, tips="all", against="plastic", out=out(tmp_path)
@@ -210,6 +211,7 @@ def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
     assert np.allclose(-forces[log.row == last].sum(axis=0), [0, 0, 9.81 * mass], atol=0.02)
 
 
+@pytest.mark.slow
 def test_fingers_that_mimic_others_hold_too(tmp_path):
     """Two fingers move as one; the file's dry friction would keep them from pressing."""
     file = gripper(tmp_path)
@@ -236,7 +238,9 @@ def test_fingers_that_mimic_others_hold_too(tmp_path):
         ({"radius": 0.01}, "--radius belongs to a single tip"),
         ({"robot": "three_link_finger"}, "needs two fingertips or more"),
         ({"robot": "turntable"}, "this robot has 0"),
-        ({"against": "steel", "press": 500.0}, "no grasp .* works"),
+        pytest.param(
+            {"against": "steel", "press": 500.0}, "no grasp .* works", marks=pytest.mark.slow
+        ),
         ({"unit": "m", "surface": "large"}, "cannot hold a part of 400 x 400 x 400 mm"),
     ],
 )
@@ -254,6 +258,7 @@ def test_what_cannot_be_held_is_refused(options, why, tmp_path):
     assert not (tmp_path / "made_part.urdf").exists()
 
 
+@pytest.mark.slow
 def test_a_part_that_is_there_is_not_replaced(tmp_path):
     (tmp_path / "made_part.urdf").write_text("mine", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"made_part\.urdf: .*is there already"):
@@ -267,7 +272,7 @@ def test_a_part_that_is_there_is_not_replaced(tmp_path):
     ("side", "surface"),
     mostly_studies(
         product(("right", "left"), ("box", "cylinder", "sphere")),
-        {("right", "box"), ("left", "sphere")}.__contains__,
+        {("right", "box")}.__contains__,
     ),
 )
 def test_an_allegro_hand_holds(side, surface, tmp_path):

@@ -1,7 +1,5 @@
 """A scenario that goes on while it is changed: what a page relies on."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -1,7 +1,5 @@
 """A run under the mouse: bodies that are dragged, targets of joints that are moved."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

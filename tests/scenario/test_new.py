@@ -1,7 +1,5 @@
 """A new scenario works as it is written: it touches, presses as promised, and keeps its energy."""
 
-from __future__ import annotations
-
 import shutil
 import tomllib
 from pathlib import Path

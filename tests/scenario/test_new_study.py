@@ -1,7 +1,5 @@
 """A cross-section of the study of new scenarios: each works in its own run, or is refused."""
 
-from __future__ import annotations
-
 import pytest
 
 from sphshell_pin.benchmarks.new_study import DATA, ask, read_once, sections
@@ -15,6 +13,7 @@ def parts(tmp_path_factory):
     return [read_once(DATA / name, folder) for name in ("bladex_upper.stl", "trimesh_wallhole.obj")]
 
 
+@pytest.mark.slow
 def test_new_scenarios_work_or_are_refused_for_a_reason(parts):
     cases = [
         ask(robot, part, place)

@@ -1,7 +1,5 @@
 """What a scenario file may say, and how its faults are told: file, key, value, valid choices."""
 
-from __future__ import annotations
-
 import pytest
 
 import sphshell_pin as sp

@@ -1,7 +1,5 @@
 """A finished run is played again: from its file, in the scene that it came from."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import shutil
@@ -15,9 +13,9 @@ from sphshell_pin.errors import ResultError, SphshellError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.view.live.opening import player_of
-from tests.scenario.files import DROP, write
+from tests.scenario.files import DROP, without_pictures, write
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +23,8 @@ def folder(tmp_path_factory):
     """A scenario and the results of a changed run of it."""
     home = tmp_path_factory.mktemp("drop")
     changes = {"contact.ball-plate.sphere.radius": "0.011", "run.record_dt": "1e-3"}
-    run_built(build(write(home), changes), home / "out", recording=False)
+    with without_pictures():
+        run_built(build(write(home), changes), home / "out", recording=False)
     return home
 
 
@@ -234,9 +233,6 @@ def test_looking_at_results_executes_no_code(with_code):
         replay = Replay(file, scenario=scenario)
         replay.seek(result.contacts.t[3])
         assert len(replay.contacts)
-    result.plot("map")
-    result.plot("path")
-    result.view()
     player_of(file)
     # The file alone, with settings of its own and no scenario beside it.
     (with_code / "drop.toml").unlink()

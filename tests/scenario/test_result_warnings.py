@@ -1,7 +1,5 @@
 """Input that is allowed and probably a mistake earns a warning, in all commands that meet it."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 
@@ -17,6 +15,8 @@ from sphshell_pin.scenario import build, explain_built
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
 from tests.scenario.files import DROP, write
+
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 SHORT = {"run.duration": "1e-4"}
 OFF = {"controller.path": "[[0, 0, 0], [0.5, 2.0, 0.0]]"}

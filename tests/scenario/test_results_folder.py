@@ -1,7 +1,5 @@
 """A folder in the hands of one process: who else may write there, and what stays of others."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl
@@ -24,12 +22,6 @@ from tests.scenario.files import write
 from tests.test_cli import call
 
 LAST = "summary.json"
-
-
-@pytest.fixture
-def no_pictures(monkeypatch):
-    """Runs draw nothing, for speed."""
-    monkeypatch.setattr("sphshell_pin.plot.save_figures", lambda *_, **__: [])
 
 
 def put(folder, text, last=LAST):

@@ -1,7 +1,5 @@
 """What is left when a process ends at any of its file operations: whole old or whole new files."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import hashlib
@@ -135,8 +133,9 @@ def two_runs(results, place, tmp_path):
     put_others(place / "out")
     keep = shutil.copytree(place, tmp_path / "keep")
     before = contents(place)
-    results("new")
+    report = results("new")
     after = contents(place)
+    assert any("recording.html" in note for note in report.notes)
     assert set(before) - set(after) == {"out/recording.html"}
     check_whole(place / "out")
     return keep, before, after

@@ -1,11 +1,8 @@
 """A run's folder: whole files or none, told early when unwritable, kept when interrupted."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,12 +21,13 @@ from tests.scenario.files import DROP, write
 
 
 @pytest.fixture
-def built(tmp_path):
+def built(tmp_path, no_pictures):
     return build(write(tmp_path))
 
 
-def test_the_folder_holds_what_was_computed(built, tmp_path):
-    seen = []
+@pytest.mark.slow
+def test_the_folder_holds_what_was_computed(tmp_path):
+    built, seen = build(write(tmp_path)), []
     out = tmp_path / "a" / "b"
     report = run_built(built, out, recording=False, progress=seen.append)
     names = {file.name for file in report.files}
@@ -43,20 +41,13 @@ def test_the_folder_holds_what_was_computed(built, tmp_path):
     assert summary["complete"]
     assert summary["stats"]["steps"] == 500
     assert summary["settings"]["run"]["duration"] == 0.05
-
-
-@pytest.mark.slow
-def test_the_contact_table_is_the_log(built, tmp_path):
-    report = run_built(built, tmp_path / "out", recording=False)
-    log = report.result.contacts
-    with (tmp_path / "out" / "contacts.csv").open() as file:
+    with (out / "contacts.csv").open() as file:
         rows = list(csv.DictReader(file))
+    log = report.result.contacts
     assert len(rows) == len(log.t) > 0
-    np.testing.assert_allclose([float(row["depth [m]"]) for row in rows], log.depth, rtol=1e-12)
     assert {row["pair"] for row in rows} == {"ball-plate"}
-    np.testing.assert_allclose(
-        [float(row["normal_z [1]"]) for row in rows], log.normal_world[:, 2], rtol=1e-12
-    )
+    for name, column in (("depth [m]", log.depth), ("normal_z [1]", log.normal_world[:, 2])):
+        np.testing.assert_allclose([float(row[name]) for row in rows], column, rtol=1e-12)
 
 
 def test_a_folder_that_cannot_be_written_is_told_before_the_run(built, tmp_path, monkeypatch):
@@ -69,29 +60,13 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_run(built, tmp_path,
         run_built(built, "/proc/nothing")
 
 
-@pytest.mark.slow
-def test_a_failing_writer_leaves_the_earlier_files(built, tmp_path, monkeypatch):
-    out = tmp_path / "out"
-    run_built(built, out, recording=False)
-    before = {path.name: path.read_bytes() for path in out.iterdir()}
-
-    def half(self, path, **_):
-        Path(path).write_bytes(b"half")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(sp.Result, "save", half)
-    with pytest.raises(ResultError, match="No space left"):
-        run_built(built, out, recording=False)
-    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
-
-
-def test_without_the_view_packages_the_rest_is_written(built, tmp_path, monkeypatch):
+def test_without_the_view_packages_the_rest_is_written(tmp_path, monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     monkeypatch.setitem(sys.modules, "meshcat", None)
-    report = run_built(built, tmp_path / "out")
+    report = run_built(build(write(tmp_path)), tmp_path / "out")
     assert {file.name for file in report.files} == {"run.npz", "contacts.csv", "summary.json"}
     assert len(report.notes) == 2
     for note in report.notes:
@@ -113,7 +88,6 @@ def stop_early(monkeypatch, fault=SimulationDiverged):
     monkeypatch.setattr(sp.Simulation, "run", stop)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fault", [Interrupted, SimulationDiverged])
 def test_what_was_computed_until_then_is_written(fault, built, tmp_path, monkeypatch):
     stop_early(monkeypatch, fault)
@@ -123,7 +97,6 @@ def test_what_was_computed_until_then_is_written(fault, built, tmp_path, monkeyp
     assert not json.loads((tmp_path / "out" / "summary.json").read_text())["complete"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fault", [Interrupted, SimulationDiverged])
 def test_a_run_that_stops_early_spares_complete_results(fault, built, tmp_path, monkeypatch):
     out = tmp_path / "out"
@@ -144,7 +117,6 @@ def test_a_run_that_stops_early_spares_complete_results(fault, built, tmp_path, 
     assert (out / "notes.txt").read_text() == "mine"
 
 
-@pytest.mark.slow
 def test_partial_results_are_replaced_in_place(built, tmp_path, monkeypatch):
     out = tmp_path / "out"
     stop_early(monkeypatch)
@@ -155,7 +127,6 @@ def test_partial_results_are_replaced_in_place(built, tmp_path, monkeypatch):
     assert not (out / "stopped").exists()
 
 
-@pytest.mark.slow
 def test_results_without_a_summary_count_as_complete(built, tmp_path, monkeypatch):
     out = tmp_path / "out"
     out.mkdir()
@@ -186,8 +157,7 @@ def test_a_figure_that_fails_costs_no_numbers(built, tmp_path, monkeypatch):
     assert any("ZeroDivisionError: no axis" in note for note in report.notes)
 
 
-@pytest.mark.slow
-def test_a_figure_of_ones_own_that_fails_is_told_after_the_writing(tmp_path):
+def test_a_figure_of_ones_own_that_fails_is_told_after_the_writing(tmp_path, no_pictures):
     (tmp_path / "own.py").write_text("def wrong(result, scene):\n    return 1 / 0\n")
     text = DROP + '[figures]\nw = "own.py:wrong"\n[expect]\n"figures.w" = { min = 1 }\n'
     with pytest.raises(ZeroDivisionError) as caught:
@@ -196,18 +166,7 @@ def test_a_figure_of_ones_own_that_fails_is_told_after_the_writing(tmp_path):
     assert (tmp_path / "out" / "run.npz").is_file()
 
 
-@pytest.mark.slow
-def test_a_recording_of_another_run_does_not_stay(built, tmp_path):
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "recording.html").write_text("old")
-    report = run_built(built, out, recording=False)
-    assert not (out / "recording.html").exists()
-    assert any("recording.html" in note for note in report.notes)
-
-
-@pytest.mark.slow
-def test_expectations_are_judged(tmp_path):
+def test_expectations_are_judged(tmp_path, no_pictures):
     text = DROP + (
         '[expect]\n"pairs.ball-plate.peak_force" = { min = 1e9 }\n"stats.steps" = '
         '{ value = 500, atol = 0.5 }\n"final.q.root_joint.0" = { value = 0.01, atol = 1e-6 }\n'

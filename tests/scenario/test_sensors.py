@@ -1,7 +1,5 @@
 """Sensors in scenario files: tables, keys, results."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np
@@ -40,6 +38,7 @@ def tau(t, q, v, contacts, sensors):
 """
 
 
+@pytest.mark.slow
 def test_a_scenario_states_its_sensors(tmp_path):
     (tmp_path / "own.py").write_text(READING, encoding="utf-8")
     controller = '\n[controller]\ntype = "python"\nfunction = "own.py:tau"\n'
@@ -64,7 +63,7 @@ def test_a_scenario_states_its_sensors(tmp_path):
     assert not (tmp_path / "out" / "sensors.csv").exists()
 
 
-def test_readings_are_figures(tmp_path):
+def test_readings_are_figures(tmp_path, no_pictures):
     expect = """
 [expect]
 "sensors.touch.closed.max" = { value = 1.0, atol = 1e-9 }

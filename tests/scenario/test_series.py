@@ -1,7 +1,5 @@
 """Curves for charts: values and units of what a live run and a finished one record."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,6 +11,8 @@ from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.scenario.running.run import run_built
 from sphshell_pin.scenario.running.series import held, motion_series
 from tests.scenario.files import FINGER, write
+
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 
 @pytest.fixture
@@ -79,7 +79,7 @@ def test_a_sensor_shows_the_last_reading_that_had_arrived(built) -> None:
 
 
 def test_a_finished_run_offers_what_it_recorded(built, tmp_path) -> None:
-    run_built(built, tmp_path / "out")
+    run_built(built, tmp_path / "out", recording=False)
     result = Result.load(tmp_path / "out" / "run.npz")
     replay = Replay(result)
     curves = {one.key: one for one in replay.series}

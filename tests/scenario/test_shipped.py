@@ -1,7 +1,5 @@
 """The shipped scenarios come out as they expect."""
 
-from __future__ import annotations
-
 import pytest
 
 from sphshell_pin.errors import MissingExtra
@@ -10,6 +8,7 @@ from sphshell_pin.scenario.running.figures import check_expectations
 from sphshell_pin.scenario.running.run import simulate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_a_shipped_scenario_comes_out_as_expected(name):
     try:

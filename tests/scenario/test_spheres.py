@@ -1,7 +1,5 @@
 """The spheres of a contact: one, those of a list, those of the collision geometry; on spheres."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -13,6 +11,8 @@ from sphshell_pin.cli import app
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, run_scenario
 from tests.scenario.files import write
+
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 LAW = 'law = { type = "hunt-crossley", stiffness = 1e6, dissipation = 0.5 }\n'
 TWO_BALLS = f"""

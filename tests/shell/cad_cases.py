@@ -1,7 +1,5 @@
 """Real CAD files, and surfaces whose contact forces are known."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass

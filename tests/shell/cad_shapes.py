@@ -1,7 +1,5 @@
 """Small CAD shapes and files, made with OpenCASCADE's own primitives [mm]."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Surfaces the shell tests share, and ways to compare them by place instead of by number."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

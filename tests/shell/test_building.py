@@ -1,7 +1,5 @@
 """What building a large shell leaves: the same bits for any number of threads, little memory."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

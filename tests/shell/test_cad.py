@@ -1,7 +1,5 @@
 """CAD files: what is read, what it is called, in which unit, and what is refused."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys
@@ -214,6 +212,7 @@ def put_before_the_library(folder, monkeypatch, text):
     monkeypatch.setattr(sys, "path", [str(folder / "first"), *sys.path])
 
 
+@pytest.mark.slow
 def test_without_the_library_the_extra_is_named(tmp_path, monkeypatch):
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     put_before_the_library(tmp_path, monkeypatch, "")

@@ -1,7 +1,5 @@
 """How near the elements of CAD files are to the exact surfaces, judged by OpenCASCADE itself."""
 
-from __future__ import annotations
-
 import pickle
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The process in which OpenCASCADE runs: whatever becomes of it, the one that asked goes on."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """The unit of a CAD file: stated by its header, by the user, by both, or by nobody."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From file to file: exact where it can be, measured in any case, and never half done."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """CAD faces say what is smooth: a coarse fillet stays one patch, a crease between faces is one."""
 
-from __future__ import annotations
-
 import itertools
 import pickle
 from dataclasses import replace

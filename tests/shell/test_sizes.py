@@ -1,7 +1,5 @@
 """Sizes that the search tree, in single precision, cannot hold are refused in one sentence."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

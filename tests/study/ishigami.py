@@ -1,7 +1,5 @@
 """Ishigami's function, whose Sobol indices have closed forms, as a table and as a scenario."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A fast scenario for sweeps: a ball settles on a plate, where its depth has a closed form."""
 
-from __future__ import annotations
-
 import contextlib
 import sqlite3
 from collections import Counter

@@ -1,7 +1,5 @@
 """Runs over each other: differences against closed forms, names matched, times interpolated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +14,8 @@ from sphshell_pin.plot.compare import plot_compare
 from sphshell_pin.study.compare import Curve, Measured, compare, measured, tables_of
 from tests.export.runs import finger_run, turntable_run
 from tests.scenario.files import DROP, write
+
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 
 @pytest.fixture(scope="module")
@@ -171,6 +171,7 @@ def drop(folder, name, **changes):
     return out
 
 
+@pytest.mark.slow
 def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     soft = drop(tmp_path, "soft")

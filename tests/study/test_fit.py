@@ -1,7 +1,5 @@
 """Fits: closed forms of values and intervals, coverage, and what the data do not determine."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,6 +20,7 @@ from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.fit.quantities import quantities_of, row_step
 from sphshell_pin.study.fit.runs import Runs, Trial
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
+from tests.studies import mostly_studies
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
 HEIGHT = "q.root_joint.2"
@@ -91,16 +90,18 @@ def test_exact_data_give_back_the_values(bounce):
 
 
 @pytest.mark.slow
-def test_intervals_hold_the_truth_as_often_as_they_say():
-    """The study of docs/fitting.md with 40 sets: bounds of the binomial at 1 in 1000."""
-    values, low, high, _ = zip(*many_sets(40, first=5000), strict=True)
+@pytest.mark.parametrize("sets", mostly_studies([16, 40], lambda sets: sets == 16))
+def test_intervals_hold_the_truth_as_often_as_they_say(sets):
+    """The study of docs/fitting.md with few sets: bounds of the binomial at 1 in 1000."""
+    values, low, high, _ = zip(*many_sets(sets, first=5000), strict=True)
     truth = np.array(list(TRUTH.values()))
     assert np.abs(np.array(values) / truth - 1.0).mean(axis=0).max() < 0.01
     inside = ((np.array(low) <= truth) & (truth <= np.array(high))).sum(axis=0)
-    least = stats.binom.ppf(0.001, 40, 0.95)
+    least = stats.binom.ppf(0.001, sets, 0.95)
     assert (inside >= least).all(), inside
 
 
+@pytest.mark.slow
 def test_touches_out_of_step_do_not_mislead(bounce):
     """From far off, pulses of force do not overlap; the times are then fitted one after another."""
     t = np.linspace(0.0, 0.24, 1201)

@@ -1,7 +1,5 @@
 """The command that fits: what it prints and writes, and its exit codes."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -31,6 +29,7 @@ from tests.study.test_fit import (
 )
 
 
+@pytest.mark.slow
 def test_the_command_writes_values_in_place(bounce, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     t = np.linspace(0.0, 0.1, 201)

@@ -1,7 +1,5 @@
 """Measured data: what is wrong with them gets one sentence, and says where."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the report measures with: closed forms, contestants in processes of their own, spreads."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the README and the documents quote is what was measured."""
 
-from __future__ import annotations
-
 import pytest
 
 from sphshell_pin.benchmarks import quote

@@ -1,7 +1,5 @@
 """The report: what it says of measured data, and what it leaves when something goes wrong."""
 
-from __future__ import annotations
-
 import base64
 import csv
 import json

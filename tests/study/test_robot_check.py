@@ -1,7 +1,5 @@
 """Whole robots: the shipped ones pass, hard ones are told of honestly, wrong physics fails."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import fields
@@ -404,6 +402,7 @@ def test_the_page_of_the_docs_is_of_these_robots() -> None:
         assert list(verdicts) == robots.names()
 
 
+@pytest.mark.slow
 def test_the_command_takes_xacro_arguments_and_package_folders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

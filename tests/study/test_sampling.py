@@ -1,7 +1,5 @@
 """Uncertain inputs: distributions from texts, points, what is refused, what the runs record."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import sqlite3

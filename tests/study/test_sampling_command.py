@@ -1,7 +1,5 @@
 """The command sweep with uncertain inputs: what it prints, writes, and how it resumes."""
 
-from __future__ import annotations
-
 import signal
 
 import numpy as np
@@ -27,6 +25,7 @@ def scenario(tmp_path_factory):
     return write(tmp_path_factory.mktemp("sampling"))
 
 
+@pytest.mark.slow
 def test_a_sample_is_told_and_drawn(scenario):
     out = scenario.parent / "told.parquet"
     options = ["--sample", "sobol", "--n", 8, "--indices", "--tornado", "--bands", DEPTH]
@@ -113,7 +112,7 @@ def test_a_killed_sample_resumes_to_the_same_bytes(scenario):
 
 @pytest.mark.slow
 def test_ishigamis_indices_by_the_command(tmp_path):
-    """The same as of the function alone; `python -m tests.study.sampling_survival` has n = 4096."""
+    """The same as of the function alone."""
     scenario, out = write_ishigami(tmp_path), tmp_path / "ishigami.parquet"
     dist = [f"--dist={key}={one}" for key, one in DIST.items()]
     options = ["--sample", "sobol", "--n", 32, "--indices", "--workers", 0, "--out", out]

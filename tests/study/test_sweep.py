@@ -1,7 +1,5 @@
 """Sweeps: the closed form of what is swept, and that nothing that happens shows in the table."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -66,6 +64,7 @@ def test_the_depth_of_rest_follows_its_closed_form(serial):
     assert not [name for name in table.columns if "wall" in name or "real_time" in name]
 
 
+@pytest.mark.slow
 def test_two_workers_leave_the_same_bytes(folder, serial):
     table = folder / "two.parquet"
     sweep(folder / "resting.toml", VARY, workers=2, out=table)
@@ -116,6 +115,7 @@ def test_a_failed_run_is_a_row_that_says_why(folder):
     assert table["figures.depth"].isna().tolist() == [False, True, False]
 
 
+@pytest.mark.slow
 def test_units_stay_with_the_table(folder, tmp_path):
     stiffness, exponent = "contact.law.stiffness", "contact.law.exponent"
     changes = {"run.duration": "0.1"}

@@ -1,7 +1,5 @@
 """What a sweep varies: texts to values, values to runs; wrong ones are reported in one sentence."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

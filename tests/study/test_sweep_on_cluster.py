@@ -1,7 +1,5 @@
 """Sweeps on a Dask cluster of real processes, of which one is killed."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """Pictures of a sweep: what is drawn where, compared with the table itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Pictures of samples: what is drawn where, compared with the numbers themselves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The cases of the validation: each error figure within its bound, or with its physics named."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

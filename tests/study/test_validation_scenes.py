@@ -1,7 +1,5 @@
 """What the cases of the validation are built from."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

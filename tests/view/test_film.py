@@ -165,7 +165,7 @@ def test_without_chromium_one_sentence_says_how_to_get_it(run, tmp_path, monkeyp
 
 
 @pytest.mark.browser
-def test_the_command(request, tmp_path):
+def test_the_command(request, tmp_path, no_pictures):
     request.getfixturevalue("browser")
     run = call("run", write(tmp_path), "--out", tmp_path / "out", "--no-recording")
     assert run.exit_code == 0, run.output

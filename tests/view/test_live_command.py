@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from sphshell_pin.cli import app
 from sphshell_pin.scenario import run_scenario
 from sphshell_pin.view.live import Live, opening
-from tests.scenario.files import write
+from tests.scenario.files import without_pictures, write
 from tests.view.live_client import get
 from tests.view.live_player import BallPlayer
 
@@ -32,7 +32,8 @@ def call(*arguments):
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
-    run_scenario(write(folder), folder / "out", recording=False)
+    with without_pictures():
+        run_scenario(write(folder), folder / "out", recording=False)
     return folder / "out"
 
 

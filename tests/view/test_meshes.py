@@ -1,7 +1,5 @@
 """Robot meshes, packed and restored: as good as they were, in less room."""
 
-from __future__ import annotations
-
 import gzip
 import re
 import struct

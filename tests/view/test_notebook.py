@@ -1,7 +1,5 @@
 """A result in a notebook: the recording as the value of a cell."""
 
-from __future__ import annotations
-
 import dataclasses
 import html
 import re
@@ -12,7 +10,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.scenario import build, run_built
-from tests.scenario.files import DROP, write
+from tests.scenario.files import DROP, without_pictures, write
 from tests.view.test_page import unpacked
 
 pytestmark = pytest.mark.slow
@@ -23,7 +21,8 @@ def result(tmp_path_factory):
     """What was saved of a run, loaded again."""
     home = tmp_path_factory.mktemp("drop")
     text = DROP.replace("dt = 1e-4", "dt = 1e-4\nrecording_speed = 0.1")
-    run_built(build(write(home, text)), home / "out", recording=False)
+    with without_pictures():
+        run_built(build(write(home, text)), home / "out", recording=False)
     return sp.Result.load(home / "out" / "run.npz")
 
 

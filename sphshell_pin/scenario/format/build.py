@@ -45,7 +45,7 @@ from sphshell_pin.scenario.format.bodies import (
     restrict,
     to_se3,
 )
-from sphshell_pin.scenario.format.functions import load_function
+from sphshell_pin.scenario.format.functions import Loader, Modules, load_function
 from sphshell_pin.scenario.format.joint_tables import joint_components
 from sphshell_pin.scenario.format.reading import (
     change_scenario,
@@ -147,23 +147,24 @@ def build_scenario(
     path: Path,
     reuse: Built | None = None,
     *,
-    function: Callable[[str, Path, str], Function] = load_function,
+    function: Loader = load_function,
     robots: Mapping[tuple[object, ...], LoadedRobot] | None = None,
     surfaces: Mapping[str, sp.Shell] | None = None,
 ) -> Built:
     """Build a scenario that is already read; `path` is its file, which others stand beside.
 
     Robots, shells and functions of `reuse` are taken over where their tables are the same.
-    `function(where, path, key)` gives what "file.py:function" names: `load_function` runs the file,
-    `functions.unloaded` does not. `robots` at hand, by the `origin` of their table, and `surfaces`,
-    by name, are not read from files.
+    `function(where, path, key, modules)` gives what "file.py:function" names: `load_function` runs
+    a file once for all its functions, `functions.unloaded` does not. `robots` at hand, by the
+    `origin` of their table, and `surfaces`, by name, are not read from files.
     """
     assembly = _assemble(scenario, path, reuse, robots)
     functions = {} if reuse is None else dict(reuse.functions)
+    modules: Modules = {}
 
     def load(where: str, key: str) -> Function:
         if where not in functions:
-            functions[where] = function(where, path, key)
+            functions[where] = function(where, path, key, modules)
         return functions[where]
 
     with blamed_on(path, "robot"):

@@ -10,13 +10,20 @@ import inspect
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario.format.bodies import blamed_on
 
+Modules = dict[Path, ModuleType]
+Loader = Callable[[str, Path, str, Modules], Callable[..., object]]
+"""What `load_function` and `unloaded` are."""
 
-def load_function(where: str, path: Path, key: str) -> Callable[..., object]:
+
+def load_function(where: str, path: Path, key: str, modules: Modules) -> Callable[..., object]:
     """Return the function that "file.py:function" names, the file relative to the scenario's.
+
+    Files that are in `modules` are not run again; one that is run is added.
 
     Raises
     ------
@@ -29,14 +36,9 @@ def load_function(where: str, path: Path, key: str) -> Callable[..., object]:
     file = path.parent / file_name
     if not os.path.isfile(file):
         raise ScenarioError(path, key, f"no such file: {file}", where)
-    spec = importlib.util.spec_from_file_location(f"sphshell_pin_scenario_{file.stem}", file)
-    if spec is None or spec.loader is None:
-        raise ScenarioError(path, key, f"python cannot load {file}", where)
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise ScenarioError(path, key, f"{file} fails: {type(error).__name__}: {error}") from error
+    if file not in modules:
+        modules[file] = _run(file, where, path, key)
+    module = modules[file]
     found = getattr(module, function, None)
     if not callable(found):
         valid = [
@@ -49,7 +51,19 @@ def load_function(where: str, path: Path, key: str) -> Callable[..., object]:
     return found  # type: ignore[no-any-return]
 
 
-def unloaded(where: str, path: Path, key: str) -> Callable[..., object]:
+def _run(file: Path, where: str, path: Path, key: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"sphshell_pin_scenario_{file.stem}", file)
+    if spec is None or spec.loader is None:
+        raise ScenarioError(path, key, f"python cannot load {file}", where)
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ScenarioError(path, key, f"{file} fails: {type(error).__name__}: {error}") from error
+    return module
+
+
+def unloaded(where: str, path: Path, key: str, modules: Modules) -> Callable[..., object]:
     """Return a stand-in for the function that "file.py:function" names; nothing is executed.
 
     Called, it raises SphshellError, which states how to load the function.

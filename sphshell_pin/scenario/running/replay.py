@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -19,7 +18,7 @@ from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SlowLawWarning, SphshellError
 from sphshell_pin.scenario.format.build import Built, build_scenario
-from sphshell_pin.scenario.format.functions import load_function, unloaded
+from sphshell_pin.scenario.format.functions import Loader, load_function, unloaded
 from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import LiveParameter
@@ -284,9 +283,7 @@ def _check_without_code(scenario: Scenario, path: Path) -> None:
             )
 
 
-def _build_again(
-    origin: Origin, name: str, function: Callable[[str, Path, str], Callable[..., object]]
-) -> Built:
+def _build_again(origin: Origin, name: str, function: Loader) -> Built:
     """Build the scene of `origin` from what is kept with it; `name` is the result's."""
     if origin.keep is None:
         why = "an earlier version saved it without its robots and surfaces: run it again, or "
