@@ -448,3 +448,26 @@ def test_a_queue_of_events_ends_with_the_run(make, monkeypatch):
     monkeypatch.setattr(live, "_handle", lambda *_: (done.append(1), live._stop.set()))
     live.frame(0.0)
     assert done == [1]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("law.stiffness", -5.0, "stiffness ({key}): should be greater than 0 (given: -5.0)"),
+        ("law.stiffness", "abc", "stiffness ({key}): 'abc' must be a number"),
+        ("friction.mu_static", 0.0, "static friction ({key}): mu_dynamic = 0.2 must not exceed"),
+    ],
+)
+def test_a_value_that_cannot_be_is_answered_in_the_words_of_its_slider(
+    make, tmp_path, key, value, told
+):
+    friction = """friction = { type = "coulomb", mu_static = 0.3, mu_dynamic = 0.2 }"""
+    key = f"contact.ball-plate.{key}"
+    text = DROP.replace("[run]", f"{friction}\n[run]") + f'\n[[knob]]\nkey = "{key}"\n'
+    live = make(LiveRun(build(write(tmp_path, text))))
+    say(live, "parameter", key=key, value=value)
+    frames(live, 1)
+    ((client, answer),) = live.told
+    assert client is TAB
+    assert answer.startswith(told.format(key=key))
+    assert str(tmp_path) not in answer

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.errors import NameNotFound, SphshellError
+from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.view.live.charts import Charts, Point
 from sphshell_pin.view.live.events import BadMessage, Client, Event, newest
 from sphshell_pin.view.live.foreign import ForeignWindow, window_of
@@ -323,11 +323,14 @@ class Live:
                 self._seek(event["t"])
 
     def _change(self, key: str, value: float | str) -> None:
-        keys = [knob.key for knob in self.player.knobs]
-        if key not in keys:
-            raise NameNotFound("parameter", key, "this run", keys)
+        labels = {one.key: one.label for one in self.player.knobs}
+        if key not in labels:
+            raise NameNotFound("parameter", key, "this run", labels)
         before = self.player.time
-        self.player.change(key, value)
+        try:
+            self.player.change(key, value)
+        except SphshellError as fault:
+            raise BadMessage(f"{_named(labels[key], key)}: {_reason(fault, key)}") from fault
         if self.player.time < before:  # it started again
             self._start_anew()
 
@@ -427,5 +430,19 @@ class Live:
             "cut": self.picture.cut,
             "coloring": self.picture.display.coloring,
             "pressure": self.picture.pressure,
+            "grid": self.picture.display.grid,
             **self._hands.state(),
         }
+
+
+def _named(label: str, key: str) -> str:
+    """Return the word beside the slider, and the key of the scenario where that is another one."""
+    return label if label == key else f"{label} ({key})"
+
+
+def _reason(fault: SphshellError, key: str) -> str:
+    """Return what is wrong with the value at `key`, without the file and the name of the value."""
+    text = str(fault)
+    if isinstance(fault, ScenarioError):
+        text = text.removeprefix(f"{fault.path}: ").removeprefix(f"{fault.key}: ")
+    return text.removeprefix(f"{key} = ").removeprefix(f"{key.rpartition('.')[2]} = ")
