@@ -82,10 +82,10 @@ def grid_spacing(view: View) -> float:
 def draw_grid(node: Visualizer, view: View) -> None:
     """Draw a grid at z = 0 below `node`, around what `view` looks at."""
     step = grid_spacing(view)
-    ticks = np.arange(-LINES, LINES + 1)
+    ticks = np.arange(-LINES, LINES + 1.0)
     x, y = np.meshgrid(ticks, ticks)
-    points = np.column_stack((x.ravel(), y.ravel(), np.zeros(x.size)))
-    points += np.round(np.array([*view.target[:2], 0.0]) / step)
+    points = np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), axis=1)
+    points = points + np.round(np.array([*view.target[:2], 0.0]) / step)
     # Pieces from crossing to crossing: some browsers lose lines that pass the camera.
     number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
     ends = ((number[:, :-1], number[:, 1:]), (number[:-1], number[1:]))

@@ -405,10 +405,10 @@ def test_the_arrow_of_a_push_ends_where_a_knob_starts_the_run_anew(make, tmp_pat
     frames(live, 6)
     say(live, "push", body="ball", direction=[1.0, 0.0, 0.0], newtons=0.1, seconds=5.0)
     frames(live, 1)
-    assert live._hands.push is not None
+    assert live._interaction.push is not None
     say(live, "parameter", key="robot.ball.start.root_joint.2", value=0.05)
     frames(live, 1)
-    assert live._hands.push is None
+    assert live._interaction.push is None
 
 
 def test_the_legend_says_where_arrows_are_cut(make):

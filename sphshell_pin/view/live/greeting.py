@@ -43,10 +43,10 @@ def greeting(player: Player, picture: str | None, offer: Json) -> Json:
         "pairs": [pair.name for pair in player.scene.pairs],
         "bodies": list(player.bodies),
         "parameters": [
-            {name: getattr(knob, name) for name in _PARAMETER}
-            | {"restart": bool(getattr(knob, "restart", False))}
-            | {"choices": list(getattr(knob, "choices", ()))}
-            for knob in player.knobs
+            {name: getattr(one, name) for name in _PARAMETER}
+            | {"restart": bool(getattr(one, "restart", False))}
+            | {"choices": list(getattr(one, "choices", ()))}
+            for one in player.knobs
         ],
         "start": player.start,
         "duration": player.duration,

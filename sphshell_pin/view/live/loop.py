@@ -22,7 +22,7 @@ from sphshell_pin.view.live.greeting import (
     check_speed,
     greeting,
 )
-from sphshell_pin.view.live.hands import Hands
+from sphshell_pin.view.live.interaction import Interaction
 from sphshell_pin.view.live.panel import Panel, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture
 from sphshell_pin.view.live.server import Server
@@ -97,8 +97,8 @@ class Live:
             canvas = new_visualizer(self._foreign or self._window)
             self.picture = Picture(player, canvas)
             own = self._window if self._foreign is None else None
-            self._hands = Hands(player, self.picture, own)
-            hello = {"type": "hello", **greeting(player, framed, self._hands.offer())}
+            self._interaction = Interaction(player, self.picture, own)
+            hello = {"type": "hello", **greeting(player, framed, self._interaction.offer())}
             self._panel.post("hello", hello | {"series": self._charts.descriptions()})
             self.draw()
         except BaseException:
@@ -218,7 +218,7 @@ class Live:
             try:
                 # A diverging run is reported in the panel, not on the terminal.
                 with np.errstate(all="ignore"):
-                    self.picture.update(self.player, self._hands.push, self._hands.drag)
+                    self.picture.update(self.player, self._interaction.push, self._interaction.drag)
             except Exception as fault:
                 # A picture that fails is reported in the panel, which goes on.
                 self.fault = fault
@@ -253,7 +253,7 @@ class Live:
 
     def _advance(self, duration: float, wall: float) -> None:
         player = self.player
-        self._hands.push_on(1.5 * duration)
+        self._interaction.push_on(1.5 * duration)
         before = player.time
         try:
             rows = player.advance(duration, wall)
@@ -298,16 +298,16 @@ class Live:
             case "parameter":
                 self._change(event["key"], event["value"])
             case "push" | "hold" | "drag" | "target":
-                self._hands.do(client, event)
+                self._interaction.do(client, event)
             case "release":
-                self._hands.release(client)
+                self._interaction.release(client)
                 if client not in self.server.clients and self._charts.forget(client):
                     self._send_curves()
             case "show":
                 if event["part"] not in LIVE_PARTS:
                     raise NameNotFound("part", event["part"], "the picture", LIVE_PARTS)
                 if event["part"] == "pressure":
-                    self._hands.record_patches(event["on"])
+                    self._interaction.record_patches(event["on"])
                 self.picture.show(event["part"], event["on"])
             case "arrows":
                 self.picture.magnify_arrows(min(max(event["value"], 1e-2), 1e2))
@@ -358,7 +358,7 @@ class Live:
 
     def _start_anew(self) -> None:
         self.fault = None
-        self._hands.forget()
+        self._interaction.forget()
         self._ahead = 0.0
         if self.player.duration is None:
             self._charts.start_anew()
@@ -405,7 +405,7 @@ class Live:
     # The panel
 
     def _read_parameters(self) -> dict[str, float | str]:
-        return {knob.key: knob.value for knob in self.player.knobs}
+        return {one.key: one.value for one in self.player.knobs}
 
     def _state(self) -> Json:
         player, contacts = self.player, self.player.contacts
@@ -424,14 +424,14 @@ class Live:
             "exchanged": exchanged,
             "ended": self._why_ended(),
             "parameters": self._parameter_values,
-            "show": self.picture.switches(player, self._hands.can_record_patches),
+            "show": self.picture.switches(player, self._interaction.can_record_patches),
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
             "coloring": self.picture.display.coloring,
             "pressure": self.picture.pressure,
             "grid": self.picture.display.grid,
-            **self._hands.state(),
+            **self._interaction.state(),
         }
 
 
