@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.export.cdr import Message
 from sphshell_pin.export.frames import WORLD, Frames, shell_key
-from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR, POINT_COLOR, ArrowScale
+from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR, POINT_COLOR, ArrowScale, pushing
 from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.robot import LINK_COLOR
 from sphshell_pin.view.surface import SURFACE_COLORS, SurfaceMesh
@@ -102,23 +102,25 @@ def contact_markers(
     on the sphere, at the lengths of `scale`.
     """
     markers: list[dict[str, object]] = [{"action": DELETEALL}]
+    pair = contacts.pair[contacts.normal_force >= 0.0]
     if len(contacts):
         points = np.asarray(contacts.point_world)
         markers.append(
             _marker(stamp, WORLD, "points", 0, SPHERE_LIST, (size,) * 3, POINT_COLOR, points=points)
         )
-    normal = contacts.normal_force[:, None] * contacts.normal_world
-    for k, point in enumerate(contacts.point_world):
+    drawn = pushing(contacts, contacts.pair)
+    normal = drawn.normal_force[:, None] * drawn.normal_world
+    for k, point in enumerate(drawn.point_world):
         for what, color, force in (
             ("normal", NORMAL_COLOR, normal[k]),
-            ("friction", FRICTION_COLOR, contacts.friction_force_world[k]),
+            ("friction", FRICTION_COLOR, drawn.friction_force_world[k]),
         ):
             length = float(np.linalg.norm(force)) * scale.metres_per_newton
             if not 0.0 < length < np.inf:
                 continue
             way = force * (scale.metres_per_newton * min(1.0, scale.longest / length))
             ends = np.array([point, point + way])
-            name = f"{what}/{pairs[contacts.pair[k]]}"
+            name = f"{what}/{pairs[pair[k]]}"
             shape = (0.5 * size, size, 0.0)  # widths of shaft and head
             markers.append(_marker(stamp, WORLD, name, k, ARROW, shape, color, points=ends))
     return {"markers": markers}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Literal
@@ -63,9 +63,11 @@ def write_tables(
 
 
 def write_folder(
-    folder: str | PathLike[str], files: Mapping[str, bytes], every: Sequence[str]
+    folder: str | PathLike[str],
+    files: Mapping[str, bytes] | Iterable[tuple[str, bytes]],
+    every: Sequence[str],
 ) -> list[Path]:
-    """Write `files` by their names into `folder`, all or none; return their paths.
+    """Write `files`, names and contents, into `folder`, all or none; return their paths.
 
     `every` are the names of all that an earlier call may have left there, which are replaced; the
     first of them is written in any case. ResultError where the folder cannot be written.
@@ -73,15 +75,16 @@ def write_folder(
     folder = Path(folder)
     try:
         with AtomicFolder(folder, last=every[0]) as place:
-            staging = place.staging()
-            for name, content in files.items():
+            staging, names = place.staging(), []
+            for name, content in files.items() if isinstance(files, Mapping) else files:
                 (staging / name).write_bytes(content)
+                names.append(name)
             place.replace(staging, every)
     except FolderInUse as busy:
         raise ResultError(folder, f"{busy}: wait until it ends, or give another folder") from None
     except OSError as error:
         raise ResultError(folder, f"cannot be written: {error.strerror or error}") from error
-    return [folder / name for name in files]
+    return [folder / name for name in names]
 
 
 def _parquet(table: Table, about: dict[str, str]) -> bytes:

@@ -56,14 +56,7 @@ def patches_on(
     log, patches = result.contacts, result.patches
     chosen = np.flatnonzero(np.isin(log.pair, pairs) & (patches["half_axes"][:, 1] > 0.0))
     row = np.asarray(log.row[chosen], dtype=np.int64)
-    model, data = scene.model, scene.model.createData()
-    rotations, origins = np.empty((len(row), 3, 3)), np.empty((len(row), 3))
-    pose: pin.SE3 | None = None
-    for k, at in enumerate(row):
-        if pose is None or (joint != 0 and at != row[k - 1]):
-            pin.forwardKinematics(model, data, np.asarray(result.q[at], dtype=float))
-            pose = data.oMi[joint] * placement
-        rotations[k], origins[k] = pose.rotation, pose.translation
+    rotations, origins = poses_along(result, scene, row, joint, placement)
 
     def turned(vectors: Array) -> Array:
         return np.asarray(np.einsum("kij,ki->kj", rotations, vectors))
@@ -80,6 +73,21 @@ def patches_on(
         np.linalg.norm(log.slip_velocity_world[chosen], axis=1),
         np.asarray(log.element[chosen], dtype=np.int64),
     )
+
+
+def poses_along(
+    result: Result, scene: Scene, rows: Longs, joint: int, placement: pin.SE3
+) -> tuple[Array, Array]:
+    """Return rotations (k, 3, 3) and origins (k, 3) [m] of a frame in a joint at ascending rows."""
+    model, data = scene.model, scene.model.createData()
+    rotations, origins = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
+    pose: pin.SE3 | None = None
+    for k, at in enumerate(rows):
+        if pose is None or (joint != 0 and at != rows[k - 1]):
+            pin.forwardKinematics(model, data, np.asarray(result.q[at], dtype=float))
+            pose = data.oMi[joint] * placement
+        rotations[k], origins[k] = pose.rotation, pose.translation
+    return rotations, origins
 
 
 def scene_of(result: Result, scene: Scene | None) -> Scene:

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.errors import NameNotFound, ResultError
-from sphshell_pin.plot.figure import INK, NO_CONTACT, new_figure, only_say, reading_unit
+from sphshell_pin.plot.figure import INK, NO_CONTACT, only_say, reading_unit
 from sphshell_pin.plot.on_shell import (
     PathGroup,
     Picture,
+    color_scale,
     element_corners,
     group_paths,
-    shell_axes,
+    shell_figure,
 )
 from sphshell_pin.plot.patches import COLORS as PATCH_COLORS
 from sphshell_pin.plot.patches import draw_patches, patches_of, peak_pressure
@@ -85,23 +86,16 @@ def plot_contact_map(
     if not views:
         reason = "No shell was touched." if len(result.contacts.t) else NO_CONTACT
         return only_say("Contact map", reason)
-    columns = min(len(views), 2)
-    figure = new_figure(2.4 + 5.2 * columns, 0.8 + 5.4 * -(-len(views) // columns))
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
+    title = f"Contact map{_caution(result, groups, quantity)}"
+    figure, axes = shell_figure(title, len(views))
     label, base, after = QUANTITIES[quantity]
     largest = max(float(view.values.max()) for view in views)
     factor, unit = reading_unit(largest, base)
-    scale = ScalarMappable(Normalize(0.0, largest * factor or 1.0), colormaps[COLORS])
-    axes = shell_axes(figure, len(views))
+    scale = color_scale(largest * factor, COLORS)
     peaks = [
         peak_pressure(view.patches).max(initial=0.0) for view in views if view.patches is not None
     ]
-    pressure = ScalarMappable(
-        Normalize(0.0, max(peaks, default=0.0) * 1e-6 or 1.0), colormaps[PATCH_COLORS]
-    )
+    pressure = color_scale(max(peaks, default=0.0) * 1e-6, PATCH_COLORS)
     for axis, view in zip(axes, views, strict=True):
         touched = element_corners(view.shell)[view.values > 0.0].reshape(-1, 3)
         near = np.vstack((touched, *view.paths))
@@ -121,7 +115,6 @@ def plot_contact_map(
     figure.colorbar(scale, ax=axes, label=f"{label} [{unit}{after}]", shrink=0.8)
     if peaks:
         figure.colorbar(pressure, ax=axes, label="peak pressure of patches [MPa]", shrink=0.8)
-    figure.suptitle(f"Contact map{_caution(result, groups, quantity)}", fontsize=12)
     return figure
 
 

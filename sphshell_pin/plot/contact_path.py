@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.plot.figure import NO_CONTACT, new_figure, only_say, reading_unit
-from sphshell_pin.plot.on_shell import PathGroup, Picture, group_paths, shell_axes
+from sphshell_pin.plot.figure import NO_CONTACT, only_say, reading_unit
+from sphshell_pin.plot.on_shell import PathGroup, Picture, group_paths, shell_figure
 from sphshell_pin.view.contact_path import FloatArray
 
 if TYPE_CHECKING:
@@ -35,15 +35,12 @@ def plot_contact_path(result: Result, scene: Scene | None = None) -> Figure:
     forces = np.concatenate([path.force for group in groups for path in group.paths])
     low, high = color_limits(forces)
     factor, unit = reading_unit(high, "N")
-    columns = min(len(groups), 2)
-    figure = new_figure(3.0 + 5.0 * columns, 0.8 + 5.5 * -(-len(groups) // columns))
-    axes = shell_axes(figure, len(groups))
+    figure, axes = shell_figure("Path of the contact", len(groups))
     for axis, group in zip(axes, groups, strict=True):
         lines = _draw(axis, group, [str(name) for name in result.pairs], factor)
         lines.set_clim(low * factor, high * factor)
     extend = "max" if forces.max() > high else "neither"
     figure.colorbar(lines, ax=axes, label=f"normal force [{unit}]", shrink=0.8, extend=extend)
-    figure.suptitle("Path of the contact", fontsize=12)
     return figure
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sphshell_pin.plot.figure import INK, reading_unit
+from sphshell_pin.plot.figure import INK, new_figure, reading_unit
 from sphshell_pin.view.contact_path import ContactPath, FloatArray, contact_paths, spaced
 
 if TYPE_CHECKING:
+    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d import Axes3D
     from numpy.typing import NDArray
@@ -186,20 +187,23 @@ class Picture:
         return np.asarray(0.6 + 0.4 * np.clip(normals @ light / np.linalg.norm(light), 0.0, 1.0))
 
 
-def shell_axes(figure: Figure, count: int) -> list[Axes3D]:
-    """Return `count` axes, two in a row."""
+def shell_figure(title: str, count: int) -> tuple[Figure, list[Axes3D]]:
+    """Return a figure called `title` and `count` axes in it, two in a row."""
     columns = min(count, 2)
-    return [
-        figure.add_subplot(
-            -(-count // columns),
-            columns,
-            k + 1,
-            projection="3d",
-            proj_type="ortho",
-            computed_zorder=False,
-        )
-        for k in range(count)
-    ]
+    rows = -(-count // columns)
+    figure = new_figure(2.7 + 5.1 * columns, 0.8 + 5.4 * rows)
+    figure.suptitle(title, fontsize=12)
+    look: dict[str, Any] = {"projection": "3d", "proj_type": "ortho", "computed_zorder": False}
+    return figure, [figure.add_subplot(rows, columns, k + 1, **look) for k in range(count)]
+
+
+def color_scale(largest: float, colors: str) -> ScalarMappable:
+    """Return the scale from 0 to `largest`, to 1 if that is 0, in the `colors` of matplotlib."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(0.0, largest or 1.0), colormaps[colors])
 
 
 def element_corners(shell: Shell) -> FloatArray:

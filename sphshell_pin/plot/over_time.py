@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -133,6 +133,12 @@ def _pair_title(result: Result, pair: PairSeries) -> str:
     )
 
 
+def _plot(axis: Axes, result: Result, values: FloatArray, **look: Any) -> None:
+    """Draw `values` (n,), in the unit of the axis, over the time of `result`."""
+    axis.plot(*thinned(np.asarray(result.t), values), linewidth=1.2, **look)
+    axis.margins(x=0.01)
+
+
 def _draw_forces(axis: Axes, result: Result, pair: PairSeries, largest: float) -> None:
     """Draw normal and friction force of `pair`, in the unit for forces up to `largest` [N]."""
     curves = {"normal": pair.normal}
@@ -140,9 +146,7 @@ def _draw_forces(axis: Axes, result: Result, pair: PairSeries, largest: float) -
         curves["friction"] = pair.friction
     factor = label_axis(axis, "force", "N", largest)
     for name, values in curves.items():
-        t, force = thinned(np.asarray(result.t), values * factor)
-        axis.plot(t, force, color=FORCE_COLORS[name], linewidth=1.2, label=name)
-    axis.margins(x=0.01)
+        _plot(axis, result, values * factor, label=name, color=FORCE_COLORS[name])
     finish_axis(axis, legend=True)
 
 
@@ -171,9 +175,7 @@ def _draw_curves(
     factor = label_axis(axis, quantity, base, max(float(one.max()) for one in curves.values()))
     alone = len(curves) == 1
     for name, values in curves.items():
-        t, shown = thinned(np.asarray(result.t), values * factor)
-        axis.plot(t, shown, linewidth=1.1, color=color if alone else None, label=name)
-    axis.margins(x=0.01)
+        _plot(axis, result, values * factor, label=name, color=color if alone else None)
     finish_axis(axis, legend=not alone)
 
 
@@ -201,9 +203,7 @@ def _draw_energies(axis: Axes, result: Result) -> None:
     factor = label_axis(axis, "energy", "J", largest)
     for label, (values, style) in curves.items():
         if np.any(values != 0.0):
-            t, energy = thinned(np.asarray(result.t), values * factor)
-            axis.plot(t, energy, linestyle=style, linewidth=1.2, label=label)
-    axis.margins(x=0.01)
+            _plot(axis, result, values * factor, label=label, linestyle=style)
     finish_axis(axis)
     if axis.get_legend_handles_labels()[0]:
         # Beside the curves: these fill their axes, and cross wherever a legend might lie.
@@ -235,13 +235,11 @@ def _draw_residual(axis: Axes, result: Result) -> None:
     residual = np.asarray(result.energy.residual, dtype=float)
     largest = float(np.abs(residual).max(initial=0.0))
     factor = label_axis(axis, "residual", "J", largest)
-    t, shown = thinned(np.asarray(result.t), residual * factor)
-    axis.plot(t, shown, color="#444444", linewidth=1.0)
+    _plot(axis, result, residual * factor, color="#444444")
     exchanged = float(result.energy.exchanged)
     if exchanged > 0.0 and len(residual):
         share = largest / exchanged
         axis.set_title(
             f"largest residual {share:.2g} of the {exchanged:.3g} J exchanged", fontsize=9
         )
-    axis.margins(x=0.01)
     finish_axis(axis)

@@ -165,14 +165,11 @@ def _draw_tornado(axis: Axes, tornado: pd.DataFrame, figure: str, units: Mapping
                 va="center",
                 fontsize=7,
             )
-    axis.axvline(median, color="#444444", linewidth=1.0)
-    axis.set_yticks(
-        places, [column(str(key), units.get(key, "")) for key in shown.index], fontsize=8
-    )
     axis.margins(x=0.15)
     axis.set_xlabel(figure_label(figure, units))
-    axis.set_title(f"one input at a time, others at their medians{_of(tornado)}", fontsize=10)
-    _legend_below(axis)
+    names = [column(str(key), units.get(key, "")) for key in shown.index]
+    title = "one input at a time, others at their medians"
+    _finish_bars(axis, median, names, title, len(tornado))
 
 
 def _draw_indices(axis: Axes, indices: pd.DataFrame) -> None:
@@ -193,18 +190,17 @@ def _draw_indices(axis: Axes, indices: pd.DataFrame) -> None:
             xerr=np.maximum(np.array(ends, dtype=float), 0.0),
             error_kw={"elinewidth": 1.0, "capsize": 2.5, "ecolor": "#101418"},
         )
-    axis.axvline(0.0, color="#444444", linewidth=1.0)
-    axis.set_yticks(places, [str(key) for key in shown.index], fontsize=8)
     axis.set_xlabel("share of the variance")
-    axis.set_title(f"Sobol indices with 95 % intervals{_of(indices)}", fontsize=10)
-    _legend_below(axis)
+    title = "Sobol indices with 95 % intervals"
+    _finish_bars(axis, 0.0, [str(key) for key in shown.index], title, len(indices))
 
 
-def _legend_below(axis: Axes) -> None:
+def _finish_bars(axis: Axes, start: float, names: list[str], title: str, inputs: int) -> None:
+    """Name the bars from `start` on, from the top down, and say of how many `inputs` they are."""
+    axis.axvline(start, color="#444444", linewidth=1.0)
+    axis.set_yticks(np.arange(len(names))[::-1], names, fontsize=8)
+    of = f" ({_MOST_INPUTS} of {inputs})" if inputs > _MOST_INPUTS else ""
+    axis.set_title(title + of, fontsize=10)
     finish_axis(axis)
     # Bars fill the axis: the legend lies outside.
     axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8, frameon=False)
-
-
-def _of(inputs: pd.DataFrame) -> str:
-    return f" ({_MOST_INPUTS} of {len(inputs)})" if len(inputs) > _MOST_INPUTS else ""

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.plot.figure import new_figure, only_say, reading_unit
-from sphshell_pin.plot.on_shell import FINE, Picture, shell_axes
+from sphshell_pin.plot.figure import only_say, reading_unit
+from sphshell_pin.plot.on_shell import FINE, Picture, color_scale, shell_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sphshell_pin.patches.wear import WearMap
 
+TITLE = "Wear by Preston's law"
 COLORS = "viridis"
 LEAST = 2e-3  # of the largest depth: less is bare
 MOST_PIECES = 60_000  # of the picture: of more, neighbors are drawn as one
@@ -28,18 +29,13 @@ def plot_wear(maps: Sequence[WearMap]) -> Figure:
     """
     shown = [one for one in maps if one.depth.max(initial=0.0) > 0.0]
     if not shown:
-        return only_say("Wear by Preston's law", "Nothing was worn off.")
-    columns = min(len(shown), 2)
-    figure = new_figure(2.4 + 5.2 * columns, 0.8 + 5.4 * -(-len(shown) // columns))
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+        return only_say(TITLE, "Nothing was worn off.")
+    figure, axes = shell_figure(TITLE, len(shown))
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     largest = max(float(one.depth.max()) for one in shown)
     factor, unit = reading_unit(largest, "m")
-    scale = ScalarMappable(Normalize(0.0, largest * factor), colormaps[COLORS])
-    axes = shell_axes(figure, len(shown))
+    scale = color_scale(largest * factor, COLORS)
     for axis, one in zip(axes, shown, strict=True):
         worn = one.depth > LEAST * largest
         corners, depth = one.corners[worn], one.depth[worn]
@@ -69,5 +65,4 @@ def plot_wear(maps: Sequence[WearMap]) -> Figure:
         volume = one.volume * 1e9
         axis.set_title(f"{one.shell.name}: {volume:.3g} mm³ removed", fontsize=10)
     figure.colorbar(scale, ax=axes, label=f"removed depth [{unit}]", shrink=0.8)
-    figure.suptitle("Wear by Preston's law", fontsize=12)
     return figure

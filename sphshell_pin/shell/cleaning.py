@@ -17,8 +17,8 @@ from sphshell_pin import _core
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.corner_normals import Found, settle_normals, unit_normals
-from sphshell_pin.shell.health import Place, ShellHealth
-from sphshell_pin.shell.orientation import Borders, Oriented, as_triangles, find_borders, orient
+from sphshell_pin.shell.health import ShellHealth
+from sphshell_pin.shell.orientation import Oriented, as_triangles, find_borders, orient
 from sphshell_pin.shell.polygons import Polygons, examine_quads, without_area
 from sphshell_pin.shell.raw import Floats, Ints, Mask, RawSurface, raw_surface
 from sphshell_pin.shell.tangent_joints import settle_joints
@@ -34,13 +34,6 @@ MOST_PASSES = 20
 
 MOST_INSERTED = 1_000_000
 """T-junctions that any surface may have; one of more corners may have four for each of them."""
-
-SMALL_HOLE_EDGES = 4
-SMALL_HOLE_AREA = 0.3
-"""A boundary loop of so few edges that spans less than this share of its component is a hole."""
-
-TINY_HOLE_AREA = 0.02
-"""A boundary loop of any number of edges is a hole if it spans less than this share."""
 
 
 def clean(vertices: object, polygons: object, normals: object = None) -> CleanedSurface:
@@ -305,7 +298,7 @@ def _assemble(
     starts = np.arange(0, triangles.size + 1, 3)
     health = ShellHealth(
         **found,
-        **_holes(borders),
+        **borders,
         vertices=len(vertices),
         elements=len(polygons),
         triangles=len(triangles),
@@ -319,12 +312,7 @@ def _assemble(
         closed_components=int(oriented.closed.sum()),
         cavities=oriented.cavities,
         one_sided_components=int(oriented.one_sided.sum()),
-        edges=borders.edges,
-        boundary_edges=borders.boundary,
-        boundary_loops=len(borders.loop_edges),
-        non_manifold_edges=borders.non_manifold,
-        non_manifold_at=_place(borders.non_manifold_at),
-        euler_number=int(in_use.sum()) - borders.edges + len(polygons),
+        euler_number=int(in_use.sum()) - borders["edges"] + len(polygons),
         worst_shape=float(_core.mend_shapes(starts, triangles.reshape(-1), vertices).min()),
     )
     return CleanedSurface(
@@ -348,29 +336,3 @@ def _with_origin(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
         face_names=raw.face_names,
         face_shapes=raw.face_shapes,
     )
-
-
-def _holes(borders: Borders) -> Found:
-    """Boundary loops that look like a lost element rather than the rim of a sheet."""
-    # A loop without any surface, below what numbers hold, is no hole: it has no share.
-    some = borders.loop_surface > 0
-    share = np.divide(
-        borders.loop_area, borders.loop_surface, where=some, out=np.full(some.shape, np.nan)
-    )
-    few = borders.loop_edges <= SMALL_HOLE_EDGES
-    small = (few & (share < SMALL_HOLE_AREA)) | (share < TINY_HOLE_AREA)
-    # One or two open edges enclose nothing: they bound a fin between non-manifold edges.
-    holes = np.flatnonzero(small & (borders.loop_edges >= 3))
-    if holes.size == 0:
-        return {}
-    largest = holes[np.argmax(borders.loop_area[holes])]
-    return {
-        "holes": int(holes.size),
-        "hole_edges": int(borders.loop_edges[largest]),
-        "largest_hole_area": float(borders.loop_area[largest]),
-        "hole_at": _place(borders.loop_center[largest]),
-    }
-
-
-def _place(point: Floats | None) -> Place | None:
-    return None if point is None else (float(point[0]), float(point[1]), float(point[2]))

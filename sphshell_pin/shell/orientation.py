@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.shell.polygons import Polygons, examine_quads
 from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask
+
+SMALL_HOLE_EDGES = 4
+SMALL_HOLE_AREA = 0.3
+"""A boundary loop of so few edges that spans less than this share of its component is a hole."""
+
+TINY_HOLE_AREA = 0.02
+"""A boundary loop of any number of edges is a hole if it spans less than this share."""
 
 
 def split_elements(polygons: Polygons, vertices: Floats) -> tuple[Longs, Ints]:
@@ -138,34 +146,11 @@ def _closed_components(polygons: Polygons, component: Ints, flip: Mask, number: 
     return closed
 
 
-@dataclass(frozen=True)
-class Borders:
-    """Open edges of oriented polygons, and the loops they form.
+def find_borders(oriented: Oriented, vertices: Floats) -> dict[str, Any]:
+    """Count the edges of oriented polygons and follow the open ones.
 
-    Attributes
-    ----------
-    edges : number of edges
-    boundary : edges of one element
-    non_manifold : edges of three or more
-    loop_edges : (loops,) edges of each boundary loop
-    loop_area : (loops,) size of the area vector each loop spans [m^2]
-    loop_center : (loops, 3) mean corner [m]
-    loop_surface : (loops,) area of the largest component that it bounds [m^2]
-    non_manifold_at : (3,) middle of the first non-manifold edge [m], or None
+    Returns ShellHealth's fields about edges, boundary loops and holes, by name.
     """
-
-    edges: int
-    boundary: int
-    non_manifold: int
-    loop_edges: Longs
-    loop_area: Floats
-    loop_center: Floats
-    loop_surface: Floats
-    non_manifold_at: Floats | None
-
-
-def find_borders(oriented: Oriented, vertices: Floats) -> Borders:
-    """Count the edges of oriented polygons and follow the open ones."""
     polygons = oriented.polygons
     slot_edge, users = polygons.edges.slot_edge, polygons.edges.users
     single: Mask = users == 1
@@ -186,13 +171,27 @@ def find_borders(oriented: Oriented, vertices: Floats) -> Borders:
     component = oriented.component[polygons.polygon_of_slot[slots]]
     np.maximum.at(surface, edge_loop, oriented.area[component])
     many = np.flatnonzero(users > 2)
-    return Borders(
-        edges=len(users),
-        boundary=len(slots),
-        non_manifold=len(many),
-        loop_edges=np.bincount(edge_loop, minlength=loops),
-        loop_area=np.sqrt((area**2).sum(axis=1)),
-        loop_center=center,
-        loop_surface=surface,
-        non_manifold_at=vertices[polygons.edges.ends[many[0]]].mean(axis=0) if many.size else None,
-    )
+    place = None if not many.size else vertices[polygons.edges.ends[many[0]]].mean(axis=0)
+    found: dict[str, Any] = {
+        "edges": len(users),
+        "boundary_edges": len(slots),
+        "boundary_loops": loops,
+        "non_manifold_edges": len(many),
+        "non_manifold_at": None if place is None else tuple(place.tolist()),
+    }
+    # Boundary loops that look like a lost element rather than the rim of a sheet. A loop without
+    # any surface, below what numbers hold, is none: it has no share.
+    loop_area, length = np.sqrt((area**2).sum(axis=1)), np.bincount(edge_loop, minlength=loops)
+    share = np.divide(loop_area, surface, where=surface > 0, out=np.full(loops, np.nan))
+    small = ((length <= SMALL_HOLE_EDGES) & (share < SMALL_HOLE_AREA)) | (share < TINY_HOLE_AREA)
+    # One or two open edges enclose nothing: they bound a fin between non-manifold edges.
+    holes = np.flatnonzero(small & (length >= 3))
+    if holes.size:
+        largest = holes[np.argmax(loop_area[holes])]
+        found |= {
+            "holes": int(holes.size),
+            "hole_edges": int(length[largest]),
+            "largest_hole_area": float(loop_area[largest]),
+            "hole_at": tuple(center[largest].tolist()),
+        }
+    return found

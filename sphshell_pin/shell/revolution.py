@@ -9,8 +9,8 @@ import numpy as np
 
 from sphshell_pin.shell.raw import KINDS, NO_SHAPE, Floats, Longs, RawSurface, raw_surface
 
-Slope = tuple[float, float]
-"""A unit normal as (radial, axial)."""
+Profile = tuple[float, float]
+"""A unit normal in the half-plane of the profile: (radial, axial)."""
 
 
 class Revolution:
@@ -56,19 +56,21 @@ class Revolution:
         self._vertices.append(points if radius else points * [0.0, 0.0, 1.0])
         return np.resize(np.arange(first, first + count), self.segments)
 
-    def strip(self, lower: Longs, upper: Longs, lower_normal: Slope, upper_normal: Slope) -> None:
+    def strip(
+        self, lower: Longs, upper: Longs, lower_normal: Profile, upper_normal: Profile
+    ) -> None:
         """Add the elements between two rings, with the normals at each of them."""
         corners = np.stack([lower, np.roll(lower, -1), np.roll(upper, -1), upper], axis=1)
-        steps, slopes = [0, 2, 2, 0], [lower_normal, lower_normal, upper_normal, upper_normal]
+        steps, profile = [0, 2, 2, 0], [lower_normal, lower_normal, upper_normal, upper_normal]
         # The tip of a cone has no normal: it gets that of the middle of the element.
         if lower[0] == lower[-1]:
             corners = np.column_stack([corners[:, 1:], np.full(self.segments, -1)])
-            steps, slopes = [1, 2, 0, 0], [lower_normal, upper_normal, upper_normal, (0.0, 0.0)]
+            steps, profile = [1, 2, 0, 0], [lower_normal, upper_normal, upper_normal, (0.0, 0.0)]
         elif upper[0] == upper[-1]:
             corners[:, 3] = -1
-            steps, slopes = [0, 2, 1, 0], [lower_normal, lower_normal, upper_normal, (0.0, 0.0)]
+            steps, profile = [0, 2, 1, 0], [lower_normal, lower_normal, upper_normal, (0.0, 0.0)]
         places = (2 * np.arange(self.segments)[:, None] + steps) % (2 * self.segments)
-        radial, axial = np.array(slopes).T
+        radial, axial = np.array(profile).T
         normals = np.empty((self.segments, 4, 3))
         normals[:, :, :2] = radial[:, None] * self._circle[places]
         normals[:, :, 2] = axial

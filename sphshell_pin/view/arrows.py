@@ -11,6 +11,7 @@ import numpy as np
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
     FloatArray,
+    IntArray,
     Move,
     mover,
     on_top,
@@ -56,7 +57,7 @@ class ContactColumns(Protocol):
         """Friction forces (k, 3) on the sphere [N]."""
 
 
-def _nice(value: float) -> float:
+def nice(value: float) -> float:
     """Round a positive `value` to the nearest 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(value))
     steps = np.array([1.0, 2.0, 5.0, 10.0])
@@ -86,12 +87,12 @@ class ArrowScale:
         A peak far above the rest (an impact before a rest) would leave nothing to see of the rest:
         beyond 1.6 times the median, the median sets the scale, and very long arrows are cut.
         """
-        reference = _nice(length)
+        reference = nice(length)
         present = forces[np.isfinite(forces) & (forces > 0.0)]
         if not present.size:
             return cls(reference, 10.0, 2.5 * reference)
         peak = min(float(present.max()), 1.6 * float(np.median(present)))
-        return cls(reference, _nice(peak * reference / length), 2.5 * reference)
+        return cls(reference, nice(peak * reference / length), 2.5 * reference)
 
     def cuts(self, forces: FloatArray) -> bool:
         """Tell whether any of `forces` (k,) [N] has an arrow longer than the longest."""
@@ -105,6 +106,39 @@ def largest_force(contacts: ContactColumns) -> FloatArray:
     """Magnitude (k,) of the total force of each contact [N]."""
     total = contacts.normal_world * contacts.normal_force[:, None] + contacts.friction_force_world
     return np.asarray(np.linalg.norm(total, axis=1))
+
+
+@dataclass(frozen=True)
+class ForceColumns:
+    """ContactColumns of their own."""
+
+    point_world: FloatArray
+    normal_world: FloatArray
+    normal_force: FloatArray
+    friction_force_world: FloatArray
+
+
+def pushing(contacts: ContactColumns, pair: IntArray) -> ContactColumns:
+    """Return `contacts` of the pairs `pair` (k,) without saddles, with the same sum of forces.
+
+    A saddle takes off what two contacts of its pair push too much, and would be an arrow that
+    pulls. Each of the two nearest contacts bears half of it: what is left of them still pushes.
+    """
+    saddle = contacts.normal_force < 0.0
+    if not saddle.any():
+        return contacts
+    normal = contacts.normal_world * contacts.normal_force[:, None]
+    friction = np.array(contacts.friction_force_world)
+    for k in np.flatnonzero(saddle):
+        others = np.flatnonzero(~saddle & (pair == pair[k]))
+        far = np.linalg.norm(contacts.point_world[others] - contacts.point_world[k], axis=1)
+        bearing = others[np.argsort(far, kind="stable")[:2]]
+        normal[bearing] += normal[k] / max(len(bearing), 1)
+        friction[bearing] += friction[k] / max(len(bearing), 1)
+    normal, kept = normal[~saddle], contacts.normal_world[~saddle]
+    force = np.linalg.norm(normal, axis=1)
+    direction = np.where(force[:, None] > 0.0, normal / np.where(force, force, 1.0)[:, None], kept)
+    return ForceColumns(contacts.point_world[~saddle], direction, force, friction[~saddle])
 
 
 class ArrowPool:

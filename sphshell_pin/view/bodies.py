@@ -55,6 +55,7 @@ class DrawnShell:
         self.joint = pair.joint_j
         self.node = visualizer[f"{index}_{node_name(shell.name)}"]
         self._curved = pair.method == "smooth"
+        self._index = index
         self._offset = pair.placement_j
         self._colorings: dict[str, bool] = {}
         draw_shell(self.node, shell, index, curved=self._curved)
@@ -68,6 +69,12 @@ class DrawnShell:
     def largest_distance(self) -> float:
         """The largest distance of its curved elements from the flat ones [m], 0 without any."""
         return self.shell.curvature_report().largest if self._curved else 0.0
+
+    def show_curved(self, on: bool) -> None:
+        """Draw the curved elements that contact uses, or the flat ones of the file."""
+        if self._curved:
+            draw_shell(self.node, self.shell, self._index, curved=on)
+            show(self.node["surface"], not any(self._colorings.values()))
 
     def show_coloring(self, part: str, on: bool, largest: float = 0.0) -> None:
         """Show or hide one of COLORINGS; each is drawn when it is first shown.

@@ -70,9 +70,9 @@ class View:
         axes = np.stack((right, np.cross(direction, right), direction))
         seen = (subject - middle) @ axes.T
         low, high = seen.min(axis=0), seen.max(axis=0)
-        slope = np.tan(np.deg2rad(0.5 * FIELD_OF_VIEW))
+        tangent = np.tan(np.deg2rad(0.5 * FIELD_OF_VIEW))
         width, height = 0.5 * (high - low)[:2]
-        distance = MARGIN * max(height / slope, width / (ASPECT * slope))
+        distance = MARGIN * max(height / tangent, width / (ASPECT * tangent))
         target = middle + 0.5 * (low + high) @ axes
         return cls(target + (distance + 0.3 * (high[2] - low[2])) * direction, target)
 

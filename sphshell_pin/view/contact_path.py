@@ -6,8 +6,9 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
+
+from sphshell_pin.patches.placed import poses_along
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
@@ -122,13 +123,6 @@ def _in_shell(
     scene: Scene, pair: ContactPair, result: Result, contacts: ContactRows
 ) -> tuple[FloatArray, FloatArray]:
     """Return points and normals of `contacts` (k, 3) in the frame of `pair`'s shell."""
-    model, data = scene.model, scene.model.createData()
-    points, normals = np.empty_like(contacts.point_world), np.empty_like(contacts.normal_world)
-    shell: pin.SE3 | None = None
-    for place, row in enumerate(contacts.row):
-        if shell is None or pair.joint_j != 0:
-            pin.forwardKinematics(model, data, np.asarray(result.q[row], dtype=float))
-            shell = data.oMi[pair.joint_j] * pair.placement_j
-        points[place] = shell.actInv(contacts.point_world[place])
-        normals[place] = shell.rotation.T @ contacts.normal_world[place]
-    return points, normals
+    turn, origin = poses_along(result, scene, contacts.row, pair.joint_j, pair.placement_j)
+    points = np.einsum("kij,ki->kj", turn, contacts.point_world - origin)
+    return points, np.einsum("kij,ki->kj", turn, contacts.normal_world)

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from sphshell_pin.dynamics.scene.models import frame_on_joint
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns
+from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns, pushing
 from sphshell_pin.view.bodies import (
     COLORINGS,
     DrawnShell,
@@ -21,6 +21,7 @@ from sphshell_pin.view.bodies import (
 )
 from sphshell_pin.view.camera import REACH, View, ball_around, look, set_surroundings
 from sphshell_pin.view.distance import Painting, range_text
+from sphshell_pin.view.frames import FrameAxes, draw_grid, grid_spacing
 from sphshell_pin.view.nodes import (
     FloatArray,
     material,
@@ -45,9 +46,25 @@ _WIDTH = 0.05  # of links, in sizes of the robot
 _FAR = 2.0  # in sizes of the robot: corners of shells that are farther away may leave the picture
 
 
-Part = Literal["robot", "spheres", "arrows", "points", "wireframe", "trails", Painting]
+Part = Literal[
+    "robot",
+    "spheres",
+    "arrows",
+    "points",
+    "wireframe",
+    "trails",
+    "curved",
+    "frames",
+    "grid",
+    Painting,
+]
 PARTS: tuple[Part, ...] = get_args(Part)
-"""What `Display.show` can show and hide; all but COLORINGS are shown at first."""
+"""What `Display.show` can show and hide.
+
+"curved" are the curved elements of shells in contact by the method "smooth", in place of the flat
+ones.
+"""
+HIDDEN_AT_FIRST: frozenset[Part] = frozenset({*get_args(Painting), "frames", "grid"})
 
 
 class Display:
@@ -85,7 +102,8 @@ class Display:
             view = choose_view(scene, neutral[None, :], visual_model=visual_model)
         self.view = view
         self.arrow_scale = ArrowScale() if arrow_scale is None else arrow_scale
-        self._hidden: set[Part] = set(get_args(Painting))
+        self._hidden: set[Part] = set(HIDDEN_AT_FIRST)
+        self._frames: FrameAxes | None = None  # until they are shown
         self._shells: dict[ShellKey, DrawnShell] = {}
         self._spheres: dict[SphereKey, DrawnSphere] = {}
         self._draw_shells()
@@ -124,7 +142,11 @@ class Display:
             shell.update(self._data)
         for ball in self._spheres.values():
             ball.update(self._data)
-        self._arrows.update(contacts, self.arrow_scale)
+        if self._frames is not None and "frames" not in self._hidden:
+            self._frames.update(self._data)
+        pair = getattr(contacts, "pair", None)
+        drawn = contacts if contacts is None or pair is None else pushing(contacts, pair)
+        self._arrows.update(drawn, self.arrow_scale)
         if patches is None:
             return
         if self._patches is None:
@@ -151,6 +173,12 @@ class Display:
         if "distance" in self._hidden:
             return None
         return range_text(self.largest_distance)
+
+    @property
+    def grid(self) -> str | None:
+        """What the grid shows, if it is shown."""
+        step = f"{1e3 * grid_spacing(self.view):g} mm"
+        return None if "grid" in self._hidden else f"grid of {step} at z = 0"
 
     @property
     def face_keys(self) -> list[tuple[str, str]]:
@@ -209,6 +237,7 @@ class Display:
         if {sphere_key(one) for pair in scene.pairs for one in pair.spheres} != set(self._spheres):
             self.visualizer["spheres"].delete()
             self._draw_spheres()
+        self._show_frames("frames" not in self._hidden)
         if visual_model is not self._visual_model:
             self._visual_model = visual_model
             self.visualizer["robot"].delete()
@@ -227,9 +256,23 @@ class Display:
             self._show_points()
         elif part in ("robot", "spheres"):
             show(self.visualizer[part], on)
+        elif part == "frames":
+            self._show_frames(on)
+        elif part == "grid":
+            draw_grid(self.visualizer["grid"], self.view)
+            show(self.visualizer["grid"], on)
         else:
             for shell in self._shells.values():
                 self._show_of_shell(shell, part, on)
+
+    def _show_frames(self, on: bool) -> None:
+        """Draw the axes of the scene of now, or none."""
+        if self._frames is not None:
+            self.visualizer["frames"].delete()
+        self._frames = None
+        if on:
+            self._frames = FrameAxes(self.visualizer["frames"], self.scene, self.view.distance)
+            self._frames.update(self._data)
 
     def show_patches(self, on: bool) -> None:
         """Draw the patches that `update` is given, or the contact points in their place."""
@@ -257,6 +300,9 @@ class Display:
     def _show_of_shell(self, shell: DrawnShell, part: Part, on: bool) -> None:
         if part in COLORINGS:
             shell.show_coloring(part, on, self.largest_distance if on else 0.0)
+        elif part == "curved":
+            shell.show_curved(on)
+            show(shell.node["elements"], "wireframe" not in self._hidden)
         else:
             show(shell.node["elements" if part == "wireframe" else "trail"], on)
 
@@ -266,7 +312,7 @@ class Display:
             if pair.shell is not None and shell_key(pair) not in self._shells:
                 drawn = DrawnShell(self.visualizer["shells"], pair, len(self._shells))
                 self._shells[shell_key(pair)] = drawn
-                for part in ("wireframe", "trails"):
+                for part in ("curved", "wireframe", "trails"):
                     if part in self._hidden:
                         self._show_of_shell(drawn, part, False)
         colorings: tuple[Part, ...] = get_args(Painting)
@@ -358,12 +404,14 @@ def choose_view(
         # Joints are points, links have some width.
         links = robot[:, None] + _WIDTH * size * np.vstack((np.eye(3), -np.eye(3)))
         around += list(links.reshape(-1, 3))
-        on_shells = [
-            corner
-            for corner in on_shells
-            if np.linalg.norm(corner - middle) <= _FAR * size
-            or np.linalg.norm(corner - center) <= reach * half
-        ]
+        # A shell is there as a whole, unless it is a floor that would leave little of the rest.
+        most = max(_FAR * size, reach * half)
+        for k in range(0, len(on_shells), len(corners)):
+            shell = np.array(on_shells[k : k + len(corners)])
+            near = np.linalg.norm(shell - middle, axis=1) <= _FAR * size
+            near |= np.linalg.norm(shell - center, axis=1) <= reach * half
+            around += list(shell if near.any() and ball_around(shell)[1] <= most else shell[near])
+        on_shells = []
         reach = np.inf
     around += on_shells
     normal = np.zeros(3)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.view.nodes import FloatArray
-from sphshell_pin.view.surface import divisions, draw_colored, hex_colors, is_curved
+from sphshell_pin.view.surface import divisions, draw_colored, is_curved, ramp_colors
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -43,15 +42,8 @@ def draw_distance(node: Visualizer, shell: Shell, largest: float) -> None:
         points = np.asarray(shell.vertices)[shell.triangles].reshape(-1, 3)
         triangles = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
         distance = distances_at(shell, FEW).max(axis=1).repeat(3)
-    draw_colored(node["distance"], points, triangles, ramp_colors(distance, largest))
-
-
-def ramp_colors(values: FloatArray, largest: float) -> FloatArray:
-    """Return colors (n, 3) from 0 to 1 for `values` (n,) between 0 and `largest`."""
-    stops = hex_colors(RAMP)
-    share = np.clip(values / largest, 0.0, 1.0) if largest > 0.0 else np.zeros(len(values))
-    at = np.linspace(0.0, 1.0, len(RAMP))
-    return np.stack([np.interp(share, at, stops[:, k]) for k in range(3)], axis=1)
+    share = distance / largest if largest > 0.0 else np.zeros(len(distance))
+    draw_colored(node["distance"], points, triangles, ramp_colors(share, RAMP))
 
 
 def check_coloring(color: str) -> None:

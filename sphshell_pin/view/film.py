@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Literal, TypedDict, TypeVar, get_args
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.atomic import AtomicFolder, FolderInUse, write_whole
+from sphshell_pin.atomic import write_whole
 from sphshell_pin.checks import check_finite, check_vector
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
+from sphshell_pin.export.tables import write_folder
 from sphshell_pin.films import Pixels, check_film, write_film
 from sphshell_pin.view.recording import Shown, check_pace, render_recording, sound_rows
 
@@ -158,7 +159,12 @@ def render_film(
                 samples = [stage.pixels(k) for k in chosen]
                 write_film(path, stage.all(stage.pixels), fps, samples)
             else:
-                _write_folder(path, stage)
+                # Other files of the folder stay.
+                files = (
+                    (FRAME.format(k), one) for k, one in enumerate(stage.all(stage.picture), 1)
+                )
+                old = [one.name for one in path.glob("frame_*.png")]
+                write_folder(path, files, [FRAME.format(1), *old])
 
     _interruptibly(draw, stage.stop)
     return path
@@ -316,18 +322,3 @@ def _launch(driver: Playwright, path: Path) -> Browser:
                 "installs one",
             ) from fault
         raise
-
-
-def _write_folder(path: Path, stage: _Stage) -> None:
-    """Replace the pictures of the folder at `path` by those of this run; other files stay."""
-    try:
-        with AtomicFolder(path, last=FRAME.format(1)) as folder:
-            staging = folder.staging()
-            for number, picture in enumerate(stage.all(stage.picture), start=1):
-                (staging / FRAME.format(number)).write_bytes(picture)
-            old = [one.name for one in path.glob("frame_*.png")]
-            folder.replace(staging, old)
-    except FolderInUse as busy:
-        raise ResultError(path, f"{busy}: wait until it ends") from None
-    except OSError as fault:
-        raise ResultError(path, f"cannot be written: {fault.strerror}") from fault

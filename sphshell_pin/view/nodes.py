@@ -102,13 +102,7 @@ def triangle_mesh(vertices: FloatArray, triangles: IntArray) -> Json:
 
 def line_segments(vertices: FloatArray, segments: IntArray) -> Json:
     """Geometry of lines: `segments` (s, 2) index `vertices` (n, 3) [m]."""
-    return {
-        "type": "BufferGeometry",
-        "data": {
-            "attributes": {"position": typed_array(vertices)},
-            "index": typed_array(segments.reshape(-1)),
-        },
-    }
+    return triangle_mesh(vertices, segments)
 
 
 def sphere(radius: float, segments: int = 32) -> Json:
@@ -142,6 +136,11 @@ def material(kind: str, color: int, opacity: float = 1.0, **properties: object) 
         "opacity": opacity,
         **properties,
     }
+
+
+def css(color: int) -> str:
+    """Return a color as style sheets have it."""
+    return f"#{color:06x}"
 
 
 def on_top(color: int, opacity: float = 1.0) -> Json:
@@ -198,6 +197,11 @@ def set_camera(visualizer: Visualizer, camera: Json) -> None:
     path = node.path.lower()
     data = {"object": {"uuid": f"{path}#camera", **camera}}
     visualizer.window.send(Command({"type": "set_object", "path": path, "object": data}))
+
+
+def is_below(path: str, parent: str) -> bool:
+    """Whether the node at `path` is the one at `parent`, or below it."""
+    return f"{path}/".startswith(parent.rstrip("/") + "/")
 
 
 def node_name(name: str) -> str:

@@ -19,6 +19,7 @@ from sphshell_pin.view.nodes import (
     FloatArray,
     Json,
     Sent,
+    is_below,
     typed_array,
     viewer_script,
 )
@@ -55,9 +56,8 @@ class FilmWindow:
             self._frames.setdefault(path, {})[self.frame] = data["matrix"]
             return
         if kind == "delete":
-            below = path.rstrip("/") + "/"
-            for key in [key for key in self._commands if (key[1] + "/").startswith(below)]:
-                del self._commands[key]
+            kept = {key: one for key, one in self._commands.items() if not is_below(key[1], path)}
+            self._commands = kept
             return
         if kind == "set_object":
             data = self._share(data)

@@ -20,6 +20,7 @@ from sphshell_pin.view.nodes import (
     triangle_mesh,
     typed_array,
 )
+from sphshell_pin.view.surface import ramp_colors
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -133,7 +134,7 @@ def _disc(level: float, rings: int = 10, sectors: int = 40) -> dict[str, Any]:
     """
     radius = np.append(np.linspace(0.0, 1.0, rings + 1), 1.06)
     share = level * np.sqrt(np.maximum(0.0, 1.0 - radius**2))
-    color = ramp_colors(share)
+    color = ramp_colors(share, RAMP)
     color[-1] = 0.15
     angle = 2.0 * np.pi * np.arange(sectors) / sectors
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros(sectors)], axis=1)
@@ -149,10 +150,3 @@ def _disc(level: float, rings: int = 10, sectors: int = 40) -> dict[str, Any]:
     mesh = triangle_mesh(vertices, triangles.astype(np.int32))
     mesh["data"]["attributes"]["color"] = typed_array(np.repeat(color, sectors, axis=0))
     return mesh
-
-
-def ramp_colors(share: FloatArray) -> FloatArray:
-    """Return colors (n, 3) from 0 to 1 for shares (n,) of the largest pressure."""
-    stops = np.array([[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in RAMP]) / 255.0
-    at = np.linspace(0.0, 1.0, len(RAMP))
-    return np.stack([np.interp(share, at, stops[:, k]) for k in range(3)], axis=1)

@@ -27,7 +27,7 @@ from sphshell_pin.view.camera import DIRECTIONS
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
 from sphshell_pin.view.display import TRAIL_COLOR, Display, choose_view
 from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
-from sphshell_pin.view.nodes import FloatArray, new_visualizer
+from sphshell_pin.view.nodes import FloatArray, css, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
@@ -369,21 +369,21 @@ def _legend(
         on_what = f"on {firsts.pop()}" if len(firsts) == 1 else "on the first body of each pair"
     if radii:
         sizes = ", ".join(f"{radius * 1e3:g}" for radius in radii[:3])
-        legend.append((_css(SPHERE_COLOR), f"sphere, radius {sizes} mm"))
+        legend.append((css(SPHERE_COLOR), f"sphere, radius {sizes} mm"))
     if not len(shown.row):
         return [*legend, ("transparent", "no contact in this run")]
     if arrows == "total":
-        legend.append((_css(TOTAL_COLOR), f"force {on_what}, {scale}"))
+        legend.append((css(TOTAL_COLOR), f"force {on_what}, {scale}"))
     else:
-        legend.append((_css(NORMAL_COLOR), f"normal force {on_what}, {scale}"))
-        legend.append((_css(FRICTION_COLOR), "friction force, same scale"))
+        legend.append((css(NORMAL_COLOR), f"normal force {on_what}, {scale}"))
+        legend.append((css(FRICTION_COLOR), "friction force, same scale"))
     if scale.cuts(_forces(shown, arrows)):
         cut = f"arrows longer than {scale.longest * 1e3:.0f} mm are cut"
         legend.append(("transparent", cut))
     if shown.patches is None:
-        legend.append((_css(POINT_COLOR), "contact point"))
+        legend.append((css(POINT_COLOR), "contact point"))
     if trailed:
-        legend.append((_css(TRAIL_COLOR), "path on the shell"))
+        legend.append((css(TRAIL_COLOR), "path on the shell"))
     return legend
 
 
@@ -396,10 +396,6 @@ def _color_keys(display: Display, shown: ContactRows) -> list[tuple[str, str]]:
         keys.append((PRESSURE_RAMP, str(display.patch_scale)))
     found = [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
     return found + display.face_keys
-
-
-def _css(color: int) -> str:
-    return f"#{color:06x}"
 
 
 def _digits(speed: float, fps: float) -> int:

@@ -13,6 +13,7 @@ import pinocchio as pin
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.view.frames import PALE_AXIS_COLORS, draw_axes
 from sphshell_pin.view.meshes import lit_facets
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 LINK_COLOR = 0x8B95A1
 JOINT_COLOR = 0x4A5560
-AXIS_COLORS = (0xE79A9A, 0x97CC99, 0x8FBFEA)  # pale: no axis may pass for an arrow
 
 
 def check_geometry_model(model: pin.Model, geometry_model: pin.GeometryModel) -> None:
@@ -178,13 +178,8 @@ class SkeletonRobot:
             set_object(
                 node["ball"], sphere(1.6 * self._width, 20), material("MeshPhong", JOINT_COLOR)
             )
-            for axis, color in enumerate(AXIS_COLORS):
-                arm = node["xyz"[axis]]
-                set_object(arm, rod(0.45, 0.45), material("MeshBasic", color))
-                direction = np.eye(3)[axis]
-                length = 5.0 * self._width
-                shape = np.array([self._width, length, self._width])
-                arm.set_transform(pose(rotation_to(direction), 0.5 * length * direction, shape))
+            looks = [material("MeshBasic", color) for color in PALE_AXIS_COLORS]
+            draw_axes(node, self._width, 5.0 * self._width, looks)
             self._axes.append((mover(node), joint))
             self._held.append((node.path.lower(), joint))
 

@@ -146,6 +146,12 @@ def hex_colors(names: Sequence[str]) -> FloatArray:
     return np.array([[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in names]) / 255.0
 
 
+def ramp_colors(share: FloatArray, ramp: Sequence[str]) -> FloatArray:
+    """Return colors (n, 3) from 0 to 1 for shares (n,): 0 the first of `ramp`, 1 the last."""
+    at, stops = np.linspace(0.0, 1.0, len(ramp)), hex_colors(ramp)
+    return np.stack([np.interp(share, at, stops[:, k]) for k in range(3)], axis=1)
+
+
 def draw_colored(
     node: Visualizer, vertices: FloatArray, triangles: IntArray, colors: FloatArray
 ) -> None:

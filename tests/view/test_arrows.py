@@ -4,7 +4,7 @@ import meshcat
 import numpy as np
 import pytest
 
-from sphshell_pin.view.arrows import ArrowPool, ArrowScale
+from sphshell_pin.view.arrows import ArrowPool, ArrowScale, pushing
 from sphshell_pin.view.page import FilmWindow
 
 
@@ -129,3 +129,27 @@ def test_forces_beyond_all_bounds_are_drawn_as_far_as_can_be(size):
     assert np.isfinite(tip).all()
     expected = 0.25 if np.isfinite(size) else 0.0
     assert np.linalg.norm(tip - [0, 1, 2]) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("least", [0.1, 0.999])
+def test_saddles_are_no_arrows_that_pull_and_the_sum_of_forces_stays(least):
+    # A chain of three contacts with a saddle between each two, and a contact of another pair.
+    normal = np.array([3.0, 3.0, 3.0, -3.0 * least, -3.0 * least, 5.0])
+    contacts = forces(*normal)
+    contacts.point_world = np.array(
+        [[0, 0, 0], [2, 0, 0], [4, 0, 0], [1, 0, 0], [3, 0, 0.0], [1, 0, 0]]
+    )
+    contacts.normal_world = np.array(
+        [[np.sin(a), 0, np.cos(a)] for a in (0.2, 0, -0.2, 0.1, -0.1, 0)]
+    )
+    pair = np.array([0, 0, 0, 0, 0, 1])
+    drawn = pushing(contacts, pair)
+    np.testing.assert_array_equal(drawn.point_world, contacts.point_world[[0, 1, 2, 5]])
+    assert (drawn.normal_force > 0.0).all()
+    pushes = np.sum(drawn.normal_world * contacts.normal_world[[0, 1, 2, 5]], axis=1)
+    assert (pushes > 0.0).all()
+    total = drawn.normal_force @ drawn.normal_world
+    np.testing.assert_allclose(total, normal @ contacts.normal_world, atol=1e-12)
+    assert drawn.normal_force[-1] == 5.0
+    alone = forces(1.0, 2.0)
+    assert pushing(alone, np.array([0, 0])) is alone

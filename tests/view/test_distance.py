@@ -9,9 +9,10 @@ import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.curved import curved_mesh
 from sphshell_pin.view.display import Display
-from sphshell_pin.view.distance import check_coloring, draw_distance, ramp_colors
+from sphshell_pin.view.distance import RAMP, check_coloring, draw_distance
 from sphshell_pin.view.page import FilmWindow
 from sphshell_pin.view.recording import render_recording
+from sphshell_pin.view.surface import ramp_colors
 from tests.shell.surfaces import plate
 from tests.shell.test_curvature import ball
 
@@ -68,7 +69,7 @@ def test_colours_run_from_none_to_the_largest_distance():
     largest = shell.curvature_report().largest
     np.testing.assert_allclose(points, curved_mesh(shell, 6)[0], atol=1e-6)
     on_flat = np.abs(points[:, None] - shell.vertices[None]).sum(axis=2).min(axis=1) < 1e-6
-    none, most = ramp_colors(np.array([0.0, largest]), largest)
+    none, most = ramp_colors(np.array([0.0, 1.0]), RAMP)
     np.testing.assert_allclose(colors[on_flat], np.tile(none, (on_flat.sum(), 1)), atol=1e-6)
     # The lightest point is next to the place of the report, or to one that is as far off.
     lightest = colors[:, 1].argmax()
@@ -92,7 +93,7 @@ def test_all_shells_share_one_range():
     lightest = [colors[:, 1].max() for _, colors in sheet.drawn("distance")]
     assert sheet.display.largest_distance == large.curvature_report().largest
     # The distances of the small one are a quarter of the other's: the second of five colours.
-    expected = ramp_colors(np.array([0.25]), 1.0)[0, 1]
+    expected = ramp_colors(np.array([0.25]), RAMP)[0, 1]
     assert min(lightest) == pytest.approx(expected, abs=0.03)
     assert max(lightest) > 0.85
 

@@ -405,10 +405,10 @@ def test_the_arrow_of_a_push_ends_where_a_knob_starts_the_run_anew(make, tmp_pat
     frames(live, 6)
     say(live, "push", body="ball", direction=[1.0, 0.0, 0.0], newtons=0.1, seconds=5.0)
     frames(live, 1)
-    assert live._hands.push is not None
+    assert live._interaction.push is not None
     say(live, "parameter", key="robot.ball.start.root_joint.2", value=0.05)
     frames(live, 1)
-    assert live._hands.push is None
+    assert live._interaction.push is None
 
 
 def test_the_legend_says_where_arrows_are_cut(make):
@@ -448,3 +448,26 @@ def test_a_queue_of_events_ends_with_the_run(make, monkeypatch):
     monkeypatch.setattr(live, "_handle", lambda *_: (done.append(1), live._stop.set()))
     live.frame(0.0)
     assert done == [1]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("law.stiffness", -5.0, "stiffness ({key}): should be greater than 0 (given: -5.0)"),
+        ("law.stiffness", "abc", "stiffness ({key}): 'abc' must be a number"),
+        ("friction.mu_static", 0.0, "static friction ({key}): mu_dynamic = 0.2 must not exceed"),
+    ],
+)
+def test_a_value_that_cannot_be_is_answered_in_the_words_of_its_slider(
+    make, tmp_path, key, value, told
+):
+    friction = """friction = { type = "coulomb", mu_static = 0.3, mu_dynamic = 0.2 }"""
+    key = f"contact.ball-plate.{key}"
+    text = DROP.replace("[run]", f"{friction}\n[run]") + f'\n[[knob]]\nkey = "{key}"\n'
+    live = make(LiveRun(build(write(tmp_path, text))))
+    say(live, "parameter", key=key, value=value)
+    frames(live, 1)
+    ((client, answer),) = live.told
+    assert client is TAB
+    assert answer.startswith(told.format(key=key))
+    assert str(tmp_path) not in answer

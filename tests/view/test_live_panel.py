@@ -65,5 +65,11 @@ def test_contacts_are_listed_in_millimetres_and_stick_creep_or_slip():
     np.testing.assert_allclose([one["depth"] for one in listed], 0.2)
     np.testing.assert_allclose([one["friction"] for one in listed], 0.5)
     np.testing.assert_allclose([one["slip"] for one in listed], 1e3 * slip)
+    # What is listed as 0.00 mm/s rests; a saddle takes off what two contacts push too much.
+    slip[:] = [0.0, 4.9e-6, 5.1e-6, 0.0, 0.0]
+    rows["normal_force"][4] = -1.0
+    listed = list_contacts(SceneContacts.from_rows(rows.tobytes()), pairs)
+    assert [one["motion"] for one in listed] == [None, "rest", "creep", "stick", "saddle"]
+    assert [f"{one['slip']:.2f}" for one in listed[1:3]] == ["0.00", "0.01"]
     many = SceneContacts.from_rows(bytes(3 * MOST_LISTED * ROW.itemsize))
     assert len(list_contacts(many, pairs)) == MOST_LISTED

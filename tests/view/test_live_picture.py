@@ -9,9 +9,13 @@ import pytest
 
 from sphshell_pin.contact import CoulombFriction
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, SceneContacts
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.live.live_run import LiveRun
+from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown
 from sphshell_pin.view.live.window import LiveWindow
-from tests.view.live_player import ArmPlayer, BallPlayer
+from tests.scenario.files import DROP, write
+from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
 from tests.view.stand_ins import ball_configuration, ball_model, contact_pair, plate
 from tests.view.test_live_window import Browser
 
@@ -67,6 +71,8 @@ def test_a_trail_grows_on_its_shell_and_moves_with_it():
     model = ball_model()
     player = SimpleNamespace(
         patches=None,
+        time=0.0,
+        duration=None,
         scene=SimpleNamespace(
             model=model, pairs=(contact_pair(model, "ball", 0.05, plate(), "table"),)
         ),
@@ -224,3 +230,75 @@ def test_the_robot_is_placed_as_pinocchio_places_it():
     for index, body in enumerate(geometry.geometryObjects):
         expected = placed.oMg[index].homogeneous @ np.diag([*body.meshScale, 1.0])
         np.testing.assert_allclose(seen[f"/meshcat/robot/visuals/{body.name}"], expected, atol=1e-6)
+
+
+def test_axes_show_how_frames_are_placed_and_the_grid_says_its_spacing():
+    player = ArmPlayer()
+    easel = Easel(player)
+    assert not any("/frames/" in path for path in easel.draw().objects)
+    easel.picture.show("frames", True)
+    easel.picture.show("grid", True)
+    seen = easel.draw()
+    model = player.scene.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, player.q)
+    for joint in range(model.njoints):
+        place = seen.matrices[f"/meshcat/frames/frame_{joint}"]
+        np.testing.assert_allclose(place, data.oMi[joint].homogeneous, atol=1e-6)
+        for k, axis in enumerate("xyz"):
+            tip = place @ seen.matrices[f"/meshcat/frames/frame_{joint}/{axis}"] @ [0, 0.5, 0, 1]
+            along = (tip - place @ [0, 0, 0, 1])[:3]
+            np.testing.assert_allclose(
+                along / np.linalg.norm(along), data.oMi[joint].rotation[:, k], atol=1e-5
+            )
+    drawn = seen.objects["/meshcat/grid"]["geometries"][0]["data"]["attributes"]["position"]
+    points = np.frombuffer(drawn["array"].data, "<f4").reshape(-1, 3)
+    step = np.diff(np.unique(points[:, 0].round(5))).min()
+    assert easel.picture.display.grid == f"grid of {1e3 * step:g} mm at z = 0"
+    assert np.ptp(points[:, :2], axis=0) == pytest.approx(40 * step, rel=1e-5)
+    assert not points[:, 2].any()
+    # A scene that is replaced takes its axes along.
+    player.scene = SimpleNamespace(model=model, pairs=())
+    assert any("/frames/" in path for path in easel.draw().objects)
+    easel.picture.show("frames", False)
+    assert not any("/frames/" in path for path in easel.draw().objects)
+
+
+def test_the_curved_surface_of_contact_can_be_compared_with_the_flat_one(tmp_path):
+    # The middles of the sides of a tube lie inside its circle, those of curved ones much less so.
+    tube = """primitive = { type = "cylinder", radius = 0.1, length = 0.2 }"""
+    text = DROP.replace('primitive = { type = "box", size = [0.2, 0.2, 0.02] }', tube)
+    player = LiveRun(build(write(tmp_path, text.replace("[run]", 'method = "smooth"\n[run]'))))
+    easel = Easel(player)
+
+    def least_radius():
+        drawn = easel.draw().objects["/meshcat/shells/0_plate/surface"]["geometries"][0]["data"]
+        points = np.frombuffer(drawn["attributes"]["position"]["array"].data, "<f4").reshape(-1, 3)
+        corners = points[np.frombuffer(drawn["index"]["array"].data, "<u4").reshape(-1, 3)]
+        mantle = np.ptp(corners[..., 2], axis=1) > 1e-3
+        middles = 0.5 * (corners + np.roll(corners, 1, axis=1))[mantle]
+        return np.hypot(middles[..., 0], middles[..., 1]).min()
+
+    curved = least_radius()
+    assert easel.picture.switches(player, False)["curved"]
+    easel.picture.show("curved", False)
+    assert 0.1 - least_radius() > 10 * (0.1 - curved)
+    easel.picture.show("curved", True)
+    assert least_radius() == curved
+    assert "curved" not in Easel(BallPlayer()).picture.switches(BallPlayer(), False)
+
+
+def test_the_first_camera_of_a_finished_run_has_all_of_its_part():
+    seen = Easel(FilmPlayer()).picture.view
+    corners = plate().vertices
+    back = (seen.eye - seen.target) / seen.distance
+    depth = (corners - seen.eye) @ -back
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    slope = np.tan(np.deg2rad(0.5 * FIELD_OF_VIEW))
+    for axis, wide in ((right, ASPECT), (np.cross(back, right), 1.0)):
+        assert np.abs((corners - seen.target) @ axis / depth).max() < wide * slope
+    player = FilmPlayer()
+    player.seek(0.7)
+    Easel(player)
+    assert player.time == 0.7

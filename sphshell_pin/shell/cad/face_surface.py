@@ -147,11 +147,11 @@ class FaceSurface:
             scale = first[0, 0] * first[1, 1]
             if not np.linalg.det(first) > SINGULAR * scale:
                 return None
-            slope = np.array([offset @ by_u, offset @ by_v])
+            gradient = np.array([offset @ by_u, offset @ by_v])
             full = first + np.array([[bend_uu, bend_uv], [bend_uv, bend_vv]])
             # At a center of curvature all directions are alike: the tangent plane decides.
             flat = abs(np.linalg.det(full)) <= 1e-6 * scale
-            step = -np.linalg.solve(first if flat else full, slope)
+            step = -np.linalg.solve(first if flat else full, gradient)
             at = np.clip(at + step, self._lowest, self._highest)
             if np.linalg.norm(step[0] * by_u + step[1] * by_v) <= settled:
                 return at

@@ -16,7 +16,7 @@ import numpy as np
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, RawSurface
-from sphshell_pin.shell.readers.text import finish, indices, pack_polygons, read_text
+from sphshell_pin.shell.readers.text import finish, indices, pack_polygons, read_bytes, read_text
 
 
 def read_stl(path: Path) -> RawSurface:
@@ -24,11 +24,8 @@ def read_stl(path: Path) -> RawSurface:
     with interrupts_delayed():
         import trimesh
 
-    try:
-        # From memory: so a file that cannot be opened is not reported as damaged.
-        data = io.BytesIO(_few_solids(path.read_bytes()))
-    except OSError as error:
-        raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
+    # From memory: so a file that cannot be opened is not reported as damaged.
+    data = io.BytesIO(_few_solids(read_bytes(path)))
     try:
         mesh: Any = trimesh.load(data, file_type="stl", process=False, force="mesh")
     except ImportError as error:  # it fails to guess the encoding of what is no text

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurface
-from sphshell_pin.shell.readers.text import finish, pack_polygons
+from sphshell_pin.shell.readers.text import finish, pack_polygons, read_bytes
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -58,10 +58,7 @@ def read_ply(path: Path) -> RawSurface:
     ShellFileError
         If the file is truncated, holds no faces, or does not follow the format.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
+    data = read_bytes(path)
     form, elements, start = _header(path, data)
     table: dict[str, Floats] = {}
     polygons: Polygons | None = None

@@ -13,8 +13,13 @@ from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurfac
 
 def read_text(path: Path) -> str:
     """Return the text of a file, with any line ends and without a byte-order mark."""
+    return read_bytes(path).decode("utf-8-sig", errors="replace")
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the contents of a file; ShellFileError if it cannot be read."""
     try:
-        return path.read_bytes().decode("utf-8-sig", errors="replace")
+        return path.read_bytes()
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
 

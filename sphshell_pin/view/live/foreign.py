@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.view.nodes import Sent, Window
+from sphshell_pin.view.nodes import Sent, Window, is_below
 
 PERIOD = 1.0 / 30.0  # [s] between two frames
 
@@ -41,8 +41,7 @@ class ForeignWindow:
                 return
             self._matrices[path] = data["matrix"]
         elif data["type"] == "delete":
-            below = path.rstrip("/") + "/"
-            for one in [one for one in self._matrices if (one + "/").startswith(below)]:
+            for one in [one for one in self._matrices if is_below(one, path)]:
                 del self._matrices[one]
         self._window.send(command)
 

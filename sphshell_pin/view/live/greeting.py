@@ -10,7 +10,7 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR
 from sphshell_pin.view.distance import RAMP
 from sphshell_pin.view.live.picture import CONE_COLOR
-from sphshell_pin.view.nodes import Json
+from sphshell_pin.view.nodes import Json, css
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 
 if TYPE_CHECKING:
@@ -55,6 +55,6 @@ def greeting(player: Player, picture: str | None, offer: Json) -> Json:
         "picture": picture,
         "ramp": list(RAMP),
         "pressure_ramp": list(PRESSURE_RAMP),
-        "colors": {name: f"#{color:06x}" for name, color in _COLORS.items()},
+        "colors": {name: css(color) for name, color in _COLORS.items()},
         **offer,
     }

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.errors import NameNotFound, SphshellError
+from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.view.live.charts import Charts, Point
 from sphshell_pin.view.live.events import BadMessage, Client, Event, newest
 from sphshell_pin.view.live.foreign import ForeignWindow, window_of
@@ -22,7 +22,7 @@ from sphshell_pin.view.live.greeting import (
     check_speed,
     greeting,
 )
-from sphshell_pin.view.live.hands import Hands
+from sphshell_pin.view.live.interaction import Interaction
 from sphshell_pin.view.live.panel import Panel, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture
 from sphshell_pin.view.live.server import Server
@@ -97,8 +97,8 @@ class Live:
             canvas = new_visualizer(self._foreign or self._window)
             self.picture = Picture(player, canvas)
             own = self._window if self._foreign is None else None
-            self._hands = Hands(player, self.picture, own)
-            hello = {"type": "hello", **greeting(player, framed, self._hands.offer())}
+            self._interaction = Interaction(player, self.picture, own)
+            hello = {"type": "hello", **greeting(player, framed, self._interaction.offer())}
             self._panel.post("hello", hello | {"series": self._charts.descriptions()})
             self.draw()
         except BaseException:
@@ -218,7 +218,7 @@ class Live:
             try:
                 # A diverging run is reported in the panel, not on the terminal.
                 with np.errstate(all="ignore"):
-                    self.picture.update(self.player, self._hands.push, self._hands.drag)
+                    self.picture.update(self.player, self._interaction.push, self._interaction.drag)
             except Exception as fault:
                 # A picture that fails is reported in the panel, which goes on.
                 self.fault = fault
@@ -253,7 +253,7 @@ class Live:
 
     def _advance(self, duration: float, wall: float) -> None:
         player = self.player
-        self._hands.push_on(1.5 * duration)
+        self._interaction.push_on(1.5 * duration)
         before = player.time
         try:
             rows = player.advance(duration, wall)
@@ -298,16 +298,16 @@ class Live:
             case "parameter":
                 self._change(event["key"], event["value"])
             case "push" | "hold" | "drag" | "target":
-                self._hands.do(client, event)
+                self._interaction.do(client, event)
             case "release":
-                self._hands.release(client)
+                self._interaction.release(client)
                 if client not in self.server.clients and self._charts.forget(client):
                     self._send_curves()
             case "show":
                 if event["part"] not in LIVE_PARTS:
                     raise NameNotFound("part", event["part"], "the picture", LIVE_PARTS)
                 if event["part"] == "pressure":
-                    self._hands.record_patches(event["on"])
+                    self._interaction.record_patches(event["on"])
                 self.picture.show(event["part"], event["on"])
             case "arrows":
                 self.picture.magnify_arrows(min(max(event["value"], 1e-2), 1e2))
@@ -323,11 +323,14 @@ class Live:
                 self._seek(event["t"])
 
     def _change(self, key: str, value: float | str) -> None:
-        keys = [one.key for one in self.player.parameters]
-        if key not in keys:
-            raise NameNotFound("parameter", key, "this run", keys)
+        labels = {one.key: one.label for one in self.player.parameters}
+        if key not in labels:
+            raise NameNotFound("parameter", key, "this run", labels)
         before = self.player.time
-        self.player.change(key, value)
+        try:
+            self.player.change(key, value)
+        except SphshellError as fault:
+            raise BadMessage(f"{_named(labels[key], key)}: {_reason(fault, key)}") from fault
         if self.player.time < before:  # it started again
             self._start_anew()
 
@@ -355,7 +358,7 @@ class Live:
 
     def _start_anew(self) -> None:
         self.fault = None
-        self._hands.forget()
+        self._interaction.forget()
         self._ahead = 0.0
         if self.player.duration is None:
             self._charts.start_anew()
@@ -421,11 +424,25 @@ class Live:
             "exchanged": exchanged,
             "ended": self._why_ended(),
             "parameters": self._parameter_values,
-            "show": self.picture.switches(player, self._hands.can_record_patches),
+            "show": self.picture.switches(player, self._interaction.can_record_patches),
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
             "coloring": self.picture.display.coloring,
             "pressure": self.picture.pressure,
-            **self._hands.state(),
+            "grid": self.picture.display.grid,
+            **self._interaction.state(),
         }
+
+
+def _named(label: str, key: str) -> str:
+    """Return the word beside the slider, and the key of the scenario where that is another one."""
+    return label if label == key else f"{label} ({key})"
+
+
+def _reason(fault: SphshellError, key: str) -> str:
+    """Return what is wrong with the value at `key`, without the file and the name of the value."""
+    text = str(fault)
+    if isinstance(fault, ScenarioError):
+        text = text.removeprefix(f"{fault.path}: ").removeprefix(f"{fault.key}: ")
+    return text.removeprefix(f"{key} = ").removeprefix(f"{key.rpartition('.')[2]} = ")

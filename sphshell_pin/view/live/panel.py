@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 1_500  # points of the charts; the page shows the last seconds
 MOST_LISTED = 40  # contacts
+RESTING_SPEED = 5e-6  # [m/s]: slower, and the list of contacts shows 0.00 mm/s
 
 
 class Panel:
@@ -92,7 +93,9 @@ def list_contacts(contacts: SceneContacts, pairs: tuple[ContactPair, ...]) -> tu
             "normal": contacts.normal_force[k],
             "friction": friction[k],
             "slip": 1e3 * slip[k],
-            "motion": motion(pairs[int(contacts.pair[k])], float(slip[k])),
+            "motion": motion(
+                pairs[int(contacts.pair[k])], float(slip[k]), float(contacts.normal_force[k])
+            ),
         }
         for k in range(min(len(contacts), MOST_LISTED))
     )
@@ -108,19 +111,25 @@ def rows_now(player: Player) -> Rows:
     return Rows.of(np.array([player.time]), len(player.scene.pairs), player.contacts, 0)
 
 
-def motion(pair: ContactPair, slip: float) -> str | None:
+def motion(pair: ContactPair, slip: float, normal_force: float = 0.0) -> str | None:
     """Return the word for a contact that slips at `slip` [m/s]; None without friction.
 
-    "slip" from the friction's `sticking_speed` on. Below it "stick" where the friction has a state:
-    a stretch then holds the contact in place. Else "creep": the force follows from the slip speed,
-    so that a contact under load goes on moving.
+    "saddle" for one that takes off what two others push too much: its `normal_force` [N] is
+    negative. "slip" from the friction's `sticking_speed` on. Below it "stick" where the friction
+    has a state: a stretch then holds the contact in place. Else the force follows from the slip
+    speed, so that a contact under load goes on moving: "creep", or "rest" where the page lists the
+    speed as zero.
     """
+    if normal_force < 0.0:
+        return "saddle"
     friction = pair.friction
     if friction is None:
         return None
     if slip >= friction.sticking_speed:
         return "slip"
-    return "stick" if friction.has_state else "creep"
+    if friction.has_state:
+        return "stick"
+    return "creep" if slip >= RESTING_SPEED else "rest"
 
 
 def dump(value: object) -> str:

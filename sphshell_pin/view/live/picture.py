@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.view.arrows import ArrowPool, ArrowScale
+from sphshell_pin.view.arrows import ArrowPool, ArrowScale, ForceColumns
 from sphshell_pin.view.camera import View, look, set_surroundings
-from sphshell_pin.view.display import Display, Part, choose_view
+from sphshell_pin.view.display import HIDDEN_AT_FIRST, PARTS, Display, choose_view
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
     FloatArray,
@@ -27,6 +26,7 @@ from sphshell_pin.view.nodes import (
     sphere,
 )
 from sphshell_pin.view.patches import PatchRows, PatchScale
+from sphshell_pin.view.surface import is_curved
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -39,31 +39,30 @@ POOL = 16
 CONE_COLOR = 0x1F8A8A
 # More of the robot than in a recording: here one looks round before one looks closely.
 FAR = 18.0
+STILLS = 24  # of a finished run, to place the camera
 # Frames with contact from which the scale of the arrows is taken.
 FRAMES_TO_SCALE = 45
 # A trail is drawn in pieces of so many points; the oldest piece makes room for the newest.
 POINTS_OF_PIECE, PIECES = 48, 60
 
-LIVE_PARTS: tuple[str, ...] = (*get_args(Part), "cones", "pressure")
+LIVE_PARTS: tuple[str, ...] = (*PARTS, "cones", "pressure")
 DRAG_COLOR = 0x16A34A
-SHOWN_AT_FIRST = frozenset({"robot", "spheres", "arrows", "points", "wireframe", "trails"})
 
 
 class Picture:
     """Draws the state of `player` below `visualizer` again and again."""
 
     def __init__(self, player: Player, visualizer: Visualizer) -> None:
-        scene, q = player.scene, player.q
-        touched = player.contacts
-        view = choose_view(
-            scene, q[None, :], touched.point_world, touched.normal_world, player.visual_model, FAR
-        )
+        scene = player.scene
+        q, points, normals = _seen_in(player)
+        whole = player.duration is not None
+        view = choose_view(scene, q, points, normals, player.visual_model, FAR, whole=whole)
         # Down a little, from below the figures that lie over the top of the scene.
         lift = np.array([0.0, 0.0, 0.05 * view.distance])
         view = View(view.eye + lift, view.target + lift)
         self.display = Display(scene, player.visual_model, visualizer, view=view, pool=_pool(scene))
         self.view: View = view
-        self.shown = {part: part in SHOWN_AT_FIRST for part in LIVE_PARTS}
+        self.shown = {part: part in PARTS and part not in HIDDEN_AT_FIRST for part in LIVE_PARTS}
         self.shown["pressure"] = player.patches is not None
         self._pairs = scene.pairs
         self._empty = _empty_parts(scene)
@@ -158,18 +157,8 @@ class Picture:
         self._scale.forget()
 
 
-@dataclass(frozen=True)
-class PushShown:
+class PushShown(ForceColumns):
     """A push as an arrow pool draws it: one force at one point."""
-
-    point_world: FloatArray
-    """(1, 3) [m]."""
-    normal_world: FloatArray
-    """Direction of the push (1, 3)."""
-    normal_force: FloatArray
-    """(1,) [N]."""
-    friction_force_world: FloatArray
-    """Zeros (1, 3)."""
 
     @classmethod
     def at(cls, point_world: FloatArray, force_world: FloatArray) -> PushShown:
@@ -358,10 +347,29 @@ def _empty_parts(scene: Scene) -> frozenset[str]:
     has = {
         "patches": any(np.ptp(shell.element_patch) for shell, _ in shells),
         "distance": any(method == "smooth" for _, method in shells),
+        "curved": any(is_curved(shell, method == "smooth") for shell, method in shells),
         "faces": any(shell.element_face is None for shell, _ in shells),
         "pressure": bool(scene.pairs),
     }
     return frozenset(part for part, some in has.items() if not some)
+
+
+def _seen_in(player: Player) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return configurations (n, nq), and points and normals (k, 3) of the contacts seen in them.
+
+    They are those of now, of a finished run those of all of it.
+    """
+    now, length = player.time, player.duration
+    times = [now] if length is None else player.start + np.linspace(0.0, length, STILLS)
+    found = []
+    for t in times:
+        if length is not None:
+            player.seek(float(t))
+        found.append((player.q[None], player.contacts.point_world, player.contacts.normal_world))
+    if length is not None:
+        player.seek(now)
+    q, points, normals = (np.concatenate(column) for column in zip(*found, strict=True))
+    return q, points, normals
 
 
 def _pool(scene: Scene) -> int:

@@ -246,7 +246,7 @@ def _handlers() -> tuple[type, type]:
     import tornado.web
     import tornado.websocket
 
-    class Guarded(tornado.web.RequestHandler):
+    class Checked(tornado.web.RequestHandler):
         """What both have in common: no access without the token, no frames, no tracebacks."""
 
         def initialize(self, server: Server, files: dict[str, Path]) -> None:
@@ -283,7 +283,7 @@ def _handlers() -> tuple[type, type]:
         def data_received(self, chunk: bytes) -> None:
             """Take no uploads."""
 
-    class FileHandler(Guarded):
+    class FileHandler(Checked):
         """The files of the page, and nothing else of the disk."""
 
         def get(self) -> None:
@@ -297,7 +297,7 @@ def _handlers() -> tuple[type, type]:
                 content = content.replace(b"@@token@@", self.token.encode())
             self.write(content)
 
-    class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
+    class SocketHandler(Checked, tornado.websocket.WebSocketHandler):
         """One browser: what was sent to it, and its events."""
 
         def initialize(self, server: Server, files: dict[str, Path]) -> None:

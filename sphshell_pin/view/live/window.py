@@ -11,7 +11,7 @@ import threading
 
 import numpy as np
 
-from sphshell_pin.view.nodes import FloatArray, Json, Move, Sent
+from sphshell_pin.view.nodes import FloatArray, Json, Move, Sent, is_below
 
 _FIRST_ROWS = 64
 
@@ -135,10 +135,9 @@ class LiveWindow:
 
     def _forget(self, path: str) -> None:
         """Drop the node at `path` and all below it."""
-        below = path.rstrip("/") + "/"
-        for key in [key for key in self._commands if (key[1] + "/").startswith(below)]:
+        for key in [key for key in self._commands if is_below(key[1], path)]:
             del self._commands[key]
-        for one in [one for one in self._row_of if (one + "/").startswith(below)]:
+        for one in [one for one in self._row_of if is_below(one, path)]:
             row = self._row_of.pop(one)
             self._drawn[row] = self._matrices[row] = 0.0
             self._changed[row] = 0

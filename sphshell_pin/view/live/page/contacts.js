@@ -4,15 +4,28 @@
 import { on } from "./connection.js";
 import { element, number } from "./controls.js";
 
-let pairs = [];
-on("hello", (data) => { pairs = data.pairs; });
+let pairs = [], short = [];
+on("hello", (data) => {
+  pairs = data.pairs;
+  short = pairs.map((name) => shorten(name, pairs));
+});
+
+// The end of a name "pair/sphere" that no other name has: "link_3.0_tip" of "fingers/hand/link_3.0_tip".
+export function shorten(name, names) {
+  const parts = name.split("/");
+  for (let k = parts.length - 1; k > 0; k -= 1) {
+    const end = parts.slice(k).join("/");
+    if (!names.some((other) => other !== name && `/${other}`.endsWith(`/${end}`))) return end;
+  }
+  return name;
+}
 
 on("state", ({ contacts, more }) => {
   const count = contacts.length + more;
   element("count").textContent = count === 1 ? "1 contact" : `${count} contacts`;
   const body = element("contacts");
   const rows = contacts.map((one) => [
-    pairs[one.pair], fixed(one.depth, 4), fixed(one.normal, 3), fixed(one.friction, 3),
+    short[one.pair], fixed(one.depth, 4), fixed(one.normal, 3), fixed(one.friction, 3),
     fixed(one.slip, 2), one.motion,
   ]);
   if (!count) rows.push(["nothing touches"]);
@@ -28,7 +41,7 @@ on("state", ({ contacts, more }) => {
       if (k === 5) mark(row.cells[k], cell);
       else if (row.cells[k].textContent !== cell) row.cells[k].textContent = cell;
     });
-    row.cells[0].title = cells[0];
+    row.cells[0].title = cells.length > 1 ? pairs[contacts[index].pair] : "";
   });
 });
 

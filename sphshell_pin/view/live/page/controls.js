@@ -1,6 +1,8 @@
 // Sliders, numbers, and how they are written.
 "use strict";
 
+import { emit } from "./connection.js";
+
 export const element = (id) => document.getElementById(id);
 const STEPS = 1000;
 const REST = 500; // [ms] after the last touch: until then a control does not follow the others
@@ -47,7 +49,7 @@ export class Slider {
       field.addEventListener("change", () => {
         const typed = Number(field.value.trim().replace(",", "."));
         field.blur();
-        if (!Number.isFinite(typed) || field.value.trim() === "") { this.write(); return; }
+        if (!Number.isFinite(typed) || field.value.trim() === "") { this.refuse(field.value.trim()); return; }
         this.touched = performance.now();
         this.value = typed;
         this.place();
@@ -76,6 +78,13 @@ export class Slider {
   write() {
     if (this.field) this.field.value = this.tell(this.value);
     if (this.output) this.output.textContent = this.tell(this.value);
+  }
+
+  // What was typed is no number: the field goes back, and the page says so.
+  refuse(text) {
+    this.write();
+    const name = this.field.getAttribute("aria-label");
+    emit("error", { text: `"${text}" is no number: ${name} stays at ${this.field.value}.` });
   }
 
   set(value) {

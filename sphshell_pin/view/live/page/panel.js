@@ -42,7 +42,8 @@ on("state", (data) => {
   element("scale").textContent = data.scale;
   element("cut").hidden = !data.cut;
   element("cone-key").hidden = !data.show.cones;
-  for (const name of ["pressure", "coloring"]) {
+  element("axes").hidden = !data.show.frames;
+  for (const name of ["pressure", "coloring", "grid"]) {
     element(name).hidden = !data[name];
     element(name).lastChild.textContent = data[name] ?? "";
   }

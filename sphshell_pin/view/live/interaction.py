@@ -25,8 +25,8 @@ SAG = 0.05
 NOT_HERE = "this run cannot be dragged or aimed: it is a finished one, or its player cannot"
 
 
-class Hands:
-    """Hands the wishes of browsers to `player`; one browser drags at a time."""
+class Interaction:
+    """Passes pushes, drags and joint targets of browsers to `player`; one drags at a time."""
 
     def __init__(self, player: Player, picture: Picture, window: LiveWindow | None) -> None:
         self._player = player

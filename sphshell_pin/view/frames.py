@@ -1,0 +1,94 @@
+"""Axes of frames and a grid on the ground: what tells where things are, and how they are turned."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.view.arrows import nice
+from sphshell_pin.view.nodes import (
+    Json,
+    Move,
+    line_segments,
+    material,
+    mover,
+    on_top,
+    pose,
+    rod,
+    rotation_to,
+    set_object,
+)
+
+if TYPE_CHECKING:
+    from meshcat import Visualizer
+
+    from sphshell_pin.dynamics.scene.scene import Scene
+    from sphshell_pin.view.camera import View
+
+AXIS_COLORS = (0xD9484F, 0x2F9E44, 0x2B7FD4)
+PALE_AXIS_COLORS = (0xE79A9A, 0x97CC99, 0x8FBFEA)  # where they are always there, beside arrows
+GRID_COLOR = 0x7B8794
+FEW = 20  # more axes are shorter
+LINES = 20  # of the grid, on each side of its middle
+
+
+def draw_axes(node: Visualizer, width: float, length: float, looks: list[Json]) -> None:
+    """Draw x, y and z of `length` [m] and half `width` [m] below `node`, with a look for each."""
+    for axis, look in enumerate(looks):
+        arm, direction = node["xyz"[axis]], np.eye(3)[axis]
+        set_object(arm, rod(0.45, 0.45), look, order=9)
+        shape = np.array([width, length, width])
+        arm.set_transform(pose(rotation_to(direction), 0.5 * length * direction, shape))
+
+
+class FrameAxes:
+    """The axes of the world, of each joint, and of the spheres and shells of `scene`.
+
+    x is red, y green and z blue, over whatever hides them; those of the world are twice as long.
+    """
+
+    def __init__(self, visualizer: Visualizer, scene: Scene, size: float) -> None:
+        model = scene.model
+        places = [(joint, pin.SE3.Identity()) for joint in range(model.njoints)]
+        for pair in scene.pairs:
+            places += [(one.joint, one.placement) for one in pair.spheres]
+            if pair.shell is not None:
+                places.append((pair.joint_j, pair.placement_j))
+        length = (0.05 if len(places) <= FEW else 0.025) * size
+        looks = [on_top(color) for color in AXIS_COLORS]
+        self._moves: list[tuple[Move, int, pin.SE3]] = []
+        drawn: set[tuple[int, bytes]] = set()
+        for joint, placement in places:
+            key = joint, placement.homogeneous.tobytes()
+            if key not in drawn:
+                node = visualizer[f"frame_{len(drawn)}"]
+                draw_axes(node, 0.06 * length, length if drawn else 2.0 * length, looks)
+                self._moves.append((mover(node), joint, placement))
+                drawn.add(key)
+
+    def update(self, data: pin.Data) -> None:
+        """Place them where forward kinematics left the joints in `data`."""
+        for move, joint, placement in self._moves:
+            move((data.oMi[joint] * placement).homogeneous)
+
+
+def grid_spacing(view: View) -> float:
+    """Return the distance of two lines of the grid [m]."""
+    return nice(view.distance / 12.0)
+
+
+def draw_grid(node: Visualizer, view: View) -> None:
+    """Draw a grid at z = 0 below `node`, around what `view` looks at."""
+    step = grid_spacing(view)
+    ticks = np.arange(-LINES, LINES + 1.0)
+    x, y = np.meshgrid(ticks, ticks)
+    points = np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), axis=1)
+    points = points + np.round(np.array([*view.target[:2], 0.0]) / step)
+    # Pieces from crossing to crossing: some browsers lose lines that pass the camera.
+    number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
+    ends = ((number[:, :-1], number[:, 1:]), (number[:-1], number[1:]))
+    segments = np.concatenate([np.stack(pair, axis=-1).reshape(-1, 2) for pair in ends])
+    look = material("LineBasic", GRID_COLOR, 0.45, depthWrite=False)
+    set_object(node, line_segments(step * points, segments), look, "LineSegments")
