@@ -12,7 +12,14 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
-from sphshell_pin.benchmarks.work_precision_cases import Array, Case, decades, rectangle, steps
+from sphshell_pin.benchmarks.work_precision_cases import (
+    Array,
+    Case,
+    decades,
+    difference,
+    rectangle,
+    steps,
+)
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
 
@@ -26,8 +33,7 @@ class Exact:
 
     def error(self, integrator: Integrator, result: Result) -> float:
         """Return the largest length of a difference from the closed form at any row."""
-        pairs = zip(self.case.figures(result), self.figures(result.t), strict=True)
-        return max(float(np.linalg.norm(found - exact, axis=1).max()) for found, exact in pairs)
+        return difference(self.case.figures(result), self.figures(result.t))
 
 
 def settings(fixed: tuple[float, ...], tolerances: tuple[float, ...]) -> tuple[Integrator, ...]:

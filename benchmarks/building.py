@@ -48,9 +48,9 @@ def build_with_normals(vertices: Array, triangles: NDArray[np.int32], center: Ar
     from sphshell_pin import Shell
 
     x, y, _ = vertices.T
-    slope_x = (height(x + 1e-6, y) - height(x - 1e-6, y)) / 2e-6
-    slope_y = (height(x, y + 1e-6) - height(x, y - 1e-6)) / 2e-6
-    normals = np.c_[-slope_x, -slope_y, np.ones(len(x))]
+    by_x = (height(x + 1e-6, y) - height(x - 1e-6, y)) / 2e-6
+    by_y = (height(x, y + 1e-6) - height(x, y - 1e-6)) / 2e-6
+    normals = np.c_[-by_x, -by_y, np.ones(len(x))]
     shell = Shell(vertices, triangles, normals)
     return shell, shell.contacts(center, RADIUS)
 

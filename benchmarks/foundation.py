@@ -13,7 +13,8 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
-from sphshell_pin.benchmarks.timing import machine, median_us, one_core, ratio, take_turns
+from sphshell_pin.benchmarks.timing import machine, one_core, take_turns
+from sphshell_pin.cases.contents import times_table
 
 DT, STEPS, CELLS, RADIUS = 1e-8, 2000, 316, 0.012
 POINT = sp.ImpactLaw(1e6, 1.5)
@@ -76,12 +77,14 @@ def main() -> None:
             bare = times.pop("nothing touched")
             side = size / CELLS / np.sqrt(2 * RADIUS * depth)
             print(
-                f"{len(shell.elements)} triangles, side / radius of the patch {side:.2f}, "
-                f"depth / radius {depth / RADIUS:.3f}"
+                f"\n{len(shell.elements)} triangles, side / radius of the patch {side:.2f}, "
+                f"depth / radius {depth / RADIUS:.3f}\n"
             )
-            for name, taken in times.items():
-                against = times["point, friction" if "friction" in name else "point"] - bare
-                print(f"  {name:24s} {median_us(taken - bare)}  {ratio(taken - bare, against)} x")
+            for friction in (False, True):
+                some = {n: t - bare for n, t in times.items() if ("friction" in n) == friction}
+                base = next(iter(some))
+                table = times_table("", "", "contact", some, base, f"over_point: over {base}")
+                print(table.markdown())
 
 
 if __name__ == "__main__":

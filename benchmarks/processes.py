@@ -8,7 +8,8 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import ParamSpec, TypeVar
 
-P, T = ParamSpec("P"), TypeVar("T")
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class ProcessLost(Exception):
@@ -18,8 +19,8 @@ class ProcessLost(Exception):
 class OwnProcess:
     """A fresh interpreter that calls functions of modules; it starts anew after it was lost."""
 
-    def __init__(self, begin: Callable[..., object] | None = None, *arguments: object) -> None:
-        self._begin = begin, arguments
+    def __init__(self, begin: Callable[[], object] | None = None) -> None:
+        self._begin = begin
         self._pool: ProcessPoolExecutor | None = None
 
     def call(
@@ -30,9 +31,8 @@ class OwnProcess:
         Raises ProcessLost, too.
         """
         if self._pool is None:
-            begin, arguments = self._begin
             context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, context, begin, arguments)
+            self._pool = ProcessPoolExecutor(1, context, self._begin)
         try:
             return self._pool.submit(function, *args, **named).result(timeout)
         except BrokenProcessPool:

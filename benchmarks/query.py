@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Shell
 from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
-from sphshell_pin.benchmarks.timing import Progress, median_us, ratio, silent, take_turns
+from sphshell_pin.benchmarks.timing import silent, take_turns
+from sphshell_pin.cases.contents import Progress
 
 Array = NDArray[np.float64]
 RADIUS, DEPTH = 0.010, 0.0005
@@ -126,17 +127,6 @@ def measure_peers(rounds: int, progress: Progress = silent) -> dict[str, Array]:
     return take_turns(contestants, rounds, progress)
 
 
-def against_peers(rounds: int) -> None:
-    """200 k triangles: all contacts of a touching sphere at cold, random positions."""
-    times = measure_peers(rounds)
-    print("Query, 199712 triangles, r = 10 mm, depth 0.5 mm, cold random positions")
-    for name, t in times.items():
-        print(f"  {name:40s} {median_us(t)}   {ratio(t, times[THIS])} x")
-    for name in (LIBIGL, FCPW):
-        if name not in times:
-            print(f"  {name:40s} not installed (pip install 'sphshell-pin[bench]')")
-
-
 SHEETS = ((32, 0.1), (100, 0.316), (316, 1.0), (1000, 3.16))  # cells along a side, side [m]
 
 
@@ -150,12 +140,3 @@ def measure_sizes(
         centers = touching_centers(20_000, size, RADIUS, DEPTH)
         contestants[str(shell.num_elements)] = query_contestant(shell, centers)
     return {int(n): t for n, t in take_turns(contestants, rounds, progress).items()}
-
-
-def against_size(rounds: int) -> None:
-    """Print the same contact patch on sheets of 2 k to 2 M triangles."""
-    times = measure_sizes(rounds)
-    smallest = next(iter(times.values()))
-    print("Query at equal contact patch")
-    for count, t in times.items():
-        print(f"  {f'{count:8d} triangles':40s} {median_us(t)}   {ratio(t, smallest)} x")

@@ -2,12 +2,11 @@
 
 Each contestant runs in a process of its own, so that its memory can be measured; all on one core,
 asked in turn to time their queries. One that gets too slow or too big is left out of larger
-sheets. `python -m benchmarks.sizes` prints the table.
+sheets.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import os
 import time
@@ -27,7 +26,11 @@ from sphshell_pin.benchmarks.query import (
     query_contestant,
 )
 from sphshell_pin.benchmarks.surfaces import Array, touching_centers, wavy_sheet
-from sphshell_pin.benchmarks.timing import Progress, Spread, machine, one_core, silent
+from sphshell_pin.benchmarks.timing import silent
+from sphshell_pin.cases.contents import (
+    Progress,
+    Spread,
+)
 
 # Cells along a side of the sheet, at equal size of the cells: 968 to 5 M triangles.
 CELLS = (22, 32, 100, 316, 1000, 1581)
@@ -90,10 +93,11 @@ def trimesh_contestant(vertices: Array, triangles: Any, centers: Array) -> Calla
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, triangles, process=False)
+    closest: Any = trimesh.proximity.closest_point
 
     def run() -> float:
         start = time.perf_counter()
-        trimesh.proximity.closest_point(mesh, centers)
+        closest(mesh, centers)
         return (time.perf_counter() - start) / len(centers)
 
     return run
@@ -226,26 +230,3 @@ def measure_one(names: list[str], cells: int, rounds: int, notes: list[str]) -> 
         )
         for name in names
     ]
-
-
-def main() -> None:
-    """Measure and print the table."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.sizes", description=(__doc__ or "").partition("\n")[0]
-    )
-    parser.add_argument("--quick", action="store_true", help="up to 200 k triangles")
-    options = parser.parse_args()
-    one_core()
-    print(machine())
-    rows, notes = measure(QUICK_CELLS if options.quick else CELLS)
-    for row in rows:
-        print(
-            f"  {row.name:14s} {row.question:32s} {row.triangles:8d}  "
-            f"{row.query.median * 1e6:10.3f} us [{row.query.low * 1e6:.3f}, "
-            f"{row.query.high * 1e6:.3f}]  build {row.build:7.3f} s  {row.memory / 1e6:8.1f} MB"
-        )
-    print(*notes, sep="\n")
-
-
-if __name__ == "__main__":
-    main()

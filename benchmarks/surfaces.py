@@ -32,11 +32,12 @@ def touching_centers(count: int, size: float, radius: float, depth: float) -> Ar
     """Return random centers (count, 3) of spheres at about `depth` in the sheet."""
     xy = np.random.default_rng(0).uniform(-0.45 * size, 0.45 * size, (count, 2))
     x, y = xy.T
-    slope_x = AMPLITUDE * WAVE_X * np.cos(WAVE_X * x) * np.cos(WAVE_Y * y)
-    slope_y = -AMPLITUDE * WAVE_Y * np.sin(WAVE_X * x) * np.sin(WAVE_Y * y)
-    normal = np.c_[-slope_x, -slope_y, np.ones(count)]
+    by_x = AMPLITUDE * WAVE_X * np.cos(WAVE_X * x) * np.cos(WAVE_Y * y)
+    by_y = -AMPLITUDE * WAVE_Y * np.sin(WAVE_X * x) * np.sin(WAVE_Y * y)
+    normal = np.c_[-by_x, -by_y, np.ones(count)]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    return np.c_[xy, height(x, y)] + normal * (radius - depth)
+    centers: Array = np.c_[xy, height(x, y)] + normal * (radius - depth)
+    return centers
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -49,6 +49,39 @@ class Case:
         duration = self.duration if duration is None else duration
         simulation = sp.Simulation(self.scene, integrator)
         return simulation.run(self.q0, self.v0, duration, self.controller, record_dt=self.record_dt)
+
+
+def difference(a: list[Array], b: list[Array]) -> float:
+    """Return the largest length of a difference of the figures at any row."""
+    return max(float(np.linalg.norm(x - y, axis=1).max()) for x, y in zip(a, b, strict=True))
+
+
+class Judge(Protocol):
+    """Judges the results of a case."""
+
+    @property
+    def case(self) -> Case:
+        """The case."""
+
+    def error(self, integrator: Integrator, result: Result) -> float:
+        """Return the largest error at any row of a result that `integrator` made."""
+
+
+class References:
+    """Judges the results of a case by its references, much finer runs."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.known = [(type(i), case.figures(case.run(i))) for i in case.references]
+
+    def disagreement(self) -> float:
+        """Return the difference between the references."""
+        return difference(self.known[0][1], self.known[1][1])
+
+    def error(self, integrator: Integrator, result: Result) -> float:
+        """Return the error against the reference that another kind of method made."""
+        own = isinstance(integrator, self.known[0][0])
+        return difference(self.case.figures(result), self.known[own][1])
 
 
 def decades(kind: Callable[[float], Integrator], *exponents: float) -> tuple[Integrator, ...]:
@@ -121,7 +154,7 @@ def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
     scene.add_contact(ball, plate, placement=placement, law=law, friction=friction)
     controller = sp.CartesianImpedance(
         TIP,
-        [[0, 0, 0], [0, 0.03, 0]],
+        [(0, 0, 0), (0, 0.03, 0)],
         stiffness=1000.0,
         damping=60.0,
         normal_force=PRESS,

@@ -25,15 +25,9 @@ from sphshell_pin.benchmarks.peers.drake_plant import (
 from sphshell_pin.benchmarks.peers.engine import Params, Trajectory
 from sphshell_pin.benchmarks.peers.merged import merged_urdf, obj_text
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import (
-    BallScene,
-    Bowl,
-    Cylinder,
-    Groove,
-    Impact,
-    Scene,
-)
+from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact
 from sphshell_pin.benchmarks.swing import BOWL
 
 Array = NDArray[np.float64]
@@ -84,9 +78,10 @@ class Drake:
                 {"contact": contact, "dt": scene.dt, "edge": edge * scene.radius}
                 for edge, contact in ((0.25, "kLagged"), (0.25, "kSap"), (1.0, "kLagged"))
             ]
+        coarse: Params
         coarse, fine, finest = ({"edge": k * FINE * scene.radius} for k in (1, 0.5, 0.25))
-        explicit = {"integrator": "runge_kutta3", "max_step": 0.01}
-        discrete = [
+        explicit: Params = {"integrator": "runge_kutta3", "max_step": 0.01}
+        discrete: list[Params] = [
             {"contact": name, "dt": dt} for name in ("kLagged", "kSap") for dt in (1e-3, 2e-4)
         ]
         if isinstance(scene, Impact):

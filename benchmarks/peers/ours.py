@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Impact, Scene
+from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Impact
 from sphshell_pin.dynamics.run.advance import advance, start_run
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 
@@ -52,16 +53,10 @@ class Ours:
         adaptive = [{"integrator": "Adaptive", "rtol": 10.0**-e} for e in (4, 6, 8)]
         if isinstance(scene, Bowl):
             orders = {"SemiImplicitEuler": (4, 3, 2, 1, 0.5), "RungeKutta4": (4, 2, 1, 0.5, 0.2)}
-            steps = [
-                {"integrator": integrator, "dt": 1e-3 * dt}
-                for integrator, dts in orders.items()
-                for dt in dts
-            ]
-            return [*steps, *adaptive]
-        if isinstance(scene, Impact):
-            return [{"integrator": "SemiImplicitEuler", "dt": dt} for dt in scene.dts] + adaptive
-        steps = [{"integrator": "SemiImplicitEuler", "dt": dt} for dt in scene.dts]
-        if not scene.mu:
+            fixed = [(name, 1e-3 * dt) for name, dts in orders.items() for dt in dts]
+            return [*({"integrator": name, "dt": dt} for name, dt in fixed), *adaptive]
+        steps: list[Params] = [{"integrator": "SemiImplicitEuler", "dt": dt} for dt in scene.dts]
+        if isinstance(scene, Impact) or not scene.mu:
             return [*steps, *adaptive]
         implicit = [{"integrator": "Implicit", "rtol": 10.0**-e} for e in (3, 4, 5, 6)]
         # Longer steps do not resolve the bristles.

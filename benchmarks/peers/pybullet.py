@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.merged import merged_urdf, obj_text
 from sphshell_pin.benchmarks.peers.press import PressScene
-from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Impact, Scene
+from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Impact
 
 Array = NDArray[np.float64]
 SCALE = 10.0  # of lengths; masses and times stay, forces grow as lengths do, torques as squares
@@ -60,8 +61,9 @@ class PyBullet:
         if isinstance(scene, PressScene):
             return [{"dt": scene.dt, "breaking": gap} for gap in (2e-3, 1e-4)]
         if isinstance(scene, Impact):
-            gaps = [{"dt": dt, "breaking": 2e-3} for dt in scene.dts]
-            return [params | {"ccd": on} for params in gaps for on in (True, False)]
+            return [
+                {"dt": dt, "breaking": 2e-3, "ccd": on} for dt in scene.dts for on in (True, False)
+            ]
         steps = (1e-3, 2e-4, 2e-3) if isinstance(scene, Bowl) else scene.dts[:2]
         gaps = (1e-3, 1e-4, 2e-3)  # the last is the default
         return [{"dt": dt, "breaking": gap} for dt in steps for gap in gaps]

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Scene
+from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl
 from sphshell_pin.benchmarks.query import coal_tree
 from sphshell_pin.benchmarks.step import bare
 

@@ -74,7 +74,7 @@ def judge(integrator: Any, depth: float, solid: bool, above: bool, bound: float)
     speed = float(result.v[-1, 0]) * (1.0 if above else -1.0)
     right = expected_speed(depth)
     moved = "comes back as fast" if right > 0 else "goes through, v^2 - k (2 r)^2 / m left"
-    yield Verdict("under-stiff law", tried, law, "all", found, len(missing), 0)
+    yield Verdict.on("under-stiff law", tried, law, "all", found, len(missing), 0)
     yield compare("under-stiff law", tried, moved, right, speed, bound)
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from sphshell_pin.cases.contents import Finding, Picture
 from sphshell_pin.cli import app
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.study.report import PAGE
-from sphshell_pin.study.report.contents import Finding, Picture
 from sphshell_pin.study.validation import Outcome, cases, collect, make_validation
 from tests.studies import mostly_studies
 

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from string import Template
 
-from sphshell_pin.study.report.contents import Finding, Picture, Section, Table, findings_table
+from sphshell_pin.cases.contents import Finding, Picture, Section, Table, findings_table
 
 TEMPLATE = Path(__file__).with_name("page.html")
 

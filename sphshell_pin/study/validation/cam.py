@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.cases import Array, Outcome, case, read
 from sphshell_pin.study.validation.pictures import Panel, draw
 

@@ -10,7 +10,6 @@ and stand on the page.
 from __future__ import annotations
 
 import csv
-import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sphshell_pin
+from sphshell_pin.cases.contents import Finding, Picture, Progress, Section, Table
+from sphshell_pin.cases.register import Register
 from sphshell_pin.errors import NameNotFound, ResultError
-from sphshell_pin.study.report.contents import Finding, Picture, Progress, Section, Table
 from sphshell_pin.study.report.making import Part, Report, Tell, make_report
 from sphshell_pin.study.report.page import Heading
 
@@ -148,7 +148,8 @@ def explanations(found: Outcome) -> list[str]:
     return [f"Out of bounds: {'; '.join(names)}. {text}" for text, names in reasons.items()]
 
 
-_CASES: dict[str, Case] = {}
+CASES: Register[Case] = Register(__package__, MODULES)
+collect = CASES.collect
 
 
 def case(
@@ -166,22 +167,11 @@ def case(
     """Decorate the function that runs a case; the case joins those of its module."""
 
     def register(run: Callable[[], Outcome]) -> Callable[[], Outcome]:
-        if key in _CASES:
-            raise ValueError(f"two cases are called {key!r}")
         texts = source, setting, bound, leaves_out
-        _CASES[key] = Case(key, title, *texts, files, run, slow, reading)
+        CASES.add(key, Case(key, title, *texts, files, run, slow, reading))
         return run
 
     return register
-
-
-def collect(*, quick: bool = False) -> list[Case]:
-    """Return the cases in the order of the page; `quick` leaves out the slow ones."""
-    names = [f"{__package__}.{name}" for name in MODULES]
-    for name in names:
-        importlib.import_module(name)
-    ordered = sorted(_CASES.values(), key=lambda known: names.index(known.run.__module__))
-    return [known for known in ordered if not (quick and known.slow)]
 
 
 def make_validation(

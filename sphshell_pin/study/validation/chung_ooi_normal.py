@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import Ball, Impact, head_on, on_plane
 from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
 from sphshell_pin.study.validation.pictures import Panel, draw

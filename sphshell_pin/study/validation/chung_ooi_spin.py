@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation import maw
 from sphshell_pin.study.validation.balls import Ball, head_on
 from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read

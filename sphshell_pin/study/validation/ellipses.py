@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.cases.contents import Finding, Table, columns
 from sphshell_pin.contact.normal_law import NormalLaw
-from sphshell_pin.study.report.contents import Finding, Table, columns
 from sphshell_pin.study.validation.balls import plane
 from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
 from sphshell_pin.study.validation.pictures import Panel, draw

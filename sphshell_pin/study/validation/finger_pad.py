@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import plane
 from sphshell_pin.study.validation.cases import Outcome, case, read
 from sphshell_pin.study.validation.ellipses import Touch, press

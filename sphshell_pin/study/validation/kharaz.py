@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation import maw
 from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
 from sphshell_pin.study.validation.chung_ooi_normal import PAPER

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sphshell_pin.study.report.contents import Picture
-from sphshell_pin.study.report.drawing import (
+from sphshell_pin.cases.contents import Picture
+from sphshell_pin.cases.drawing import (
     BLUE,
     GREEN,
     INK,

@@ -13,7 +13,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.rolling import Ball, in_bowl, in_cylinder, on_turntable, velocities
 from sphshell_pin.benchmarks.swing import GRAVITY
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import plane
 from sphshell_pin.study.validation.cases import Outcome, case, read
 from sphshell_pin.study.validation.pictures import Panel, Series, draw

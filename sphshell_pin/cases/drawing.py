@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.cases.contents import superscript
 from sphshell_pin.plot.figure import new_figure
-from sphshell_pin.study.report.contents import superscript
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,8 @@ import numpy as np
 
 from sphshell_pin.benchmarks import convergence, query, sizes, timing
 from sphshell_pin.benchmarks.sizes import Row
-from sphshell_pin.study.report.contents import (
+from sphshell_pin.benchmarks.surfaces import Array
+from sphshell_pin.cases.contents import (
     TIME_COLUMNS,
     TIMES,
     Column,
@@ -17,12 +18,13 @@ from sphshell_pin.study.report.contents import (
     Picture,
     Progress,
     Section,
+    Spread,
     Table,
     columns,
     number,
-    quartiles,
+    times_table,
 )
-from sphshell_pin.study.report.drawing import (
+from sphshell_pin.cases.drawing import (
     BLUE,
     GREEN,
     GREY,
@@ -36,7 +38,7 @@ from sphshell_pin.study.report.drawing import (
     png_of,
 )
 
-Times = dict[str, np.ndarray]
+Times = dict[str, Array]
 KEY, TITLE = "queries", "Time and memory of a query"
 COLORS = {
     "smooth": (BLUE, "o"),
@@ -78,7 +80,7 @@ def section(*, quick: bool, progress: Progress) -> Section:
 
 def assemble(
     peers: Times,
-    growth: dict[int, np.ndarray],
+    growth: dict[int, Array],
     cost: dict[str, Times],
     rows: list[Row],
     notes: list[str],
@@ -90,7 +92,19 @@ def assemble(
         TEXT,
         findings=findings_of(peers, growth, cost),
         pictures=[picture(rows)] if rows else [],
-        tables=[peers_table(peers), cost_table(cost), growth_table(growth), sizes_table(rows)],
+        tables=[
+            times_table(
+                "queries_peers",
+                "A query on 200 k triangles, in turn in one process.",
+                "code: 200 k triangles",
+                peers,
+                query.THIS,
+                "over_ours: over ours",
+            ),
+            convergence.cost_table(cost),
+            growth_table(growth),
+            sizes_table(rows),
+        ],
         notes=notes,
         unmeasured=[
             f"query against {label}: not installed"
@@ -102,7 +116,7 @@ def assemble(
 
 def findings_of(
     peers: Times,
-    growth: dict[int, np.ndarray],
+    growth: dict[int, Array],
     cost: dict[str, Times],
 ) -> list[Finding]:
     """Return the ratios that have aims."""
@@ -144,44 +158,14 @@ def findings_of(
     return found
 
 
-def peers_table(peers: Times) -> Table:
-    """Return the times on 200 k triangles."""
-    this = peers[query.THIS]
-    return Table(
-        "queries_peers",
-        "A query on 200 k triangles, in turn in one process.",
-        columns("code: 200 k triangles", *TIME_COLUMNS, f"over_ours: over ours [{TIMES}]"),
-        [(name, *quartiles(t), float(np.median(t / this))) for name, t in peers.items()],
-    )
-
-
-def cost_table(cost: dict[str, Times]) -> Table:
-    """Return the times of our methods."""
-    return Table(
-        "queries_methods",
-        "What a method costs.",
-        columns(
-            "surface: 200 k triangles",
-            "method",
-            *TIME_COLUMNS,
-            f"over_facets: over facets [{TIMES}]",
-        ),
-        [
-            (surface, method, *quartiles(t), float(np.median(t / times["facets"])))
-            for surface, times in cost.items()
-            for method, t in times.items()
-        ],
-    )
-
-
-def growth_table(growth: dict[int, np.ndarray]) -> Table:
+def growth_table(growth: dict[int, Array]) -> Table:
     """Return our time at equal contact patch."""
     few = growth[min(growth)]
     return Table(
         "queries_growth",
         "Our query at equal contact patch, in turn in one process.",
         columns("triangles", *TIME_COLUMNS, f"over_smallest: over the smallest [{TIMES}]"),
-        [(count, *quartiles(t), float(np.median(t / few))) for count, t in growth.items()],
+        [(count, *Spread.of(t), float(np.median(t / few))) for count, t in growth.items()],
     )
 
 
@@ -197,8 +181,8 @@ def sizes_table(rows: list[Row]) -> Table:
             *columns("bytes_per_triangle: bytes / triangle"),
         ),
         [
-            (row.name, row.question, row.triangles, row.query.median, row.query.low)
-            + (row.query.high, row.build, row.memory, row.memory / row.triangles)
+            (row.name, row.question, row.triangles, *row.query)
+            + (row.build, row.memory, row.memory / row.triangles)
             for row in rows
         ],
         folded=True,

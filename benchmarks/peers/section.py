@@ -1,13 +1,15 @@
-"""Section 6: the same scenes in other engines."""
+"""The same scenes in other engines: findings, pictures and tables."""
 
 from __future__ import annotations
 
 import math
+import platform
 
-from sphshell_pin.benchmarks.peers import measuring, scenes
+from sphshell_pin.benchmarks.peers import measuring
 from sphshell_pin.benchmarks.peers.engine import Params
 from sphshell_pin.benchmarks.peers.measuring import Ratio, Row
-from sphshell_pin.study.report.contents import (
+from sphshell_pin.benchmarks.peers.scenes import SCENES
+from sphshell_pin.cases.contents import (
     TIMES,
     Finding,
     Picture,
@@ -17,7 +19,7 @@ from sphshell_pin.study.report.contents import (
     columns,
     number,
 )
-from sphshell_pin.study.report.drawing import (
+from sphshell_pin.cases.drawing import (
     BLUE,
     GREEN,
     GREY,
@@ -29,6 +31,7 @@ from sphshell_pin.study.report.drawing import (
     logarithmic,
     png_of,
 )
+from sphshell_pin.cases.measured import Measured
 
 KEY, TITLE = "peers", "Other engines"
 # Name on the page, color, marker; of an engine that is not here, its own name in gray.
@@ -40,6 +43,7 @@ LOOKS = {
     "loop": ("Python loop", VIOLET, "D"),
 }
 SWING = "bowl"
+TITLES = {name: make().title for name, make in SCENES.items()}
 ABOUT = 100  # rows of a whole measurement, for the progress
 TEXT = """\
 The same scenes, each with a truth that no engine computes, in other engines. Every engine runs in a
@@ -77,11 +81,11 @@ def section(*, quick: bool, progress: Progress) -> Section:
         progress(lines / (lines + ABOUT / 2))
 
     rows, ratios = measuring.measure(quick=quick, say=count)
-    return assemble(rows, ratios, {name: make().title for name, make in scenes.SCENES.items()})
+    return assemble(rows, ratios)
 
 
-def assemble(rows: list[Row], ratios: list[Ratio], titles: dict[str, str]) -> Section:
-    """Return the section of what was measured; `titles` of the scenes by name."""
+def assemble(rows: list[Row], ratios: list[Ratio]) -> Section:
+    """Return the section of what was measured."""
     names = list(dict.fromkeys(row.scene for row in rows))
     drawn = [row for row in rows if row.scene == SWING and not row.note]
     return Section(
@@ -92,7 +96,7 @@ def assemble(rows: list[Row], ratios: list[Ratio], titles: dict[str, str]) -> Se
         pictures=[picture(drawn)] if drawn else [],
         tables=[
             ratios_table(ratios),
-            *(scene_table(rows, scene, titles.get(scene, scene)) for scene in names),
+            *(scene_table(rows, scene, TITLES.get(scene, scene)) for scene in names),
             settings_table(rows),
         ],
         notes=notes_of(rows),
@@ -115,34 +119,19 @@ def findings_of(ratios: list[Ratio]) -> list[Finding]:
     """Return the ratios that count: the fastest peer at the press, the best at the swing."""
     press = [r for r in ratios if r.peer.scene == "press"]
     swings = [r for r in ratios if r.peer.scene.startswith(SWING)]
-    found = []
+    chosen = []
     if press:
-        fastest = min(press, key=lambda r: r.median)
-        found.append(
-            _finding(
-                "peers_press",
-                f"{AIMED[0]} ({name_of(fastest.peer.engine)}) / ours",
-                fastest,
-                1.6,
-            )
-        )
+        chosen.append(("peers_press", AIMED[0], min(press, key=lambda r: r.median), 1.6))
     if swings:
         best = min(swings, key=lambda r: r.peer.errors["period"] * r.peer.errors["energy"])
-        found.append(
-            _finding(
-                "peers_swing",
-                f"{AIMED[1]} ({name_of(best.peer.engine)}) / ours",
-                best,
-                100.0,
-            )
+        chosen.append(("peers_swing", AIMED[1], best, 100.0))
+    return [
+        Finding(
+            key, f"{what} ({name_of(one.peer.engine)}) / ours", one.median, TIMES, one.low,
+            one.high, aim, sense=">=", headline=True,
         )
-    return found
-
-
-def _finding(key: str, what: str, ratio: Ratio, aim: float) -> Finding:
-    return Finding(
-        key, what, ratio.median, TIMES, ratio.low, ratio.high, aim, sense=">=", headline=True
-    )
+        for key, what, one, aim in chosen
+    ]  # fmt: skip
 
 
 def params_text(params: Params) -> str:
@@ -256,3 +245,21 @@ def picture(rows: list[Row]) -> Picture:
         "The swing in the bowl, triangles of 0.3 r: a dot is a setting of an engine; more precise "
         "to the right, dearer upwards.",
     )
+
+
+def machine_line() -> str:
+    """Return one line on what this runs on."""
+    return f"{platform.machine()}, Python {platform.python_version()}; every engine on one core"
+
+
+def site_sections(rows: list[Row], ratios: list[Ratio]) -> list[Measured]:
+    """Return what docs/peers.md shows: the tables, with what each scene is."""
+    found = [
+        Measured(text=f"{machine_line()}. {notes_of(rows)[0]}"),
+        Measured.of(ratios_table(ratios), "How much more a peer costs"),
+    ]
+    for scene in dict.fromkeys(row.scene for row in rows):
+        about = " ".join((type(SCENES[scene]()).__doc__ or "").split())
+        table = scene_table(rows, scene, TITLES[scene])
+        found.append(Measured.of(table, TITLES[scene], about))
+    return [*found, Measured.of(settings_table(rows), "Settings")]
