@@ -30,6 +30,7 @@ from sphshell_pin.benchmarks.surfaces import (
     wavy_sheet,
 )
 from sphshell_pin.benchmarks.timing import machine, one_core, part, silent, take_turns
+from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
     TIME_COLUMNS,
     TIMES,
@@ -41,19 +42,6 @@ from sphshell_pin.cases.contents import (
     Table,
     columns,
     number,
-)
-from sphshell_pin.cases.drawing import (
-    BLUE,
-    DASHED,
-    GREEN,
-    ORANGE,
-    RED,
-    SMALL,
-    drawing,
-    guide,
-    label_ends,
-    logarithmic,
-    png_of,
 )
 
 Array = NDArray[np.float64]
@@ -230,10 +218,10 @@ def measure_cost(rounds: int, progress: Progress = silent) -> dict[str, dict[str
 KEY, TITLE = "forces", "Error of the contact force"
 # Name, color, marker, line: estimated normals are exact on a sphere, and one hides the other.
 LOOKS = {
-    SMOOTH: ("smooth", BLUE, "o", "-"),
-    ESTIMATED: ("smooth, estimated", GREEN, "s", DASHED),
-    "facets": ("facets", ORANGE, "^", "-"),
-    "elements": ("elements", RED, "v", "-"),
+    SMOOTH: ("smooth", drawing.BLUE, "o", "-"),
+    ESTIMATED: ("smooth, estimated", drawing.GREEN, "s", drawing.DASHED),
+    "facets": ("facets", drawing.ORANGE, "^", "-"),
+    "elements": ("elements", drawing.RED, "v", "-"),
 }
 CURVED = ("bowl", "dome", "torus")
 AT = 0.3  # h / r at which errors are compared
@@ -409,12 +397,12 @@ def picture(names: tuple[str, ...], rows: list[Row], *, against_time: bool) -> P
     def abscissa(row: Row) -> float:
         return float(row.time.median * 1e6 if against_time else row.triangles)
 
-    with drawing(7.8, 5.8) as figure:
+    with drawing.canvas(7.8, 5.8) as figure:
         figure.set_layout_engine("constrained", h_pad=0.09)
         panels = figure.subplots(2, 2, sharex=True).ravel()
         for axis, name in zip(panels, names, strict=True):
             flat = name == "flat plate"
-            logarithmic(axis, counts=True, every=(1, 3 if flat else 2))
+            drawing.logarithmic(axis, counts=True, every=(1, 3 if flat else 2))
             axis.set_ylim(*((1e-17, 1e3) if flat else (1e-10, 1e2)))
             axis.set_title(name)
             for rule, (_, color, marker, dashes) in looks.items():
@@ -425,17 +413,19 @@ def picture(names: tuple[str, ...], rows: list[Row], *, against_time: bool) -> P
                     largest = [r.largest for r in line]
                     axis.fill_between(x, mean, largest, color=color, alpha=0.15, linewidth=0)
             if not against_time and not flat:
-                guide(axis, (350, 2e-7), 2500, -1, "order 2")
-                guide(axis, (350, 2e-7), 2500, -2, "order 4")
+                drawing.guide(axis, (350, 2e-7), 2500, -1, "order 2")
+                drawing.guide(axis, (350, 2e-7), 2500, -2, "order 4")
         for axis, name in zip(panels, names, strict=True):  # now that all have their limits
             ends = []
             for rule, (label, color, _, _) in looks.items():
                 last = of(rows, name, rule)[-1]
                 ends.append((abscissa(last), last.mean, label, color))
-            label_ends(axis, ends)
-        figure.supxlabel("time of a query [us]" if against_time else "elements", fontsize=SMALL + 1)
-        figure.supylabel("error of the force / force", fontsize=SMALL + 1)
-        png = png_of(figure)
+            drawing.label_ends(axis, ends)
+        figure.supxlabel(
+            "time of a query [us]" if against_time else "elements", fontsize=drawing.SMALL + 1
+        )
+        figure.supylabel("error of the force / force", fontsize=drawing.SMALL + 1)
+        png = drawing.png_of(figure)
     if against_time:
         return Picture(
             "force_time",

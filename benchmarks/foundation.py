@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
 from sphshell_pin.benchmarks.timing import machine, one_core, take_turns
 from sphshell_pin.cases.contents import times_table
@@ -22,16 +23,6 @@ PAD = sp.FoundationLaw(1e7, 5e-3)
 FRICTION = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
 
 
-def heavy_ball() -> pin.Model:
-    """Return a free ball that no force moves noticeably."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(10.0, 1.0), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    model.gravity.setZero()
-    return model
-
-
 def runner(
     shell: sp.Shell,
     center: np.ndarray,
@@ -40,7 +31,9 @@ def runner(
     method: str = "smooth",
 ) -> Callable[[], float]:
     """Seconds per step of a ball that creeps over the shell."""
-    scene = sp.Scene(heavy_ball())
+    # No force moves it noticeably.
+    heavy = ("ball", pin.JointModelFreeFlyer(), pin.Inertia.FromSphere(10.0, 1.0))
+    scene = sp.Scene(model_of(heavy))
     used = FRICTION if friction else None
     ball = sp.Sphere(RADIUS, "ball")
     scene.add_contact(sphere=ball, shell=shell, law=law, friction=used, method=method)

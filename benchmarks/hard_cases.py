@@ -19,15 +19,8 @@ from pathlib import Path
 
 import sphshell_pin
 from sphshell_pin.benchmarks.timing import silent
-from sphshell_pin.cases.contents import (
-    Finding,
-    Picture,
-    Progress,
-    Section,
-    Verdict,
-    verdicts_table,
-)
-from sphshell_pin.cases.drawing import BLUE, INK, RED, SMALL, drawing, png_of, power_of_ten
+from sphshell_pin.cases import drawing
+from sphshell_pin.cases.contents import Finding, Picture, Progress, Section, Verdict, verdicts_table
 from sphshell_pin.cases.register import Case
 
 MOST_PROCESSES = 4
@@ -151,7 +144,7 @@ def assemble(found: Found, *, quick: bool) -> Section:
 def picture(rows: list[Verdict]) -> Picture:
     """Draw each verdict as a dot: its error over its bound, in the row of its group."""
     groups = list(dict.fromkeys(row.group for row in rows))
-    with drawing(7.8, 0.3 * len(groups) + 0.9) as figure:
+    with drawing.canvas(7.8, 0.3 * len(groups) + 0.9) as figure:
         axis = figure.subplots()
         axis.set_xscale("log")
         for k, row in enumerate(rows):
@@ -159,11 +152,11 @@ def picture(rows: list[Verdict]) -> Picture:
             share = row.value / bound if bound > 0 else (0.0 if row.ok else math.inf)
             x = min(max(share, LEAST), 1e3) if math.isfinite(share) else 1e3
             jitter = 0.5 * ((k * 0.618034) % 1 - 0.5)
-            color = BLUE if row.ok else RED
+            color = drawing.BLUE if row.ok else drawing.RED
             axis.plot(x, groups.index(row.group) + jitter, "o", color=color, alpha=0.55, ms=3.4)
-        axis.axvline(1.0, color=INK, linewidth=1.0)
+        axis.axvline(1.0, color=drawing.INK, linewidth=1.0)
         axis.annotate(
-            "bound", (1.0, -0.6), xytext=(4, 0), textcoords="offset points", fontsize=SMALL,
+            "bound", (1.0, -0.6), xytext=(4, 0), textcoords="offset points", fontsize=drawing.SMALL,
             va="bottom", annotation_clip=False,
         )  # fmt: skip
         axis.set_yticks(range(len(groups)), groups)
@@ -172,12 +165,12 @@ def picture(rows: list[Verdict]) -> Picture:
         from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
         axis.xaxis.set_major_locator(LogLocator(base=1e4, numticks=10))
-        axis.xaxis.set_major_formatter(FuncFormatter(power_of_ten))
+        axis.xaxis.set_major_formatter(FuncFormatter(drawing.power_of_ten))
         axis.xaxis.set_minor_locator(NullLocator())
         axis.tick_params(axis="y", length=0)
         axis.grid(visible=True, axis="x")
         axis.set_xlabel("error / bound")
-        png = png_of(figure)
+        png = drawing.png_of(figure)
     return Picture(
         "hard_cases",
         png,

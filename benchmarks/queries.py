@@ -10,6 +10,7 @@ import numpy as np
 from sphshell_pin.benchmarks import convergence, query, sizes, timing
 from sphshell_pin.benchmarks.sizes import Row
 from sphshell_pin.benchmarks.surfaces import Array
+from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
     TIME_COLUMNS,
     TIMES,
@@ -24,29 +25,16 @@ from sphshell_pin.cases.contents import (
     number,
     times_table,
 )
-from sphshell_pin.cases.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    VIOLET,
-    drawing,
-    guide,
-    label_ends,
-    logarithmic,
-    png_of,
-)
 
 Times = dict[str, Array]
 KEY, TITLE = "queries", "Time and memory of a query"
 COLORS = {
-    "smooth": (BLUE, "o"),
-    "facets": (GREEN, "s"),
-    "coal::collide": (RED, "v"),
-    "trimesh": (ORANGE, "^"),
-    "libigl": (VIOLET, "D"),
-    "fcpw": (GREY, "P"),
+    "smooth": (drawing.BLUE, "o"),
+    "facets": (drawing.GREEN, "s"),
+    "coal::collide": (drawing.RED, "v"),
+    "trimesh": (drawing.ORANGE, "^"),
+    "libigl": (drawing.VIOLET, "D"),
+    "fcpw": (drawing.GREY, "P"),
 }
 OTHERS = (
     ("query_libigl", query.LIBIGL, "libigl's AABB tree (closest point)"),
@@ -114,11 +102,7 @@ def assemble(
     )
 
 
-def findings_of(
-    peers: Times,
-    growth: dict[int, Array],
-    cost: dict[str, Times],
-) -> list[Finding]:
+def findings_of(peers: Times, growth: dict[int, Array], cost: dict[str, Times]) -> list[Finding]:
     """Return the ratios that have aims."""
     this = peers[query.THIS]
     found = [
@@ -191,14 +175,14 @@ def sizes_table(rows: list[Row]) -> Table:
 
 def picture(rows: list[Row]) -> Picture:
     """Draw time and memory against the number of triangles."""
-    with drawing(7.8, 3.9) as figure:
+    with drawing.canvas(7.8, 3.9) as figure:
         panels = figure.subplots(1, 2)
         values: tuple[tuple[str, Callable[[Row], float]], ...] = (
             ("time of a query [us]", lambda r: r.query.median * 1e6),
             ("memory held [MB]", lambda r: r.memory / 1e6),
         )
         for axis, (title, value) in zip(panels, values, strict=True):
-            logarithmic(axis, counts=True)
+            drawing.logarithmic(axis, counts=True)
             axis.set_title(title)
             axis.set_xlabel("triangles")
             ends = []
@@ -217,9 +201,9 @@ def picture(rows: list[Row]) -> Picture:
             else:
                 count = [r.triangles for r in rows]
                 start = (min(count) * 3, 0.4 * min(value(r) for r in rows if value(r) > 0))
-                guide(axis, start, max(count) / 30, 1, "~ triangles")
-            label_ends(axis, ends, gap=0.06)
-        png = png_of(figure)
+                drawing.guide(axis, start, max(count) / 30, 1, "~ triangles")
+            drawing.label_ends(axis, ends, gap=0.06)
+        png = drawing.png_of(figure)
     largest = max(r.triangles for r in rows)
     return Picture(
         "queries",

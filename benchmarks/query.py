@@ -18,15 +18,22 @@ Array = NDArray[np.float64]
 RADIUS, DEPTH = 0.010, 0.0005
 
 
-def query_contestant(shell: Shell, centers: Array, method: str = "smooth") -> Callable[[], float]:
-    radii = np.full(len(centers), RADIUS)
+def per_center(ask: Callable[[], object], centers: Array) -> Callable[[], float]:
+    """Return what asks of all centers and returns the seconds of one of them."""
 
     def run() -> float:
         start = time.perf_counter()
-        shell.contacts_batch(centers, radii, method=method, threads=1)
+        ask()
         return (time.perf_counter() - start) / len(centers)
 
     return run
+
+
+def query_contestant(shell: Shell, centers: Array, method: str = "smooth") -> Callable[[], float]:
+    radii = np.full(len(centers), RADIUS)
+    return per_center(
+        lambda: shell.contacts_batch(centers, radii, method=method, threads=1), centers
+    )
 
 
 def coal_tree(vertices: Array, triangles: NDArray[np.int32]) -> coal.BVHModelOBBRSS:
@@ -47,15 +54,13 @@ def coal_contestant(
     request = coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, 1_000_000)
     result, there, place = coal.CollisionResult(), coal.Transform3s(), coal.Transform3s()
 
-    def run() -> float:
-        start = time.perf_counter()
+    def ask() -> None:
         for center in centers:
             place.setTranslation(center)
             result.clear()
             coal.collide(sphere, place, tree, there, request, result)
-        return (time.perf_counter() - start) / len(centers)
 
-    return run
+    return per_center(ask, centers)
 
 
 def libigl_contestant(
@@ -69,12 +74,7 @@ def libigl_contestant(
     corners = triangles.astype(np.int64)
     tree.init(vertices, corners)
 
-    def run() -> float:
-        start = time.perf_counter()
-        tree.squared_distance(vertices, corners, centers)
-        return (time.perf_counter() - start) / len(centers)
-
-    return run
+    return per_center(lambda: tree.squared_distance(vertices, corners, centers), centers)
 
 
 def fcpw_contestant(
@@ -92,13 +92,10 @@ def fcpw_contestant(
     points = np.asfortranarray(centers, dtype=np.float32)
     reach = np.full(len(centers), RADIUS**2, dtype=np.float32)
 
-    def run() -> float:
-        found = fcpw.interaction_3D_list()
-        start = time.perf_counter()
-        scene.find_closest_points(points, reach, found)
-        return (time.perf_counter() - start) / len(centers)
+    def ask() -> None:
+        scene.find_closest_points(points, reach, fcpw.interaction_3D_list())
 
-    return run
+    return per_center(ask, centers)
 
 
 THIS, FACETS, COAL = "this", "this, method facets", "coal::collide, all contacts"

@@ -23,14 +23,12 @@ from sphshell_pin.benchmarks.query import (
     coal_contestant,
     fcpw_contestant,
     libigl_contestant,
+    per_center,
     query_contestant,
 )
 from sphshell_pin.benchmarks.surfaces import Array, touching_centers, wavy_sheet
 from sphshell_pin.benchmarks.timing import silent
-from sphshell_pin.cases.contents import (
-    Progress,
-    Spread,
-)
+from sphshell_pin.cases.contents import Progress, Spread
 
 # Cells along a side of the sheet, at equal size of the cells: 968 to 5 M triangles.
 CELLS = (22, 32, 100, 316, 1000, 1581)
@@ -94,13 +92,7 @@ def trimesh_contestant(vertices: Array, triangles: Any, centers: Array) -> Calla
 
     mesh = trimesh.Trimesh(vertices, triangles, process=False)
     closest: Any = trimesh.proximity.closest_point
-
-    def run() -> float:
-        start = time.perf_counter()
-        closest(mesh, centers)
-        return (time.perf_counter() - start) / len(centers)
-
-    return run
+    return per_center(lambda: closest(mesh, centers), centers)
 
 
 def contestant(name: str, vertices: Array, triangles: Any, centers: Array) -> Callable[[], float]:

@@ -14,6 +14,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
 from sphshell_pin.benchmarks.timing import measure_import, part, silent, take_turns
+from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
     TIME_COLUMNS,
     Finding,
@@ -25,18 +26,6 @@ from sphshell_pin.cases.contents import (
     columns,
     times_table,
 )
-from sphshell_pin.cases.drawing import (
-    BLUE,
-    DASHED,
-    GREY,
-    INK,
-    ORANGE,
-    PAPER,
-    SMALL,
-    drawing,
-    png_of,
-)
-from sphshell_pin.cases.drawing import TEXT as SIZE
 
 Array = NDArray[np.float64]
 Times = dict[str, Array]
@@ -208,9 +197,9 @@ def measure_components(rounds: int, progress: Progress = silent) -> Times:
 
 KEY, TITLE = "steps", "Cost of a step"
 PARTS = {
-    "aba": ("ABA and integrate", GREY),
-    "stepping": ("stepping", BLUE),
-    "contact": ("contact", ORANGE),
+    "aba": ("ABA and integrate", drawing.GREY),
+    "stepping": ("stepping", drawing.BLUE),
+    "contact": ("contact", drawing.ORANGE),
 }
 TEXT = """\
 Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
@@ -310,29 +299,35 @@ def components_table(added: Times) -> Table:
 
 def picture(parts: dict[str, Times]) -> Picture:
     """Draw the parts of each scene's step as a bar, and the bare dynamics as a line."""
-    with drawing(7.8, 0.62 * len(parts) + 1.15) as figure:
+    with drawing.canvas(7.8, 0.62 * len(parts) + 1.15) as figure:
         axis = figure.subplots()
         rows = np.arange(len(parts))
         left = np.zeros(len(parts))
         for key, (label, color) in PARTS.items():
             widths = [max(float(np.median(times[key])) * 1e6, 0.0) for times in parts.values()]
             bars = axis.barh(
-                rows, widths, 0.62, left=left, color=color, edgecolor=PAPER, label=label
+                rows, widths, 0.62, left=left, color=color, edgecolor=drawing.PAPER, label=label
             )
             texts = [f"{width:.2f}" if width > 0.2 else "" for width in widths]
-            axis.bar_label(bars, texts, label_type="center", color=PAPER, fontsize=SMALL)
+            axis.bar_label(
+                bars, texts, label_type="center", color=drawing.PAPER, fontsize=drawing.SMALL
+            )
             left += widths
-        axis.bar_label(bars, [f"{whole:.2f} us" for whole in left], padding=4, fontsize=SIZE)
+        axis.bar_label(
+            bars, [f"{whole:.2f} us" for whole in left], padding=4, fontsize=drawing.TEXT
+        )
         bare = float(np.median(next(iter(parts.values()))["aba"])) * 1e6
-        axis.axvline(bare, color=INK, linewidth=1.0, linestyle=DASHED)
+        axis.axvline(bare, color=drawing.INK, linewidth=1.0, linestyle=drawing.DASHED)
         axis.set_yticks(rows, list(parts))
         axis.invert_yaxis()
         axis.tick_params(axis="y", length=0)
         axis.spines["left"].set_visible(False)
         axis.set_xlabel("time of a step [us]; dashed: ABA and integrate alone")
         axis.margins(x=0.1)
-        figure.legend(loc="outside upper center", ncols=len(PARTS), frameon=False, fontsize=SMALL)
-        png = png_of(figure)
+        figure.legend(
+            loc="outside upper center", ncols=len(PARTS), frameon=False, fontsize=drawing.SMALL
+        )
+        png = drawing.png_of(figure)
     return Picture(
         "steps",
         png,

@@ -111,10 +111,7 @@ def torus(ring: float, tube: float, side: float) -> Mesh:
     a, b = i * columns + j, next_i * columns + j
     c, d = next_i * columns + next_j, i * columns + next_j
     first = rng.random(len(a)) < 0.5
-    halves = (
-        np.where(first, [a, b, c], [a, b, d]),
-        np.where(first, [a, c, d], [b, c, d]),
-    )
+    halves = (np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d]))
     triangles = np.concatenate([half.T for half in halves]).astype(np.int32)
     return Mesh(vertices, triangles, normals)
 

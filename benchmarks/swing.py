@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
 from sphshell_pin.benchmarks.timing import machine, one_core
 from sphshell_pin.cases.contents import Table, columns
@@ -83,13 +84,8 @@ def ellipsoid(level: int, jitter: float = 0.2, seed: int = 3) -> Mesh:
 
 def ball_model() -> pin.Model:
     """Return the ball on a joint that moves along x, y, z: nothing turns it without friction."""
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball_joint")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(MASS, RADIUS), pin.SE3.Identity())
-    frame = pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
-    model.addFrame(frame)
-    return model
+    inertia = pin.Inertia.FromSphere(MASS, RADIUS)
+    return model_of(("ball", pin.JointModelTranslation(), inertia), gravity=GRAVITY)
 
 
 def mesh_scene(mesh: Mesh, method: str = "smooth", exact_normals: bool = True) -> Scene:

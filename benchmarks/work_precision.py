@@ -25,6 +25,7 @@ from sphshell_pin.benchmarks.work_precision_cases import (
     press,
     stick_slip,
 )
+from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
     TIMES,
     Finding,
@@ -35,33 +36,17 @@ from sphshell_pin.cases.contents import (
     Value,
     columns,
 )
-from sphshell_pin.cases.drawing import (
-    BLUE,
-    DASHED,
-    FAINT,
-    GREEN,
-    ORANGE,
-    RED,
-    SMALL,
-    VIOLET,
-    drawing,
-    guide,
-    label_ends,
-    logarithmic,
-    png_of,
-    power_of_ten,
-)
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.errors import SimulationDiverged
 
 KEY, TITLE = "integrators", "Work and precision of the integrators"
 COLORS = {
-    "SemiImplicitEuler": (ORANGE, "^", "semi-implicit"),
-    "LinearlyImplicitEuler": (RED, "v", "linearly implicit"),
-    "RungeKutta4": (GREEN, "s", "Runge-Kutta 4"),
-    "Adaptive": (BLUE, "o", "adaptive"),
-    "Implicit": (VIOLET, "D", "implicit"),
+    "SemiImplicitEuler": (drawing.ORANGE, "^", "semi-implicit"),
+    "LinearlyImplicitEuler": (drawing.RED, "v", "linearly implicit"),
+    "RungeKutta4": (drawing.GREEN, "s", "Runge-Kutta 4"),
+    "Adaptive": (drawing.BLUE, "o", "adaptive"),
+    "Implicit": (drawing.VIOLET, "D", "implicit"),
 }
 LARGEST_DRAWN = 0.3
 EXPLICIT = ("SemiImplicitEuler", "RungeKutta4", "Adaptive")
@@ -252,7 +237,7 @@ def costs_table(cases: list[Case], rows: list[Row]) -> Table:
         for case in cases
         for name in COLORS
     ]
-    errors = (f"cpu_at_{error:.0e}: error {power_of_ten(error)}" for error in ERRORS)
+    errors = (f"cpu_at_{error:.0e}: error {drawing.power_of_ten(error)}" for error in ERRORS)
     return Table(
         "integrators_costs",
         "CPU seconds per simulated second of the cheapest setting with at most this error; a "
@@ -288,24 +273,24 @@ def rows_table(rows: list[Row]) -> Table:
 def picture(cases: list[Case], rows: list[Row]) -> Picture:
     """Draw cost against error, one panel per case."""
     lines = -(-len(cases) // 2)
-    with drawing(7.8, 2.75 * lines) as figure:
+    with drawing.canvas(7.8, 2.75 * lines) as figure:
         figure.set_layout_engine("constrained", h_pad=0.12)
         panels = figure.subplots(lines, 2, sharey=True, squeeze=False).ravel()
         for axis, case in zip(panels, cases, strict=False):
-            logarithmic(axis, every=(2, 1))
+            drawing.logarithmic(axis, every=(2, 1))
             axis.set_title(case.title)
-            axis.set_xlabel(case.judged, fontsize=SMALL)
+            axis.set_xlabel(case.judged, fontsize=drawing.SMALL)
             for name, (color, marker, _) in COLORS.items():
                 found = drawn(rows, case, name)
                 axis.plot(
                     [r.error for r in found], [r.cpu for r in found], color=color, marker=marker
                 )
-            axis.axhline(1.0, color=FAINT, linewidth=0.8, linestyle=DASHED)
+            axis.axhline(1.0, color=drawing.FAINT, linewidth=0.8, linestyle=drawing.DASHED)
             axis.invert_xaxis()
-        guide(panels[0], (1e-4, 1.5e-3), 1e-7, -0.25, "order 4")
+        drawing.guide(panels[0], (1e-4, 1.5e-3), 1e-7, -0.25, "order 4")
         panels[0].annotate(
             "real time", (0.99, 1.0), xycoords=("axes fraction", "data"), xytext=(0, 3),
-            textcoords="offset points", color=FAINT, fontsize=SMALL, ha="right",
+            textcoords="offset points", color=drawing.FAINT, fontsize=drawing.SMALL, ha="right",
         )  # fmt: skip
         for axis, case in zip(panels, cases, strict=False):  # now that all have their limits
             ends = []
@@ -313,11 +298,11 @@ def picture(cases: list[Case], rows: list[Row]) -> Picture:
                 found = drawn(rows, case, name)
                 if found:
                     ends.append((found[-1].error, found[-1].cpu, label, color))
-            label_ends(axis, ends)
+            drawing.label_ends(axis, ends)
         for axis in panels[len(cases) :]:
             axis.set_visible(False)
-        figure.supylabel("CPU seconds per simulated second", fontsize=SMALL + 1)
-        png = png_of(figure)
+        figure.supylabel("CPU seconds per simulated second", fontsize=drawing.SMALL + 1)
+        png = drawing.png_of(figure)
     return Picture(
         "integrators",
         png,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks import swing
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.step import RADIUS, START, panda, tip_position
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
@@ -20,7 +21,7 @@ from sphshell_pin.dynamics.run.integrators import Integrator
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Case:
     """A run, and its settings from coarse to fine.
 
@@ -34,13 +35,13 @@ class Case:
     title: str
     judged: str  # what the error is of, and against what
     scene: sp.Scene
-    controller: Any
+    controller: Any = None
     q0: Array
-    v0: Array | None
+    v0: Array | None = None
     duration: float
     record_dt: float
     figures: Callable[[Result], list[Array]]
-    references: tuple[Integrator, ...]
+    references: tuple[Integrator, ...] = ()
     integrators: tuple[Integrator, ...]
     quick_dt: float  # --quick makes no shorter steps
 
@@ -105,9 +106,7 @@ def bowl() -> Case:
         title="Ball swings in a bowl",
         judged="error of position / amplitude",
         scene=swing.mesh_scene(swing.bowl(0.15)),
-        controller=None,
         q0=swing.start(float(swing.AZIMUTHS[0])),
-        v0=None,
         duration=0.72,
         record_dt=0.02,
         figures=lambda result: [result.q / amplitude],
@@ -184,7 +183,6 @@ def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
         scene=scene,
         controller=controller,
         q0=START,
-        v0=None,
         duration=duration,
         record_dt=0.01,
         figures=figures,
@@ -204,16 +202,11 @@ def stick_slip() -> Case:
 
     The belt is a plate that slides, too heavy to be slowed; the block does not turn.
     """
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -swing.GRAVITY])
-    bodies = (
+    model = model_of(
         ("block", pin.JointModelTranslation(), pin.Inertia.FromSphere(BLOCK, 0.01)),
         ("belt", pin.JointModelPX(), pin.Inertia(1e8, np.zeros(3), np.eye(3))),
+        gravity=swing.GRAVITY,
     )
-    for name, joint, inertia in bodies:
-        index = model.addJoint(0, joint, pin.SE3.Identity(), f"{name}_joint")
-        model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
-        model.addFrame(pin.Frame(name, index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     damping = math.sqrt(CONTACT * BLOCK)  # half of the critical one
     law = sp.ImpactLaw(CONTACT, 1.0, damping, 1e-7)
     friction = sp.BristleFriction(MU_STATIC, MU_DYNAMIC, CONTACT, damping, v_stribeck=0.01)

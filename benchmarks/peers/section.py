@@ -9,6 +9,7 @@ from sphshell_pin.benchmarks.peers import measuring
 from sphshell_pin.benchmarks.peers.engine import Params
 from sphshell_pin.benchmarks.peers.measuring import Ratio, Row
 from sphshell_pin.benchmarks.peers.scenes import SCENES
+from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
     TIMES,
     Finding,
@@ -19,28 +20,16 @@ from sphshell_pin.cases.contents import (
     columns,
     number,
 )
-from sphshell_pin.cases.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    SMALL,
-    VIOLET,
-    drawing,
-    logarithmic,
-    png_of,
-)
 from sphshell_pin.cases.measured import Measured
 
 KEY, TITLE = "peers", "Other engines"
 # Name on the page, color, marker; of an engine that is not here, its own name in gray.
 LOOKS = {
-    "ours": ("sphshell_pin", BLUE, "o"),
-    "mujoco": ("MuJoCo", RED, "v"),
-    "drake": ("Drake", GREEN, "s"),
-    "pybullet": ("PyBullet", ORANGE, "^"),
-    "loop": ("Python loop", VIOLET, "D"),
+    "ours": ("sphshell_pin", drawing.BLUE, "o"),
+    "mujoco": ("MuJoCo", drawing.RED, "v"),
+    "drake": ("Drake", drawing.GREEN, "s"),
+    "pybullet": ("PyBullet", drawing.ORANGE, "^"),
+    "loop": ("Python loop", drawing.VIOLET, "D"),
 }
 SWING = "bowl"
 TITLES = {name: make().title for name, make in SCENES.items()}
@@ -105,7 +94,7 @@ def assemble(rows: list[Row], ratios: list[Ratio]) -> Section:
 
 def name_of(engine: str) -> str:
     """Return the name of an engine on the page."""
-    return LOOKS.get(engine, (engine, GREY, "P"))[0]
+    return LOOKS.get(engine, (engine, drawing.GREY, "P"))[0]
 
 
 def notes_of(rows: list[Row]) -> list[str]:
@@ -217,15 +206,15 @@ def settings_table(rows: list[Row]) -> Table:
 
 def picture(rows: list[Row]) -> Picture:
     """Draw the cost of the swing against its errors, a dot per setting."""
-    with drawing(7.8, 3.7) as figure:
+    with drawing.canvas(7.8, 3.7) as figure:
         panels = figure.subplots(1, 2, sharey=True)
         engines = list(dict.fromkeys(row.engine for row in rows))
         for axis, what in zip(panels, ("period", "energy"), strict=True):
-            logarithmic(axis, every=(2, 1))
+            drawing.logarithmic(axis, every=(2, 1))
             axis.set_title(f"error of the {what}")
             axis.invert_xaxis()
             for engine in engines:
-                _, color, marker = LOOKS.get(engine, (engine, GREY, "P"))
+                _, color, marker = LOOKS.get(engine, (engine, drawing.GREY, "P"))
                 found = [row for row in rows if row.engine == engine and row.errors[what] > 0]
                 axis.plot(
                     [row.errors[what] for row in found], [row.cost for row in found], marker,
@@ -235,9 +224,9 @@ def picture(rows: list[Row]) -> Picture:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(
             handles, labels, loc="outside upper center", ncols=len(labels), frameon=False,
-            fontsize=SMALL,
+            fontsize=drawing.SMALL,
         )  # fmt: skip
-        png = png_of(figure)
+        png = drawing.png_of(figure)
     return Picture(
         "peers",
         png,

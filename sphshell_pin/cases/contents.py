@@ -292,12 +292,7 @@ TIME_COLUMNS = ("median_s: median [us]", "low_s: lower quartile", "high_s: upper
 
 
 def times_table(
-    name: str,
-    caption: str,
-    label: str,
-    times: Mapping[str, Array],
-    base: str,
-    heading: str,
+    name: str, caption: str, label: str, times: Mapping[str, Array], base: str, heading: str
 ) -> Table:
     """Return times [s] (rounds,) by their names: quartiles, and the median over those of `base`.
 

@@ -49,7 +49,7 @@ _STYLE: dict[str, object] = {
 
 
 @contextlib.contextmanager
-def drawing(width: float, height: float) -> Iterator[Figure]:
+def canvas(width: float, height: float) -> Iterator[Figure]:
     """Give an empty figure of these inches; draw and write it inside."""
     figure = new_figure(width, height)
     from matplotlib import rc_context

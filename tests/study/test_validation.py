@@ -57,7 +57,15 @@ def test_command(tmp_path, monkeypatch):
     """It writes the page; a figure that is out stands with its explanation."""
     ran = {"here": outcome(0.5, {}), "far": outcome(2.0, {"error": "Balls have hair."})}
     made = [
-        cases.Case(key, f"Case {key}", "S, https://x", "P", "B", "L", (), lambda key=key: ran[key])
+        cases.Case(
+            key=key,
+            title=f"Case {key}",
+            source="S, https://x",
+            setting="P",
+            bound="B",
+            leaves_out="L",
+            run=lambda key=key: ran[key],
+        )
         for key in ran
     ]
     monkeypatch.setattr(cases, "collect", lambda quick: made)

@@ -69,10 +69,7 @@ def whole_name(findings: list[Finding], k: int) -> str:
 
 
 def render(
-    sections: list[Section],
-    machine: dict[str, str],
-    heading: Heading = SPEED,
-    caution: str = "",
+    sections: list[Section], machine: dict[str, str], heading: Heading = SPEED, caution: str = ""
 ) -> str:
     """Return the page; `caution` is what a reader should know of the machine."""
     findings = [f for section in sections for f in section.findings]

@@ -30,20 +30,7 @@ def exponent(touches: list[Touch]) -> float:
     return float(np.log(last.approach / first.approach) / np.log(last.force / first.force))
 
 
-@case(
-    "finger_pad",
-    "A finger pad against a plate: exponent and shape of the pressure",
-    source="D. T. V. Pawluk and R. D. Howe, Dynamic Contact of the Human Fingerpad Against a Flat "
-    "Surface, J. Biomech. Eng. 121 (1999) 605-611, https://doi.org/10.1115/1.2800860; "
-    "https://koreascience.kr/article/JAKO200111919995062.page (2001).",
-    setting="FoundationLaw and HertzLaw of a ball on a plate, approaches from 0.1 to 5 % of the "
-    "radius. Radius, modulus and thickness cancel in both figures, so that there is nothing to "
-    "tune; published curves with modulus and thickness could not be read.",
-    bound="The papers state both without scatter; 5 % is asked.",
-    leaves_out="The shape and the layers of a pad, its viscosity, its stiffening: the force of "
-    "Pawluk and Howe grows exponentially with displacement.",
-    files=("finger_pad",),
-)
+@case("finger_pad")
 def finger_pad() -> Outcome:
     """Compare how displacement grows with force, and the largest pressure with the mean one."""
     data = read("finger_pad")
@@ -67,7 +54,6 @@ def finger_pad() -> Outcome:
                 f"{name}: largest over mean pressure, relative to that of a paraboloid",
                 abs(ratio / published["peak_over_mean"] - 1),
                 aim=BOUND,
-                headline=name == "FoundationLaw",
             ),
             Finding(
                 f"{name}_exponent",
