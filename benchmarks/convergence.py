@@ -1,5 +1,14 @@
 """Error of the contact force against the size of the elements, and cost, of every contact method.
 
+A sphere of radius r lies 0.04 r deep in or on a surface whose elements have sides of the mean
+length h, at 300 random places; its force of the law k depth^1.5 is compared, as a vector, with that
+of the exact surface. Bowl and dome are the inside and the outside of a sphere of 4 r, the torus
+(inside) has radii of 6 r and 3 r, the flat plate is made of random triangles. The method "smooth"
+bends the elements to the normals of their vertices, exact ones or those estimated from the mesh;
+"facets" is the exact polyhedron; "elements" sums over all elements, as SPHSHL3 did. On a faceted
+bowl the sphere is pushed by both sides of every edge, and refinement does not help; the sum over
+elements grows without limit.
+
 python -m benchmarks.convergence    # prints tables, draws docs/pictures/convergence.png
 """
 
@@ -40,6 +49,7 @@ from sphshell_pin.cases.contents import (
     Section,
     Spread,
     Table,
+    about,
     columns,
     number,
 )
@@ -225,15 +235,7 @@ LOOKS = {
 }
 CURVED = ("bowl", "dome", "torus")
 AT = 0.3  # h / r at which errors are compared
-TEXT = """\
-A sphere of radius r lies 0.04 r deep in or on a surface whose elements have sides of the mean
-length h, at 300 random places; its force of the law k depth^1.5 is compared, as a vector, with that
-of the exact surface. Bowl and dome are the inside and the outside of a sphere of 4 r, the torus
-(inside) has radii of 6 r and 3 r, the flat plate is made of random triangles. The method "smooth"
-bends the elements to the normals of their vertices, exact ones or those estimated from the mesh;
-"facets" is the exact polyhedron; "elements" sums over all elements, as SPHSHL3 did. On a faceted
-bowl the sphere is pushed by both sides of every edge, and refinement does not help; the sum over
-elements grows without limit."""
+TEXT = about(__doc__)
 
 
 def section(*, quick: bool, progress: Progress) -> Section:
@@ -331,14 +333,9 @@ def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
         "forces_orders",
         "Orders by a fit over all meshes; none where the force is exact at any size.",
         columns(
-            "surface",
-            "method",
-            "order",
-            "mean_error_at_0.3: error at h/r = 0.3",
-            "largest_error_at_0.3: largest",
-            "finest_triangles: triangles of the finest mesh",
-            "finest_mean_error: error there",
-            "query_s: query [us]",
+            "surface; method; order; mean_error_at_0.3: error at h/r = 0.3; largest_error_at_0.3: "
+            "largest; finest_triangles: triangles of the finest mesh; finest_mean_error: error "
+            "there; query_s: query [us]"
         ),
         cells,
     )
@@ -350,17 +347,10 @@ def errors_table(rows: list[Row]) -> Table:
         "forces",
         "All meshes: errors of the force over the force, and time of a query.",
         columns(
-            "surface",
-            "method",
-            "triangles",
-            "side_over_radius: h/r",
-            "mean_error",
-            "largest_error: largest",
-            "mean_magnitude_error: of the magnitude",
-            "mean_direction_error_deg: of the direction [deg]",
-            "query_s: query [us]",
-            "query_low_s: lower quartile",
-            "query_high_s: upper quartile",
+            "surface; method; triangles; side_over_radius: h/r; mean_error; largest_error: "
+            "largest; mean_magnitude_error: of the magnitude; mean_direction_error_deg: of the "
+            "direction [deg]; query_s: query [us]; query_low_s: lower quartile; query_high_s: "
+            "upper quartile"
         ),
         [
             (row.surface, row.rule, row.triangles, row.side, row.mean, row.largest)
@@ -379,7 +369,7 @@ def cost_table(cost: dict[str, dict[str, Array]]) -> Table:
         columns(
             "surface: 200 k triangles",
             "method",
-            *TIME_COLUMNS,
+            TIME_COLUMNS,
             f"over_facets: over facets [{TIMES}]",
         ),
         [

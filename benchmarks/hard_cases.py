@@ -1,6 +1,8 @@
-"""The hard cases of tests/hard_cases, each against a closed form or a bound of physics.
+"""The hard cases of tests/hard_cases, which belong to a checkout, in processes of their own.
 
-They run in processes of their own, and belong to a checkout.
+Runs that are compared with a closed form, or with a bound that physics sets: impacts, rolling,
+surfaces, energy, impact tests, under-stiff laws, extreme numbers, rest on slopes. Each verdict has
+a bound for its error.
 """
 
 from __future__ import annotations
@@ -20,7 +22,15 @@ from pathlib import Path
 import sphshell_pin
 from sphshell_pin.benchmarks.timing import silent
 from sphshell_pin.cases import drawing
-from sphshell_pin.cases.contents import Finding, Picture, Progress, Section, Verdict, verdicts_table
+from sphshell_pin.cases.contents import (
+    Finding,
+    Picture,
+    Progress,
+    Section,
+    Verdict,
+    about,
+    verdicts_table,
+)
 from sphshell_pin.cases.register import Case
 
 MOST_PROCESSES = 4
@@ -91,10 +101,7 @@ def _run(number: int, quick: bool, only: str | None) -> tuple[int, list[Verdict]
 
 
 KEY, TITLE = "hard_cases", "Hard cases"
-TEXT = """\
-Runs that are compared with a closed form, or with a bound that physics sets: impacts, rolling,
-surfaces, energy, impact tests, under-stiff laws, extreme numbers, rest on slopes. Each verdict has
-a bound for its error."""
+TEXT = about(__doc__)
 ABSENT = """\
 The hard cases are part of the checkout (tests/hard_cases), and this package is installed without
 it: run the report from a checkout to have them here."""

@@ -1,4 +1,13 @@
-"""Section 2: time and memory of a query, against other codes and the number of triangles."""
+"""Time and memory of a query, against other codes and the number of triangles.
+
+All contacts of a 10 mm sphere pressed 0.5 mm into a wavy sheet, at random positions that the caches
+do not know, on one core, by the default method, "smooth", unless another is named. Coal collects a
+contact for every triangle that is touched; trimesh, libigl and fcpw (in single precision) answer
+the smaller question of the one closest point. The sheet grows at equal size of its triangles, so
+that the sphere always touches the same number of them. In the picture every contestant has a
+process of its own; memory is what it holds after its first query. The ratios among the findings are
+measured in turn in one process.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +30,7 @@ from sphshell_pin.cases.contents import (
     Section,
     Spread,
     Table,
+    about,
     columns,
     number,
     times_table,
@@ -40,14 +50,7 @@ OTHERS = (
     ("query_libigl", query.LIBIGL, "libigl's AABB tree (closest point)"),
     ("query_fcpw", query.FCPW, "single-precision fcpw (closest point)"),
 )
-TEXT = """\
-All contacts of a 10 mm sphere pressed 0.5 mm into a wavy sheet, at random positions that the caches
-do not know, on one core, by the default method, "smooth", unless another is named. Coal collects a
-contact for every triangle that is touched; trimesh, libigl and fcpw (in single precision) answer
-the smaller question of the one closest point. The sheet grows at equal size of its triangles, so
-that the sphere always touches the same number of them. In the picture every contestant has a
-process of its own; memory is what it holds after its first query. The ratios among the findings are
-measured in turn in one process."""
+TEXT = about(__doc__)
 
 
 def section(*, quick: bool, progress: Progress) -> Section:
@@ -148,7 +151,7 @@ def growth_table(growth: dict[int, Array]) -> Table:
     return Table(
         "queries_growth",
         "Our query at equal contact patch, in turn in one process.",
-        columns("triangles", *TIME_COLUMNS, f"over_smallest: over the smallest [{TIMES}]"),
+        columns("triangles", TIME_COLUMNS, f"over_smallest: over the smallest [{TIMES}]"),
         [(count, *Spread.of(t), float(np.median(t / few))) for count, t in growth.items()],
     )
 
@@ -159,7 +162,7 @@ def sizes_table(rows: list[Row]) -> Table:
         "queries_sizes",
         "Every contestant in a process of its own: query, building, memory held.",
         (
-            *columns("code", "question: answers", "triangles", *TIME_COLUMNS),
+            *columns("code", "question: answers", "triangles", TIME_COLUMNS),
             Column("build_s", "build [s]", number),
             Column("memory_bytes", "memory [MB]", lambda m: number(m / 1e6)),
             *columns("bytes_per_triangle: bytes / triangle"),

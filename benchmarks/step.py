@@ -1,4 +1,11 @@
-"""What a step of a Panda with a fingertip on 200 k triangles costs, by its parts."""
+"""What a step of a Panda with a fingertip on 200 k triangles costs, by its parts.
+
+Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
+triangles, forces, losses and figures of every pair included, against Pinocchio's ABA and integrate
+alone, in a compiled loop. The parts are differences: stepping is what a scene without contact takes
+beyond ABA (the guard against tunnelling, the energy audit, summaries), contact is what the touching
+sphere adds (kinematics, query, law and wrench).
+"""
 
 from __future__ import annotations
 
@@ -23,6 +30,7 @@ from sphshell_pin.cases.contents import (
     Section,
     Spread,
     Table,
+    about,
     columns,
     times_table,
 )
@@ -201,12 +209,7 @@ PARTS = {
     "stepping": ("stepping", drawing.BLUE),
     "contact": ("contact", drawing.ORANGE),
 }
-TEXT = """\
-Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
-triangles, forces, losses and figures of every pair included, against Pinocchio's ABA and integrate
-alone, in a compiled loop. The parts are differences: stepping is what a scene without contact takes
-beyond ABA (the guard against tunnelling, the energy audit, summaries), contact is what the touching
-sphere adds (kinematics, query, law and wrench)."""
+TEXT = about(__doc__)
 
 
 def section(*, quick: bool, progress: Progress) -> Section:
@@ -292,7 +295,7 @@ def components_table(added: Times) -> Table:
     return Table(
         "steps_components",
         "What a component adds to the step; a scene without it does not pay.",
-        columns("scene", *TIME_COLUMNS, "added_s: added [us]"),
+        columns("scene", TIME_COLUMNS, "added_s: added [us]"),
         [(name, *Spread.of(t), float(np.median(t - base))) for name, t in added.items()],
     )
 

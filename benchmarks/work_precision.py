@@ -1,5 +1,13 @@
 """CPU time against error of every integrator.
 
+Every integrator with many steps or tolerances, CPU seconds per simulated second against the largest
+error at any instant. Three cases have a closed form: a ball that bobs on a spring without leaving
+it (order of convergence), one that bounces five times (touches and lift-offs), and one that glides
+on a plate so stiff and damped that an explicit method is bound to steps of 1e-5 s by a motion that
+has long died out. The others are judged by a much finer run of a method of another kind: a ball
+that swings in a bowl of curved elements, a Panda that slides a steel ball on steel, a block that
+sticks and slips on a belt.
+
 python -m benchmarks.work_precision [--quick] [--write]
 """
 
@@ -34,6 +42,7 @@ from sphshell_pin.cases.contents import (
     Section,
     Table,
     Value,
+    about,
     columns,
 )
 from sphshell_pin.dynamics import Result
@@ -51,14 +60,7 @@ COLORS = {
 LARGEST_DRAWN = 0.3
 EXPLICIT = ("SemiImplicitEuler", "RungeKutta4", "Adaptive")
 ERRORS = (1e-2, 1e-4, 1e-6)
-TEXT = """\
-Every integrator with many steps or tolerances, CPU seconds per simulated second against the largest
-error at any instant. Three cases have a closed form: a ball that bobs on a spring without leaving
-it (order of convergence), one that bounces five times (touches and lift-offs), and one that glides
-on a plate so stiff and damped that an explicit method is bound to steps of 1e-5 s by a motion that
-has long died out. The others are judged by a much finer run of a method of another kind: a ball
-that swings in a bowl of curved elements, a Panda that slides a steel ball on steel, a block that
-sticks and slips on a belt."""
+TEXT = about(__doc__)
 PICTURE = Path(__file__).parent.parent / "docs" / "pictures" / "work_precision.png"
 TARGET = 1e-4  # error at which costs are compared
 ROUNDS = 5
@@ -253,14 +255,8 @@ def rows_table(rows: list[Row]) -> Table:
         "integrators",
         "All settings.",
         columns(
-            "case",
-            "integrator",
-            "setting",
-            "error",
-            "cpu_s_per_s: CPU s/s",
-            "evaluations_per_s: evaluations / s",
-            "steps",
-            "rejected",
+            "case; integrator; setting; error; cpu_s_per_s: CPU s/s; evaluations_per_s: "
+            "evaluations / s; steps; rejected"
         ),
         [
             (r.case, r.integrator, r.setting, r.error, r.cpu, r.evaluations, r.steps, r.rejected)

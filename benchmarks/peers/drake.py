@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import importlib.metadata
 import math
-import tempfile
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +21,7 @@ from sphshell_pin.benchmarks.peers.drake_plant import (
     wall_forces,
 )
 from sphshell_pin.benchmarks.peers.engine import Params, Trajectory
-from sphshell_pin.benchmarks.peers.merged import merged_urdf, obj_text
+from sphshell_pin.benchmarks.peers.merged import MeshFiles, merged_urdf
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
@@ -108,26 +106,18 @@ class Drake:
         return self._ball(scene, params)
 
     @cached_property
-    def _folder(self) -> Any:
-        return tempfile.TemporaryDirectory()
-
-    @cached_property
     def _arms(self) -> dict[tuple[Any, ...], Arm]:
         return {}
 
     @cached_property
-    def _files(self) -> dict[Surface, Path]:
-        return {}
+    def _files(self) -> MeshFiles:
+        return MeshFiles()
 
     def _mesh(self, surface: Surface) -> Any:
         """Return the shape of a surface."""
         from pydrake.geometry import Mesh
 
-        if surface not in self._files:
-            path = Path(self._folder.name) / f"{len(self._files)}.obj"
-            path.write_text(obj_text(surface.vertices, surface.triangles))
-            self._files[surface] = path
-        return Mesh(str(self._files[surface]))
+        return Mesh(self._files.of(surface))
 
     def _touch(self, plant: Any, scene: Scene, params: Params, ball: Any, ground: Any) -> None:
         """Give the ball (body and place of the center) and the ground their shapes and the law."""

@@ -98,6 +98,33 @@ def _gradient(at: Array, small: float = 1e-6) -> Array:
     return np.array([(_height(at + e) - _height(at - e)) / (2 * small) for e in steps])
 
 
+def tip_motion(scene: PressScene, q: Array, v: Array) -> tuple[Array, Array, Array]:
+    """Return the fingertip's place [m], velocity [m/s] and angular velocity [rad/s]."""
+    model = pin.buildModelFromXML(scene.urdf)
+    data, frame = model.createData(), model.getFrameId(FRAME)
+    pin.forwardKinematics(model, data, q, v)
+    tip = pin.updateFramePlacement(model, data, frame).translation
+    motion = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+    return tip.copy(), motion.linear.copy(), motion.angular.copy()
+
+
+def at_the_end(
+    scene: PressScene, q: Array, v: Array, cpu: float, steps: int, force: Array | None = None
+) -> Trajectory:
+    """Return the only row of a run of the Panda; `force` (3,) [N] is that on the fingertip."""
+    position, velocity, spin = tip_motion(scene, q, v)
+    return Trajectory(
+        t=np.array([steps * scene.dt]),
+        position=position[None],
+        velocity=velocity[None],
+        angular_velocity=spin[None],
+        cpu=cpu,
+        simulated=steps * scene.dt,
+        steps=steps,
+        force=None if force is None else force[None],
+    )
+
+
 def panda_urdf(radius: float) -> str:
     """Return the text of the Panda's URDF, made bare: see PressScene.
 

@@ -1,4 +1,11 @@
-"""The same scenes in other engines: findings, pictures and tables."""
+"""The same scenes in other engines: findings, pictures and tables.
+
+The same scenes, each with a truth that no engine computes, in other engines. Every engine runs in a
+process of its own on one core, with the settings that its documentation recommends; the errors are
+worked out from the motion of the ball alone, in the same way for all. Costs are CPU time of
+stepping. In the swing each peer is taken at its best error and this package at its cheapest setting
+that is at least as good in period and energy; ratios are measured in turns.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +24,7 @@ from sphshell_pin.cases.contents import (
     Progress,
     Section,
     Table,
+    about,
     columns,
     number,
 )
@@ -34,12 +42,7 @@ LOOKS = {
 SWING = "bowl"
 TITLES = {name: make().title for name, make in SCENES.items()}
 ABOUT = 100  # rows of a whole measurement, for the progress
-TEXT = """\
-The same scenes, each with a truth that no engine computes, in other engines. Every engine runs in a
-process of its own on one core, with the settings that its documentation recommends; the errors are
-worked out from the motion of the ball alone, in the same way for all. Costs are CPU time of
-stepping. In the swing each peer is taken at its best error and this package at its cheapest setting
-that is at least as good in period and energy; ratios are measured in turns."""
+TEXT = about(__doc__)
 AIMED = (
     "Panda press with control on 200 k triangles, time of a step: fastest peer",
     "bowl swing, CPU time at equal errors of period and energy: peer of the best error",

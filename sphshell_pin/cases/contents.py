@@ -196,8 +196,11 @@ class Column:
 
 
 def columns(*names: str) -> tuple[Column, ...]:
-    """Return columns of keys, or of texts "key: heading"; else the heading is the key."""
-    parts = (name.partition(": ") for name in names)
+    """Return columns of keys, or of texts "key: heading"; else the heading is the key.
+
+    A text may state several, with "; " between them.
+    """
+    parts = (name.partition(": ") for text in names for name in text.split("; "))
     return tuple(Column(key, heading or key.replace("_", " ")) for key, _, heading in parts)
 
 
@@ -272,6 +275,11 @@ class Section:
     seconds: float = 0.0  # that measuring it took
 
 
+def about(doc: str | None) -> str:
+    """Return the second paragraph of a docstring, as one line: what a section says of itself."""
+    return " ".join("".join((doc or "").split("\n\n")[1:2]).split())
+
+
 def findings_table(findings: Sequence[Finding]) -> Table:
     """Return findings as a table; its verdict is empty for a finding without an aim."""
     words = {True: "met", False: "missed", None: ""}
@@ -287,7 +295,7 @@ def findings_table(findings: Sequence[Finding]) -> Table:
     )
 
 
-TIME_COLUMNS = ("median_s: median [us]", "low_s: lower quartile", "high_s: upper quartile")
+TIME_COLUMNS = "median_s: median [us]; low_s: lower quartile; high_s: upper quartile"
 """Columns for the `Spread` of times [s]."""
 
 
@@ -299,7 +307,7 @@ def times_table(
     `label` is the column of the names; `heading` is that of the ratios, as "key: heading".
     """
     rows = [(what, *Spread.of(t), float(np.median(t / times[base]))) for what, t in times.items()]
-    return Table(name, caption, columns(label, *TIME_COLUMNS, f"{heading} [{TIMES}]"), rows)
+    return Table(name, caption, columns(label, TIME_COLUMNS, f"{heading} [{TIMES}]"), rows)
 
 
 def number(value: float | None) -> str:

@@ -58,8 +58,8 @@ def turn_cam() -> Motion:
 @case("cam_and_follower")
 def cam_and_follower() -> Outcome:
     """Compare the extremes with the published ones, and the whole motion with the closed form."""
-    data = read("cam_and_follower")
-    published = dict(zip(data.texts("quantity"), data["value"] / 1e3, strict=True))
+    data = read("cam_and_follower").published
+    published = {name: value / 1e3 for name, value in data.items()}
     ours = turn_cam()
     phase = SPEED * ours.t
     exact = {

@@ -189,6 +189,11 @@ class Data:
         """Return a column (n,) of numbers."""
         return np.array(self.texts(column), dtype=float)
 
+    @property
+    def published(self) -> dict[str, float]:
+        """The column "value" by the column "quantity"."""
+        return dict(zip(self.texts("quantity"), self["value"].tolist(), strict=True))
+
     def where(self, column: str, value: str) -> Data:
         """Return the rows whose `column` is `value`."""
         chosen = [k for k, text in enumerate(self.texts(column)) if text == value]

@@ -33,8 +33,7 @@ def exponent(touches: list[Touch]) -> float:
 @case("finger_pad")
 def finger_pad() -> Outcome:
     """Compare how displacement grows with force, and the largest pressure with the mean one."""
-    data = read("finger_pad")
-    published = dict(zip(data.texts("quantity"), data["value"].tolist(), strict=True))
+    published = read("finger_pad").published
     plate, approaches = plane(1.0), RADIUS * np.geomspace(1e-3, 5e-2, 9)
     laws = {
         "FoundationLaw": sp.FoundationLaw(MODULUS, THICKNESS),

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation import maw
@@ -119,6 +120,11 @@ def _own_error(data: Data) -> float:
     )
 
 
+def parts(angle: Array) -> list[tuple[str, NDArray[np.bool_], str]]:
+    """Return ends of keys and of names, and which angles: all, and those from 10 degrees on."""
+    return [("", angle > 0, ""), ("_from_10", angle > 9, ", from 10 degrees on")]
+
+
 def what(quantity: str) -> str:
     """Return the name of an error figure of a quantity."""
     names = {"restitution": "v'/v along the plane", "spin": "spin, over the largest"}
@@ -161,12 +167,7 @@ def rigid() -> Outcome:
             marks.append((name, angle, value))
             errors = values(spheres[name], quantity, angle) - value
             scale = value.max() if quantity == "spin" else 1.0
-            for key, chosen, where in (
-                ("", angle > 0, ""),
-                ("_from_10", angle > 9, ", from 10 degrees on"),
-            ):
-                if key and quantity != "restitution":
-                    continue
+            for key, chosen, where in parts(angle)[: 1 + (quantity == "restitution")]:
                 findings.append(
                     Finding(
                         f"{quantity}_{name}{key}",
@@ -218,10 +219,7 @@ def mfix() -> Outcome:
     for quantity, bound in (("restitution", 0.01), ("spin", 0.01), ("rebound_angle", 0.5)):
         here, there = taken(ours, quantity, angle), data[quantity]
         scale = there.max() if quantity == "spin" else 1.0
-        for key, chosen, where in (
-            ("", angle > 0, ""),
-            ("_from_10", angle >= 10, ", from 10 degrees on"),
-        ):
+        for key, chosen, where in parts(angle):
             finding = Finding(
                 quantity + key,
                 what(quantity) + where,

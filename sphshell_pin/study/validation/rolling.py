@@ -24,12 +24,6 @@ SHARE = 3e-5  # depth under the weight, over the radius: it does not count
 FILE = "rolling_balls"
 
 
-def published(of: str) -> dict[str, float]:
-    """Return the published figures of one of the cases, by their names."""
-    data = read(FILE).where("case", of)
-    return dict(zip(data.texts("quantity"), data["value"].tolist(), strict=True))
-
-
 def wall(radius: float, angle: float, length: float, columns: int, rows: int = 1) -> sp.Shell:
     """Return the inside of a cylinder of `radius` and `length` [m] about y, `angle` [rad] from -z.
 
@@ -49,7 +43,7 @@ def wall(radius: float, angle: float, length: float, columns: int, rows: int = 1
 @case("turntable")
 def turntable() -> Outcome:
     """Roll three balls two orbits each."""
-    ratio = published("turntable")["ratio"]
+    ratio = read(FILE).where("case", "turntable").published["ratio"]
     shell, ratios, misses = plane(1.0), [], []
     ours: list[Series] = []
     theory: list[Series] = []
@@ -98,7 +92,7 @@ def turntable() -> Outcome:
 @case("golf_ball")
 def golf_ball() -> Outcome:
     """Roll the ball three times down and up again."""
-    given = published("cylinder")
+    given = read(FILE).where("case", "cylinder").published
     radius, cup, orbit = given["ball radius [m]"], given["cup radius [m]"], 30.0
     upright = pin.SE3(pin.utils.rotate("x", math.pi / 2), np.zeros(3))
     shell = wall(cup, math.pi, 0.2, columns=60, rows=30).transformed(upright)
@@ -136,7 +130,7 @@ def golf_ball() -> Outcome:
 @case("curved_track")
 def curved_track() -> Outcome:
     """Swing without rolling resistance, and compare force and period; then with it."""
-    given = published("track")
+    given = read(FILE).where("case", "track").published
     bend, angle = given["radius [m]"], given["displacement [m]"] / given["radius [m]"]
     ball = Ball(0.067, 0.0127)
     shell = wall(bend, 1.5 * angle, 0.05, columns=40)
