@@ -3,8 +3,8 @@
 Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
 triangles, forces, losses and figures of every pair included, against Pinocchio's ABA and integrate
 alone, in a compiled loop. The parts are differences: stepping is what a scene without contact takes
-beyond ABA (the guard against tunnelling, the energy audit, summaries), contact is what the touching
-sphere adds (kinematics, query, law and wrench).
+beyond ABA (continuous collision detection, the energy audit, summaries), contact is what the
+touching sphere adds (kinematics, query, law and wrench).
 """
 
 from __future__ import annotations

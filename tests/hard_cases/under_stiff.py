@@ -55,8 +55,8 @@ def expected_speed(depth: float) -> float:
 def warns(depth: float) -> Verdict:
     """Return whether it is said before the run."""
     scene = scene_of(depth, solid=False)
-    told = scene.explain(np.array([1.5 * RADIUS]), np.array([-SPEED])).warnings
-    warned = any("cannot stop the sphere" in warning for warning in told)
+    said = scene.explain(np.array([1.5 * RADIUS]), np.array([-SPEED])).warnings
+    warned = any("cannot stop the sphere" in warning for warning in said)
     tried = f"depth {depth / RADIUS:g} r"
     return at_most("under-stiff law", tried, "explain warns of it", float(not warned), 0)
 

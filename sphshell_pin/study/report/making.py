@@ -173,10 +173,10 @@ def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     files[DATA] = json_text(report, sorted(files)).encode()
     files[PAGE] = render(report.sections, report.machine, report.heading, report.caution).encode()
     try:
-        desk = place.desk()
+        staging = place.desk()
         for name, content in files.items():
-            (desk / name).write_bytes(content)
-        place.replace(desk, [PAGE, DATA, *_files_of_old(out)])
+            (staging / name).write_bytes(content)
+        place.replace(staging, [PAGE, DATA, *_files_of_old(out)])
     except OSError as error:
         raise ResultError(out, f"cannot be written: {error.strerror or error}") from None
 
