@@ -7,8 +7,9 @@ import argparse
 from sphshell_pin.benchmarks import convergence, query, step
 from sphshell_pin.benchmarks.building import SHEETS, building
 from sphshell_pin.benchmarks.queries import assemble
-from sphshell_pin.benchmarks.timing import machine, measure_import, one_core
+from sphshell_pin.benchmarks.timing import measure_import, one_core
 from sphshell_pin.cases.contents import markdown
+from sphshell_pin.cases.machine import machine
 
 
 def main() -> None:

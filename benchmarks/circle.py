@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin import _core
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.cases.machine import machine
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "docs" / "examples" / "05_circle_with_5_newtons.py"

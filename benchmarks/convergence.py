@@ -33,7 +33,7 @@ from sphshell_pin.benchmarks.surfaces import (
     touching_centers,
     wavy_sheet,
 )
-from sphshell_pin.benchmarks.timing import machine, one_core, part, silent, take_turns
+from sphshell_pin.benchmarks.timing import one_core, part, silent, take_turns
 from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
     TIME_COLUMNS,
@@ -48,6 +48,7 @@ from sphshell_pin.cases.contents import (
     columns,
     number,
 )
+from sphshell_pin.cases.machine import machine
 
 Array = NDArray[np.float64]
 PLACES = 300

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.step import panda, start_of, with_sheet
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
-from sphshell_pin.benchmarks.timing import machine, one_core, take_turns
+from sphshell_pin.benchmarks.timing import one_core, take_turns
 from sphshell_pin.cases.contents import times_table
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.testing.numbers import names_of
 
 Array = NDArray[np.float64]

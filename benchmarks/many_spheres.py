@@ -10,7 +10,8 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics.run.integrators import Integrator
 
 COUNT, RADIUS, APART = 8, 0.006, 0.012

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -53,3 +55,13 @@ class OwnProcess:
                 process.kill()
             self._pool.shutdown(wait=True, cancel_futures=True)
             self._pool = None
+
+
+def resident() -> tuple[float, float]:
+    """Return the memory of this process now and at its highest [bytes]; NaN where unknown."""
+    try:
+        text = Path("/proc/self/status").read_text(encoding="ascii")
+    except OSError:
+        return math.nan, math.nan
+    rows = dict(line.split(":", 1) for line in text.splitlines())
+    return 1024 * float(rows["VmRSS"].split()[0]), 1024 * float(rows["VmHWM"].split()[0])

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Adaptive, ImpactLaw, JointPD, Scene, Shell, Simulation, Sphere
 from sphshell_pin.benchmarks.models import model_of
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError
 from sphshell_pin.shell.contact_set import ContactSet
@@ -382,7 +383,7 @@ def main() -> None:
     if options.only:
         files = [path for path in files if path.name in options.only]
     one_core()
-    print(machine().partition(";")[0])
+    print(machine())
     if options.walks:
         walk_all(files, options.walks)
     for method in options.methods if options.runs else []:

@@ -8,7 +8,6 @@ sheets.
 from __future__ import annotations
 
 import importlib.util
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.benchmarks.processes import OwnProcess
+from sphshell_pin.benchmarks.processes import OwnProcess, resident
 from sphshell_pin.benchmarks.query import (
     DEPTH,
     RADIUS,
@@ -66,15 +65,6 @@ class Row:
     memory: float
 
 
-def resident() -> float:
-    """Return the memory that this process holds [bytes]; NaN where it is unknown."""
-    try:
-        with open("/proc/self/statm", encoding="ascii") as file:
-            return float(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except OSError:
-        return float("nan")
-
-
 def available() -> float:
     """Return the memory that is free for programs [bytes]; infinity where it is unknown."""
     try:
@@ -120,11 +110,11 @@ def build(name: str, cells: int) -> tuple[float, float]:
     vertices, triangles = wavy_sheet(cells, size)
     centers = touching_centers(QUERIES.get(name, 20_000), size, RADIUS, DEPTH)
     contestant(name, *wavy_sheet(4, 4 * SIDE), centers[:1])()  # imports what it needs
-    before, start = resident(), time.perf_counter()
+    (before, _), start = resident(), time.perf_counter()
     run = contestant(name, vertices, triangles, centers)
     if name != COAL:
         run()  # some build at the first query
-    cost = time.perf_counter() - start, resident() - before
+    cost = time.perf_counter() - start, resident()[0] - before
     _served[:] = [run]
     return cost
 

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.timing import one_core
 from sphshell_pin.cases.contents import Table, columns
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics import Result
 
 Array = NDArray[np.float64]
@@ -329,7 +330,7 @@ def main() -> None:
     parser.add_argument("--long", action="store_true", help="200 swings, and an uneven ellipsoid")
     long = parser.parse_args().long
     one_core()
-    print(machine().partition(";")[0])
+    print(machine())
     period = reference_period()
     print(f"Period of the exact bowl {period:.9f} s; relative to it: twice the step "
           f"{reference_period(4e-5) / period - 1:+.0e}, pendulum with length and sink "

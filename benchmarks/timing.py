@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import platform
 import subprocess
 import sys
 import time
@@ -73,17 +72,3 @@ def measure_import(rounds: int, progress: Progress = silent) -> dict[str, Array]
 
     modules = ("sphshell_pin", "pinocchio")
     return take_turns({m: partial(fresh, m) for m in modules}, rounds, progress)
-
-
-def machine() -> str:
-    """One line on what this runs on."""
-    import coal
-    import pinocchio
-
-    import sphshell_pin
-
-    return (
-        f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}, "
-        f"Pinocchio {pinocchio.__version__}, Coal {coal.__version__}, "
-        f"sphshell_pin {sphshell_pin.__version__}; one core, medians [quartiles] of rounds in turn"
-    )

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.benchmarks import analytic_cases, swing
-from sphshell_pin.benchmarks.timing import machine, one_core, part, silent
+from sphshell_pin.benchmarks.timing import one_core, part, silent
 from sphshell_pin.benchmarks.work_precision_cases import (
     FAST_CREEP,
     SLOW_CREEP,
@@ -45,6 +45,7 @@ from sphshell_pin.cases.contents import (
     about,
     columns,
 )
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.errors import SimulationDiverged

@@ -11,9 +11,10 @@ from pathlib import Path
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.benchmarks.peers.measuring import measure
 from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.benchmarks.peers.section import assemble, machine_line, site_sections
+from sphshell_pin.benchmarks.peers.section import assemble, site_sections
 from sphshell_pin.benchmarks.peers.workers import ENGINES
 from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.cases.measured import write
 
 
@@ -29,7 +30,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write docs/measured/peers.json")
     arguments = parser.parse_args()
     one_core()
-    print(machine_line())
+    print(machine())
     rows, ratios = measure(
         arguments.engine or ENGINES,
         arguments.scene or SCENES,

@@ -10,7 +10,6 @@ that is at least as good in period and energy; ratios are measured in turns.
 from __future__ import annotations
 
 import math
-import platform
 
 from sphshell_pin.benchmarks.peers import measuring
 from sphshell_pin.benchmarks.peers.engine import Params
@@ -28,6 +27,7 @@ from sphshell_pin.cases.contents import (
     columns,
     number,
 )
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.cases.measured import Measured
 
 KEY, TITLE = "peers", "Other engines"
@@ -239,15 +239,10 @@ def picture(rows: list[Row]) -> Picture:
     )
 
 
-def machine_line() -> str:
-    """Return one line on what this runs on."""
-    return f"{platform.machine()}, Python {platform.python_version()}; every engine on one core"
-
-
 def site_sections(rows: list[Row], ratios: list[Ratio]) -> list[Measured]:
     """Return what docs/peers.md shows: the tables, with what each scene is."""
     found = [
-        Measured(text=f"{machine_line()}. {notes_of(rows)[0]}"),
+        Measured(text=f"{machine()}; every engine on one core. {notes_of(rows)[0]}"),
         Measured.of(ratios_table(ratios), "How much more a peer costs"),
     ]
     for scene in dict.fromkeys(row.scene for row in rows):

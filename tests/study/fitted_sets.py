@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.benchmarks.timing import machine
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.fit.quantities import quantities_of

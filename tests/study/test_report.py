@@ -29,11 +29,12 @@ from sphshell_pin.benchmarks.peers import section as peers_section
 from sphshell_pin.benchmarks.peers.measuring import Ratio
 from sphshell_pin.benchmarks.peers.measuring import Row as PeerRow
 from sphshell_pin.benchmarks.sizes import Row as SizeRow
+from sphshell_pin.cases import machine
 from sphshell_pin.cases.contents import Column, Finding, Section, Spread, Table, Verdict
 from sphshell_pin.cases.drawing import spread_apart
 from sphshell_pin.cli import app
 from sphshell_pin.errors import Interrupted
-from sphshell_pin.study.report import PAGE, machine, making
+from sphshell_pin.study.report import PAGE, making
 from sphshell_pin.study.report.page import Heading
 
 pytest.importorskip("matplotlib")

@@ -17,9 +17,9 @@ from sphshell_pin.atomic import AtomicFolder, FolderInUse
 from sphshell_pin.benchmarks import convergence, hard_cases, queries, step, timing, work_precision
 from sphshell_pin.benchmarks.peers import section as peers
 from sphshell_pin.cases.contents import Column, Progress, Section, Table, findings_table
+from sphshell_pin.cases.machine import OtherWork, caution_of, describe
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
 from sphshell_pin.plot.figure import new_figure
-from sphshell_pin.study.report.machine import OtherWork, caution_of, describe
 from sphshell_pin.study.report.page import SPEED, Heading, render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
