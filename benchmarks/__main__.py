@@ -4,22 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-import numpy as np
-
+from sphshell_pin.benchmarks import convergence, query, step
 from sphshell_pin.benchmarks.building import SHEETS, building
-from sphshell_pin.benchmarks.query import against_peers, against_size
-from sphshell_pin.benchmarks.step import ingredients, step_cost
-from sphshell_pin.benchmarks.timing import machine, measure_import, one_core, ratio
-
-
-def import_time(rounds: int) -> None:
-    """Print the time of importing the package against importing Pinocchio."""
-    times = measure_import(rounds)
-    print("Import, whole interpreter")
-    print(
-        f"  {'sphshell_pin / pinocchio':40s} {np.median(times['sphshell_pin']) * 1e3:9.1f} ms   "
-        f"{ratio(times['sphshell_pin'], times['pinocchio'])} x"
-    )
+from sphshell_pin.benchmarks.queries import assemble
+from sphshell_pin.benchmarks.timing import measure_import, one_core
+from sphshell_pin.cases.contents import markdown
+from sphshell_pin.cases.machine import machine
 
 
 def main() -> None:
@@ -29,12 +19,11 @@ def main() -> None:
     rounds = 5 if parser.parse_args().quick else 25
     one_core()
     print(machine())
-    against_peers(rounds)
-    against_size(rounds)
+    queries = query.measure_peers(rounds), query.measure_sizes(rounds)
+    print(markdown(assemble(*queries, convergence.measure_cost(rounds), [], [])))
     building(max(1, rounds // 8), SHEETS[:1])
-    step_cost(2 * rounds)
-    ingredients(2 * rounds)
-    import_time(max(5, rounds // 2))
+    steps = step.measure_step(2 * rounds), step.measure_components(2 * rounds)
+    print(markdown(step.assemble(*steps, measure_import(max(5, rounds // 2)))))
 
 
 if __name__ == "__main__":

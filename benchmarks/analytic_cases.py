@@ -11,8 +11,16 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
-from sphshell_pin.benchmarks.work_precision_cases import Array, Case, decades, rectangle, steps
+from sphshell_pin.benchmarks.work_precision_cases import (
+    Array,
+    Case,
+    decades,
+    difference,
+    rectangle,
+    steps,
+)
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
 
@@ -26,26 +34,24 @@ class Exact:
 
     def error(self, integrator: Integrator, result: Result) -> float:
         """Return the largest length of a difference from the closed form at any row."""
-        pairs = zip(self.case.figures(result), self.figures(result.t), strict=True)
-        return max(float(np.linalg.norm(found - exact, axis=1).max()) for found, exact in pairs)
+        return difference(self.case.figures(result), self.figures(result.t))
 
 
-def settings(fixed: tuple[float, ...], tolerances: tuple[float, ...]) -> tuple[Integrator, ...]:
-    """Return every integrator, with the steps [s] or the exponents of its tolerance."""
-    kinds: tuple[Any, ...] = (sp.SemiImplicitEuler, sp.RungeKutta4, sp.LinearlyImplicitEuler)
-    made: list[Integrator] = [i for kind in kinds for i in steps(kind, *fixed)]
+def settings() -> tuple[Integrator, ...]:
+    """Return every integrator, with steps [s] or tolerances from coarse to fine."""
+    fixed: tuple[Any, ...] = (sp.SemiImplicitEuler, sp.RungeKutta4, sp.LinearlyImplicitEuler)
     adaptive: tuple[Any, ...] = (sp.Adaptive, sp.Implicit)
-    return (*made, *(i for kind in adaptive for i in decades(kind, *tolerances)))
+    dts = (1e-3, 4e-4, 2e-4, 1e-4, 4e-5, 2e-5, 1e-5)
+    return (
+        *(made for kind in fixed for made in steps(kind, *dts)),
+        *(made for kind in adaptive for made in decades(kind, *range(2, 11))),
+    )
 
 
 def ball_on_plate(law: sp.ImpactLaw, joint: Any, plate: float = 0.1) -> sp.Scene:
     """Return a ball on `joint` above the plate z = 0."""
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
-    index = model.addJoint(0, joint, pin.SE3.Identity(), "ball_joint")
-    model.appendBodyToJoint(index, pin.Inertia.FromSphere(MASS, RADIUS), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model)
+    ball = ("ball", joint, pin.Inertia.FromSphere(MASS, RADIUS))
+    scene = sp.Scene(model_of(ball, gravity=GRAVITY))
     scene.add_contact(sp.Sphere(RADIUS, "ball"), rectangle(plate, plate), law=law)
     return scene
 
@@ -60,16 +66,11 @@ def bob() -> Exact:
         title="Ball bobs on a spring",
         judged="error of height / amplitude, against a cosine",
         scene=ball_on_plate(sp.ImpactLaw(stiffness, 1.0), pin.JointModelPZ()),
-        controller=None,
         q0=np.array([RADIUS - sag + amplitude]),
-        v0=None,
         duration=0.1,
         record_dt=0.004,
         figures=lambda result: [(result.q - RADIUS + sag) / amplitude],
-        references=(),
-        integrators=settings(
-            (1e-3, 4e-4, 2e-4, 1e-4, 4e-5, 2e-5, 1e-5), (2, 3, 4, 5, 6, 7, 8, 9, 10)
-        ),
+        integrators=settings(),
         quick_dt=4e-5,
     )
     return Exact(case, lambda t: [np.cos(omega * t)[:, None]])
@@ -98,16 +99,11 @@ def bounces() -> Exact:
         title="Ball bounces five times",
         judged="error of height / fall, against parabolas and sines",
         scene=ball_on_plate(sp.ImpactLaw(stiffness, 1.0), pin.JointModelPZ()),
-        controller=None,
         q0=np.array([RADIUS + FALL]),
-        v0=None,
         duration=0.74,
         record_dt=0.02,
         figures=lambda result: [(result.q - RADIUS) / FALL],
-        references=(),
-        integrators=settings(
-            (1e-3, 4e-4, 2e-4, 1e-4, 4e-5, 2e-5, 1e-5), (2, 3, 4, 5, 6, 7, 8, 9, 10)
-        ),
+        integrators=settings(),
         quick_dt=4e-5,
     )
     return Exact(case, lambda t: [bounce_height(t, stiffness)[:, None] / FALL])
@@ -140,13 +136,11 @@ def glide() -> Exact:
         scene=ball_on_plate(law, pin.JointModelTranslation()),
         controller=sp.JointPD([SPRING, 0, 0], 0.0, np.zeros(3), gravity_compensation=False),
         q0=np.array([REACH, 0.0, RADIUS - sag - deeper]),
-        v0=None,
         duration=0.5,
         record_dt=0.02,
         figures=lambda result: [
             np.c_[result.q[:, :1] / REACH, result.q[:, 1:2], (RADIUS - result.q[:, 2:]) / sag]
         ],
-        references=(),
         integrators=(
             *steps(sp.SemiImplicitEuler, 4e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6),
             *steps(sp.RungeKutta4, 2e-5, 1e-5, 5e-6, 2e-6),

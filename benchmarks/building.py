@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.benchmarks.processes import OwnProcess
+from sphshell_pin.benchmarks.processes import OwnProcess, resident
 from sphshell_pin.benchmarks.surfaces import height, touching_centers, wavy_sheet
 
 Array = NDArray[np.float64]
@@ -28,13 +28,13 @@ THIS, GIVEN, LIBIGL = "this, curved contact", "this, normals given", "libigl AAB
 class Cost:
     """What building took: triangles, CPU time [s], bytes kept and at the highest, above the arrays.
 
-    Memory is 0 where it is unknown (elsewhere than on Linux).
+    Memory is NaN where it is unknown (elsewhere than on Linux).
     """
 
     triangles: int
     cpu: float
-    kept: int
-    peak: int
+    kept: float
+    peak: float
 
 
 def build_ours(vertices: Array, triangles: NDArray[np.int32], center: Array) -> object:
@@ -48,9 +48,9 @@ def build_with_normals(vertices: Array, triangles: NDArray[np.int32], center: Ar
     from sphshell_pin import Shell
 
     x, y, _ = vertices.T
-    slope_x = (height(x + 1e-6, y) - height(x - 1e-6, y)) / 2e-6
-    slope_y = (height(x, y + 1e-6) - height(x, y - 1e-6)) / 2e-6
-    normals = np.c_[-slope_x, -slope_y, np.ones(len(x))]
+    by_x = (height(x + 1e-6, y) - height(x - 1e-6, y)) / 2e-6
+    by_y = (height(x, y + 1e-6) - height(x, y - 1e-6)) / 2e-6
+    normals = np.c_[-by_x, -by_y, np.ones(len(x))]
     shell = Shell(vertices, triangles, normals)
     return shell, shell.contacts(center, RADIUS)
 
@@ -65,16 +65,6 @@ def build_libigl(vertices: Array, triangles: NDArray[np.int32], center: Array) -
 
 
 BUILDERS = {THIS: build_ours, GIVEN: build_with_normals, LIBIGL: build_libigl}
-
-
-def resident() -> tuple[int, int]:
-    """Return the memory of this process now and at its highest [bytes]; 0 where unknown."""
-    try:
-        text = Path("/proc/self/status").read_text()
-    except OSError:
-        return 0, 0
-    rows = dict(line.split(":", 1) for line in text.splitlines())
-    return 1024 * int(rows["VmRSS"].split()[0]), 1024 * int(rows["VmHWM"].split()[0])
 
 
 def forget_highest() -> None:

@@ -22,24 +22,28 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin import _core
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.cases.machine import machine
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "docs" / "examples" / "05_circle_with_5_newtons.py"
 Names = dict[str, Any]
+Array = NDArray[np.float64]
 
 
 def solve(names: Names) -> dict[str, Any]:
     """Solve the example's problem again, and measure where the time goes."""
     from sphshell_pin.adapters import crocoddyl as adapter
+    from sphshell_pin.adapters.evaluator import StepEvaluator
 
     core = Clock()
     everything = Clock()
-    evaluator = adapter.StepEvaluator
-    methods = [(evaluator, "calc", core), (evaluator, "calc_diff", core)]
+    methods: list[tuple[Any, str, Clock]]
+    methods = [(StepEvaluator, "calc", core), (StepEvaluator, "calc_diff", core)]
     methods += [(_core, f"{name}frame_into", core) for name in ("", "differentiate_")]
     for kind in (adapter.ContactStep, adapter.ContactForceResidual, adapter.FrameResidual):
         methods += [(kind, "calc", everything), (kind, "calcDiff", everything)]
@@ -136,16 +140,16 @@ def solve_rigid(names: Names, python: str, folder: Path) -> dict[str, Any]:
 
 def replay(names: Names, scene: sp.Scene, plan: dict[str, Any], feedback: bool) -> str:
     """Replay torques with small steps: the largest errors of force and place."""
-    model, dt, us = names["model"], names["dt"], plan["us"]
-    nq = model.nq
+    model, dt, nq = names["model"], names["dt"], names["model"].nq
+    us: Array = plan["us"]
 
-    def torques(t: float, q: np.ndarray, v: np.ndarray, contacts: object) -> np.ndarray:
+    def torques(t: float, q: Array, v: Array, contacts: object) -> Array:
         k = min(round(t / dt), len(us) - 1)
         if not feedback:
-            return us[k]
+            return np.asarray(us[k])
         wanted = plan["xs"][k]
         off = np.concatenate((pin.difference(model, wanted[:nq], q), v - wanted[nq:]))
-        return us[k] - plan["gains"][k] @ off
+        return np.asarray(us[k] - plan["gains"][k] @ off)
 
     result = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
         plan["xs"][0, :nq], plan["xs"][0, nq:], names["duration"], torques, dt, record_dt=dt

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import time
+from typing import Any
 
 import crocoddyl
 import example_robot_data
@@ -36,7 +37,7 @@ def main(problem_file: str, solution_file: str) -> None:
     def node(k: int) -> crocoddyl.ActionModelAbstract:
         costs = crocoddyl.CostModelSum(state)
 
-        def add(name, weight, residual, activation=None):
+        def add(name: str, weight: float, residual: Any, activation: Any = None) -> None:
             parts = (state, residual) if activation is None else (state, activation, residual)
             costs.addCost(name, crocoddyl.CostModelResidual(*parts), weight)
 

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.benchmarks.convergence import DEPTH, EXPONENT, RADIUS
-from sphshell_pin.benchmarks.surfaces import ball_places, icosphere
+from sphshell_pin.benchmarks.convergence import EXPONENT
+from sphshell_pin.benchmarks.surfaces import BALL, DEPTH, RADIUS, ball_places, icosphere
 
 Array = NDArray[np.float64]
-BALL = 4 * RADIUS  # radius of the dome [m]
 LEVEL = 4  # of the icosphere: its sides are 0.3 of the sphere's radius
 SHARES = (0.0, 0.002, 0.005, 0.01, 0.02, 0.05)  # of a side
 PLACES = 300

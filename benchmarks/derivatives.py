@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.step import panda, start_of, with_sheet
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
-from sphshell_pin.benchmarks.timing import machine, median_us, one_core, ratio, take_turns
+from sphshell_pin.benchmarks.timing import one_core, take_turns
+from sphshell_pin.cases.contents import times_table
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.testing.numbers import names_of
 
 Array = NDArray[np.float64]
@@ -89,11 +91,12 @@ def main() -> None:
         **own,
     }
     times = take_turns(contestants, ROUNDS)
-    aba = times[whole] - times[call]
-    print("Derivatives of the Panda's dynamics, fingertip on 199712 triangles, C++ unless said")
-    print(f"  {'pin.computeABADerivatives':40s} {median_us(aba)}")
-    for name in own:
-        print(f"  {name:40s} {median_us(times[name])}   {ratio(times[name], aba)} x")
+    shown = {"pin.computeABADerivatives": times[whole] - times[call]}
+    shown |= {name: times[name] for name in own}
+    caption = "Derivatives of the Panda's dynamics, fingertip on 199712 triangles, C++ unless said"
+    first, heading = "derivatives", "over_aba: over Pinocchio's"
+    print(f"{caption}\n")
+    print(times_table("", caption, first, shown, next(iter(shown)), heading).markdown())
 
 
 if __name__ == "__main__":

@@ -12,23 +12,16 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
-from sphshell_pin.benchmarks.timing import machine, median_us, one_core, ratio, take_turns
+from sphshell_pin.benchmarks.timing import one_core, take_turns
+from sphshell_pin.cases.contents import times_table
+from sphshell_pin.cases.machine import machine
 
 DT, STEPS, CELLS, RADIUS = 1e-8, 2000, 316, 0.012
 POINT = sp.ImpactLaw(1e6, 1.5)
 PAD = sp.FoundationLaw(1e7, 5e-3)
 FRICTION = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
-
-
-def heavy_ball() -> pin.Model:
-    """Return a free ball that no force moves noticeably."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(10.0, 1.0), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    model.gravity.setZero()
-    return model
 
 
 def runner(
@@ -39,7 +32,9 @@ def runner(
     method: str = "smooth",
 ) -> Callable[[], float]:
     """Seconds per step of a ball that creeps over the shell."""
-    scene = sp.Scene(heavy_ball())
+    # No force moves it noticeably.
+    heavy = ("ball", pin.JointModelFreeFlyer(), pin.Inertia.FromSphere(10.0, 1.0))
+    scene = sp.Scene(model_of(heavy))
     used = FRICTION if friction else None
     ball = sp.Sphere(RADIUS, "ball")
     scene.add_contact(sphere=ball, shell=shell, law=law, friction=used, method=method)
@@ -76,12 +71,14 @@ def main() -> None:
             bare = times.pop("nothing touched")
             side = size / CELLS / np.sqrt(2 * RADIUS * depth)
             print(
-                f"{len(shell.elements)} triangles, side / radius of the patch {side:.2f}, "
-                f"depth / radius {depth / RADIUS:.3f}"
+                f"\n{len(shell.elements)} triangles, side / radius of the patch {side:.2f}, "
+                f"depth / radius {depth / RADIUS:.3f}\n"
             )
-            for name, taken in times.items():
-                against = times["point, friction" if "friction" in name else "point"] - bare
-                print(f"  {name:24s} {median_us(taken - bare)}  {ratio(taken - bare, against)} x")
+            for friction in (False, True):
+                some = {n: t - bare for n, t in times.items() if ("friction" in n) == friction}
+                base = next(iter(some))
+                table = times_table("", "", "contact", some, base, f"over_point: over {base}")
+                print(table.markdown())
 
 
 if __name__ == "__main__":

@@ -8,8 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics.run.integrators import Integrator
 
 COUNT, RADIUS, APART = 8, 0.006, 0.012
@@ -28,12 +30,8 @@ def scene_of(
     count: int, shell: sp.Shell, friction: sp.BristleFriction | None, *, together: bool
 ) -> sp.Scene:
     """Return a free body with count * count spheres, added one by one or `together`."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "floats")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    model.addFrame(pin.Frame("pad", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    model.gravity.linear = np.zeros(3)
-    scene = sp.Scene(model)
+    body = ("pad", pin.JointModelFreeFlyer(), pin.Inertia.FromSphere(1.0, 0.1))
+    scene = sp.Scene(model_of(body))
     if together:
         scene.add_contacts(pad(count), shell, law=LAW, friction=friction)
     else:

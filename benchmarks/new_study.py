@@ -23,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.measured import Measured, write
+from sphshell_pin.cases.measured import Measured, write
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, judge
 from sphshell_pin.scenario.drafting.new import new_scenario
@@ -143,9 +143,10 @@ def link_inside(built: Built, q: np.ndarray) -> str:
     pin.updateGeometryPlacements(model, data, geometry, at, whole_posture(built, q))
     pin.updateFramePlacements(model, data)
     spheres = []
-    for one in built.scenario.contact:
-        pose = data.oMf[model.getFrameId(one.sphere.frame)]
-        spheres.append((pose.act(np.array(one.sphere.offset)), one.sphere.radius))
+    for contact in built.scenario.contact:
+        if (sphere := contact.sphere) is not None:
+            pose = data.oMf[model.getFrameId(sphere.frame)]
+            spheres.append((pose.act(np.array(sphere.offset)), sphere.radius))
     part = to_se3(section.placement)
     for one, pose in zip(geometry.geometryObjects, at.oMg, strict=True):
         if not isinstance(one.geometry, coal.BVHModelBase):

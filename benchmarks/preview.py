@@ -14,15 +14,17 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
-from sphshell_pin.benchmarks.timing import machine
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.live import Live
 from sphshell_pin.view.live.server import Server
 
+Counter = Any  # multiprocessing.Value: a class to typeshed, a function when it runs
 GREETING = (
     "GET /socket?token={token} HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n"
     "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
@@ -30,7 +32,7 @@ GREETING = (
 )
 
 
-def fast_browser(port: int, token: str, count: multiprocessing.Value) -> None:
+def fast_browser(port: int, token: str, count: Counter) -> None:
     """Take every frame, and ask for the next at once; in a process of its own."""
     import asyncio
     import json
@@ -49,7 +51,7 @@ def fast_browser(port: int, token: str, count: multiprocessing.Value) -> None:
 
 
 @contextmanager
-def audience(server: Server, kinds: tuple[str, ...]) -> Iterator[multiprocessing.Value]:
+def audience(server: Server, kinds: tuple[str, ...]) -> Iterator[Counter]:
     """Let browsers of these kinds, "fast" and "deaf", look on; yield what the fast one counts."""
     count = multiprocessing.Value("q", 0)
     port, token = server.port, server.access.token

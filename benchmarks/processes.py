@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-P, T = ParamSpec("P"), TypeVar("T")
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class ProcessLost(Exception):
@@ -18,8 +21,8 @@ class ProcessLost(Exception):
 class OwnProcess:
     """A fresh interpreter that calls functions of modules; it starts anew after it was lost."""
 
-    def __init__(self, begin: Callable[..., object] | None = None, *arguments: object) -> None:
-        self._begin = begin, arguments
+    def __init__(self, begin: Callable[[], object] | None = None) -> None:
+        self._begin = begin
         self._pool: ProcessPoolExecutor | None = None
 
     def call(
@@ -30,9 +33,8 @@ class OwnProcess:
         Raises ProcessLost, too.
         """
         if self._pool is None:
-            begin, arguments = self._begin
             context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, context, begin, arguments)
+            self._pool = ProcessPoolExecutor(1, context, self._begin)
         try:
             return self._pool.submit(function, *args, **named).result(timeout)
         except BrokenProcessPool:
@@ -53,3 +55,13 @@ class OwnProcess:
                 process.kill()
             self._pool.shutdown(wait=True, cancel_futures=True)
             self._pool = None
+
+
+def resident() -> tuple[float, float]:
+    """Return the memory of this process now and at its highest [bytes]; NaN where unknown."""
+    try:
+        text = Path("/proc/self/status").read_text(encoding="ascii")
+    except OSError:
+        return math.nan, math.nan
+    rows = dict(line.split(":", 1) for line in text.splitlines())
+    return 1024 * float(rows["VmRSS"].split()[0]), 1024 * float(rows["VmHWM"].split()[0])

@@ -11,21 +11,29 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Shell
 from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
-from sphshell_pin.benchmarks.timing import Progress, median_us, ratio, silent, take_turns
+from sphshell_pin.benchmarks.timing import silent, take_turns
+from sphshell_pin.cases.contents import Progress
 
 Array = NDArray[np.float64]
 RADIUS, DEPTH = 0.010, 0.0005
 
 
-def query_contestant(shell: Shell, centers: Array, method: str = "smooth") -> Callable[[], float]:
-    radii = np.full(len(centers), RADIUS)
+def per_center(ask: Callable[[], object], centers: Array) -> Callable[[], float]:
+    """Return what asks of all centers and returns the seconds of one of them."""
 
     def run() -> float:
         start = time.perf_counter()
-        shell.contacts_batch(centers, radii, method=method, threads=1)
+        ask()
         return (time.perf_counter() - start) / len(centers)
 
     return run
+
+
+def query_contestant(shell: Shell, centers: Array, method: str = "smooth") -> Callable[[], float]:
+    radii = np.full(len(centers), RADIUS)
+    return per_center(
+        lambda: shell.contacts_batch(centers, radii, method=method, threads=1), centers
+    )
 
 
 def coal_tree(vertices: Array, triangles: NDArray[np.int32]) -> coal.BVHModelOBBRSS:
@@ -46,15 +54,13 @@ def coal_contestant(
     request = coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, 1_000_000)
     result, there, place = coal.CollisionResult(), coal.Transform3s(), coal.Transform3s()
 
-    def run() -> float:
-        start = time.perf_counter()
+    def ask() -> None:
         for center in centers:
             place.setTranslation(center)
             result.clear()
             coal.collide(sphere, place, tree, there, request, result)
-        return (time.perf_counter() - start) / len(centers)
 
-    return run
+    return per_center(ask, centers)
 
 
 def libigl_contestant(
@@ -68,12 +74,7 @@ def libigl_contestant(
     corners = triangles.astype(np.int64)
     tree.init(vertices, corners)
 
-    def run() -> float:
-        start = time.perf_counter()
-        tree.squared_distance(vertices, corners, centers)
-        return (time.perf_counter() - start) / len(centers)
-
-    return run
+    return per_center(lambda: tree.squared_distance(vertices, corners, centers), centers)
 
 
 def fcpw_contestant(
@@ -91,13 +92,10 @@ def fcpw_contestant(
     points = np.asfortranarray(centers, dtype=np.float32)
     reach = np.full(len(centers), RADIUS**2, dtype=np.float32)
 
-    def run() -> float:
-        found = fcpw.interaction_3D_list()
-        start = time.perf_counter()
-        scene.find_closest_points(points, reach, found)
-        return (time.perf_counter() - start) / len(centers)
+    def ask() -> None:
+        scene.find_closest_points(points, reach, fcpw.interaction_3D_list())
 
-    return run
+    return per_center(ask, centers)
 
 
 THIS, FACETS, COAL = "this", "this, method facets", "coal::collide, all contacts"
@@ -126,17 +124,6 @@ def measure_peers(rounds: int, progress: Progress = silent) -> dict[str, Array]:
     return take_turns(contestants, rounds, progress)
 
 
-def against_peers(rounds: int) -> None:
-    """200 k triangles: all contacts of a touching sphere at cold, random positions."""
-    times = measure_peers(rounds)
-    print("Query, 199712 triangles, r = 10 mm, depth 0.5 mm, cold random positions")
-    for name, t in times.items():
-        print(f"  {name:40s} {median_us(t)}   {ratio(t, times[THIS])} x")
-    for name in (LIBIGL, FCPW):
-        if name not in times:
-            print(f"  {name:40s} not installed (pip install 'sphshell-pin[bench]')")
-
-
 SHEETS = ((32, 0.1), (100, 0.316), (316, 1.0), (1000, 3.16))  # cells along a side, side [m]
 
 
@@ -150,12 +137,3 @@ def measure_sizes(
         centers = touching_centers(20_000, size, RADIUS, DEPTH)
         contestants[str(shell.num_elements)] = query_contestant(shell, centers)
     return {int(n): t for n, t in take_turns(contestants, rounds, progress).items()}
-
-
-def against_size(rounds: int) -> None:
-    """Print the same contact patch on sheets of 2 k to 2 M triangles."""
-    times = measure_sizes(rounds)
-    smallest = next(iter(times.values()))
-    print("Query at equal contact patch")
-    for count, t in times.items():
-        print(f"  {f'{count:8d} triangles':40s} {median_us(t)}   {ratio(t, smallest)} x")

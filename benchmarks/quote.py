@@ -13,9 +13,11 @@ import json
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 from sphshell_pin.atomic import atomic_file
 
+Data = dict[str, Any]
 ROOT = Path(__file__).parent.parent
 PAGE = "README.md"
 DATA = "docs/measured/report.json"
@@ -32,7 +34,7 @@ SUMMARY = (
 )
 
 
-def blocks_of(data: dict) -> dict[str, str]:
+def blocks_of(data: Data) -> dict[str, str]:
     """Return every block by its name, from a report.json: tables, findings, machine."""
     tables = {name: text for one in data["sections"] for name, text in one["tables"].items()}
     found = {f["key"]: f["row"] for one in data["sections"] for f in one["findings"]}
@@ -86,9 +88,9 @@ def quoted(text: str, blocks: dict[str, str]) -> str:
     return BLOCK.sub(block, text)
 
 
-def read(path: Path) -> dict:
+def read(path: Path) -> Data:
     """Return the data of a report; raise ValueError where a section was not measured."""
-    data = json.loads(path.read_text(encoding="utf-8"))
+    data: Data = json.loads(path.read_text(encoding="utf-8"))
     for section in data["sections"]:
         if section["error"]:
             raise ValueError(f"section {section['title']!r} was not measured: {section['error']}")

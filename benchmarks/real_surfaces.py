@@ -22,7 +22,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin import Adaptive, ImpactLaw, JointPD, Scene, Shell, Simulation, Sphere
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.models import model_of
+from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError
 from sphshell_pin.shell.contact_set import ContactSet
@@ -231,13 +233,8 @@ class Run:
 
     def simulate(self, shell: Shell, method: str, seconds: float, rtol: float = RTOL) -> Result:
         """Run; Interrupted, with what was computed, after so many seconds of computing."""
-        model = pin.Model()
-        model.gravity.linear = np.zeros(3)
-        joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball_joint")
         inertia = pin.Inertia.FromSphere(1.0, self.radius)
-        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-        model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-        scene = Scene(model)
+        scene = Scene(model_of(("ball", pin.JointModelTranslation(), inertia)))
         law, there = ImpactLaw(self.stiffness, 1.5), pin.SE3(np.eye(3), -self.start)
         sphere = Sphere(self.radius, "ball")
         scene.add_contact(sphere, shell, "universe", there, law=law, method=method)
@@ -386,7 +383,7 @@ def main() -> None:
     if options.only:
         files = [path for path in files if path.name in options.only]
     one_core()
-    print(machine().partition(";")[0])
+    print(machine())
     if options.walks:
         walk_all(files, options.walks)
     for method in options.methods if options.runs else []:

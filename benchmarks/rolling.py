@@ -23,6 +23,7 @@ from sphshell_pin import (
     Simulation,
     Sphere,
 )
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.swing import GRAVITY, mean_period
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.dynamics import Result
@@ -60,14 +61,12 @@ class Ball:
         moved = 2 / 7 * self.mass if mass is None else mass
         return BristleFriction(mu, mu, stiffness, 2 * RATIO * math.sqrt(stiffness * moved))
 
-    def model(self, gravity: float = GRAVITY) -> pin.Model:
-        """Return the ball alone; the frame "ball" is at its center."""
-        model = pin.Model()
-        model.gravity.linear = np.array([0.0, 0.0, -gravity])
-        _add(
-            model, "ball", pin.JointModelFreeFlyer(), pin.Inertia.FromSphere(self.mass, self.radius)
-        )
-        return model
+    def model(
+        self, *others: tuple[str, pin.JointModel, pin.Inertia], gravity: float = GRAVITY
+    ) -> pin.Model:
+        """Return the ball, and `others` beside it; the frame "ball" is at its center."""
+        inertia = pin.Inertia.FromSphere(self.mass, self.radius)
+        return model_of(("ball", pin.JointModelFreeFlyer(), inertia), *others, gravity=gravity)
 
     def scene(
         self,
@@ -134,9 +133,8 @@ def on_turntable(
     law = ball.spring(stiffness)
     depth = law.depth_at(ball.mass * GRAVITY)
     b = ball.beta(depth)
-    model = ball.model()
     heavy = pin.Inertia(1.0, np.zeros(3), TABLE_INERTIA * np.eye(3))
-    _add(model, "table", pin.JointModelRUBZ(), heavy)
+    model = ball.model(("table", pin.JointModelRUBZ(), heavy))
     scene = ball.scene(shell, law, ball.bristle(mu, bristles), model=model, frame="table")
     center, along = np.array([*place, ball.radius - depth]), np.array([*velocity, 0.0])
     slip = along - turn * np.cross(UP, center)
@@ -250,10 +248,3 @@ def swing_period(angle: float, length: float) -> float:
     while abs(a - c) > 1e-15:
         a, c = (a + c) / 2, math.sqrt(a * c)
     return 2 * math.pi / a * math.sqrt(length / GRAVITY)
-
-
-def _add(model: pin.Model, name: str, joint: pin.JointModel, inertia: pin.Inertia) -> None:
-    index = model.addJoint(0, joint, pin.SE3.Identity(), f"{name}_joint")
-    model.addJointFrame(index)
-    model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
-    model.addFrame(pin.Frame(name, index, pin.SE3.Identity(), pin.FrameType.OP_FRAME))

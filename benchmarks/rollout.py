@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import resource
 
 import numpy as np
 
 import sphshell_pin as sp
 from sphshell_pin import robots, scenarios
+from sphshell_pin.benchmarks.processes import resident
 from sphshell_pin.dynamics import Rollout
 
 RADIUS = 0.012
@@ -37,11 +37,6 @@ def drops(runs: int, seconds: float, threads: int) -> Rollout:
     return sp.Simulation(scene, sp.Adaptive()).rollout(q0s, None, seconds, threads, vary=vary)
 
 
-def memory() -> float:
-    """Return the largest memory this process has had [MB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.rollout", description=__doc__)
@@ -51,12 +46,12 @@ def main() -> None:
     options = parser.parse_args()
     cores = os.cpu_count() or 1
     drops(options.runs // 10, options.seconds, cores)
-    before = memory()
+    before = resident()[1] / 1e6
     all_runs = drops(options.runs, options.seconds, cores)
     print(
         f"{options.runs} drops of {options.seconds} s, {cores} threads: "
         f"{all_runs.wall_time:.0f} s, {len(all_runs.failures)} failed; memory at most "
-        f"{memory():.0f} MB, after a tenth of them "
+        f"{resident()[1] / 1e6:.0f} MB, after a tenth of them "
         f"{before:.0f} MB"
     )
     ratios = []

@@ -2,14 +2,12 @@
 
 Each contestant runs in a process of its own, so that its memory can be measured; all on one core,
 asked in turn to time their queries. One that gets too slow or too big is left out of larger
-sheets. `python -m benchmarks.sizes` prints the table.
+sheets.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,17 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.benchmarks.processes import OwnProcess
+from sphshell_pin.benchmarks.processes import OwnProcess, resident
 from sphshell_pin.benchmarks.query import (
     DEPTH,
     RADIUS,
     coal_contestant,
     fcpw_contestant,
     libigl_contestant,
+    per_center,
     query_contestant,
 )
 from sphshell_pin.benchmarks.surfaces import Array, touching_centers, wavy_sheet
-from sphshell_pin.benchmarks.timing import Progress, Spread, machine, one_core, silent
+from sphshell_pin.benchmarks.timing import silent
+from sphshell_pin.cases.contents import Progress, Spread
 
 # Cells along a side of the sheet, at equal size of the cells: 968 to 5 M triangles.
 CELLS = (22, 32, 100, 316, 1000, 1581)
@@ -65,15 +65,6 @@ class Row:
     memory: float
 
 
-def resident() -> float:
-    """Return the memory that this process holds [bytes]; NaN where it is unknown."""
-    try:
-        with open("/proc/self/statm", encoding="ascii") as file:
-            return float(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except OSError:
-        return float("nan")
-
-
 def available() -> float:
     """Return the memory that is free for programs [bytes]; infinity where it is unknown."""
     try:
@@ -90,13 +81,8 @@ def trimesh_contestant(vertices: Array, triangles: Any, centers: Array) -> Calla
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, triangles, process=False)
-
-    def run() -> float:
-        start = time.perf_counter()
-        trimesh.proximity.closest_point(mesh, centers)
-        return (time.perf_counter() - start) / len(centers)
-
-    return run
+    closest: Any = trimesh.proximity.closest_point
+    return per_center(lambda: closest(mesh, centers), centers)
 
 
 def contestant(name: str, vertices: Array, triangles: Any, centers: Array) -> Callable[[], float]:
@@ -124,11 +110,11 @@ def build(name: str, cells: int) -> tuple[float, float]:
     vertices, triangles = wavy_sheet(cells, size)
     centers = touching_centers(QUERIES.get(name, 20_000), size, RADIUS, DEPTH)
     contestant(name, *wavy_sheet(4, 4 * SIDE), centers[:1])()  # imports what it needs
-    before, start = resident(), time.perf_counter()
+    (before, _), start = resident(), time.perf_counter()
     run = contestant(name, vertices, triangles, centers)
     if name != COAL:
         run()  # some build at the first query
-    cost = time.perf_counter() - start, resident() - before
+    cost = time.perf_counter() - start, resident()[0] - before
     _served[:] = [run]
     return cost
 
@@ -226,26 +212,3 @@ def measure_one(names: list[str], cells: int, rounds: int, notes: list[str]) -> 
         )
         for name in names
     ]
-
-
-def main() -> None:
-    """Measure and print the table."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.sizes", description=(__doc__ or "").partition("\n")[0]
-    )
-    parser.add_argument("--quick", action="store_true", help="up to 200 k triangles")
-    options = parser.parse_args()
-    one_core()
-    print(machine())
-    rows, notes = measure(QUICK_CELLS if options.quick else CELLS)
-    for row in rows:
-        print(
-            f"  {row.name:14s} {row.question:32s} {row.triangles:8d}  "
-            f"{row.query.median * 1e6:10.3f} us [{row.query.low * 1e6:.3f}, "
-            f"{row.query.high * 1e6:.3f}]  build {row.build:7.3f} s  {row.memory / 1e6:8.1f} MB"
-        )
-    print(*notes, sep="\n")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,11 @@
-"""Cost of one simulation step of a Panda with a fingertip on 200 k triangles."""
+"""What a step of a Panda with a fingertip on 200 k triangles costs, by its parts.
+
+Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
+triangles, forces, losses and figures of every pair included, against Pinocchio's ABA and integrate
+alone, in a compiled loop. The parts are differences: stepping is what a scene without contact takes
+beyond ABA (continuous collision detection, the energy audit, summaries), contact is what the
+touching sphere adds (kinematics, query, law and wrench).
+"""
 
 from __future__ import annotations
 
@@ -13,9 +20,23 @@ from numpy.typing import NDArray
 import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
-from sphshell_pin.benchmarks.timing import Progress, median_us, ratio, silent, take_turns
+from sphshell_pin.benchmarks.timing import measure_import, part, silent, take_turns
+from sphshell_pin.cases import drawing
+from sphshell_pin.cases.contents import (
+    TIME_COLUMNS,
+    Finding,
+    Picture,
+    Progress,
+    Section,
+    Spread,
+    Table,
+    about,
+    columns,
+    times_table,
+)
 
 Array = NDArray[np.float64]
+Times = dict[str, Array]
 DT, STEPS, RADIUS = 1e-5, 5000, 0.012
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 START = np.array([0, 0.35, 0, -2.0, 0, 2.35, 0.8])
@@ -94,7 +115,7 @@ TOUCHING = "touching, damping and friction"
 CONTROL_FREE, CONTROL_TOUCHING = "joint PD + gravity, no contact", "joint PD + gravity, touching"
 
 
-def measure_step(rounds: int, progress: Progress = silent) -> dict[str, Array]:
+def measure_step(rounds: int, progress: Progress = silent) -> Times:
     """Return the times of a step [s], by what the scene holds."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
     pd = sp.JointPD(100.0, 10.0)
@@ -112,20 +133,7 @@ def measure_step(rounds: int, progress: Progress = silent) -> dict[str, Array]:
     )
 
 
-def step_cost(rounds: int) -> None:
-    """Print whole step against bare ABA + integrate, and touching against free with control."""
-    times = measure_step(rounds)
-    print("Step, Panda and fingertip on 199712 triangles, against ABA + integrate")
-    for name, t in times.items():
-        print(f"  {name:40s} {median_us(t)}   {ratio(t, times[BARE])} x")
-    share = ratio(times[CONTROL_TOUCHING], times[CONTROL_FREE])
-    print(f"  {'with control: touching / no contact':40s} {'':12s}   {share} x")
-
-
-PARTS = ("aba", "stepping", "contact")
-
-
-def parts_of(times: dict[str, Array]) -> dict[str, dict[str, Array]]:
+def parts_of(times: Times) -> dict[str, Times]:
     """Return the parts of a step [s] from the times of `measure_step`, by scene.
 
     "aba": ABA and integrate; "stepping": what a scene without contact takes beyond them; "contact":
@@ -159,8 +167,8 @@ def with_moving_sheet(shell: sp.Shell) -> sp.Scene:
     return scene
 
 
-def measure_ingredients(rounds: int, progress: Progress = silent) -> dict[str, Array]:
-    """Return the times of a step [s] of scenes that differ by one ingredient."""
+def measure_components(rounds: int, progress: Progress = silent) -> Times:
+    """Return the times of a step [s] of scenes that differ by one component."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
 
     def touching(**settings: Any) -> sp.Scene:
@@ -195,11 +203,137 @@ def measure_ingredients(rounds: int, progress: Progress = silent) -> dict[str, A
     )
 
 
-def ingredients(rounds: int) -> None:
-    """Print what each ingredient of a scene adds to the step."""
-    times = measure_ingredients(rounds)
-    base = times["no contact"]
-    print("What an ingredient adds to the step")
-    for name, t in times.items():
-        added = np.median(t - base) * 1e6
-        print(f"  {name:40s} {median_us(t)}   {added:+9.3f} us")
+KEY, TITLE = "steps", "Cost of a step"
+PARTS = {
+    "aba": ("ABA and integrate", drawing.GREY),
+    "stepping": ("stepping", drawing.BLUE),
+    "contact": ("contact", drawing.ORANGE),
+}
+TEXT = about(__doc__)
+
+
+def section(*, quick: bool, progress: Progress) -> Section:
+    """Measure and return the section."""
+    rounds = 8 if quick else 50
+    steps = measure_step(rounds, part(progress, 0.0, 0.6))
+    added = measure_components(rounds // 2, part(progress, 0.6, 0.9))
+    imports = measure_import(5 if quick else 15, part(progress, 0.9, 1.0))
+    return assemble(steps, added, imports)
+
+
+def assemble(steps: Times, added: Times, imports: Times) -> Section:
+    """Return the section of what was measured."""
+    parts = parts_of(steps)
+    bare, control = steps[BARE], steps[CONTROL_TOUCHING]
+    return Section(
+        KEY,
+        TITLE,
+        TEXT,
+        findings=[
+            Finding.of_rounds(
+                "step_touching",
+                "Panda and fingertip touching 200 k triangles: whole step / bare ABA + integrate",
+                steps[TOUCHING] / bare,
+                aim=1.8,
+                headline=True,
+            ),
+            Finding.of_rounds("step_far", "the same with the sphere far away", steps[FAR] / bare),
+            Finding.of_rounds(
+                "step_control",
+                "Panda with joint PD and gravity compensation: step touching / without any contact",
+                control / steps[CONTROL_FREE],
+                aim=1.35,
+                headline=True,
+            ),
+            Finding.of_rounds(
+                "import",
+                "import sphshell_pin / import pinocchio, whole interpreter",
+                imports["sphshell_pin"] / imports["pinocchio"],
+                aim=1.2,
+            ),
+        ],
+        pictures=[picture(parts)],
+        tables=[
+            times_table(
+                "steps",
+                "Whole steps, in turn in one process.",
+                "scene",
+                steps,
+                BARE,
+                "over_bare: over ABA + integrate",
+            ),
+            parts_table(parts),
+            components_table(added),
+        ],
+    )
+
+
+def parts_table(parts: dict[str, Times]) -> Table:
+    """Return the medians of the parts."""
+    return Table(
+        "steps_parts",
+        "Parts of a step, medians.",
+        columns(
+            "scene",
+            *(f"{key}_s: {name} [us]" for key, (name, _) in PARTS.items()),
+            "whole_s: whole [us]",
+        ),
+        [
+            (
+                name,
+                *(float(np.median(times[key])) for key in PARTS),
+                float(np.median(sum(times.values()))),
+            )
+            for name, times in parts.items()
+        ],
+    )
+
+
+def components_table(added: Times) -> Table:
+    """Return what each component of a scene adds."""
+    base = added["no contact"]
+    return Table(
+        "steps_components",
+        "What a component adds to the step; a scene without it does not pay.",
+        columns("scene", TIME_COLUMNS, "added_s: added [us]"),
+        [(name, *Spread.of(t), float(np.median(t - base))) for name, t in added.items()],
+    )
+
+
+def picture(parts: dict[str, Times]) -> Picture:
+    """Draw the parts of each scene's step as a bar, and the bare dynamics as a line."""
+    with drawing.canvas(7.8, 0.62 * len(parts) + 1.15) as figure:
+        axis = figure.subplots()
+        rows = np.arange(len(parts))
+        left = np.zeros(len(parts))
+        for key, (label, color) in PARTS.items():
+            widths = [max(float(np.median(times[key])) * 1e6, 0.0) for times in parts.values()]
+            bars = axis.barh(
+                rows, widths, 0.62, left=left, color=color, edgecolor=drawing.PAPER, label=label
+            )
+            texts = [f"{width:.2f}" if width > 0.2 else "" for width in widths]
+            axis.bar_label(
+                bars, texts, label_type="center", color=drawing.PAPER, fontsize=drawing.SMALL
+            )
+            left += widths
+        axis.bar_label(
+            bars, [f"{whole:.2f} us" for whole in left], padding=4, fontsize=drawing.TEXT
+        )
+        bare = float(np.median(next(iter(parts.values()))["aba"])) * 1e6
+        axis.axvline(bare, color=drawing.INK, linewidth=1.0, linestyle=drawing.DASHED)
+        axis.set_yticks(rows, list(parts))
+        axis.invert_yaxis()
+        axis.tick_params(axis="y", length=0)
+        axis.spines["left"].set_visible(False)
+        axis.set_xlabel("time of a step [us]; dashed: ABA and integrate alone")
+        axis.margins(x=0.1)
+        figure.legend(
+            loc="outside upper center", ncols=len(PARTS), frameon=False, fontsize=drawing.SMALL
+        )
+        png = drawing.png_of(figure)
+    return Picture(
+        "steps",
+        png,
+        "Bars of the parts of a step for three scenes, and the time of the bare dynamics.",
+        "Medians of the parts of a step; dashed: ABA and integrate alone.",
+    )

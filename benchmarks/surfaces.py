@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -32,11 +33,12 @@ def touching_centers(count: int, size: float, radius: float, depth: float) -> Ar
     """Return random centers (count, 3) of spheres at about `depth` in the sheet."""
     xy = np.random.default_rng(0).uniform(-0.45 * size, 0.45 * size, (count, 2))
     x, y = xy.T
-    slope_x = AMPLITUDE * WAVE_X * np.cos(WAVE_X * x) * np.cos(WAVE_Y * y)
-    slope_y = -AMPLITUDE * WAVE_Y * np.sin(WAVE_X * x) * np.sin(WAVE_Y * y)
-    normal = np.c_[-slope_x, -slope_y, np.ones(count)]
+    by_x = AMPLITUDE * WAVE_X * np.cos(WAVE_X * x) * np.cos(WAVE_Y * y)
+    by_y = -AMPLITUDE * WAVE_Y * np.sin(WAVE_X * x) * np.sin(WAVE_Y * y)
+    normal = np.c_[-by_x, -by_y, np.ones(count)]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    return np.c_[xy, height(x, y)] + normal * (radius - depth)
+    centers: Array = np.c_[xy, height(x, y)] + normal * (radius - depth)
+    return centers
 
 
 @dataclass(frozen=True)
@@ -110,10 +112,7 @@ def torus(ring: float, tube: float, side: float) -> Mesh:
     a, b = i * columns + j, next_i * columns + j
     c, d = next_i * columns + next_j, i * columns + next_j
     first = rng.random(len(a)) < 0.5
-    halves = (
-        np.where(first, [a, b, c], [a, b, d]),
-        np.where(first, [a, c, d], [b, c, d]),
-    )
+    halves = (np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d]))
     triangles = np.concatenate([half.T for half in halves]).astype(np.int32)
     return Mesh(vertices, triangles, normals)
 
@@ -157,3 +156,72 @@ def plate(side: float, half: float) -> Mesh:
     x, y, triangles = random_grid(max(3, round(1.15 * 2 * half / side)), half)
     up = np.tile([0.0, 0.0, 1.0], (len(x), 1))
     return Mesh(np.c_[x, y, np.zeros(len(x))], triangles, up)
+
+
+# Surfaces with exact normals, from coarse to fine, under a sphere of RADIUS that lies DEPTH deep.
+RADIUS = 0.010  # of the touching sphere [m]
+DEPTH = 0.04 * RADIUS
+BALL = 4 * RADIUS
+RING, TUBE = 6 * RADIUS, 3 * RADIUS
+PLATE = 6 * RADIUS  # half the side of the flat plate
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Meshes from coarse to fine, random places with outward normals, and where the sphere is."""
+
+    meshes: Callable[[], list[Mesh]]
+    places: Callable[[np.random.Generator, int], tuple[Array, Array]]
+    inside: bool
+
+    def touching(self, seed: int, count: int) -> tuple[Array, Array]:
+        """Return centers (count, 3) of spheres DEPTH deep, and the exact unit forces (count, 3)."""
+        points, outward = self.places(np.random.default_rng(seed), count)
+        normals = -outward if self.inside else outward
+        return points + (RADIUS - DEPTH) * normals, normals
+
+
+def on_ball(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    return ball_places(BALL, rng, count)
+
+
+def torus_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, count)))
+
+
+def sheet_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    clear = SHEET - 1.3  # of the borders
+    points, normals = on_sheet(*rng.uniform(-clear, clear, (2, count)))
+    return RADIUS * points, normals
+
+
+def plate_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    clear = PLATE - 1.3 * RADIUS
+    xy = rng.uniform(-clear, clear, (count, 2))
+    return np.c_[xy, np.zeros(count)], np.tile([0.0, 0.0, 1.0], (count, 1))
+
+
+def balls() -> list[Mesh]:
+    return [icosphere(level, BALL) for level in (2, 3, 4, 5, 6)]
+
+
+def tori() -> list[Mesh]:
+    return [torus(RING, TUBE, side * RADIUS) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
+
+
+def sheets() -> list[Mesh]:
+    meshes = [sheet(side) for side in (1.2, 0.6, 0.3, 0.15, 0.075)]
+    return [Mesh(RADIUS * m.vertices, m.triangles, m.normals) for m in meshes]
+
+
+def plates() -> list[Mesh]:
+    return [plate(side * RADIUS, PLATE) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
+
+
+SURFACES = {
+    "bowl": Surface(balls, on_ball, inside=True),
+    "dome": Surface(balls, on_ball, inside=False),
+    "torus": Surface(tori, torus_places, inside=True),
+    "wavy sheet": Surface(sheets, sheet_places, inside=False),
+    "flat plate": Surface(plates, plate_places, inside=False),
+}

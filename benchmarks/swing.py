@@ -10,19 +10,18 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.cases.contents import Table, columns
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics import Result
-
-if TYPE_CHECKING:
-    from sphshell_pin.study.report.contents import Table
 
 Array = NDArray[np.float64]
 RADIUS, BOWL = 0.010, 0.040  # of the ball and of the bowl [m]
@@ -86,13 +85,8 @@ def ellipsoid(level: int, jitter: float = 0.2, seed: int = 3) -> Mesh:
 
 def ball_model() -> pin.Model:
     """Return the ball on a joint that moves along x, y, z: nothing turns it without friction."""
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball_joint")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(MASS, RADIUS), pin.SE3.Identity())
-    frame = pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
-    model.addFrame(frame)
-    return model
+    inertia = pin.Inertia.FromSphere(MASS, RADIUS)
+    return model_of(("ball", pin.JointModelTranslation(), inertia), gravity=GRAVITY)
 
 
 def mesh_scene(mesh: Mesh, method: str = "smooth", exact_normals: bool = True) -> Scene:
@@ -134,8 +128,8 @@ def downward_crossings(t: Array, x: Array, v: Array) -> Array:
     for _ in range(8):  # Newton's method, from the chord
         cubic = 2 * a + va - 2 * b + vb, -3 * a - 2 * va + 3 * b - vb, va, a
         value = ((cubic[0] * share + cubic[1]) * share + cubic[2]) * share + cubic[3]
-        slope = (3 * cubic[0] * share + 2 * cubic[1]) * share + cubic[2]
-        share = share - value / slope
+        derivative = (3 * cubic[0] * share + 2 * cubic[1]) * share + cubic[2]
+        share = share - value / derivative
     crossings: Array = t[rows] + share * step
     return crossings
 
@@ -160,7 +154,7 @@ def reference_period(dt: float = 2e-5, periods: int = PERIODS) -> float:
     """
     pull, stretch = STIFFNESS / MASS, ARM
 
-    def slope(x: float, z: float, vx: float, vz: float) -> tuple[float, float, float, float]:
+    def rates(x: float, z: float, vx: float, vz: float) -> tuple[float, float, float, float]:
         reach = math.sqrt(x * x + z * z)
         back = pull * max(0.0, reach - stretch) / reach
         return vx, vz, -back * x, -back * z - GRAVITY
@@ -172,11 +166,11 @@ def reference_period(dt: float = 2e-5, periods: int = PERIODS) -> float:
     for i in range(count + 1):
         x, z, vx, vz = state
         rows[i] = x, vx
-        a = slope(x, z, vx, vz)
+        a = rates(x, z, vx, vz)
         h = 0.5 * dt
-        b = slope(x + h * a[0], z + h * a[1], vx + h * a[2], vz + h * a[3])
-        c = slope(x + h * b[0], z + h * b[1], vx + h * b[2], vz + h * b[3])
-        d = slope(x + dt * c[0], z + dt * c[1], vx + dt * c[2], vz + dt * c[3])
+        b = rates(x + h * a[0], z + h * a[1], vx + h * a[2], vz + h * a[3])
+        c = rates(x + h * b[0], z + h * b[1], vx + h * b[2], vz + h * b[3])
+        d = rates(x + dt * c[0], z + dt * c[1], vx + dt * c[2], vz + dt * c[3])
         w = dt / 6
         state = (
             x + w * (a[0] + 2 * (b[0] + c[0]) + d[0]),
@@ -275,11 +269,11 @@ def ellipsoid_energy(scene: Scene, azimuth: float, swings: int) -> float:
 
 def table(period: float) -> Table:
     """Return errors of period and energy for meshes, normals and methods."""
-    from sphshell_pin.study.report.contents import Table, columns  # the report measures swings
-
     rows = []
 
-    def add(name: str, scene: Scene, count: int, dt: float, runs: int, periods: int = PERIODS):
+    def add(
+        name: str, scene: Scene, count: int, dt: float, runs: int, periods: int = PERIODS
+    ) -> None:
         row = measure(scene, period, AZIMUTHS[:runs], dt, periods)
         rows.append(
             (name, count, dt * 1e3, runs, row.rms, row.mean, row.largest, row.energy, row.cpu)
@@ -313,8 +307,6 @@ def table(period: float) -> Table:
 
 def long_table() -> Table:
     """Return the largest energy errors of 200 swings, and of 20 in an uneven ellipsoid."""
-    from sphshell_pin.study.report.contents import Table, columns
-
     changes = energy_changes(long_run(mesh_scene(bowl(0.3)), start(float(AZIMUTHS[0])), 200))
     rows = [
         (f"bowl, swings {20 * k + 1} to {20 * (k + 1)}", float(np.abs(part).max()))
@@ -338,7 +330,7 @@ def main() -> None:
     parser.add_argument("--long", action="store_true", help="200 swings, and an uneven ellipsoid")
     long = parser.parse_args().long
     one_core()
-    print(machine().partition(";")[0])
+    print(machine())
     period = reference_period()
     print(f"Period of the exact bowl {period:.9f} s; relative to it: twice the step "
           f"{reference_period(4e-5) / period - 1:+.0e}, pendulum with length and sink "

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import os
-import platform
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-Progress = Callable[[float], None]  # called with the share that is done, 0 to 1
+from sphshell_pin.cases.contents import Array, Progress
 
 
 def silent(share: float) -> None:
@@ -45,24 +44,9 @@ def on_one_core() -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Median and quartiles of a figure over the rounds."""
-
-    median: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, figures: np.ndarray) -> Spread:
-        """Return the spread of figures (rounds,)."""
-        low, middle, high = np.percentile(figures, [25, 50, 75])
-        return cls(float(middle), float(low), float(high))
-
-
 def take_turns(
     contestants: dict[str, Callable[[], float]], rounds: int, progress: Progress = silent
-) -> dict[str, np.ndarray]:
+) -> dict[str, Array]:
     """Run every contestant once a round; return the times of each, (rounds,).
 
     A contestant times itself and returns seconds per unit of its work.
@@ -78,7 +62,7 @@ def take_turns(
     return {name: np.array(t) for name, t in times.items()}
 
 
-def measure_import(rounds: int, progress: Progress = silent) -> dict[str, np.ndarray]:
+def measure_import(rounds: int, progress: Progress = silent) -> dict[str, Array]:
     """Return the times [s] of importing this package and Pinocchio in fresh interpreters."""
 
     def fresh(module: str) -> float:
@@ -87,29 +71,4 @@ def measure_import(rounds: int, progress: Progress = silent) -> dict[str, np.nda
         return time.perf_counter() - start
 
     modules = ("sphshell_pin", "pinocchio")
-    return take_turns({m: lambda m=m: fresh(m) for m in modules}, rounds, progress)
-
-
-def ratio(a: np.ndarray, b: np.ndarray) -> str:
-    """Median of a / b round by round, with the quartiles."""
-    spread = Spread.of(a / b)
-    return f"{spread.median:7.2f} [{spread.low:.2f}, {spread.high:.2f}]"
-
-
-def median_us(times: np.ndarray) -> str:
-    """Median in microseconds."""
-    return f"{np.median(times) * 1e6:9.3f} us"
-
-
-def machine() -> str:
-    """One line on what this runs on."""
-    import coal
-    import pinocchio
-
-    import sphshell_pin
-
-    return (
-        f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}, "
-        f"Pinocchio {pinocchio.__version__}, Coal {coal.__version__}, "
-        f"sphshell_pin {sphshell_pin.__version__}; one core, medians [quartiles] of rounds in turn"
-    )
+    return take_turns({m: partial(fresh, m) for m in modules}, rounds, progress)

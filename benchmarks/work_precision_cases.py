@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks import swing
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.step import RADIUS, START, panda, tip_position
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
@@ -20,7 +21,7 @@ from sphshell_pin.dynamics.run.integrators import Integrator
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Case:
     """A run, and its settings from coarse to fine.
 
@@ -34,13 +35,13 @@ class Case:
     title: str
     judged: str  # what the error is of, and against what
     scene: sp.Scene
-    controller: Any
+    controller: Any = None
     q0: Array
-    v0: Array | None
+    v0: Array | None = None
     duration: float
     record_dt: float
     figures: Callable[[Result], list[Array]]
-    references: tuple[Integrator, ...]
+    references: tuple[Integrator, ...] = ()
     integrators: tuple[Integrator, ...]
     quick_dt: float  # --quick makes no shorter steps
 
@@ -49,6 +50,39 @@ class Case:
         duration = self.duration if duration is None else duration
         simulation = sp.Simulation(self.scene, integrator)
         return simulation.run(self.q0, self.v0, duration, self.controller, record_dt=self.record_dt)
+
+
+def difference(a: list[Array], b: list[Array]) -> float:
+    """Return the largest length of a difference of the figures at any row."""
+    return max(float(np.linalg.norm(x - y, axis=1).max()) for x, y in zip(a, b, strict=True))
+
+
+class Judge(Protocol):
+    """Judges the results of a case."""
+
+    @property
+    def case(self) -> Case:
+        """The case."""
+
+    def error(self, integrator: Integrator, result: Result) -> float:
+        """Return the largest error at any row of a result that `integrator` made."""
+
+
+class References:
+    """Judges the results of a case by its references, much finer runs."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.known = [(type(i), case.figures(case.run(i))) for i in case.references]
+
+    def disagreement(self) -> float:
+        """Return the difference between the references."""
+        return difference(self.known[0][1], self.known[1][1])
+
+    def error(self, integrator: Integrator, result: Result) -> float:
+        """Return the error against the reference that another kind of method made."""
+        own = isinstance(integrator, self.known[0][0])
+        return difference(self.case.figures(result), self.known[own][1])
 
 
 def decades(kind: Callable[[float], Integrator], *exponents: float) -> tuple[Integrator, ...]:
@@ -72,9 +106,7 @@ def bowl() -> Case:
         title="Ball swings in a bowl",
         judged="error of position / amplitude",
         scene=swing.mesh_scene(swing.bowl(0.15)),
-        controller=None,
         q0=swing.start(float(swing.AZIMUTHS[0])),
-        v0=None,
         duration=0.72,
         record_dt=0.02,
         figures=lambda result: [result.q / amplitude],
@@ -121,7 +153,7 @@ def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
     scene.add_contact(ball, plate, placement=placement, law=law, friction=friction)
     controller = sp.CartesianImpedance(
         TIP,
-        [[0, 0, 0], [0, 0.03, 0]],
+        [(0, 0, 0), (0, 0.03, 0)],
         stiffness=1000.0,
         damping=60.0,
         normal_force=PRESS,
@@ -151,7 +183,6 @@ def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
         scene=scene,
         controller=controller,
         q0=START,
-        v0=None,
         duration=duration,
         record_dt=0.01,
         figures=figures,
@@ -171,16 +202,11 @@ def stick_slip() -> Case:
 
     The belt is a plate that slides, too heavy to be slowed; the block does not turn.
     """
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -swing.GRAVITY])
-    bodies = (
+    model = model_of(
         ("block", pin.JointModelTranslation(), pin.Inertia.FromSphere(BLOCK, 0.01)),
         ("belt", pin.JointModelPX(), pin.Inertia(1e8, np.zeros(3), np.eye(3))),
+        gravity=swing.GRAVITY,
     )
-    for name, joint, inertia in bodies:
-        index = model.addJoint(0, joint, pin.SE3.Identity(), f"{name}_joint")
-        model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
-        model.addFrame(pin.Frame(name, index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     damping = math.sqrt(CONTACT * BLOCK)  # half of the critical one
     law = sp.ImpactLaw(CONTACT, 1.0, damping, 1e-7)
     friction = sp.BristleFriction(MU_STATIC, MU_DYNAMIC, CONTACT, damping, v_stribeck=0.01)

@@ -197,15 +197,14 @@ def load_file(
     description = read(path, package_dirs, xacro_args, free_flyer=free_flyer)
     model = build_model(description, free_flyer=free_flyer)
     _load_poses(model, srdf)
-    geometry, missing = [], []
-    for kind in (pin.GeometryType.COLLISION, pin.GeometryType.VISUAL):
-        one, without = build_geometry(description, model, kind)
-        geometry.append(one)
-        missing += without
+    collision, missing = build_geometry(description, model, pin.GeometryType.COLLISION)
+    visual, without = build_geometry(description, model, pin.GeometryType.VISUAL)
+    missing = [*missing, *without]
     robot = LoadedRobot(
         name or model.name,
         model,
-        *geometry,
+        collision,
+        visual,
         description.q0(model),
         description=description,
     )
@@ -313,7 +312,7 @@ def fingertips(name: str) -> list[Sphere]:
     small table of well-known robots; an empty list where neither is known.
     """
     if name in TIPS:
-        return [Sphere(radius, frame, np.array(offset)) for frame, radius, offset in TIPS[name]]
+        return [Sphere(radius, frame, offset) for frame, radius, offset in TIPS[name]]
     return end_spheres(load(name))
 
 

@@ -265,15 +265,14 @@ class _Reader:
                 self.start[made.attrib["name"]] = pin.SE3ToXYZQUAT(place)
                 place = pin.SE3.Identity()
             last = k + 1 == len(joints)
-            here = ET.SubElement(
-                here, "body", name=name if last else f"{name}/{made.get('name')}", **posed(place)
-            )
+            of_joint = {"name": name if last else f"{name}/{made.get('name')}"}
+            here = ET.SubElement(here, "body", of_joint | posed(place))
             here.append(made)
             if not last:
                 add_inertial(here, pin.Inertia.Zero())
             place = pin.SE3.Identity()
         if not joints:
-            here = ET.SubElement(here, "body", name=name, **posed(place))
+            here = ET.SubElement(here, "body", {"name": name} | posed(place))
         self._fill(here, parts, name)
         for part, at, cls in parts:
             if part.tag == "body":
@@ -300,7 +299,11 @@ class _Reader:
             if part.tag != "geom":
                 continue
             geom = self._with_defaults(part, cls)
-            made, pose = plain_geom(geom, self.meshes, lambda one, at=at: at * self._pose(one))
+
+            def pose_of(one: Mapping[str, str], at: pin.SE3 = at) -> pin.SE3:
+                return at * self._pose(one)
+
+            made, pose = plain_geom(geom, self.meshes, pose_of)
             if needs and low <= number(geom.get("group"), 0) <= high:
                 summed += geom_inertia(geom, made, self.meshes, name).se3Action(pose)
             if made is not None:

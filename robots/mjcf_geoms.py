@@ -79,7 +79,7 @@ class Meshes:
         if kind == "shell":
             raise ValueError(f"{why}which is a shell: state its <inertial>")
         try:
-            mesh = trimesh.load(path, force="mesh")
+            mesh: Any = trimesh.load(path, force="mesh")
             mesh.apply_scale(scale)
             mesh.merge_vertices()
             if kind == "convex":
@@ -165,14 +165,14 @@ def geom_inertia(
         factor = density if mass is None else mass / volume
         return pin.Inertia(factor * inertia.mass, inertia.lever, factor * inertia.inertia)
     size = numbers(made.attrib["size"]).tolist()
-    volumes = {
+    volumes: dict[str, Callable[..., float]] = {
         "sphere": lambda r: 4 / 3 * np.pi * r**3,
         "capsule": lambda r, h: np.pi * r**2 * (2 * h + 4 / 3 * r),
         "cylinder": lambda r, h: np.pi * r**2 * 2 * h,
         "box": lambda x, y, z: 8 * x * y * z,
         "ellipsoid": lambda x, y, z: 4 / 3 * np.pi * x * y * z,
     }
-    inertias = {
+    inertias: dict[str, Callable[..., pin.Inertia]] = {
         "sphere": pin.Inertia.FromSphere,
         "capsule": lambda m, r, h: pin.Inertia.FromCapsule(m, r, 2 * h),
         "cylinder": lambda m, r, h: pin.Inertia.FromCylinder(m, r, 2 * h),

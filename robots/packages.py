@@ -76,13 +76,13 @@ class Folders:
 
     def searched(self) -> str:
         """Say where has been searched."""
-        told = [str(one) for one in (*self.given, self.file.parent)]
-        told += [
+        searched = [str(one) for one in (*self.given, self.file.parent)]
+        searched += [
             f"${name} ({os.environ[name]})"
             for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
             if os.environ.get(name)
         ]
-        return ", ".join(dict.fromkeys(told))
+        return ", ".join(dict.fromkeys(searched))
 
 
 def _listed(variable: str) -> list[Path]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from sphshell_pin import Result, Scene
 
-def orbit_ratio(result, scene):
+
+def orbit_ratio(result: Result, scene: Scene) -> float:
     """Return how fast the ball orbits the axle, by how fast the table turns, in the last second."""
     ball = scene.model.joints[scene.model.getJointId("ball/root_joint")]
     axle = scene.model.joints[scene.model.getJointId("turntable/axle")]

@@ -14,6 +14,13 @@ The tips are relieved a little, as on real gears, so that a pair of teeth takes 
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin import Result, Scene
+from sphshell_pin.dynamics import SceneContacts
+
+Array = NDArray[np.float64]
 
 TEETH_1, TEETH_2 = 20, 40
 MODULE = 0.005  # pitch diameter / teeth [m]
@@ -32,10 +39,10 @@ END = np.sqrt((MODULE * (TEETH_1 / 2 + 1)) ** 2 - BASE_1**2)
 HALF_TOOTH = np.pi / (2 * TEETH_1) + np.tan(ALPHA) - ALPHA
 
 
-def find(pose_i, pose_j):
+def find(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Array, Array, Array]:
     """Return the contact points of gear_2 (i) with gear_1 (j).
 
-    pose_i, pose_j: pinocchio.SE3 of the two gears in the world, axles along z.
+    `pose_i` and `pose_j` are those of the two gears in the world, axles along z.
     Returns points_world (k,3) [m], normals_world (k,3) from j to i, depths (k,) [m].
     """
     angle_1, angle_2 = turned(pose_j.rotation), turned(pose_i.rotation)
@@ -56,14 +63,14 @@ def find(pose_i, pose_j):
             lever = BASE_1 * (1 - slope)
             tilt = np.arccos((lever + BASE_2) / CENTRES)
             normal = np.array([np.sin(tilt), side * np.cos(tilt), 0.0])
-            foot = lever * np.array([np.cos(tilt), -side * np.sin(tilt), 0.0])
-            points.append(pose_j.translation + foot + s * normal)
+            tangent = lever * np.array([np.cos(tilt), -side * np.sin(tilt), 0.0])
+            points.append(pose_j.translation + tangent + s * normal)
             normals.append(normal)
             depths.append(overlap - relief)
     return np.reshape(points, (-1, 3)), np.reshape(normals, (-1, 3)), np.array(depths)
 
 
-def tip_relief(s):
+def tip_relief(s: float) -> tuple[float, float]:
     """Return how much the flanks are relieved at `s` on the line of action [m], and its slope."""
     enter = max(0.0, 1 - (s - START) / RELIEF_LENGTH)
     leave = max(0.0, 1 - (END - s) / RELIEF_LENGTH)
@@ -71,29 +78,29 @@ def tip_relief(s):
     return RELIEF * (enter**2 + leave**2), slope
 
 
-def turned(rotation):
+def turned(rotation: Array) -> float:
     """Return the angle of a rotation about z [rad]."""
-    return np.arctan2(rotation[1, 0], rotation[0, 0])
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
 
 
 SPEED = 10.0  # what the motor on gear 1 holds [rad/s]
 LOAD = 12.0  # torque of the brake on gear 2 [N m]
 
 
-def drive(t, q, v, contacts):
+def drive(t: float, q: Array, v: Array, contacts: SceneContacts) -> Array:
     """Return the joint torques: a motor holds gear 1's speed, a brake is put on gear 2 in 0.1 s."""
     u = min(t / 0.1, 1.0)
     brake = LOAD * u * u * (3 - 2 * u)
     return np.array([0.5 * (SPEED - v[0]) + brake * TEETH_1 / TEETH_2, brake])
 
 
-def speed_ratio(result, scene):
+def speed_ratio(result: Result, scene: Scene) -> float:
     """Return the mean speed of gear 1 over that of gear 2, over the second half of the run."""
     half = len(result.t) // 2
     return float(-result.v[half:, 0].mean() / result.v[half:, 1].mean())
 
 
-def tooth_force(result, scene):
+def tooth_force(result: Result, scene: Scene) -> float:
     """Return the force between the gears [N], over the second half of the run."""
     half = result.t[-1] / 2
     log = result.contacts

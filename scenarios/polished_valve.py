@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sphshell_pin.patches import wear_maps
+from sphshell_pin import Result, Scene
+from sphshell_pin.patches import WearMap, wear_maps
+
+Array = NDArray[np.float64]
 
 COEFFICIENT = 1e-12  # run.wear [1/Pa]
 # The raster less 5 mm at each border, where strokes turn: along the barrel [m], about it [rad].
 LOW, HIGH = np.array([0.035, np.deg2rad(-20.0)]), np.array([0.109, np.deg2rad(20.0)])
 
-_maps = {}
+_maps: dict[int, WearMap] = {}
 
 
-def raster(result, scene):
+def raster(result: Result, scene: Scene) -> tuple[Array, Array, WearMap]:
     """Return depths and areas of the map inside the raster, and the map."""
     key = id(result)
     if key not in _maps:
@@ -26,27 +30,27 @@ def raster(result, scene):
     return worn.depth[chosen], worn.areas[chosen], worn
 
 
-def mean_depth(result, scene):
+def mean_depth(result: Result, scene: Scene) -> float:
     """Return the mean removed depth in the raster [nm]."""
     depth, area, _ = raster(result, scene)
     return float(1e9 * (depth @ area) / area.sum())
 
 
-def uniformity(result, scene):
+def uniformity(result: Result, scene: Scene) -> float:
     """Return the standard deviation of the depth in the raster over its mean."""
     depth, area, _ = raster(result, scene)
     mean = (depth @ area) / area.sum()
     return float(np.sqrt(((depth - mean) ** 2 @ area) / area.sum()) / mean)
 
 
-def coverage(result, scene):
+def coverage(result: Result, scene: Scene) -> float:
     """Return the share of the raster's area that lost at least half of the mean depth."""
     depth, area, _ = raster(result, scene)
     mean = (depth @ area) / area.sum()
     return float(area[depth >= 0.5 * mean].sum() / area.sum())
 
 
-def volume_by_preston(result, scene):
+def volume_by_preston(result: Result, scene: Scene) -> float:
     """Return the removed volume over coefficient x sum of force, slip and time."""
     log = result.contacts
     half = 0.5 * np.diff(result.t)

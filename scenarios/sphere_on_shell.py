@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from sphshell_pin import Result, Scene
 
-def swing_period(result, scene):
+
+def swing_period(result: Result, scene: Scene) -> float:
     """Return the period [s] of the rolling: twice the time between passages of the middle."""
     x, t = result.q[:, 0], result.t
     passed = np.flatnonzero(x[:-1] * x[1:] < 0)

@@ -173,27 +173,26 @@ def test_a_checkout_that_is_not_built_says_so(tmp_path: Path) -> None:
     assert "circular" not in said
 
 
-# A module imports from its own layer and from those before it. All others, such as errors and
-# units, are before the first.
+# A module imports from its own layer and from those before it, inside functions too. All others,
+# such as errors and units, are before the first.
 LAYERS = (
     ("shell",),
     ("contact",),
     ("dynamics",),
     ("adapters",),
-    ("patches",),
+    ("patches", "robots"),
     ("sphshell_pin",),  # its public names are those of the folders above
-    ("scenario",),
+    ("scenario", "scenarios"),
     ("plot", "view", "export"),
-    ("study", "testing"),
+    ("testing",),
+    ("cases",),
+    ("benchmarks",),
+    ("study",),
     ("cli",),
 )
 LEVEL = {folder: k for k, folders in enumerate(LAYERS) for folder in folders}
-# These offer pictures of themselves.
-PICTURES = (
-    "sphshell_pin.dynamics.result.result",
-    "sphshell_pin.patches.taxels",
-    "sphshell_pin.patches.wear",
-)
+# Installed below the package, and beside it in a checkout.
+BESIDE = ("robots", "scenarios", "benchmarks")
 
 
 def imports_of(file: Path, modules: set[str]) -> set[str]:
@@ -215,23 +214,36 @@ def imports_of(file: Path, modules: set[str]) -> set[str]:
     return found & modules
 
 
+def files_of(package: Path) -> dict[str, Path]:
+    """Return the modules of the package by their names, with those of folders beside it."""
+    folders = [package, *(package.parent / name for name in BESIDE)]
+    named = {
+        file: file.relative_to(package.parent) for top in folders for file in top.rglob("*.py")
+    }
+    named[package / "_core.pyi"] = Path("sphshell_pin", "_core.py")
+    files = {}
+    for file, path in named.items():
+        parts = path.with_suffix("").parts
+        parts = parts if parts[0] == package.name else (package.name, *parts)
+        files[".".join(parts).removesuffix(".__init__")] = file
+    return files
+
+
 @pytest.fixture(scope="module")
 def graph() -> dict[str, set[str]]:
     """What each module of the package imports, imports inside functions included."""
-    files = {
-        ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts): file
-        for file in [*PACKAGE.rglob("*.py"), PACKAGE / "_core.pyi"]
-    }
-    modules = {name.removesuffix(".__init__"): file for name, file in files.items()}
-    edges = {name: imports_of(file, set(modules)) - {name} for name, file in modules.items()}
-    for owner in PICTURES:
-        edges[owner] = {name for name in edges[owner] if level(name) <= level(owner)}
-    return edges
+    modules = files_of(PACKAGE)
+    return {name: imports_of(file, set(modules)) - {name} for name, file in modules.items()}
 
 
 def level(module: str) -> int:
     """Return the layer of a module's folder."""
-    return LEVEL.get((module.split(".") * 2)[1], -1)
+    return LEVEL.get(folder(module), -1)
+
+
+def folder(module: str) -> str:
+    """Return the folder of a module below the package; the package itself is one."""
+    return (module.split(".") * 2)[1]
 
 
 def test_no_imports_run_in_circles(graph: dict[str, set[str]]) -> None:
@@ -244,6 +256,31 @@ def test_no_imports_run_in_circles(graph: dict[str, set[str]]) -> None:
 def test_imports_go_down_the_layers(graph: dict[str, set[str]]) -> None:
     edges = [(name, other) for name, others in graph.items() for other in others]
     assert not [f"{name} -> {other}" for name, other in edges if level(other) > level(name)]
+
+
+def test_no_two_layers_import_each_other(graph: dict[str, set[str]]) -> None:
+    """Within a layer, too: folders are no circle either."""
+    folders: dict[str, set[str]] = {}
+    for name, others in graph.items():
+        folders.setdefault(folder(name), set()).update(map(folder, others))
+    edges = {name: {one for one in others if one in LEVEL} for name, others in folders.items()}
+    try:
+        TopologicalSorter({name: edges[name] - {name} for name in LEVEL}).prepare()
+    except CycleError as error:
+        pytest.fail(" imports ".join(reversed(error.args[1])))
+
+
+def test_what_a_value_offers_of_upper_layers_exists(graph: dict[str, set[str]]) -> None:
+    """Such functions are named and not imported: `sphshell_pin.offered`."""
+    named = {}
+    for module, file in files_of(PACKAGE).items():
+        for name in re.findall(r'offered\(\s*"([\w.]+:\w+)"', file.read_text(encoding="utf-8")):
+            named[name] = module
+    assert {folder(module) for module in named.values()} == {"dynamics", "patches"}
+    for name, module in named.items():
+        owner, _, function = name.partition(":")
+        assert level(owner) > level(module), f"{module} can import {name}"
+        assert callable(getattr(import_module(owner), function)), name
 
 
 def test_values_have_types() -> None:

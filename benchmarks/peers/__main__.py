@@ -9,13 +9,13 @@ import argparse
 from pathlib import Path
 
 from sphshell_pin.atomic import atomic_file
-from sphshell_pin.benchmarks.measured import write
 from sphshell_pin.benchmarks.peers.measuring import measure
 from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.benchmarks.peers.tables import TITLES, machine_line, sections
+from sphshell_pin.benchmarks.peers.section import assemble, site_sections
 from sphshell_pin.benchmarks.peers.workers import ENGINES
 from sphshell_pin.benchmarks.timing import one_core
-from sphshell_pin.study.report.peers import assemble
+from sphshell_pin.cases.machine import machine
+from sphshell_pin.cases.measured import write
 
 
 def main() -> None:
@@ -30,14 +30,14 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write docs/measured/peers.json")
     arguments = parser.parse_args()
     one_core()
-    print(machine_line())
+    print(machine())
     rows, ratios = measure(
         arguments.engine or ENGINES,
         arguments.scene or SCENES,
         arguments.quick,
         say=lambda text: print(text, flush=True),
     )
-    tables = assemble(rows, ratios, TITLES).tables
+    tables = assemble(rows, ratios).tables
     for table in tables:
         print(f"{table.caption}\n\n{table.markdown()}")
     if arguments.out is not None:
@@ -48,7 +48,7 @@ def main() -> None:
         print(f"wrote {len(tables)} tables to {arguments.out}")
     if arguments.write:
         command = f"python -m benchmarks.peers{' --quick' * arguments.quick} --write"
-        print(f"wrote {write('peers', command, sections(rows, ratios))}")
+        print(f"wrote {write('peers', command, site_sections(rows, ratios))}")
 
 
 if __name__ == "__main__":

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import importlib.metadata
 import math
-import tempfile
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,17 +21,11 @@ from sphshell_pin.benchmarks.peers.drake_plant import (
     wall_forces,
 )
 from sphshell_pin.benchmarks.peers.engine import Params, Trajectory
-from sphshell_pin.benchmarks.peers.merged import merged_urdf, obj_text
+from sphshell_pin.benchmarks.peers.merged import MeshFiles, merged_urdf
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import (
-    BallScene,
-    Bowl,
-    Cylinder,
-    Groove,
-    Impact,
-    Scene,
-)
+from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact
 from sphshell_pin.benchmarks.swing import BOWL
 
 Array = NDArray[np.float64]
@@ -84,9 +76,10 @@ class Drake:
                 {"contact": contact, "dt": scene.dt, "edge": edge * scene.radius}
                 for edge, contact in ((0.25, "kLagged"), (0.25, "kSap"), (1.0, "kLagged"))
             ]
+        coarse: Params
         coarse, fine, finest = ({"edge": k * FINE * scene.radius} for k in (1, 0.5, 0.25))
-        explicit = {"integrator": "runge_kutta3", "max_step": 0.01}
-        discrete = [
+        explicit: Params = {"integrator": "runge_kutta3", "max_step": 0.01}
+        discrete: list[Params] = [
             {"contact": name, "dt": dt} for name in ("kLagged", "kSap") for dt in (1e-3, 2e-4)
         ]
         if isinstance(scene, Impact):
@@ -113,26 +106,18 @@ class Drake:
         return self._ball(scene, params)
 
     @cached_property
-    def _folder(self) -> Any:
-        return tempfile.TemporaryDirectory()
-
-    @cached_property
     def _arms(self) -> dict[tuple[Any, ...], Arm]:
         return {}
 
     @cached_property
-    def _files(self) -> dict[Surface, Path]:
-        return {}
+    def _files(self) -> MeshFiles:
+        return MeshFiles()
 
     def _mesh(self, surface: Surface) -> Any:
         """Return the shape of a surface."""
         from pydrake.geometry import Mesh
 
-        if surface not in self._files:
-            path = Path(self._folder.name) / f"{len(self._files)}.obj"
-            path.write_text(obj_text(surface.vertices, surface.triangles))
-            self._files[surface] = path
-        return Mesh(str(self._files[surface]))
+        return Mesh(self._files.of(surface))
 
     def _touch(self, plant: Any, scene: Scene, params: Params, ball: Any, ground: Any) -> None:
         """Give the ball (body and place of the center) and the ground their shapes and the law."""

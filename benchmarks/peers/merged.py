@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
+from sphshell_pin.benchmarks.peers.shapes import Surface
 
 AXES = {"JointModelRX": "1 0 0", "JointModelRY": "0 1 0", "JointModelRZ": "0 0 1"}
 
@@ -59,3 +62,20 @@ def obj_text(vertices: np.ndarray, triangles: np.ndarray) -> str:
     """Return a mesh as the text of an OBJ file: vertices (n, 3), triangles (m, 3)."""
     points = "v %.17g %.17g %.17g\n" * len(vertices) % tuple(vertices.ravel().tolist())
     return points + "f %d %d %d\n" * len(triangles) % tuple((triangles + 1).ravel().tolist())
+
+
+class MeshFiles:
+    """Surfaces as OBJ files in a temporary `folder`, each written once."""
+
+    def __init__(self) -> None:
+        self._held = tempfile.TemporaryDirectory()
+        self.folder = Path(self._held.name)
+        self._known: dict[Surface, str] = {}
+
+    def of(self, surface: Surface) -> str:
+        """Return the path of the file of a surface."""
+        if surface not in self._known:
+            path = self.folder / f"{len(self._known)}.obj"
+            path.write_text(obj_text(surface.vertices, surface.triangles))
+            self._known[surface] = str(path)
+        return self._known[surface]

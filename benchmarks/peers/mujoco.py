@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import (
+from sphshell_pin.benchmarks.peers.scenes import Scene
+from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import (
     BallScene,
     Bowl,
     Cylinder,
     Groove,
     Impact,
     Plate,
-    Scene,
     Turntable,
 )
-from sphshell_pin.benchmarks.peers.shapes import Surface
 
 Array = NDArray[np.float64]
 # A contact of impedance d answers the share d of a load by itself and leaves 1 - d to the spring:

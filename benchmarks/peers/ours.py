@@ -11,10 +11,12 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Impact, Scene
+from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
+from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Impact
 from sphshell_pin.dynamics.run.advance import advance, start_run
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 
@@ -52,16 +54,10 @@ class Ours:
         adaptive = [{"integrator": "Adaptive", "rtol": 10.0**-e} for e in (4, 6, 8)]
         if isinstance(scene, Bowl):
             orders = {"SemiImplicitEuler": (4, 3, 2, 1, 0.5), "RungeKutta4": (4, 2, 1, 0.5, 0.2)}
-            steps = [
-                {"integrator": integrator, "dt": 1e-3 * dt}
-                for integrator, dts in orders.items()
-                for dt in dts
-            ]
-            return [*steps, *adaptive]
-        if isinstance(scene, Impact):
-            return [{"integrator": "SemiImplicitEuler", "dt": dt} for dt in scene.dts] + adaptive
-        steps = [{"integrator": "SemiImplicitEuler", "dt": dt} for dt in scene.dts]
-        if not scene.mu:
+            fixed = [(name, 1e-3 * dt) for name, dts in orders.items() for dt in dts]
+            return [*({"integrator": name, "dt": dt} for name, dt in fixed), *adaptive]
+        steps: list[Params] = [{"integrator": "SemiImplicitEuler", "dt": dt} for dt in scene.dts]
+        if isinstance(scene, Impact) or not scene.mu:
             return [*steps, *adaptive]
         implicit = [{"integrator": "Implicit", "rtol": 10.0**-e} for e in (3, 4, 5, 6)]
         # Longer steps do not resolve the bristles.
@@ -121,26 +117,20 @@ def friction_of(mu: float, stiffness: float, mass: float) -> sp.BristleFriction 
 
 def ball_scene(scene: BallScene) -> tuple[sp.Scene, Array, Array]:
     """Return the scene of a ball, q0 and v0."""
-    model = pin.Model()
-    model.gravity.linear = np.array(scene.gravity)
     kind = pin.JointModelFreeFlyer() if scene.rolls else pin.JointModelTranslation()
-    joint = model.addJoint(0, kind, pin.SE3.Identity(), "ball_joint")
-    inertia = pin.Inertia.FromSphere(scene.mass, scene.radius)
-    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    bodies = [("ball", kind, pin.Inertia.FromSphere(scene.mass, scene.radius))]
     q0, v0 = np.array(scene.position), np.array(scene.velocity)
     if scene.rolls:
         q0, v0 = np.r_[q0, 0.0, 0.0, 0.0, 1.0], np.r_[v0, scene.angular_velocity]
     frame = "universe"
     if scene.table_speed:
         frame = "table"
-        table = model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "table_joint")
         heavy = pin.Inertia(1.0, np.zeros(3), TABLE_INERTIA * np.eye(3))
-        model.appendBodyToJoint(table, heavy, pin.SE3.Identity())
-        placed = pin.Frame(frame, table, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
-        model.addFrame(placed)
+        bodies.append((frame, pin.JointModelRUBZ(), heavy))
         q0, v0 = np.r_[q0, 1.0, 0.0], np.r_[v0, scene.table_speed]
     moved = scene.mass * (2 / 7 if scene.rolls else 1.0)
+    model = model_of(*bodies)
+    model.gravity.linear = np.array(scene.gravity)
     built = sp.Scene(model)
     built.add_contact(
         sphere=sp.Sphere(scene.radius, "ball"),
@@ -194,19 +184,5 @@ def run_press(scene: PressScene, simulation: sp.Simulation) -> Trajectory:
     q0, control = np.array(scene.q0), sp.JointPD(scene.kp, scene.kd, scene.q_ref)
     cpu = timed(simulation, q0, None, scene.duration, control)
     result = simulation.run(q0, None, scene.duration, control, record_dt=scene.duration)
-    model = simulation.scene.model
-    data = model.createData()
-    pin.forwardKinematics(model, data, result.q[-1], result.v[-1])
-    pin.updateFramePlacements(model, data)
-    frame = model.getFrameId(FRAME)
-    motion = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-    return Trajectory(
-        t=result.t[-1:],
-        position=data.oMf[frame].translation[None].copy(),
-        velocity=motion.linear[None].copy(),
-        angular_velocity=motion.angular[None].copy(),
-        cpu=cpu,
-        simulated=scene.duration,
-        steps=int(result.stats.steps),
-        force=result.contacts.at_row(len(result.t) - 1).force_world.sum(axis=0)[None],
-    )
+    force = result.contacts.at_row(len(result.t) - 1).force_world.sum(axis=0)
+    return at_the_end(scene, result.q[-1], result.v[-1], cpu, int(result.stats.steps), force)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sphshell_pin.benchmarks import step
 from sphshell_pin.benchmarks.peers import shapes
 from sphshell_pin.benchmarks.peers.engine import Trajectory
+from sphshell_pin.benchmarks.surfaces import height as wavy_height
 from sphshell_pin.errors import MissingExtra
 
 Array = NDArray[np.float64]
@@ -77,8 +78,8 @@ class PressScene:
         # Newton's method for the nearest place of the sheet, in x and y.
         at = np.array([x, y])
         for _ in range(20):
-            gap, slopes = z - _height(at), _slopes(at)
-            at += 0.5 * (np.array([x, y]) - at + gap * slopes)
+            gap, gradient = z - _height(at), _gradient(at)
+            at += 0.5 * (np.array([x, y]) - at + gap * gradient)
         away = float(np.linalg.norm([x - at[0], y - at[1], z - _height(at)]))
         return {"pressed [mm]": (self.radius - away) * 1e3}
 
@@ -89,12 +90,39 @@ class PressScene:
 
 
 def _height(at: Array) -> float:
-    return float(shapes.wavy_height(at[:1], at[1:])[0])
+    return float(wavy_height(at[:1], at[1:])[0])
 
 
-def _slopes(at: Array, small: float = 1e-6) -> Array:
+def _gradient(at: Array, small: float = 1e-6) -> Array:
     steps = small * np.eye(2)
     return np.array([(_height(at + e) - _height(at - e)) / (2 * small) for e in steps])
+
+
+def tip_motion(scene: PressScene, q: Array, v: Array) -> tuple[Array, Array, Array]:
+    """Return the fingertip's place [m], velocity [m/s] and angular velocity [rad/s]."""
+    model = pin.buildModelFromXML(scene.urdf)
+    data, frame = model.createData(), model.getFrameId(FRAME)
+    pin.forwardKinematics(model, data, q, v)
+    tip = pin.updateFramePlacement(model, data, frame).translation
+    motion = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+    return tip.copy(), motion.linear.copy(), motion.angular.copy()
+
+
+def at_the_end(
+    scene: PressScene, q: Array, v: Array, cpu: float, steps: int, force: Array | None = None
+) -> Trajectory:
+    """Return the only row of a run of the Panda; `force` (3,) [N] is that on the fingertip."""
+    position, velocity, spin = tip_motion(scene, q, v)
+    return Trajectory(
+        t=np.array([steps * scene.dt]),
+        position=position[None],
+        velocity=velocity[None],
+        angular_velocity=spin[None],
+        cpu=cpu,
+        simulated=steps * scene.dt,
+        steps=steps,
+        force=None if force is None else force[None],
+    )
 
 
 def panda_urdf(radius: float) -> str:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import importlib.metadata
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.merged import merged_urdf, obj_text
-from sphshell_pin.benchmarks.peers.press import PressScene
-from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Impact, Scene
+from sphshell_pin.benchmarks.peers.merged import MeshFiles, merged_urdf
+from sphshell_pin.benchmarks.peers.press import PressScene, at_the_end
+from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Impact
 
 Array = NDArray[np.float64]
 SCALE = 10.0  # of lengths; masses and times stay, forces grow as lengths do, torques as squares
@@ -60,8 +59,9 @@ class PyBullet:
         if isinstance(scene, PressScene):
             return [{"dt": scene.dt, "breaking": gap} for gap in (2e-3, 1e-4)]
         if isinstance(scene, Impact):
-            gaps = [{"dt": dt, "breaking": 2e-3} for dt in scene.dts]
-            return [params | {"ccd": on} for params in gaps for on in (True, False)]
+            return [
+                {"dt": dt, "breaking": 2e-3, "ccd": on} for dt in scene.dts for on in (True, False)
+            ]
         steps = (1e-3, 2e-4, 2e-3) if isinstance(scene, Bowl) else scene.dts[:2]
         gaps = (1e-3, 1e-4, 2e-3)  # the last is the default
         return [{"dt": dt, "breaking": gap} for dt in steps for gap in gaps]
@@ -74,22 +74,14 @@ class PyBullet:
             return self._ball(bullet, scene, params)
 
     @cached_property
-    def _folder(self) -> Any:
-        return tempfile.TemporaryDirectory()
-
-    @cached_property
-    def _files(self) -> dict[Surface, Path]:
-        return {}
+    def _files(self) -> MeshFiles:
+        return MeshFiles()
 
     def _mesh(self, bullet: Any, surface: Surface) -> int:
         """Return the collision shape of a surface."""
-        if surface not in self._files:
-            path = Path(self._folder.name) / f"{len(self._files)}.obj"
-            path.write_text(obj_text(surface.vertices, surface.triangles))
-            self._files[surface] = path
         shape: int = bullet.createCollisionShape(
             bullet.GEOM_MESH,
-            fileName=str(self._files[surface]),
+            fileName=self._files.of(surface),
             meshScale=[SCALE] * 3,
             flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH | bullet.GEOM_CONCAVE_INTERNAL_EDGE,
         )
@@ -142,7 +134,7 @@ class PyBullet:
         )
 
     def _press(self, bullet: Any, scene: PressScene) -> Trajectory:
-        path = Path(self._folder.name) / "arm.urdf"
+        path = self._files.folder / "arm.urdf"
         path.write_text(merged_urdf(scene, SCALE))
         flags = bullet.URDF_USE_INERTIA_FROM_FILE
         arm = bullet.loadURDF(str(path), useFixedBase=True, flags=flags)
@@ -168,17 +160,10 @@ class PyBullet:
                 force=1e9,
             )
         _, cpu = stepped(bullet.stepSimulation, scene.steps, 1, lambda: None)
-        position, velocity, spin = tip_motion(bullet, scene, arm)
-        return Trajectory(
-            t=np.array([scene.duration]),
-            position=position[None],
-            velocity=velocity[None],
-            angular_velocity=spin[None],
-            cpu=cpu,
-            simulated=scene.duration,
-            steps=scene.steps,
-            force=point_forces(bullet.getContactPoints(arm, ground)).sum(axis=0)[None],
-        )
+        states = bullet.getJointStates(arm, joints)
+        angles, rates = (np.array([state[k] for state in states]) for k in (0, 1))
+        force = point_forces(bullet.getContactPoints(arm, ground)).sum(axis=0)
+        return at_the_end(scene, angles, rates, cpu, scene.steps, force)
 
 
 @contextmanager
@@ -278,20 +263,3 @@ def point_forces(points: Any) -> Array:
         for point in points
     ]
     return np.reshape(forces, (-1, 3)) / SCALE
-
-
-def tip_motion(bullet: Any, scene: PressScene, arm: int) -> tuple[Array, Array, Array]:
-    """Return the fingertip's place [m], velocity [m/s] and angular velocity [rad/s]."""
-    import pinocchio as pin
-
-    from sphshell_pin.benchmarks.peers.press import FRAME
-
-    states = bullet.getJointStates(arm, range(len(scene.q0)))
-    model = pin.buildModelFromXML(scene.urdf)
-    data = model.createData()
-    q, v = (np.array([state[k] for state in states]) for k in (0, 1))
-    pin.forwardKinematics(model, data, q, v)
-    pin.updateFramePlacements(model, data)
-    frame = model.getFrameId(FRAME)
-    motion = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-    return data.oMf[frame].translation.copy(), motion.linear.copy(), motion.angular.copy()

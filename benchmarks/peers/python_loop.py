@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Scene
+from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
+from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl
 from sphshell_pin.benchmarks.query import coal_tree
 from sphshell_pin.benchmarks.step import bare
 
@@ -214,28 +215,7 @@ def run_press(scene: PressScene, dt: float) -> Trajectory:
             fext[joint] = data.oMi[joint].actInv(world)
             v = v + dt * pin.aba(model, data, q, v, tau, fext)
             q = pin.integrate(model, q, dt * v)
-    return at_the_end(scene, model, q, v, clock.spent, steps)
-
-
-def at_the_end(
-    scene: PressScene, model: Any, q: Array, v: Array, cpu: float, steps: int
-) -> Trajectory:
-    """Return the only row of a run of the Panda."""
-    import pinocchio as pin
-
-    data, frame = model.createData(), model.getFrameId(FRAME)
-    pin.forwardKinematics(model, data, q, v)
-    tip = pin.updateFramePlacement(model, data, frame).translation
-    motion = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
-    return Trajectory(
-        t=np.array([steps * scene.dt]),
-        position=tip[None].copy(),
-        velocity=motion.linear[None].copy(),
-        angular_velocity=motion.angular[None].copy(),
-        cpu=cpu,
-        simulated=steps * scene.dt,
-        steps=steps,
-    )
+    return at_the_end(scene, q, v, clock.spent, steps)
 
 
 def compiled_parts(scene: PressScene) -> Trajectory:

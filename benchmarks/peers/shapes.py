@@ -46,7 +46,9 @@ class Surface:
     boxes: tuple[Box, ...] = ()
 
 
-def grid(cells: int, half_x: float, half_y: float, jitter: float, seed: int) -> tuple[Array, Array]:
+def grid(
+    cells: int, half_x: float, half_y: float, jitter: float, seed: int
+) -> tuple[Array, NDArray[np.int32]]:
     """Return x, y (n, 2) [m] of moved grid points and triangles (m, 3) with random diagonals.
 
     Points on the border and on the line x = 0 stay there (the crease of a groove).
@@ -160,6 +162,6 @@ def wavy(cells: int, size: float, place: Array) -> Surface:
     x0, y0, z0 = place
 
     def height(x: Array, y: Array) -> Array:
-        return z0 + wavy_height(x - x0, y - y0)
+        return np.asarray(z0 + wavy_height(x - x0, y - y0))
 
     return Surface(vertices + place, triangles, None, size / cells, size / 2, height)

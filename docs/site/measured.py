@@ -1,7 +1,8 @@
 """A hook of MkDocs: a page shows the data of docs/measured/ in place of a link to them.
 
-A line `[data](measured/NAME.json)` becomes all sections of that file (see benchmarks/measured.py),
-and `[NAME](measured/report.json)` one block of a report (see benchmarks/quote.py).
+A line `[data](measured/NAME.json)` becomes all sections of that file, which
+sphshell_pin/cases/measured.py writes, and `[NAME](measured/report.json)` one block of a report (see
+benchmarks/quote.py).
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from sphshell_pin.benchmarks.measured import Measured, write
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
+from sphshell_pin.cases.measured import Measured, write
 from sphshell_pin.study.validation import Case, Outcome, collect
 from sphshell_pin.study.validation.cases import NOT_FOUND, explanations
 

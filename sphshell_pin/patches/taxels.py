@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_name, check_positive, check_vector, read_only
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
+from sphshell_pin.offered import offered
 from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
 from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
@@ -56,9 +57,10 @@ class TaxelImages(Summarized):
 
     def save_film(self, path: str | PathLike[str], *, fps: float = 30, speed: float = 1.0) -> Path:
         """Write a film of the images of a grid, .gif or .mp4: see `sphshell_pin.plot.taxels`."""
-        from sphshell_pin.plot.taxels import save_film
-
-        return save_film(Path(path), self, fps=fps, speed=speed)
+        film: Path = offered("sphshell_pin.plot.taxels:save_film")(
+            Path(path), self, fps=fps, speed=speed
+        )
+        return film
 
 
 @dataclass(frozen=True)

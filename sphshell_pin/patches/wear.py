@@ -13,6 +13,7 @@ import numpy as np
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, read_only
 from sphshell_pin.errors import ResultError
+from sphshell_pin.offered import offered
 from sphshell_pin.patches.ellipse import stroke
 from sphshell_pin.patches.foundation import Overlap, overlap_of
 from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
@@ -88,9 +89,8 @@ class WearMap(Summarized):
 
     def plot(self) -> Figure:
         """Return a picture of it; MissingExtra without matplotlib."""
-        from sphshell_pin.plot.wear import plot_wear
-
-        return plot_wear([self])
+        figure: Figure = offered("sphshell_pin.plot.wear:plot_wear")([self])
+        return figure
 
 
 def wear_maps(
@@ -189,10 +189,8 @@ def save_wear(maps: Sequence[WearMap], folder: str | PathLike[str]) -> None:
         arrays |= {f"{prefix}{name}": array for name, array in one.arrays().items()}
     with atomic_file(Path(folder) / "wear.npz") as stream:
         np.savez_compressed(stream, allow_pickle=False, **arrays)
-    from sphshell_pin.plot.figure import write_figure
-    from sphshell_pin.plot.wear import plot_wear
-
-    write_figure(Path(folder) / "wear.png", plot_wear(maps))
+    figure = offered("sphshell_pin.plot.wear:plot_wear")(maps)
+    offered("sphshell_pin.plot.figure:write_figure")(Path(folder) / "wear.png", figure)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import os
 import pytest
 
 from sphshell_pin.benchmarks import processes
-from sphshell_pin.benchmarks.peers import measuring, tables, workers
+from sphshell_pin.benchmarks.peers import measuring, section, workers
 from sphshell_pin.benchmarks.peers.measuring import Ratio, Row, as_good_as, best_of, compared
 
 
@@ -67,7 +67,7 @@ def test_a_lost_process_is_reported_and_starts_anew():
 def test_the_page_has_every_scene_and_ratio():
     rows = [row("mujoco", 1e-3, math.nan, math.nan, note="diverged"), row("ours", 1e-6, 1e-5, 0.01)]
     ratios = [Ratio("swing", rows[0], rows[1], 100.0, 90.0, 110.0)]
-    _, ratio, scene, _ = tables.sections(rows, ratios)
+    _, ratio, scene, _ = section.site_sections(rows, ratios)
     assert list(ratio.table[1])[:5] == ["swing", "MuJoCo", "100", "90", "110"]
     assert scene.title == "Ball swings in a bowl without friction, triangles of 0.3 radii"
     assert list(scene.table[1]) == ["MuJoCo", "dt 0.001", "0.001", *4 * "-", "diverged"]

@@ -11,68 +11,28 @@ import itertools
 import sys
 import time
 
-from sphshell_pin.benchmarks import measured
-from tests.hard_cases.verdict import CASES, Case, Verdict, failed
+from sphshell_pin.cases.contents import Verdict, verdicts_table
+from sphshell_pin.cases.measured import Measured, write
+from sphshell_pin.cases.register import Case
+from tests.hard_cases.verdict import CASES
 
-# In the order of the page. A module's docstring is the text above its table.
-MODULES = (
-    "analytic_impact",
-    "analytic_rolling",
-    "analytic_surfaces",
-    "analytic_energy",
-    "impacts",
-    "under_stiff",
-    "extremes",
-    "resting",
-    "starts",
-    "repeats",
-)
 NAME = "hard_cases"
-COLUMNS = ("case", "what is tried", "law", "expected", "measured", "error", "bound", "verdict")
+collect = CASES.collect
 
 
-def collect() -> list[Case]:
-    """Import the modules and return their cases in the order of MODULES."""
-    names = [f"{__package__ or 'tests.hard_cases'}.{name}" for name in MODULES]
-    for name in names:
-        importlib.import_module(name)
-    return sorted(CASES, key=lambda known: names.index(known.module))
+def row(verdict: Verdict) -> list[str]:
+    return verdicts_table([verdict], grouped=False).cells[0]
 
 
-def run(chosen: Case) -> list[Verdict]:
-    """Run a case; an error of its run is a verdict, too."""
-    try:
-        return chosen.run()
-    except Exception as problem:
-        return [failed(chosen.name, problem)]
-
-
-def shown(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.7g}"
-
-
-def row(verdict: Verdict) -> tuple[str, ...]:
-    return (
-        verdict.case,
-        verdict.tried,
-        verdict.law,
-        shown(verdict.expected),
-        shown(verdict.measured),
-        f"{verdict.error:.1e}",
-        f"{verdict.bound:.0e}",
-        "ok" if verdict.ok else "FAILS",
-    )
-
-
-def sections(results: list[tuple[Case, list[Verdict]]]) -> list[measured.Measured]:
+def sections(results: list[tuple[Case, list[Verdict]]]) -> list[Measured]:
     """Return what the site shows: a section for each module."""
     found = [verdict for _, verdicts in results for verdict in verdicts]
     wrong = sum(not verdict.ok for verdict in found)
-    parts = [measured.Measured(text=f"{len(found)} verdicts, {wrong} of them out of bounds.")]
+    parts = [Measured(text=f"{len(found)} verdicts, {wrong} of them out of bounds.")]
     for module, group in itertools.groupby(results, key=lambda result: result[0].module):
         heading, _, text = (importlib.import_module(module).__doc__ or "").strip().partition(".")
-        rows = [row(verdict) for _, verdicts in group for verdict in verdicts]
-        parts.append(measured.Measured(heading, text.strip(), table=[COLUMNS, *rows]))
+        verdicts = [verdict for _, some in group for verdict in some]
+        parts.append(Measured.of(verdicts_table(verdicts, grouped=False), heading, text.strip()))
     return parts
 
 
@@ -88,13 +48,9 @@ def main() -> int:
     if options.write and (options.quick or options.only):
         parser.error("--write needs all cases: leave out --quick and --only")
     results = []
-    for known in collect():
-        if options.only and options.only not in f"{known.module} {known.name}":
-            continue
-        if options.quick and known.slow:
-            continue
+    for known in collect(quick=options.quick, only=options.only):
         begin = time.perf_counter()
-        verdicts = run(known)
+        verdicts = known.verdicts()
         print(f"{known.name} ({time.perf_counter() - begin:.1f} s)", flush=True)
         for verdict in verdicts:
             name, tried, _, expected, measured, error, bound, word = row(verdict)
@@ -103,7 +59,7 @@ def main() -> int:
         results.append((known, verdicts))
     if options.write:
         command = "python -m tests.hard_cases --write"
-        print(f"wrote {measured.write(NAME, command, sections(results))}")
+        print(f"wrote {write(NAME, command, sections(results))}")
     wrong = sum(not verdict.ok for _, verdicts in results for verdict in verdicts)
     print(f"{sum(len(verdicts) for _, verdicts in results)} verdicts, {wrong} of them fail")
     return 1 if wrong else 0

@@ -162,7 +162,7 @@ def order_by_tolerance(
 def falls(name: str, tried: str, power: float) -> Verdict:
     """Return the verdict on a power of the tolerance; a higher one is no fault."""
     law = "error ~ rtol^p, p about 0.8 to 1, or better"
-    return Verdict(name, tried, law, ">= 0.8", power, max(0.0, 0.8 - power), 0.05)
+    return Verdict.on(name, tried, law, ">= 0.8", power, max(0.0, 0.8 - power), 0.05)
 
 
 @case("order of the fixed steps")

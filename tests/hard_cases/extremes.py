@@ -69,7 +69,7 @@ def settle_all(integrator: Any, gravity: float, start: float) -> Verdict:
     law = "depth = m g / k, but for rounding"
     if gravity > GRAVITY:
         law += ", 1000 g"
-    return Verdict("ball at rest", tried, law, depth, found, error, 1e-6)
+    return Verdict.on("ball at rest", tried, law, depth, found, error, 1e-6)
 
 
 @case("balls of 1 mg to 100 kg on springs of 1e3 to 1e9 N/m")

@@ -47,14 +47,14 @@ def start(aside: float) -> tuple[Array, Array]:
 
 def digest(result: sp.Result) -> str:
     """Return a number of every bit of the rows, the contacts, the energies and the events."""
-    told = hashlib.sha256()
+    digest = hashlib.sha256()
     for part in (result.contacts, result.energy):
         for field in fields(part):
-            told.update(np.ascontiguousarray(getattr(part, field.name)).tobytes())
+            digest.update(np.ascontiguousarray(getattr(part, field.name)).tobytes())
     for column in (result.t, result.q, result.v):
-        told.update(column.tobytes())
-    told.update(repr(result.events).encode())
-    return told.hexdigest()
+        digest.update(column.tobytes())
+    digest.update(repr(result.events).encode())
+    return digest.hexdigest()
 
 
 def once(integrator: Any) -> str:
@@ -85,8 +85,8 @@ def repeated() -> Verdicts:
         yield at_most("repeat", tried, "same bits", others, 0)
         for threads in (1, 2, 4):
             with ThreadPoolExecutor(threads) as pool:
-                told = list(pool.map(once, [integrator] * 4))
-            others = sum(one != first for one in told)
+                results = list(pool.map(once, [integrator] * 4))
+            others = sum(one != first for one in results)
             tried = f"{type(integrator).__name__}, 4 runs in {threads} threads"
             yield at_most("repeat", tried, "same bits", others, 0)
 

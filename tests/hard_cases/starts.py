@@ -91,7 +91,7 @@ def grazing() -> Verdicts:
             tried = f"{integrator}, friction {mu:g}"
             law = "leaves with d sqrt(k / m)" if allowed < 1 else "d sqrt(k / m) at most"
             over = abs(away / form - 1) if allowed < 1 else max(away / form - 1, -away / form)
-            yield Verdict("graze", tried, law, form, away, over, allowed)
+            yield Verdict.on("graze", tried, law, form, away, over, allowed)
             # Rounding of a speed of 1 m/s hides what friction takes.
             slowed = abs(1 - along - mu * away)
             law = "slowed by mu of that"

@@ -1,4 +1,4 @@
-"""What spheres are shot at, and geometry that shares nothing with the package: plain NumPy."""
+"""What spheres are thrown at, and geometry that shares nothing with the package: plain NumPy."""
 
 from __future__ import annotations
 
@@ -113,8 +113,8 @@ def sweep(start: Array, along: Array, radius: float, corners: Array) -> float:
     for offset in (radius, -radius):
         moving = rate != 0
         t = (offset - _dot(start - a[:, 0], normal)) / np.where(moving, rate, 1)
-        foot = start + t[:, None] * along - offset * normal
-        inside = (_dot(np.cross(sides, foot[:, None] - a), normal[:, None]) >= 0).all(axis=1)
+        projection = start + t[:, None] * along - offset * normal
+        inside = (_dot(np.cross(sides, projection[:, None] - a), normal[:, None]) >= 0).all(axis=1)
         best = min(best, _first(t, inside & moving))
     away = start - a
     length = np.linalg.norm(sides, axis=2)

@@ -55,8 +55,8 @@ def expected_speed(depth: float) -> float:
 def warns(depth: float) -> Verdict:
     """Return whether it is said before the run."""
     scene = scene_of(depth, solid=False)
-    told = scene.explain(np.array([1.5 * RADIUS]), np.array([-SPEED])).warnings
-    warned = any("cannot stop the sphere" in warning for warning in told)
+    said = scene.explain(np.array([1.5 * RADIUS]), np.array([-SPEED])).warnings
+    warned = any("cannot stop the sphere" in warning for warning in said)
     tried = f"depth {depth / RADIUS:g} r"
     return at_most("under-stiff law", tried, "explain warns of it", float(not warned), 0)
 
@@ -74,7 +74,7 @@ def judge(integrator: Any, depth: float, solid: bool, above: bool, bound: float)
     speed = float(result.v[-1, 0]) * (1.0 if above else -1.0)
     right = expected_speed(depth)
     moved = "comes back as fast" if right > 0 else "goes through, v^2 - k (2 r)^2 / m left"
-    yield Verdict("under-stiff law", tried, law, "all", found, len(missing), 0)
+    yield Verdict.on("under-stiff law", tried, law, "all", found, len(missing), 0)
     yield compare("under-stiff law", tried, moved, right, speed, bound)
 
 

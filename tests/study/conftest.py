@@ -6,7 +6,7 @@ import pytest
 @pytest.fixture
 def bounce(tmp_path):
     """The file of a scenario whose ball bounces, for fits."""
-    from sphshell_pin.benchmarks.fitting import SCENARIO
+    from tests.study.fitted_sets import SCENARIO
 
     path = tmp_path / "bounce.toml"
     path.write_text(SCENARIO, encoding="utf-8")

@@ -10,7 +10,6 @@ pytest.importorskip("matplotlib")
 from scipy import stats
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.fitting import SCENARIO, TRUTH, many_sets
 from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
 from sphshell_pin.scenario.format.reading import find_scenario
@@ -21,6 +20,7 @@ from sphshell_pin.study.fit.quantities import quantities_of, row_step
 from sphshell_pin.study.fit.runs import Runs, Trial
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
 from tests.studies import mostly_studies
+from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
 HEIGHT = "q.root_joint.2"

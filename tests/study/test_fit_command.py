@@ -14,10 +14,10 @@ pytest.importorskip("matplotlib")
 
 import sphshell_pin as sp
 from sphshell_pin.atomic import folder
-from sphshell_pin.benchmarks.fitting import SCENARIO
 from sphshell_pin.cli import app, fit
 from sphshell_pin.scenario import read_scenario
 from sphshell_pin.study.fit.parameters import parse_wanted
+from tests.study.fitted_sets import SCENARIO
 from tests.study.test_fit import (
     DISSIPATION,
     FORCE,

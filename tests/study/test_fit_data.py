@@ -10,7 +10,6 @@ from typer.testing import CliRunner
 pytest.importorskip("scipy")
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.fitting import SCENARIO
 from sphshell_pin.cli import app
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
@@ -18,6 +17,7 @@ from sphshell_pin.study.fit.data import read_experiment
 from sphshell_pin.study.fit.quantities import quantities_of, unit_of
 from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.fit.writing import scenario_text
+from tests.study.fitted_sets import SCENARIO
 
 HEIGHT = "q.root_joint.2"
 HEAD = f"t [s],{HEIGHT} [m]\n"

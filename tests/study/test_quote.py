@@ -3,8 +3,8 @@
 import pytest
 
 from sphshell_pin.benchmarks import quote
+from sphshell_pin.cases.contents import Column, Finding, Section, Table
 from sphshell_pin.study.report import making
-from sphshell_pin.study.report.contents import Column, Finding, Section, Table
 
 
 def test_the_readme_agrees_with_the_measured_data():

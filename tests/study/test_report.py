@@ -17,22 +17,22 @@ from typer.testing import CliRunner
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks import analytic_cases, convergence, hard_cases, query, step
+from sphshell_pin.benchmarks import convergence as forces_section
+from sphshell_pin.benchmarks import hard_cases as hard_section
+from sphshell_pin.benchmarks import queries as queries_section
+from sphshell_pin.benchmarks import step as steps_section
+from sphshell_pin.benchmarks import work_precision as integrators_section
 from sphshell_pin.benchmarks import work_precision as work
+from sphshell_pin.benchmarks.peers import section as peers_section
 from sphshell_pin.benchmarks.peers.measuring import Ratio
 from sphshell_pin.benchmarks.peers.measuring import Row as PeerRow
 from sphshell_pin.benchmarks.sizes import Row as SizeRow
-from sphshell_pin.benchmarks.timing import Spread
+from sphshell_pin.cases import machine
+from sphshell_pin.cases.contents import Column, Finding, Section, Spread, Table, Verdict
+from sphshell_pin.cases.drawing import spread_apart
 from sphshell_pin.cli import app
 from sphshell_pin.errors import Interrupted
-from sphshell_pin.study.report import PAGE, machine, making
-from sphshell_pin.study.report import forces as forces_section
-from sphshell_pin.study.report import hard_cases as hard_section
-from sphshell_pin.study.report import integrators as integrators_section
-from sphshell_pin.study.report import peers as peers_section
-from sphshell_pin.study.report import queries as queries_section
-from sphshell_pin.study.report import steps as steps_section
-from sphshell_pin.study.report.contents import Column, Finding, Section, Table
-from sphshell_pin.study.report.drawing import spread_apart
+from sphshell_pin.study.report import PAGE, making
 from sphshell_pin.study.report.page import Heading
 
 pytest.importorskip("matplotlib")
@@ -95,9 +95,9 @@ def steps(*, quick, progress):
 
 
 def hard(*, quick, progress):
-    row = hard_cases.Row("Impacts", "ball", "a < b & c", "1", 1.0, 1.0, 1e-9, 1e-6, ok=True)
-    bad = replace(row, measured="passed", expected="none", error=math.inf, ok=False)
-    nothing = replace(row, error=0.0, bound=0.0)
+    row = replace(Verdict.on("ball", "a < b & c", "1", 1.0, 1.0, 1e-9, 1e-6), group="Impacts")
+    bad = replace(row, measured="passed", expected="none", value=math.inf)
+    nothing = replace(row, value=0.0, aim=0.0)
     return hard_section.assemble(hard_cases.Found([row, bad, nothing], 2, 1.0), quick=quick)
 
 
@@ -111,7 +111,7 @@ def peers(*, quick, progress):
         Ratio("swing", other, ours, 120.0, 110.0, 130.0),
         Ratio("press", replace(press, engine="mujoco"), press, 1.2, 1.1, 1.3),
     ]
-    return peers_section.assemble([ours, other, press, absent], ratios, {"bowl": "Ball swings"})
+    return peers_section.assemble([ours, other, press, absent], ratios)
 
 
 def parts_of(*measures) -> tuple[making.Part, ...]:
@@ -416,7 +416,7 @@ def test_hard_cases_run_in_a_process_of_their_own():
         hard_cases.checkout(), quick=True, only="impact of Hunt", progress=shares.append
     )
     assert (found.cases, len(found.rows)) == (1, 4)
-    assert all(row.ok and row.error <= row.bound for row in found.rows)
+    assert all(row.ok and row.value <= row.aim for row in found.rows)
     assert shares == [1.0]
 
 

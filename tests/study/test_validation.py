@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from sphshell_pin.cases.contents import Finding, Picture
 from sphshell_pin.cli import app
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.study.report import PAGE
-from sphshell_pin.study.report.contents import Finding, Picture
 from sphshell_pin.study.validation import Outcome, cases, collect, make_validation
 from tests.studies import mostly_studies
 
@@ -55,7 +55,15 @@ def test_command(tmp_path, monkeypatch):
     """It writes the page; a figure that is out stands with its explanation."""
     ran = {"here": outcome(0.5, {}), "far": outcome(2.0, {"error": "Balls have hair."})}
     made = [
-        cases.Case(key, f"Case {key}", "S, https://x", "P", "B", "L", (), lambda key=key: ran[key])
+        cases.Case(
+            key=key,
+            title=f"Case {key}",
+            source="S, https://x",
+            setting="P",
+            bound="B",
+            leaves_out="L",
+            run=lambda key=key: ran[key],
+        )
         for key in ran
     ]
     monkeypatch.setattr(cases, "collect", lambda quick: made)

@@ -20,6 +20,7 @@ from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import Columns, columns
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog, sensor_columns
 from sphshell_pin.errors import ResultError, import_extra
+from sphshell_pin.offered import offered
 from sphshell_pin.summary import Detail, Fact, Summarized
 
 if TYPE_CHECKING:
@@ -234,9 +235,10 @@ class Result(Summarized):
         Raises ResultError without a scene, for a time before 1970 and where the file cannot be
         written, MissingExtra without mcap.
         """
-        from sphshell_pin.export.mcap import write_mcap
-
-        return write_mcap(path, self, scene, start=start)
+        written: Path = offered("sphshell_pin.export.mcap:write_mcap")(
+            path, self, scene, start=start
+        )
+        return written
 
     def plot(self, kind: str = "overview", scene: Scene | None = None) -> Figure:
         """Return a figure, which a notebook shows.
@@ -250,15 +252,13 @@ class Result(Summarized):
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
         there is no scene for the map or it cannot be built again.
         """
-        from sphshell_pin.plot import plot_result
-
-        return plot_result(self, kind, scene)
+        figure: Figure = offered("sphshell_pin.plot:plot_result")(self, kind, scene)
+        return figure
 
     def save_figures(self, folder: str | PathLike[str], scene: Scene | None = None) -> list[Path]:
         """Write the figures as .png files into `folder`; see `sphshell_pin.plot.save_figures`."""
-        from sphshell_pin.plot import save_figures
-
-        return save_figures(self, folder, scene=scene)
+        paths: list[Path] = offered("sphshell_pin.plot:save_figures")(self, folder, scene=scene)
+        return paths
 
     def view(
         self,
@@ -278,9 +278,10 @@ class Result(Summarized):
 
         Raises ResultError without a scene, MissingExtra without meshcat.
         """
-        from sphshell_pin.view.recording import view_result
-
-        return view_result(self, scene, visual_model, speed=speed, height=height, title=title)
+        recording: RecordingView = offered("sphshell_pin.view.recording:view_result")(
+            self, scene, visual_model, speed=speed, height=height, title=title
+        )
+        return recording
 
     def render(
         self,
@@ -298,9 +299,10 @@ class Result(Summarized):
         Raises what `render_film` does: MissingExtra without playwright, ResultError without
         Chromium.
         """
-        from sphshell_pin.view.film import render_film
-
-        return render_film(path, self, scene, visual_model, **options)
+        film: Path = offered("sphshell_pin.view.film:render_film")(
+            path, self, scene, visual_model, **options
+        )
+        return film
 
 
 def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:

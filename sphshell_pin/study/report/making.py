@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Protocol
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
-from sphshell_pin.benchmarks import timing
+from sphshell_pin.benchmarks import convergence, hard_cases, queries, step, timing, work_precision
+from sphshell_pin.benchmarks.peers import section as peers
+from sphshell_pin.cases.contents import Column, Progress, Section, Table, findings_table
+from sphshell_pin.cases.machine import OtherWork, caution_of, describe
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
 from sphshell_pin.plot.figure import new_figure
-from sphshell_pin.study.report import forces, hard_cases, integrators, peers, queries, steps
-from sphshell_pin.study.report.contents import Column, Progress, Section, Table, findings_table
-from sphshell_pin.study.report.machine import OtherWork, caution_of, describe
 from sphshell_pin.study.report.page import SPEED, Heading, render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
@@ -47,10 +47,10 @@ class Part:
 
 
 PARTS = (
-    Part(forces.KEY, forces.TITLE, forces.section, (8.0, 20.0)),
+    Part(convergence.KEY, convergence.TITLE, convergence.section, (8.0, 20.0)),
     Part(queries.KEY, queries.TITLE, queries.section, (40.0, 300.0)),
-    Part(integrators.KEY, integrators.TITLE, integrators.section, (10.0, 120.0)),
-    Part(steps.KEY, steps.TITLE, steps.section, (15.0, 60.0)),
+    Part(work_precision.KEY, work_precision.TITLE, work_precision.section, (10.0, 120.0)),
+    Part(step.KEY, step.TITLE, step.section, (15.0, 60.0)),
     Part(hard_cases.KEY, hard_cases.TITLE, hard_cases.section, (60.0, 300.0), pinned=False),
 )
 PEERS = Part(peers.KEY, peers.TITLE, peers.section, (180.0, 1200.0), pinned=False)

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from string import Template
 
-from sphshell_pin.study.report.contents import Finding, Picture, Section, Table, findings_table
+from sphshell_pin.cases.contents import Finding, Picture, Section, Table, findings_table
 
 TEMPLATE = Path(__file__).with_name("page.html")
 
@@ -69,10 +69,7 @@ def whole_name(findings: list[Finding], k: int) -> str:
 
 
 def render(
-    sections: list[Section],
-    machine: dict[str, str],
-    heading: Heading = SPEED,
-    caution: str = "",
+    sections: list[Section], machine: dict[str, str], heading: Heading = SPEED, caution: str = ""
 ) -> str:
     """Return the page; `caution` is what a reader should know of the machine."""
     findings = [f for section in sections for f in section.findings]

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.result.result import Result
@@ -85,14 +86,10 @@ def head_on(
 
 
 def _free(balls: list[Ball]) -> pin.Model:
-    model = pin.Model()
-    model.gravity.linear = np.zeros(3)
-    for k, ball in enumerate(balls):
-        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"free{k}")
-        inertia = pin.Inertia.FromSphere(ball.mass, ball.radius)
-        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-        model.addFrame(pin.Frame(f"ball{k}", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    return model
+    inertias = [pin.Inertia.FromSphere(ball.mass, ball.radius) for ball in balls]
+    return model_of(
+        *((f"ball{k}", pin.JointModelFreeFlyer(), one) for k, one in enumerate(inertias))
+    )
 
 
 def _run(

@@ -1,26 +1,28 @@
 """What a case of the validation is, and how all of them become a page.
 
 A module of MODULES holds the cases of one subject. A case is a function with the decorator `case`,
-which states its source; it runs the scenes and returns an Outcome: error figures with their bounds,
-and a picture. What it is compared with lies in tests/data/validation, a csv file for each source;
-the lines of such a file that begin with "#" say where the numbers come from and how they were read,
-and stand on the page.
+and a table of cases.toml with its source; it runs the scenes and returns an Outcome: error figures
+with their bounds, and a picture. What it is compared with lies in tests/data/validation, a csv file
+for each source; the lines of such a file that begin with "#" say where the numbers come from and
+how they were read, and stand on the page.
 """
 
 from __future__ import annotations
 
 import csv
-import importlib
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import sphshell_pin
+from sphshell_pin.cases.contents import Finding, Picture, Progress, Section, Table
+from sphshell_pin.cases.register import Register
 from sphshell_pin.errors import NameNotFound, ResultError
-from sphshell_pin.study.report.contents import Finding, Picture, Progress, Section, Table
 from sphshell_pin.study.report.making import Part, Report, Tell, make_report
 from sphshell_pin.study.report.page import Heading
 
@@ -44,21 +46,10 @@ HEADING = Heading(
     "figure is out of its aim, the case says which physics the theory leaves out.",
 )
 DATA = Path("tests", "data", "validation")
-NOT_FOUND = (
-    "D. Gugan, Inelastic collision and the Hertz theory of impact, Am. J. Phys. 68 (2000) 920; R. "
-    "Cross, The bounce of a ball (1999); T. Pozar and others, Optical detection of impact contact "
-    "times, Experimental Mechanics (2017) 1225, all on contact times: only their beginnings could "
-    "be read, not the measured times.",
-    "C. Guettler and others, Normal collisions of spheres, arXiv 1204.0001, on restitution against "
-    "speed: its digitised points are files of their own, which could not be read.",
-    "K. L. Johnson and others, Surface energy and the contact of elastic solids (1971), and "
-    "measured areas of a small sphere on glass: on contact radii against load.",
-    "B. M. Dzidek and others, J. R. Soc. Interface 14 (2017); T. Inoue and S. Hirai, IEEE Trans. "
-    "Robotics 22 (2006); N. Xydas and I. Kao (1999): force, indentation and area of finger pads "
-    "and soft fingertips with modulus and thickness.",
-    "R. Cross, Measurements of rolling friction with a stringless pendulum: the measured "
-    "coefficients; the measured frequencies of balls on turntables and in cylinders.",
+STATED: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("cases.toml").read_text(encoding="utf-8")
 )
+NOT_FOUND: list[str] = STATED.pop("not_found")
 """What could not be compared, as its numbers were not found: none is made up."""
 ABSENT = (
     "the published data belong to the checkout (tests/data/validation), and this package is "
@@ -86,7 +77,7 @@ class Outcome:
         return [f for f in self.findings if f.met is False and f.key not in self.explained]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Case:
     """One comparison: `source` is a citation with its address, `files` are names of csv files.
 
@@ -100,8 +91,8 @@ class Case:
     setting: str
     bound: str
     leaves_out: str
-    files: Sequence[str]
     run: Callable[[], Outcome]
+    files: Sequence[str] = ()
     slow: bool = False
     reading: str = ""
 
@@ -124,15 +115,13 @@ class Case:
     def section(self, *, quick: bool = False, progress: Progress | None = None) -> Section:
         """Run the case and return its section of the page."""
         found = self.run()
+        first, *others = found.findings
         stated = [f"{heading}: {text}" for heading, text in self.texts.items()]
         return Section(
             self.key,
             self.title,
-            # Those on top of the page stand there without their section.
-            findings=[
-                replace(f, what=f"{self.title}: {f.what}") if f.headline else f
-                for f in found.findings
-            ],
+            # The one on top of the page stands there without its section.
+            findings=[replace(first, what=f"{self.title}: {first.what}"), *others],
             pictures=list(found.pictures),
             tables=list(found.tables),
             notes=[*stated, *found.notes, *explanations(found)],
@@ -148,40 +137,18 @@ def explanations(found: Outcome) -> list[str]:
     return [f"Out of bounds: {'; '.join(names)}. {text}" for text, names in reasons.items()]
 
 
-_CASES: dict[str, Case] = {}
+CASES: Register[Case] = Register(__package__, MODULES)
+collect = CASES.collect
 
 
-def case(
-    key: str,
-    title: str,
-    *,
-    source: str,
-    setting: str,
-    bound: str,
-    leaves_out: str,
-    files: Sequence[str] = (),
-    slow: bool = False,
-    reading: str = "",
-) -> Callable[[Callable[[], Outcome]], Callable[[], Outcome]]:
-    """Decorate the function that runs a case; the case joins those of its module."""
+def case(key: str) -> Callable[[Callable[[], Outcome]], Callable[[], Outcome]]:
+    """Decorate the function that runs a case; what it states of itself is in cases.toml."""
 
     def register(run: Callable[[], Outcome]) -> Callable[[], Outcome]:
-        if key in _CASES:
-            raise ValueError(f"two cases are called {key!r}")
-        texts = source, setting, bound, leaves_out
-        _CASES[key] = Case(key, title, *texts, files, run, slow, reading)
+        CASES.add(key, Case(key=key, run=run, **STATED[key]))
         return run
 
     return register
-
-
-def collect(*, quick: bool = False) -> list[Case]:
-    """Return the cases in the order of the page; `quick` leaves out the slow ones."""
-    names = [f"{__package__}.{name}" for name in MODULES]
-    for name in names:
-        importlib.import_module(name)
-    ordered = sorted(_CASES.values(), key=lambda known: names.index(known.run.__module__))
-    return [known for known in ordered if not (quick and known.slow)]
 
 
 def make_validation(
@@ -221,6 +188,11 @@ class Data:
     def __getitem__(self, column: str) -> Array:
         """Return a column (n,) of numbers."""
         return np.array(self.texts(column), dtype=float)
+
+    @property
+    def published(self) -> dict[str, float]:
+        """The column "value" by the column "quantity"."""
+        return dict(zip(self.texts("quantity"), self["value"].tolist(), strict=True))
 
     def where(self, column: str, value: str) -> Data:
         """Return the rows whose `column` is `value`."""

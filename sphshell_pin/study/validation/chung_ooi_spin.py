@@ -6,12 +6,11 @@ import dataclasses
 
 import numpy as np
 
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation import maw
 from sphshell_pin.study.validation.balls import Ball, head_on
 from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
-from sphshell_pin.study.validation.chung_ooi_normal import PAPER
-from sphshell_pin.study.validation.kharaz import AS_A_WHOLE, RINGS, THEORY
+from sphshell_pin.study.validation.kharaz import RINGS, THEORY
 from sphshell_pin.study.validation.oblique import Setting, rms
 from sphshell_pin.study.validation.pictures import Panel, draw
 
@@ -31,17 +30,7 @@ def after_sliding(one: Setting, incident: Array, quantity: str) -> Array:
     return np.array(out)
 
 
-@case(
-    "chung_ooi_5",
-    "Steel and polyethylene at an angle (Chung and Ooi, test 5)",
-    source=f"{PAPER}5: spheres on a rigid plane, 5 m/s along the normal, the rest varied.",
-    setting="Radius 10 µm, mu 0.3, no damping; steel: E 208 GPa, Poisson's ratio 0.3, density "
-    "7850 kg/m^3; polyethylene: 1 GPa, 0.4, 1400 kg/m^3.",
-    bound="0.1, a hundredth of the figures' axes or two.",
-    leaves_out="Waves in the spheres. With the points of the codes our run has no micro-slip, as "
-    "they have none; with the finite elements it has, with eight rings.",
-    files=("chung_ooi_5",),
-)
+@case("chung_ooi_5")
 def sliding() -> Outcome:
     """Run test 5."""
     data = read("chung_ooi_5")
@@ -60,7 +49,6 @@ def sliding() -> Outcome:
                 f"rms of the {quantity}, " + ("finite elements" if name == "fem" else name),
                 rms(after_sliding(compared, incident, quantity) - value),
                 aim=0.1,
-                headline=not findings,
             )
             findings.append(finding)
             if not finding.met and name != "fem":
@@ -113,10 +101,6 @@ def after_spinning(one: Setting, x: Array, quantity: str) -> Array:
     return np.array(out)
 
 
-SPINNING = (
-    "Radius 0.1 m, normal velocity 0.2 m/s, mu 0.4, restitution 0.5; alloy: E 70 GPa, Poisson's "
-    "ratio 0.33, density 2700 kg/m^3; nylon: 2.5 GPa, 0.4, 1000 kg/m^3"
-)
 DAMPED = (
     "Damping along the plane: what was read of the benchmark does not state it, but its curves "
     "have it. At a restitution of 0.5 it decides how far a patch swings back that sticks. "
@@ -145,7 +129,6 @@ def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
                     f"rms of {quantity}, {name}, {part}",
                     rms(errors[which]),
                     aim=bound,
-                    headline=not findings,
                 )
                 findings.append(finding)
                 if not finding.met and part == "sticking":
@@ -166,39 +149,18 @@ def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
 
 
 AXES = {
-    "beta": (
-        "7/2 mu (1 + e) normal / tangential velocity",
-        "- tangential velocity after / before",
-    ),
+    "beta": ("7/2 mu (1 + e) normal / tangential velocity", "- tangential velocity after / before"),
     "recoil": ("tangential / normal velocity", RECOIL),
 }
 
 
-@case(
-    "chung_ooi_6",
-    "Spinning balls on a rigid plane (Chung and Ooi, test 6)",
-    source=f"{PAPER}6: spheres fall on a rigid plane, their spin varied.",
-    setting=f"{SPINNING}; the plane is rigid.",
-    bound="0.02 in beta and 0.05 in the recoil, a hundredth of the figures' axes.",
-    leaves_out=DAMPED + AS_A_WHOLE,
-    files=("chung_ooi_6",),
-)
+@case("chung_ooi_6")
 def on_a_plane() -> Outcome:
     """Run test 6."""
     return _spinning("chung_ooi_6", {"alloy": ALLOY, "nylon": NYLON})
 
 
-@case(
-    "chung_ooi_7",
-    "Two equal balls that spin the opposite way (Chung and Ooi, test 7)",
-    source=f"{PAPER}7: two equal spheres, 0.2 m/s each, their spins opposite and varied.",
-    setting="Radius 0.1 m, mu 0.4, restitution 0.5; alloy: E 70 GPa, Poisson's ratio 0.33, density "
-    "2700 kg/m^3; copper: 120 GPa, 0.35, 8900 kg/m^3.",
-    bound="One thousandth, the depth over the radius: the patches do not slide on each other, but "
-    "our contact point is on the surface of the second ball, and that much off the middle.",
-    leaves_out="Nothing: it is a symmetry.",
-    files=("chung_ooi_7",),
-)
+@case("chung_ooi_7")
 def opposite() -> Outcome:
     """Run test 7."""
     data = read("chung_ooi_7")
@@ -224,11 +186,7 @@ def opposite() -> Outcome:
         slip = float(np.abs(along - data["tangential"]).max())
         findings += [
             Finding(
-                f"spin_{name}",
-                f"largest change of the spin, relative, {name}",
-                error,
-                aim=1e-3,
-                headline=not findings,
+                f"spin_{name}", f"largest change of the spin, relative, {name}", error, aim=1e-3
             ),
             Finding(f"along_{name}", f"largest tangential velocity, {name}", slip, "m/s", aim=1e-3),
         ]
@@ -243,17 +201,7 @@ def opposite() -> Outcome:
     return Outcome(findings, [draw("chung_ooi_7", panels, "The spin stays as it was.")])
 
 
-@case(
-    "chung_ooi_8",
-    "A spinning ball on a large and heavy one (Chung and Ooi, test 8, case A)",
-    source=f"{PAPER}8: a sphere meets one of five times its radius and 1000 times its density.",
-    setting=f"{SPINNING}; the large one at rest, 0.5 m, 1000 times as dense and as stiff. Case B "
-    "is left out: what was read of it does not say which stiffness it changes.",
-    bound="0.02 in beta and 0.05 in the recoil, a hundredth of the figures' axes.",
-    leaves_out=DAMPED + AS_A_WHOLE,
-    files=("chung_ooi_8",),
-    slow=True,
-)
+@case("chung_ooi_8")
 def on_a_ball() -> Outcome:
     """Run test 8."""
     spheres = {

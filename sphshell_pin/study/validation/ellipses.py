@@ -9,8 +9,9 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.models import model_of
+from sphshell_pin.cases.contents import Finding, Table, columns
 from sphshell_pin.contact.normal_law import NormalLaw
-from sphshell_pin.study.report.contents import Finding, Table, columns
 from sphshell_pin.study.validation.balls import plane
 from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
 from sphshell_pin.study.validation.pictures import Panel, draw
@@ -34,12 +35,8 @@ class Touch:
 
 def press(radius: float, shell: sp.Shell, law: NormalLaw, approach: float) -> Touch:
     """Return the contact of a ball of `radius` [m] over the shell, whose top is at the origin."""
-    model = pin.Model()
-    model.gravity.linear = np.zeros(3)
-    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slider")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1e3, radius), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model)
+    ball = ("ball", pin.JointModelPZ(), pin.Inertia.FromSphere(1e3, radius))
+    scene = sp.Scene(model_of(ball))
     scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law)
     start = np.array([radius - approach])
     result = sp.Simulation(scene).run(start, None, 1e-12, record=("patch",))
@@ -101,23 +98,7 @@ def ours(row: Data) -> Touch:
     return under(row["force"].item(), ball, shell, law)
 
 
-@case(
-    "elliptical_contacts",
-    "Elliptical contacts at rest: wheel on rail, ball in a bearing",
-    source="E. A. H. Vollebregt and J. J. Kalker, CONTACT, reference outputs of the open source "
-    "version, https://github.com/eve70a/CONTACT; ball bearing 6206: "
-    "https://eng-tools.dev/series-a/a2-hertz-contact.",
-    setting="Curvatures, loads, shear moduli and Poisson's ratios as published; HertzLaw on "
-    "tessellated cylinders and on the saddle of the bearing's groove, elements of 0.02 of the "
-    "smallest radius.",
-    bound="Half axes: the four digits in which CONTACT prints them and the curvatures, 5e-4. "
-    "Approach and pressure: its error on the coarsest grid, of 7 elements across the contact, "
-    "4e-3. Bearing: the approximate formula takes 12.19 for the ratio of the half axes, which is "
-    "off by 3 %.",
-    leaves_out="The half-space and the quadratic gap are theirs, too: what is compared is Hertz's "
-    "theory, its numerical solution and our curvatures of the shell.",
-    files=(FILE,),
-)
+@case("elliptical_contacts")
 def elliptical_contacts() -> Outcome:
     """Press each of them."""
     data = read(FILE)
@@ -142,7 +123,7 @@ def elliptical_contacts() -> Outcome:
     findings = [
         Finding(
             "axes", "half axes, largest error relative to CONTACT's", worst(contact, ("a", "b")),
-            aim=5e-4, headline=True,
+            aim=5e-4,
         ),
         Finding(
             "approach",
@@ -179,20 +160,7 @@ def elliptical_contacts() -> Outcome:
     )
 
 
-@case(
-    "hertz_coefficients",
-    "The coefficients of a manufacturer of rolling bearings",
-    source="J. Brändlein, P. Eschmann, L. Hasbargen, K. Weigand, Die Wälzlagerpraxis (1995, 1998), "
-    "reprinted at https://www.yumpu.com/de/document/view/32855633/"
-    "a-erweiterungen-der-elementaren-festigkeitslehre-fa-1-4-r-die-springer/6.",
-    setting="38 ratios of curvatures, from a circle to an ellipse a hundred times as long as wide: "
-    "a ball on tessellated cylinders, elements of 0.02 of the smaller radius. Modulus and load "
-    "cancel.",
-    bound="The last printed digit, 0.01 of half axis a and 0.001 of the others, is up to 0.5 %; "
-    "0.6 % is asked, as one of the entries is off by more than that digit.",
-    leaves_out="Nothing: it is the same theory, printed in three digits.",
-    files=("hertz_coefficients",),
-)
+@case("hertz_coefficients")
 def hertz_coefficients() -> Outcome:
     """Press a ball on a cylinder of each of the ratios."""
     data = read("hertz_coefficients")
@@ -214,7 +182,6 @@ def hertz_coefficients() -> Outcome:
             f"{name}, largest error relative to the printed coefficient",
             float(np.abs(np.array(found[key]) / data[key] - 1).max()),
             aim=0.006,
-            headline=key == "xi",
         )
         for key, name in names.items()
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import plane
 from sphshell_pin.study.validation.cases import Outcome, case, read
 from sphshell_pin.study.validation.ellipses import Touch, press
@@ -30,24 +30,10 @@ def exponent(touches: list[Touch]) -> float:
     return float(np.log(last.approach / first.approach) / np.log(last.force / first.force))
 
 
-@case(
-    "finger_pad",
-    "A finger pad against a plate: exponent and shape of the pressure",
-    source="D. T. V. Pawluk and R. D. Howe, Dynamic Contact of the Human Fingerpad Against a Flat "
-    "Surface, J. Biomech. Eng. 121 (1999) 605-611, https://doi.org/10.1115/1.2800860; "
-    "https://koreascience.kr/article/JAKO200111919995062.page (2001).",
-    setting="FoundationLaw and HertzLaw of a ball on a plate, approaches from 0.1 to 5 % of the "
-    "radius. Radius, modulus and thickness cancel in both figures, so that there is nothing to "
-    "tune; published curves with modulus and thickness could not be read.",
-    bound="The papers state both without scatter; 5 % is asked.",
-    leaves_out="The shape and the layers of a pad, its viscosity, its stiffening: the force of "
-    "Pawluk and Howe grows exponentially with displacement.",
-    files=("finger_pad",),
-)
+@case("finger_pad")
 def finger_pad() -> Outcome:
     """Compare how displacement grows with force, and the largest pressure with the mean one."""
-    data = read("finger_pad")
-    published = dict(zip(data.texts("quantity"), data["value"].tolist(), strict=True))
+    published = read("finger_pad").published
     plate, approaches = plane(1.0), RADIUS * np.geomspace(1e-3, 5e-2, 9)
     laws = {
         "FoundationLaw": sp.FoundationLaw(MODULUS, THICKNESS),
@@ -67,7 +53,6 @@ def finger_pad() -> Outcome:
                 f"{name}: largest over mean pressure, relative to that of a paraboloid",
                 abs(ratio / published["peak_over_mean"] - 1),
                 aim=BOUND,
-                headline=name == "FoundationLaw",
             ),
             Finding(
                 f"{name}_exponent",

@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation import maw
 from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
-from sphshell_pin.study.validation.chung_ooi_normal import PAPER
 from sphshell_pin.study.validation.oblique import Rebound, Setting, of, rms, thrown
 from sphshell_pin.study.validation.pictures import Panel, draw
 
@@ -28,11 +28,6 @@ NAMES = {
     "rebound_angle": "rebound angle of the center [deg]",
     "patch_angle": "rebound angle of the patch [deg]",
 }
-AS_A_WHOLE = (
-    "Micro-slip: like the codes that computed the points, we let the disc of contact stick or "
-    "slip as a whole here (one ring); by Mindlin and by Maw, Barber and Fawcett (Wear 38 (1976) "
-    "101) its rim slips before its middle. "
-)
 WHOLE = (
     "Codes like MFIX multiply the whole displacement along the plane by the present stiffness: a "
     "growing disc stiffens a spring that is stretched already. Integrated by itself, that rule "
@@ -73,20 +68,7 @@ def with_micro_slip(setting: Setting, quantity: str, angles: Array) -> Array:
     return np.degrees(np.arctan2(moved, back * normal))
 
 
-@case(
-    "kharaz",
-    "Alumina on glass at an angle, measured (Kharaz, Gorham and Salman)",
-    source="A. H. Kharaz, D. A. Gorham and A. D. Salman, An experimental study of the elastic "
-    "rebound of spheres, Powder Technology 120 (2001) 281-291, "
-    "https://doi.org/10.1016/S0032-5910(01)00283-2.",
-    setting="Radius 2.5 mm, density 4000 kg/m^3, 3.9 m/s; E 380 GPa and Poisson's ratio 0.23 of "
-    "alumina, 70 GPa and 0.25 of glass; mu 0.092, restitution 0.98 at every angle. Micro-slip with "
-    "eight rings.",
-    bound="0.02 in v'/v and 3 % of the largest spin; the three readings of the same printed points "
-    "differ by up to 0.003 in v'/v. One degree for the angles.",
-    leaves_out="Waves in the glass, and the change of restitution with the angle.",
-    files=("kharaz",),
-)
+@case("kharaz")
 def measured() -> Outcome:
     """Compare with all three readings of the measured points."""
     data = read("kharaz")
@@ -108,7 +90,6 @@ def measured() -> Outcome:
                 rms(values(GLASS, quantity, angle) - value) / scale,
                 unit(quantity),
                 aim=bound,
-                headline=quantity == "restitution",
             )
         )
         theory[quantity] = rms(with_micro_slip(GLASS, quantity, angle) - value) / scale
@@ -139,6 +120,11 @@ def _own_error(data: Data) -> float:
     )
 
 
+def parts(angle: Array) -> list[tuple[str, NDArray[np.bool_], str]]:
+    """Return ends of keys and of names, and which angles: all, and those from 10 degrees on."""
+    return [("", angle > 0, ""), ("_from_10", angle > 9, ", from 10 degrees on")]
+
+
 def what(quantity: str) -> str:
     """Return the name of an error figure of a quantity."""
     names = {"restitution": "v'/v along the plane", "spin": "spin, over the largest"}
@@ -164,17 +150,7 @@ def _panel(quantity: str, points: Data, lines: dict[str, list[Rebound]]) -> Pane
     )
 
 
-@case(
-    "chung_ooi_4",
-    "A sphere on a rigid plane at an angle (Chung and Ooi, test 4)",
-    source=f"{PAPER}4: spheres of aluminum oxide and aluminum alloy, 3.9 m/s.",
-    setting="Radius 2.5 mm, mu 0.092, restitution 0.98 at every angle; oxide: E 380 GPa, Poisson's "
-    "ratio 0.23, density 4000 kg/m^3; alloy: 70 GPa, 0.33, 2700 kg/m^3; the plane is rigid.",
-    bound="0.02 in v'/v and 3 % of the largest spin, two degrees for the patch. By theory v'/v "
-    "does not depend on the speed where restitution and mu do not: 0.001.",
-    leaves_out=AS_A_WHOLE,
-    files=("chung_ooi_4",),
-)
+@case("chung_ooi_4")
 def rigid() -> Outcome:
     """Run test 4, and at a tenth and a hundredth of its speed."""
     data = read("chung_ooi_4")
@@ -191,12 +167,7 @@ def rigid() -> Outcome:
             marks.append((name, angle, value))
             errors = values(spheres[name], quantity, angle) - value
             scale = value.max() if quantity == "spin" else 1.0
-            for key, chosen, where in (
-                ("", angle > 0, ""),
-                ("_from_10", angle > 9, ", from 10 degrees on"),
-            ):
-                if key and quantity != "restitution":
-                    continue
+            for key, chosen, where in parts(angle)[: 1 + (quantity == "restitution")]:
                 findings.append(
                     Finding(
                         f"{quantity}_{name}{key}",
@@ -204,7 +175,6 @@ def rigid() -> Outcome:
                         rms(errors[chosen]) / scale,
                         unit(quantity),
                         aim=bound,
-                        headline=not findings,
                     )
                 )
         ours = [
@@ -237,16 +207,7 @@ def _speeds() -> list[Finding]:
     ]
 
 
-@case(
-    "mfix_dem05",
-    "Alumina on glass at an angle, computed by MFIX (DEM05)",
-    source="MFIX, verification test DEM05, "
-    "https://mfix.netl.doe.gov/doc/vvuq-manual/main/html/dem/dem-05.html.",
-    setting="As measured by Kharaz, without damping: restitution 1. Without micro-slip, as MFIX.",
-    bound="0.01 in v'/v, 1 % of the largest spin, half a degree: what is left between two codes.",
-    leaves_out=AS_A_WHOLE,
-    files=("mfix_dem05",),
-)
+@case("mfix_dem05")
 def mfix() -> Outcome:
     """Compare with what MFIX prints."""
     data = read("mfix_dem05")
@@ -258,17 +219,13 @@ def mfix() -> Outcome:
     for quantity, bound in (("restitution", 0.01), ("spin", 0.01), ("rebound_angle", 0.5)):
         here, there = taken(ours, quantity, angle), data[quantity]
         scale = there.max() if quantity == "spin" else 1.0
-        for key, chosen, where in (
-            ("", angle > 0, ""),
-            ("_from_10", angle >= 10, ", from 10 degrees on"),
-        ):
+        for key, chosen, where in parts(angle):
             finding = Finding(
                 quantity + key,
                 what(quantity) + where,
                 rms((here - there)[chosen]) / scale,
                 unit(quantity),
                 aim=bound,
-                headline=not findings,
             )
             findings.append(finding)
             if not finding.met and not key:

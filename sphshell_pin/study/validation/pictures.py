@@ -8,20 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sphshell_pin.study.report.contents import Picture
-from sphshell_pin.study.report.drawing import (
-    BLUE,
-    GREEN,
-    INK,
-    ORANGE,
-    RED,
-    SMALL,
-    VIOLET,
-    drawing,
-    png_of,
-)
+from sphshell_pin.cases import drawing
+from sphshell_pin.cases.contents import Picture
 
-COLORS = (BLUE, ORANGE, GREEN, VIOLET, RED)
+COLORS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.VIOLET, drawing.RED)
 MARKS = ("o", "s", "^", "D", "v")
 Series = tuple[str, ArrayLike, ArrayLike]
 """A name, x (n,) and y (n,)."""
@@ -47,17 +37,19 @@ def draw(name: str, panels: Sequence[Panel], caption: str, description: str = ""
     """Draw the panels side by side; `description` is for those who cannot see them."""
     wide = 2 if len(panels) == 4 else len(panels)
     tall = len(panels) // wide
-    with drawing(max(4.6, 3.9 * wide), 3.3 * tall) as figure:
+    with drawing.canvas(max(4.6, 3.9 * wide), 3.3 * tall) as figure:
         axes = figure.subplots(tall, wide, squeeze=False).flat
         for axis, panel in zip(axes, panels, strict=True):
             for k, (label, x, y) in enumerate(panel.ours):
                 axis.plot(x, y, color=COLORS[k % len(COLORS)], label=label)
             for label, x, y in panel.theory:
-                axis.plot(x, y, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), label=label)
+                axis.plot(
+                    x, y, color=drawing.INK, linewidth=1.0, linestyle=(0, (4, 3)), label=label
+                )
             for k, (label, x, y) in enumerate(panel.published):
                 axis.plot(
                     np.asarray(x), np.asarray(y), MARKS[k % len(MARKS)], label=label,
-                    color=INK, markerfacecolor="none", markersize=4.5,
+                    color=drawing.INK, markerfacecolor="none", markersize=4.5,
                 )  # fmt: skip
             if panel.logarithmic:
                 axis.set_xscale("log")
@@ -67,6 +59,6 @@ def draw(name: str, panels: Sequence[Panel], caption: str, description: str = ""
             axis.set_xlabel(panel.x)
             axis.set_ylabel(panel.y)
             axis.grid(visible=True)
-            axis.legend(fontsize=SMALL - 0.5, edgecolor="none", framealpha=0.85)
-        png = png_of(figure)
+            axis.legend(fontsize=drawing.SMALL - 0.5, edgecolor="none", framealpha=0.85)
+        png = drawing.png_of(figure)
     return Picture(name, png, description or caption, caption)

@@ -13,7 +13,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.rolling import Ball, in_bowl, in_cylinder, on_turntable, velocities
 from sphshell_pin.benchmarks.swing import GRAVITY
-from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import plane
 from sphshell_pin.study.validation.cases import Outcome, case, read
 from sphshell_pin.study.validation.pictures import Panel, Series, draw
@@ -22,13 +22,6 @@ WOOD = 1e10  # Young's modulus [Pa]
 RESISTANCE = 0.005
 SHARE = 3e-5  # depth under the weight, over the radius: it does not count
 FILE = "rolling_balls"
-CLOSED = "The law has no scatter: 1e-4 is asked."
-
-
-def published(of: str) -> dict[str, float]:
-    """Return the published figures of one of the cases, by their names."""
-    data = read(FILE).where("case", of)
-    return dict(zip(data.texts("quantity"), data["value"].tolist(), strict=True))
 
 
 def wall(radius: float, angle: float, length: float, columns: int, rows: int = 1) -> sp.Shell:
@@ -47,24 +40,10 @@ def wall(radius: float, angle: float, length: float, columns: int, rows: int = 1
     return sp.Shell(np.concatenate(vertices), elements, normals=normals)
 
 
-@case(
-    "turntable",
-    "A ball on a turntable",
-    source="W. Weckesser, Am. J. Phys. 65 (1997) 736, "
-    "http://www.warrenweckesser.net/pubs/AJP_BallRolling.pdf; experiment: lecture demonstration "
-    "D5-21 of the University of Maryland, http://jedlik.phy.bme.hu/~hartlein/physics.umd.edu/"
-    "deptinfo/facilities/lecdem/d5-21.htm.",
-    setting="Three solid balls, of 5, 10 and 40 mm radius and 2, 50 and 900 g, that start rolling "
-    "at different places and speeds on tables of 20, 33.3 and 78 rpm. Stiff springs and "
-    "bristles.",
-    bound=CLOSED,
-    leaves_out="Rolling resistance and a table out of level, which let the orbits of an experiment "
-    "drift.",
-    files=(FILE,),
-)
+@case("turntable")
 def turntable() -> Outcome:
     """Roll three balls two orbits each."""
-    ratio = published("turntable")["ratio"]
+    ratio = read(FILE).where("case", "turntable").published["ratio"]
     shell, ratios, misses = plane(1.0), [], []
     ours: list[Series] = []
     theory: list[Series] = []
@@ -97,7 +76,6 @@ def turntable() -> Outcome:
             "orbit over table, largest error relative to 2/7",
             max(abs(seen / ratio - 1) for seen in ratios),
             aim=1e-4,
-            headline=True,
         ),
         Finding(
             "circle",
@@ -111,23 +89,10 @@ def turntable() -> Outcome:
     return Outcome(findings, [draw("turntable", [panel], caption)])
 
 
-@case(
-    "golf_ball",
-    "A golf ball that rolls into the cup and out again",
-    source="M. Gualtieri et al., Golfer's dilemma, Am. J. Phys. 74 (2006) 497-501; sizes: "
-    "http://demonstrations.wolfram.com/RollingBallInsideACylinder/; experiments: Gutterballs and "
-    "rolling down the tubes, Am. J. Phys. 89 (2021) 459, https://pubs.aip.org/aapt/ajp/"
-    "article-abstract/89/5/459/1057354/.",
-    setting="Ball and cup of 21 and 54 mm radius, 46 g; the ball comes over the rim level, "
-    "touching the wall, and goes round at 30 rad/s. Stiff springs and bristles.",
-    bound=CLOSED,
-    leaves_out="Rolling and spinning resistance: a real ball loses height at every turn. The fall "
-    "over the rim, before the ball rolls on the wall.",
-    files=(FILE,),
-)
+@case("golf_ball")
 def golf_ball() -> Outcome:
     """Roll the ball three times down and up again."""
-    given = published("cylinder")
+    given = read(FILE).where("case", "cylinder").published
     radius, cup, orbit = given["ball radius [m]"], given["cup radius [m]"], 30.0
     upright = pin.SE3(pin.utils.rotate("x", math.pi / 2), np.zeros(3))
     shell = wall(cup, math.pi, 0.2, columns=60, rows=30).transformed(upright)
@@ -140,7 +105,6 @@ def golf_ball() -> Outcome:
             "frequency of bobbing over that of the orbit, error relative to sqrt(2/7)",
             abs(run.ratio / given["ratio"] - 1),
             aim=1e-4,
-            headline=True,
         ),
         Finding(
             "height",
@@ -157,30 +121,16 @@ def golf_ball() -> Outcome:
             (),
             [("ours", t, 1e3 * height)],
             [("closed form", t, 1e3 * exact)],
-        ),
+        )
     ]
     caption = "The height of the ball's center over three swings, in six turns."
     return Outcome(findings, [draw("golf_ball", panels, caption)])
 
 
-@case(
-    "curved_track",
-    "A ball that swings on a curved track",
-    source="L. Minkin and D. Sikes, Coefficient of rolling friction - Lab experiment, Am. J. Phys. "
-    "86 (2018) 77-78, https://pubs.aip.org/aapt/ajp/article/86/1/77/1045848/.",
-    setting="Track of 0.57 m radius, from rest at 0.15 m along it. The ball's size was not read: "
-    "a radius of 12.7 mm is taken; the normal force over the weight does not depend on it, and the "
-    "closed form of the period has it.",
-    bound="The published force has two digits: 0.005 of 0.97. The closed form of the period has no "
-    "scatter, that of the amplitudes is to second order in the angle: 1e-3. How linear: 1 %.",
-    leaves_out="The measured coefficient was not read: what is compared of the damping is its law, "
-    "amplitudes that fall off linearly, with a coefficient of 0.005. Air, and a coefficient that "
-    "changes with speed.",
-    files=(FILE,),
-)
+@case("curved_track")
 def curved_track() -> Outcome:
     """Swing without rolling resistance, and compare force and period; then with it."""
-    given = published("track")
+    given = read(FILE).where("case", "track").published
     bend, angle = given["radius [m]"], given["displacement [m]"] / given["radius [m]"]
     ball = Ball(0.067, 0.0127)
     shell = wall(bend, 1.5 * angle, 0.05, columns=40)
@@ -212,7 +162,6 @@ def curved_track() -> Outcome:
             "normal force over weight where the ball turns, relative to the published one",
             abs(force[turning] / given["normal force over weight"] - 1),
             aim=0.005 / given["normal force over weight"],
-            headline=True,
         ),
         Finding(
             "period", "period, relative to the closed form", abs(run.period / run.expected - 1),

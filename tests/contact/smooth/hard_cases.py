@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.benchmarks.measured import Measured, write
+from sphshell_pin.cases.measured import Measured, write
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import jittered_grid
 from tests.contact.smooth.test_real_surfaces import faults, jump

@@ -1,6 +1,6 @@
 """Fits to synthetic data with known parameters: errors, and how often the intervals hold them.
 
-python -m benchmarks.fitting [--sets 1000] [--first 0]
+python -m tests.study.fitted_sets [--sets 1000] [--first 0]
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.benchmarks.timing import machine
+from sphshell_pin.cases.machine import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.fit.quantities import quantities_of
@@ -64,7 +64,7 @@ def exact(path: Path) -> tuple[Array, dict[str, Array]]:
     """Return the times (n,) and the columns (n,) of a run with the true values."""
     built = build(path)
     run = built.scenario.run
-    t = STEP * np.arange(1, round(run.duration / STEP) + 1)
+    t: Array = STEP * np.arange(1, round(run.duration / STEP) + 1, dtype=float)
     result = built.simulation.run(built.q0, built.v0, run.duration, record_dt=STEP)
     known = quantities_of(built)
     return t, {name: known[name].at(result, t) for name in COLUMNS}
@@ -107,7 +107,7 @@ def many_sets(
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.fitting", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.study.fitted_sets", description=__doc__)
     parser.add_argument("--sets", type=int, default=1000)
     parser.add_argument("--first", type=int, default=0, help="seed of the first set")
     given = parser.parse_args()

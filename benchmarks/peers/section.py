@@ -1,52 +1,48 @@
-"""Section 6: the same scenes in other engines."""
+"""The same scenes in other engines: findings, pictures and tables.
+
+The same scenes, each with a truth that no engine computes, in other engines. Every engine runs in a
+process of its own on one core, with the settings that its documentation recommends; the errors are
+worked out from the motion of the ball alone, in the same way for all. Costs are CPU time of
+stepping. In the swing each peer is taken at its best error and this package at its cheapest setting
+that is at least as good in period and energy; ratios are measured in turns.
+"""
 
 from __future__ import annotations
 
 import math
 
-from sphshell_pin.benchmarks.peers import measuring, scenes
+from sphshell_pin.benchmarks.peers import measuring
 from sphshell_pin.benchmarks.peers.engine import Params
 from sphshell_pin.benchmarks.peers.measuring import Ratio, Row
-from sphshell_pin.study.report.contents import (
+from sphshell_pin.benchmarks.peers.scenes import SCENES
+from sphshell_pin.cases import drawing
+from sphshell_pin.cases.contents import (
     TIMES,
     Finding,
     Picture,
     Progress,
     Section,
     Table,
+    about,
     columns,
     number,
 )
-from sphshell_pin.study.report.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    SMALL,
-    VIOLET,
-    drawing,
-    logarithmic,
-    png_of,
-)
+from sphshell_pin.cases.machine import machine
+from sphshell_pin.cases.measured import Measured
 
 KEY, TITLE = "peers", "Other engines"
 # Name on the page, color, marker; of an engine that is not here, its own name in gray.
 LOOKS = {
-    "ours": ("sphshell_pin", BLUE, "o"),
-    "mujoco": ("MuJoCo", RED, "v"),
-    "drake": ("Drake", GREEN, "s"),
-    "pybullet": ("PyBullet", ORANGE, "^"),
-    "loop": ("Python loop", VIOLET, "D"),
+    "ours": ("sphshell_pin", drawing.BLUE, "o"),
+    "mujoco": ("MuJoCo", drawing.RED, "v"),
+    "drake": ("Drake", drawing.GREEN, "s"),
+    "pybullet": ("PyBullet", drawing.ORANGE, "^"),
+    "loop": ("Python loop", drawing.VIOLET, "D"),
 }
 SWING = "bowl"
+TITLES = {name: make().title for name, make in SCENES.items()}
 ABOUT = 100  # rows of a whole measurement, for the progress
-TEXT = """\
-The same scenes, each with a truth that no engine computes, in other engines. Every engine runs in a
-process of its own on one core, with the settings that its documentation recommends; the errors are
-worked out from the motion of the ball alone, in the same way for all. Costs are CPU time of
-stepping. In the swing each peer is taken at its best error and this package at its cheapest setting
-that is at least as good in period and energy; ratios are measured in turns."""
+TEXT = about(__doc__)
 AIMED = (
     "Panda press with control on 200 k triangles, time of a step: fastest peer",
     "bowl swing, CPU time at equal errors of period and energy: peer of the best error",
@@ -77,11 +73,11 @@ def section(*, quick: bool, progress: Progress) -> Section:
         progress(lines / (lines + ABOUT / 2))
 
     rows, ratios = measuring.measure(quick=quick, say=count)
-    return assemble(rows, ratios, {name: make().title for name, make in scenes.SCENES.items()})
+    return assemble(rows, ratios)
 
 
-def assemble(rows: list[Row], ratios: list[Ratio], titles: dict[str, str]) -> Section:
-    """Return the section of what was measured; `titles` of the scenes by name."""
+def assemble(rows: list[Row], ratios: list[Ratio]) -> Section:
+    """Return the section of what was measured."""
     names = list(dict.fromkeys(row.scene for row in rows))
     drawn = [row for row in rows if row.scene == SWING and not row.note]
     return Section(
@@ -92,7 +88,7 @@ def assemble(rows: list[Row], ratios: list[Ratio], titles: dict[str, str]) -> Se
         pictures=[picture(drawn)] if drawn else [],
         tables=[
             ratios_table(ratios),
-            *(scene_table(rows, scene, titles.get(scene, scene)) for scene in names),
+            *(scene_table(rows, scene, TITLES.get(scene, scene)) for scene in names),
             settings_table(rows),
         ],
         notes=notes_of(rows),
@@ -101,7 +97,7 @@ def assemble(rows: list[Row], ratios: list[Ratio], titles: dict[str, str]) -> Se
 
 def name_of(engine: str) -> str:
     """Return the name of an engine on the page."""
-    return LOOKS.get(engine, (engine, GREY, "P"))[0]
+    return LOOKS.get(engine, (engine, drawing.GREY, "P"))[0]
 
 
 def notes_of(rows: list[Row]) -> list[str]:
@@ -115,34 +111,19 @@ def findings_of(ratios: list[Ratio]) -> list[Finding]:
     """Return the ratios that count: the fastest peer at the press, the best at the swing."""
     press = [r for r in ratios if r.peer.scene == "press"]
     swings = [r for r in ratios if r.peer.scene.startswith(SWING)]
-    found = []
+    chosen = []
     if press:
-        fastest = min(press, key=lambda r: r.median)
-        found.append(
-            _finding(
-                "peers_press",
-                f"{AIMED[0]} ({name_of(fastest.peer.engine)}) / ours",
-                fastest,
-                1.6,
-            )
-        )
+        chosen.append(("peers_press", AIMED[0], min(press, key=lambda r: r.median), 1.6))
     if swings:
         best = min(swings, key=lambda r: r.peer.errors["period"] * r.peer.errors["energy"])
-        found.append(
-            _finding(
-                "peers_swing",
-                f"{AIMED[1]} ({name_of(best.peer.engine)}) / ours",
-                best,
-                100.0,
-            )
+        chosen.append(("peers_swing", AIMED[1], best, 100.0))
+    return [
+        Finding(
+            key, f"{what} ({name_of(one.peer.engine)}) / ours", one.median, TIMES, one.low,
+            one.high, aim, sense=">=", headline=True,
         )
-    return found
-
-
-def _finding(key: str, what: str, ratio: Ratio, aim: float) -> Finding:
-    return Finding(
-        key, what, ratio.median, TIMES, ratio.low, ratio.high, aim, sense=">=", headline=True
-    )
+        for key, what, one, aim in chosen
+    ]  # fmt: skip
 
 
 def params_text(params: Params) -> str:
@@ -228,15 +209,15 @@ def settings_table(rows: list[Row]) -> Table:
 
 def picture(rows: list[Row]) -> Picture:
     """Draw the cost of the swing against its errors, a dot per setting."""
-    with drawing(7.8, 3.7) as figure:
+    with drawing.canvas(7.8, 3.7) as figure:
         panels = figure.subplots(1, 2, sharey=True)
         engines = list(dict.fromkeys(row.engine for row in rows))
         for axis, what in zip(panels, ("period", "energy"), strict=True):
-            logarithmic(axis, every=(2, 1))
+            drawing.logarithmic(axis, every=(2, 1))
             axis.set_title(f"error of the {what}")
             axis.invert_xaxis()
             for engine in engines:
-                _, color, marker = LOOKS.get(engine, (engine, GREY, "P"))
+                _, color, marker = LOOKS.get(engine, (engine, drawing.GREY, "P"))
                 found = [row for row in rows if row.engine == engine and row.errors[what] > 0]
                 axis.plot(
                     [row.errors[what] for row in found], [row.cost for row in found], marker,
@@ -246,9 +227,9 @@ def picture(rows: list[Row]) -> Picture:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(
             handles, labels, loc="outside upper center", ncols=len(labels), frameon=False,
-            fontsize=SMALL,
+            fontsize=drawing.SMALL,
         )  # fmt: skip
-        png = png_of(figure)
+        png = drawing.png_of(figure)
     return Picture(
         "peers",
         png,
@@ -256,3 +237,16 @@ def picture(rows: list[Row]) -> Picture:
         "The swing in the bowl, triangles of 0.3 r: a dot is a setting of an engine; more precise "
         "to the right, dearer upwards.",
     )
+
+
+def site_sections(rows: list[Row], ratios: list[Ratio]) -> list[Measured]:
+    """Return what docs/peers.md shows: the tables, with what each scene is."""
+    found = [
+        Measured(text=f"{machine()}; every engine on one core. {notes_of(rows)[0]}"),
+        Measured.of(ratios_table(ratios), "How much more a peer costs"),
+    ]
+    for scene in dict.fromkeys(row.scene for row in rows):
+        about = " ".join((type(SCENES[scene]()).__doc__ or "").split())
+        table = scene_table(rows, scene, TITLES[scene])
+        found.append(Measured.of(table, TITLES[scene], about))
+    return [*found, Measured.of(settings_table(rows), "Settings")]

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import sphshell_pin
 from sphshell_pin.atomic import write_whole
-from sphshell_pin.study.report.contents import Table
+from sphshell_pin.cases.contents import Table
 
-FOLDER = Path(__file__).parent.parent / "docs" / "measured"
+FOLDER = Path(sphshell_pin.__file__).parent.parent / "docs" / "measured"
 
 
 @dataclass(frozen=True)

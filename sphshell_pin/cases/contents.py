@@ -1,7 +1,8 @@
-"""What a report holds: sections of findings, pictures and tables, each described once.
+"""What was measured: findings with their bounds, pictures and tables, and sections of them.
 
-A table is a csv file, an HTML table on the page and a Markdown table in the documents; a picture is
-a png file, which the page holds, too.
+The report, the validation, the hard cases, the benchmarks and the other engines all state their
+results in these. A table is a csv file, an HTML table on the page and a Markdown table in the
+documents; a picture is a png file, which the page holds, too.
 """
 
 from __future__ import annotations
@@ -9,17 +10,32 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 Progress = Callable[[float], None]
 """Called with the share of a section that is done, 0 to 1."""
 Value = str | float | None
+Array = NDArray[np.float64]
 
 TIMES = "\u00d7"  # the unit of ratios
+
+
+class Spread(NamedTuple):
+    """Median and quartiles of a figure over the rounds."""
+
+    median: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, figures: Sequence[float] | Array) -> Spread:
+        """Return the spread of figures (rounds,)."""
+        return cls(*np.percentile(figures, [50, 25, 75]).tolist())
 
 
 @dataclass(frozen=True)
@@ -46,13 +62,13 @@ class Finding:
         cls,
         key: str,
         what: str,
-        ratios: np.ndarray,
+        ratios: Array,
         aim: float | None = None,
         sense: Literal["<=", ">="] = "<=",
         headline: bool = False,
     ) -> Finding:
         """Return the median of the ratios (rounds,) of every round, with its quartiles."""
-        median, low, high = quartiles(ratios)
+        median, low, high = Spread.of(ratios)
         return cls(key, what, median, TIMES, low, high, aim, sense, headline)
 
     @property
@@ -95,6 +111,70 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class Verdict(Finding):
+    """A finding of a law: what was tried, the law in words or symbols, what it says, what came out.
+
+    `value` is the error that `aim` bounds, mostly |measured / expected - 1|; infinite where there
+    is no figure. Where `expected` is a text ("no gain", "none passed"), `measured` may be one, too.
+    `group` is the heading of the case's module.
+    """
+
+    tried: str = ""
+    law: str = ""
+    expected: float | str = ""
+    measured: float | str = ""
+    group: str = ""
+
+    @classmethod
+    def on(
+        cls,
+        what: str,
+        tried: str,
+        law: str,
+        expected: float | str,
+        measured: float | str,
+        error: float,
+        bound: float,
+    ) -> Verdict:
+        """Return the verdict on an error; one that is no number is out of every bound."""
+        error = math.inf if math.isnan(error) else float(error)
+        return cls(
+            "", what, error, aim=bound, tried=tried, law=law, expected=expected, measured=measured
+        )
+
+    @property
+    def ok(self) -> bool:
+        """Whether the error is within its bound."""
+        return self.met is True
+
+
+def compare(
+    what: str,
+    tried: str,
+    law: str,
+    expected: float,
+    measured: float,
+    bound: float,
+    *,
+    scale: float | None = None,
+) -> Verdict:
+    """Return the verdict on |measured - expected| / scale; the scale is |expected| by default."""
+    error = abs(measured - expected) / (abs(expected) if scale is None else scale)
+    return Verdict.on(what, tried, law, expected, measured, error, bound)
+
+
+def at_most(what: str, tried: str, law: str, measured: float, bound: float) -> Verdict:
+    """Return the verdict on a figure that should be zero: its size is the error."""
+    return Verdict.on(what, tried, law, 0.0, measured, abs(measured), bound)
+
+
+def failed(what: str, problem: BaseException) -> Verdict:
+    """Return the verdict on a case that raised."""
+    text = f"{type(problem).__name__}: {str(problem).splitlines()[0] if str(problem) else ''}"
+    return Verdict.on(what, "", "runs to its end", "a figure", text, math.inf, 0.0)
+
+
+@dataclass(frozen=True)
 class Column:
     """A column of a table: name in the file, heading on the page, how a cell is shown.
 
@@ -116,8 +196,11 @@ class Column:
 
 
 def columns(*names: str) -> tuple[Column, ...]:
-    """Return columns of keys, or of texts "key: heading"; else the heading is the key."""
-    parts = (name.partition(": ") for name in names)
+    """Return columns of keys, or of texts "key: heading"; else the heading is the key.
+
+    A text may state several, with "; " between them.
+    """
+    parts = (name.partition(": ") for text in names for name in text.split("; "))
     return tuple(Column(key, heading or key.replace("_", " ")) for key, _, heading in parts)
 
 
@@ -192,6 +275,11 @@ class Section:
     seconds: float = 0.0  # that measuring it took
 
 
+def about(doc: str | None) -> str:
+    """Return the second paragraph of a docstring, as one line: what a section says of itself."""
+    return " ".join("".join((doc or "").split("\n\n")[1:2]).split())
+
+
 def findings_table(findings: Sequence[Finding]) -> Table:
     """Return findings as a table; its verdict is empty for a finding without an aim."""
     words = {True: "met", False: "missed", None: ""}
@@ -207,14 +295,19 @@ def findings_table(findings: Sequence[Finding]) -> Table:
     )
 
 
-def quartiles(figures: np.ndarray) -> tuple[float, float, float]:
-    """Return median, lower and upper quartile of figures (rounds,)."""
-    median, low, high = (float(one) for one in np.percentile(figures, [50, 25, 75]))
-    return median, low, high
+TIME_COLUMNS = "median_s: median [us]; low_s: lower quartile; high_s: upper quartile"
+"""Columns for the `Spread` of times [s]."""
 
 
-TIME_COLUMNS = ("median_s: median [us]", "low_s: lower quartile", "high_s: upper quartile")
-"""Columns for `quartiles` of times [s]."""
+def times_table(
+    name: str, caption: str, label: str, times: Mapping[str, Array], base: str, heading: str
+) -> Table:
+    """Return times [s] (rounds,) by their names: quartiles, and the median over those of `base`.
+
+    `label` is the column of the names; `heading` is that of the ratios, as "key: heading".
+    """
+    rows = [(what, *Spread.of(t), float(np.median(t / times[base]))) for what, t in times.items()]
+    return Table(name, caption, columns(label, TIME_COLUMNS, f"{heading} [{TIMES}]"), rows)
 
 
 def number(value: float | None) -> str:
@@ -251,3 +344,37 @@ def with_unit(value: float, unit: str) -> str:
 def microseconds(seconds: float | None) -> str:
     """Return a time in microseconds; below a nanosecond it is shown as 0."""
     return "" if seconds is None else number(seconds * 1e6 if abs(seconds) >= 1e-9 else 0.0)
+
+
+def verdicts_table(verdicts: Sequence[Verdict], *, grouped: bool = True) -> Table:
+    """Return verdicts, each with what was tried and its law; `grouped`: with their groups."""
+    cells = [
+        (v.group, v.what, v.tried, v.law, v.expected, v.measured, v.value, v.aim, v.ok)
+        for v in verdicts
+    ]
+    return Table(
+        "hard_cases",
+        "All verdicts.",
+        (
+            *columns("group", "case", "tried: what is tried", "law")[not grouped :],
+            Column("expected", "expected", seven_digits),
+            Column("measured", "measured", seven_digits),
+            Column("error", "error", "{:.1e}".format),
+            Column("bound", "bound", "{:.0e}".format),
+            Column("ok", "verdict", lambda ok: "ok" if ok else "FAILS"),
+        ),
+        [row[not grouped :] for row in cells],
+        folded=True,
+    )
+
+
+def seven_digits(value: float | str) -> str:
+    """Return a figure of a verdict."""
+    return value if isinstance(value, str) else f"{value:.7g}"
+
+
+def markdown(section: Section) -> str:
+    """Return a section's findings, tables and notes as Markdown, for a terminal."""
+    tables = [findings_table(section.findings)] if section.findings else []
+    parts = [f"{one.caption}\n\n{one.markdown()}" for one in [*tables, *section.tables]]
+    return "\n".join([f"{section.title}\n", *parts, *section.notes, *section.unmeasured])

@@ -107,3 +107,9 @@ def _versions() -> list[str]:
         with contextlib.suppress(metadata.PackageNotFoundError):
             found.append(f"{name} {metadata.version(name)}")
     return found
+
+
+def machine() -> str:
+    """Return one line on what this runs on."""
+    found = describe("")
+    return f"{found['processor']}; Python {found['Python']}; {found['packages']}"

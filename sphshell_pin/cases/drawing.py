@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.cases.contents import superscript
 from sphshell_pin.plot.figure import new_figure
-from sphshell_pin.study.report.contents import superscript
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,7 @@ _STYLE: dict[str, object] = {
 
 
 @contextlib.contextmanager
-def drawing(width: float, height: float) -> Iterator[Figure]:
+def canvas(width: float, height: float) -> Iterator[Figure]:
     """Give an empty figure of these inches; draw and write it inside."""
     figure = new_figure(width, height)
     from matplotlib import rc_context

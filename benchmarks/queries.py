@@ -1,4 +1,13 @@
-"""Section 2: time and memory of a query, against other codes and the number of triangles."""
+"""Time and memory of a query, against other codes and the number of triangles.
+
+All contacts of a 10 mm sphere pressed 0.5 mm into a wavy sheet, at random positions that the caches
+do not know, on one core, by the default method, "smooth", unless another is named. Coal collects a
+contact for every triangle that is touched; trimesh, libigl and fcpw (in single precision) answer
+the smaller question of the one closest point. The sheet grows at equal size of its triangles, so
+that the sphere always touches the same number of them. In the picture every contestant has a
+process of its own; memory is what it holds after its first query. The ratios among the findings are
+measured in turn in one process.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +18,9 @@ import numpy as np
 
 from sphshell_pin.benchmarks import convergence, query, sizes, timing
 from sphshell_pin.benchmarks.sizes import Row
-from sphshell_pin.study.report.contents import (
+from sphshell_pin.benchmarks.surfaces import Array
+from sphshell_pin.cases import drawing
+from sphshell_pin.cases.contents import (
     TIME_COLUMNS,
     TIMES,
     Column,
@@ -17,47 +28,29 @@ from sphshell_pin.study.report.contents import (
     Picture,
     Progress,
     Section,
+    Spread,
     Table,
+    about,
     columns,
     number,
-    quartiles,
-)
-from sphshell_pin.study.report.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    VIOLET,
-    drawing,
-    guide,
-    label_ends,
-    logarithmic,
-    png_of,
+    times_table,
 )
 
-Times = dict[str, np.ndarray]
+Times = dict[str, Array]
 KEY, TITLE = "queries", "Time and memory of a query"
 COLORS = {
-    "smooth": (BLUE, "o"),
-    "facets": (GREEN, "s"),
-    "coal::collide": (RED, "v"),
-    "trimesh": (ORANGE, "^"),
-    "libigl": (VIOLET, "D"),
-    "fcpw": (GREY, "P"),
+    "smooth": (drawing.BLUE, "o"),
+    "facets": (drawing.GREEN, "s"),
+    "coal::collide": (drawing.RED, "v"),
+    "trimesh": (drawing.ORANGE, "^"),
+    "libigl": (drawing.VIOLET, "D"),
+    "fcpw": (drawing.GREY, "P"),
 }
 OTHERS = (
     ("query_libigl", query.LIBIGL, "libigl's AABB tree (closest point)"),
     ("query_fcpw", query.FCPW, "single-precision fcpw (closest point)"),
 )
-TEXT = """\
-All contacts of a 10 mm sphere pressed 0.5 mm into a wavy sheet, at random positions that the caches
-do not know, on one core, by the default method, "smooth", unless another is named. Coal collects a
-contact for every triangle that is touched; trimesh, libigl and fcpw (in single precision) answer
-the smaller question of the one closest point. The sheet grows at equal size of its triangles, so
-that the sphere always touches the same number of them. In the picture every contestant has a
-process of its own; memory is what it holds after its first query. The ratios among the findings are
-measured in turn in one process."""
+TEXT = about(__doc__)
 
 
 def section(*, quick: bool, progress: Progress) -> Section:
@@ -78,7 +71,7 @@ def section(*, quick: bool, progress: Progress) -> Section:
 
 def assemble(
     peers: Times,
-    growth: dict[int, np.ndarray],
+    growth: dict[int, Array],
     cost: dict[str, Times],
     rows: list[Row],
     notes: list[str],
@@ -90,7 +83,19 @@ def assemble(
         TEXT,
         findings=findings_of(peers, growth, cost),
         pictures=[picture(rows)] if rows else [],
-        tables=[peers_table(peers), cost_table(cost), growth_table(growth), sizes_table(rows)],
+        tables=[
+            times_table(
+                "queries_peers",
+                "A query on 200 k triangles, in turn in one process.",
+                "code: 200 k triangles",
+                peers,
+                query.THIS,
+                "over_ours: over ours",
+            ),
+            convergence.cost_table(cost),
+            growth_table(growth),
+            sizes_table(rows),
+        ],
         notes=notes,
         unmeasured=[
             f"query against {label}: not installed"
@@ -100,11 +105,7 @@ def assemble(
     )
 
 
-def findings_of(
-    peers: Times,
-    growth: dict[int, np.ndarray],
-    cost: dict[str, Times],
-) -> list[Finding]:
+def findings_of(peers: Times, growth: dict[int, Array], cost: dict[str, Times]) -> list[Finding]:
     """Return the ratios that have aims."""
     this = peers[query.THIS]
     found = [
@@ -144,44 +145,14 @@ def findings_of(
     return found
 
 
-def peers_table(peers: Times) -> Table:
-    """Return the times on 200 k triangles."""
-    this = peers[query.THIS]
-    return Table(
-        "queries_peers",
-        "A query on 200 k triangles, in turn in one process.",
-        columns("code: 200 k triangles", *TIME_COLUMNS, f"over_ours: over ours [{TIMES}]"),
-        [(name, *quartiles(t), float(np.median(t / this))) for name, t in peers.items()],
-    )
-
-
-def cost_table(cost: dict[str, Times]) -> Table:
-    """Return the times of our methods."""
-    return Table(
-        "queries_methods",
-        "What a method costs.",
-        columns(
-            "surface: 200 k triangles",
-            "method",
-            *TIME_COLUMNS,
-            f"over_facets: over facets [{TIMES}]",
-        ),
-        [
-            (surface, method, *quartiles(t), float(np.median(t / times["facets"])))
-            for surface, times in cost.items()
-            for method, t in times.items()
-        ],
-    )
-
-
-def growth_table(growth: dict[int, np.ndarray]) -> Table:
+def growth_table(growth: dict[int, Array]) -> Table:
     """Return our time at equal contact patch."""
     few = growth[min(growth)]
     return Table(
         "queries_growth",
         "Our query at equal contact patch, in turn in one process.",
-        columns("triangles", *TIME_COLUMNS, f"over_smallest: over the smallest [{TIMES}]"),
-        [(count, *quartiles(t), float(np.median(t / few))) for count, t in growth.items()],
+        columns("triangles", TIME_COLUMNS, f"over_smallest: over the smallest [{TIMES}]"),
+        [(count, *Spread.of(t), float(np.median(t / few))) for count, t in growth.items()],
     )
 
 
@@ -191,14 +162,14 @@ def sizes_table(rows: list[Row]) -> Table:
         "queries_sizes",
         "Every contestant in a process of its own: query, building, memory held.",
         (
-            *columns("code", "question: answers", "triangles", *TIME_COLUMNS),
+            *columns("code", "question: answers", "triangles", TIME_COLUMNS),
             Column("build_s", "build [s]", number),
             Column("memory_bytes", "memory [MB]", lambda m: number(m / 1e6)),
             *columns("bytes_per_triangle: bytes / triangle"),
         ),
         [
-            (row.name, row.question, row.triangles, row.query.median, row.query.low)
-            + (row.query.high, row.build, row.memory, row.memory / row.triangles)
+            (row.name, row.question, row.triangles, *row.query)
+            + (row.build, row.memory, row.memory / row.triangles)
             for row in rows
         ],
         folded=True,
@@ -207,14 +178,14 @@ def sizes_table(rows: list[Row]) -> Table:
 
 def picture(rows: list[Row]) -> Picture:
     """Draw time and memory against the number of triangles."""
-    with drawing(7.8, 3.9) as figure:
+    with drawing.canvas(7.8, 3.9) as figure:
         panels = figure.subplots(1, 2)
         values: tuple[tuple[str, Callable[[Row], float]], ...] = (
             ("time of a query [us]", lambda r: r.query.median * 1e6),
             ("memory held [MB]", lambda r: r.memory / 1e6),
         )
         for axis, (title, value) in zip(panels, values, strict=True):
-            logarithmic(axis, counts=True)
+            drawing.logarithmic(axis, counts=True)
             axis.set_title(title)
             axis.set_xlabel("triangles")
             ends = []
@@ -233,9 +204,9 @@ def picture(rows: list[Row]) -> Picture:
             else:
                 count = [r.triangles for r in rows]
                 start = (min(count) * 3, 0.4 * min(value(r) for r in rows if value(r) > 0))
-                guide(axis, start, max(count) / 30, 1, "~ triangles")
-            label_ends(axis, ends, gap=0.06)
-        png = png_of(figure)
+                drawing.guide(axis, start, max(count) / 30, 1, "~ triangles")
+            drawing.label_ends(axis, ends, gap=0.06)
+        png = drawing.png_of(figure)
     largest = max(r.triangles for r in rows)
     return Picture(
         "queries",

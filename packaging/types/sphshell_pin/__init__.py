@@ -1,0 +1,1 @@
+../../../sphshell_pin/__init__.py

@@ -1,0 +1,1 @@
+"""Cases with a known truth: error, bound and verdict, and their pictures, tables and sections."""
