@@ -18,12 +18,14 @@ template <typename T, int Columns>
 using InRows = nb::ndarray<const T, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
 
 template <std::size_t Columns, typename T>
+// A list of numbers as an array of that many columns.
 Array<T> rows_of(std::vector<T> values) {
   const std::size_t rows = values.size() / Columns;
   return to_array(std::move(values), {rows, Columns});
 }
 
 template <typename Loop>
+// For loops over plain memory, which may take seconds.
 auto without_gil(Loop&& loop) {
   const ReleaseGil released;
   return loop();
@@ -43,9 +45,9 @@ std::vector<T> copy(const In<T>& values) {
 
 void bind_mending(nanobind::module_& module) {
   using namespace sphshell;
-  using namespace nb::literals;
 
   module.def(
+      // Each takes and returns arrays; what they mean is in mending.hpp.
       "mend_weld",
       [](InRows<double, 3> points, double tolerance) {
         auto result = without_gil([&] { return weld(points.data(), points.shape(0), tolerance); });
