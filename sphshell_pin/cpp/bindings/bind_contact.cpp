@@ -18,9 +18,9 @@ using namespace sphshell;
 namespace {
 
 // A family whose member `law` holds one of its kinds.
-template <class Law, class... Extra>
 // A law by its name and the numbers of its dataclass, and the names of all: what a new kind needs
 // on this side.
+template <class Law, class... Extra>
 nb::class_<Law> bind_family(nb::module_& m, const char* name, const Extra&... extra) {
   using Family = Kinds<decltype(Law::law)>;
   return nb::class_<Law>(m, name, extra...)

@@ -110,9 +110,9 @@ int visit_run(const Run& run, visitproc visit, void* arg) {
   return visit_sources(run.simulation.pairs(), visit, arg);
 }
 
-template <class T, int (*visit_parts)(const T&, visitproc, void*)>
 // Lets Python's garbage collector see what the object holds, so that cycles through callbacks are
 // freed.
+template <class T, int (*visit_parts)(const T&, visitproc, void*)>
 PyType_Slot* slots() {
   static PyType_Slot all[] = {{Py_tp_traverse, reinterpret_cast<void*>(&traverse<T, visit_parts>)},
                               {0, nullptr}};

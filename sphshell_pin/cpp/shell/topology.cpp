@@ -191,9 +191,9 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
       const Vec3& p = vertices[triangles[t][k]];
       const Vec3 a = vertices[triangles[t][next_corner(k)]] - p;
       const Vec3 b = vertices[triangles[t][previous_corner(k)]] - p;
+      // Weighted with the angle at the vertex, so that the sum does not depend on the
+      // triangulation.
       out.vertex_normal[triangles[t][k]] +=
-          // Weighted with the angle at the vertex, so that the sum does not depend on the
-          // triangulation.
           std::atan2(a.cross(b).norm(), a.dot(b)) * out.face_normal[t];
     }
 }

@@ -81,8 +81,8 @@ class CellQuadrature {
     const Vec3 x = patch_.point(w.x(), w.y());
     visit(x, patch_.along_u(w.x(), w.y()).cross(patch_.along_v(w.x(), w.y())), weight);
   }
-  template <class Visit>
   // One ray of Green's formula: Gauss's points from the pole to w, with the Jacobian s.
+  template <class Visit>
   void sector(const Vec2& pole, const Vec2& w, const Vec2& dw, double weight, const GaussRule& rule,
               Visit& visit) {
     const Vec2 from = w - pole;
@@ -177,8 +177,8 @@ class CellQuadrature::Arc {
   double length_ = 0, lean_ = -1, rise_a_ = 0, rise_b_ = 0;
 };
 
-template <class Visit>
 // Into four similar triangles by the middles of the sides.
+template <class Visit>
 void CellQuadrature::divide(const Part& w, int level, Visit& visit) {
   const Vec2 half[3] = {(w.corner[0] + w.corner[1]) / 2, (w.corner[1] + w.corner[2]) / 2,
                         (w.corner[2] + w.corner[0]) / 2};

@@ -78,8 +78,8 @@ struct Dual {
 
 namespace Eigen {
 
-template <int N>
 // What Eigen asks of a scalar type, so that vectors and matrices of duals work.
+template <int N>
 struct NumTraits<sphshell::Dual<N>> : NumTraits<double> {
   using Real = sphshell::Dual<N>;
   using NonInteger = sphshell::Dual<N>;

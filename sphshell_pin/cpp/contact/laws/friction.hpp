@@ -24,8 +24,8 @@ struct ContactForce {
 };
 
 // x, or the nearest to it in the ball.
-template <class S>
 // The projection P of the friction laws.
+template <class S>
 Vector3<S> in_ball(const Vector3<S>& x, const S& radius) {
   using std::sqrt;
   // In a ball of no size the slopes are zero as well, even where x is.

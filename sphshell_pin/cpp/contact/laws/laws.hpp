@@ -32,8 +32,8 @@ S step(const S& x, double x0, double h0, double x1, double h1) {
   return h0 + (h1 - h0) * u * u * (3 - 2 * u);
 }
 
-template <class S>
 // The usual exponents without pow(), which is slow and differs between processors in the last bit.
+template <class S>
 S power(const S& x, double exponent) {
   using std::pow, std::sqrt;
   if (exponent == 1) return x;
@@ -48,8 +48,8 @@ struct NormalForce {
   S elastic;  // its part that derives from the potential [N]
 };
 
-template <class S>
 // Contacts do not pull: damping cannot make the force negative.
+template <class S>
 NormalForce<S> push(const S& total, const S& elastic) {
   return {total < 0 ? S(0) : total, elastic};
 }
@@ -308,8 +308,8 @@ struct FunctionLaw {
     return finite(function(depth, gap_rate, parameters.data()), "force", depth, gap_rate);
   }
 
-  template <class Function>
   // Central difference of fourth order.
+  template <class Function>
   static double slope(const Function& f, double x, double h) {
     return (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h);
   }

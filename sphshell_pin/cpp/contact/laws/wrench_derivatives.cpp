@@ -28,8 +28,8 @@ constexpr int kSpin = 4, kStretch = 5, kRolling = 8, kOuter = 11;
 constexpr int rings_of(int seeds) { return seeds > kOuter ? (seeds - kOuter) / 3 + 1 : 1; }
 constexpr bool has_scale(int seeds) { return seeds > kRolling; }
 
-template <int N>
 // Sorts the derivatives of a vector by the seeds they belong to.
+template <int N>
 void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
   for (int i = 0; i < 3; ++i) {
     value[i] = x[i].value;
@@ -49,9 +49,9 @@ void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
   if constexpr (N <= kSpin) by.spin.setZero(), by.stretch[0].setZero();
 }
 
-template <int N>
 // One evaluation of the laws on dual numbers: the values are those of the simulation, as the code
 // is the same template.
+template <int N>
 void differentiate(const NormalLaw& law, const FrictionLaw& friction, const ContactSite& site,
                    double relaxation, const ContactKinematics<double>& at, LawSlopes& out) {
   // Depth, velocity and, where the law has them, spin, stretches, rolling and scale become

@@ -62,9 +62,9 @@ void Multibody::need(int joint) {
 }
 
 void Multibody::kinematics(const VectorX& q) {
+  // The step of Pinocchio's own forward kinematics, for the joints on the way to contacts
+  // alone.
   using Step =
-      // The step of Pinocchio's own forward kinematics, for the joints on the way to contacts
-      // alone.
       pinocchio::impl::ForwardKinematicZeroStep<double, 0, pinocchio::JointCollectionDefaultTpl,
                                                 VectorX>;
   for (int j : needed_)

@@ -19,8 +19,8 @@ Mat3 eigenvectors(const Mat3& symmetric) {
   return Eigen::SelfAdjointEigenSolver<Mat3>(symmetric).eigenvectors();
 }
 
-template <class Matrix, class Vector>
 // Rank-revealing: what the points do not determine stays as it is (a basic solution).
+template <class Matrix, class Vector>
 Eigen::VectorXd least_squares(const Matrix& a, const Vector& b) {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(a);
   solver.setThreshold(1e-10);
@@ -65,9 +65,9 @@ struct Frame {
   explicit Frame(const Vec3& axis) : u(axis.unitOrthogonal()), v(axis.cross(u)) {}
 };
 
-template <class Row>
 // The derivative of a distance by a motion of the surface is minus the normal's component of that
 // motion.
+template <class Row>
 double distance_and_row(const Primitive& p, const Frame& frame, const Vec3& x, Row&& row) {
   Vec3 n;
   const double distance = p.distance(x, n);
