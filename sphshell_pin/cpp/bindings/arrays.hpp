@@ -14,6 +14,7 @@
 namespace sphshell {
 
 namespace nb = nanobind;
+using namespace nb::literals;
 
 template <class T>
 using Array = nb::ndarray<nb::numpy, T>;
@@ -62,14 +63,17 @@ inline Array<const double> read_only_array(const Eigen::VectorXd& x) {
   return array_of<const double>(std::vector<double>(x.begin(), x.end()), {std::size_t(x.size())});
 }
 
+// Row by row, as NumPy's arrays are by default, while Eigen's matrices are column by column.
 inline Array<const double> read_only_array(const Eigen::MatrixXd& x) {
   return by_rows<const double>(x);
 }
 
+// The three numbers of a vector, behind those that are there.
 inline void append(std::vector<double>& out, const Eigen::Vector3d& x) {
   out.insert(out.end(), x.data(), x.data() + 3);
 }
 
+// Row i of an array (n, 3).
 inline Eigen::Vector3d row(const Points& points, std::size_t i) {
   return Eigen::Vector3d(points(i, 0), points(i, 1), points(i, 2));
 }

@@ -12,11 +12,14 @@
 #include "contact/laws/friction.hpp"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 using namespace sphshell;
 
 namespace {
 
 // A family whose member `law` holds one of its kinds.
+// A law by its name and the numbers of its dataclass, and the names of all: what a new kind needs
+// on this side.
 template <class Law, class... Extra>
 nb::class_<Law> bind_family(nb::module_& m, const char* name, const Extra&... extra) {
   using Family = Kinds<decltype(Law::law)>;
@@ -26,7 +29,7 @@ nb::class_<Law> bind_family(nb::module_& m, const char* name, const Extra&... ex
           [](Law* self, const std::string& kind, const Numbers& numbers) {
             new (self) Law{Family::make(kind, numbers)};
           },
-          nb::arg("kind"), nb::arg("numbers"))
+          "kind"_a, "numbers"_a)
       .def_static("kinds", &Family::names);
 }
 
@@ -40,6 +43,7 @@ NormalLaw of_function(Numbers parameters, std::uintptr_t force, nb::object of_fo
   return {std::move(law)};
 }
 
+// A fault of a user's function, as the package's own error.
 void translate_fault(const std::exception_ptr& thrown, void*) {
   try {
     std::rethrow_exception(thrown);
@@ -57,13 +61,14 @@ PyType_Slot law_slots[] = {
 void bind_contact(nb::module_& m) {
   nb::register_exception_translator(translate_fault);
   bind_family<NormalLaw>(m, "NormalLaw", nb::type_slots(law_slots))
-      .def_static("of_function", &of_function, nb::arg("parameters"), nb::arg("force"),
-                  nb::arg("of_force"), nb::arg("energy"), nb::arg("of_energy").none())
+      .def_static("of_function", &of_function, "parameters"_a, "force"_a, "of_force"_a, "energy"_a,
+                  "of_energy"_a.none())
       .def_prop_ro("needs_rate", &NormalLaw::needs_rate)
       .def("force",
            [](const NormalLaw& law, double depth, double gap_rate) {
              return depth > 0 ? law.force(depth, gap_rate).total : 0.0;
            })
+      // By the depth, at rest: from a dual number.
       .def("stiffness",
            [](const NormalLaw& law, double depth) {
              using S = Dual<1>;
@@ -71,22 +76,23 @@ void bind_contact(nb::module_& m) {
            })
       .def("energy",
            [](const NormalLaw& law, double depth) { return depth > 0 ? law.energy(depth) : 0.0; });
+  // The same for friction; no friction is null in Python.
   bind_family<FrictionLaw>(m, "FrictionLaw")
       .def_prop_ro("has_state", &FrictionLaw::has_state)
       .def_prop_ro("torsional", &FrictionLaw::torsional)
-      .def("coefficient", &FrictionLaw::coefficient, nb::arg("speed"));
+      .def("coefficient", &FrictionLaw::coefficient, "speed"_a);
   m.def(
       "contact_force",
       [](const NormalLaw& law, const FrictionLaw* friction, double depth, const Vec3& normal,
          const Vec3& relative, double spin, const Vec3& rolling, const Vec3& bristle, double radius,
          double relaxation) {
+        // Both laws at one contact, without a scene: force, friction, moment, rate of the bristle.
         const ContactKinematics<double> kinematics{depth, normal, relative, spin, bristle, rolling};
         const ContactForce<double> f = contact_force(law, friction ? *friction : FrictionLaw(),
                                                      radius, relaxation, kinematics);
         const Vec3 moment = f.torsion * normal + f.rolling;
         return nb::make_tuple(f.normal, f.friction, moment, f.bristle_rate);
       },
-      nb::arg("law"), nb::arg("friction").none(), nb::arg("depth"), nb::arg("normal"),
-      nb::arg("relative"), nb::arg("spin"), nb::arg("rolling"), nb::arg("bristle"),
-      nb::arg("radius"), nb::arg("relaxation"));
+      "law"_a, "friction"_a.none(), "depth"_a, "normal"_a, "relative"_a, "spin"_a, "rolling"_a,
+      "bristle"_a, "radius"_a, "relaxation"_a);
 }

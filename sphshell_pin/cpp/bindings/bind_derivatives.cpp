@@ -1,11 +1,9 @@
 #include "bindings/interop.hpp"
 
-#include <memory>
-
 #include "bindings/evaluations.hpp"
+#include "bindings/held_step.hpp"
 #include "bindings/records.hpp"
 #include "dynamics/derivatives/sensitivities.hpp"
-#include "dynamics/integrators/table.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/string.h>
@@ -13,30 +11,6 @@
 
 namespace sphshell {
 namespace {
-
-class HeldTorques : public Torques {
- public:
-  explicit HeldTorques(const VectorX& tau) : tau_(tau) {}
-  const VectorX& torque(double, const VectorX&, const VectorX&) override { return tau_; }
-  bool follow_state() const override { return false; }
-  bool follow_time() const override { return false; }
-
- private:
-  const VectorX& tau_;
-};
-
-// Explicit fixed steps hold bristles back; the scene of a pool is left as it was.
-class Relaxed {
- public:
-  Relaxed(SceneData& scene, double time) : scene_(scene), before_(scene.least_relaxation()) {
-    scene.relax_in(time);
-  }
-  ~Relaxed() { scene_.relax_in(before_); }
-
- private:
-  SceneData& scene_;
-  double before_;
-};
 
 template <class T>
 void bind(nb::class_<T>& bound) {
@@ -53,6 +27,7 @@ void bind(nb::class_<T>& bound) {
                   const VectorX z = self.bristles(scene);
                   MatrixX jacobian;
                   VectorX acceleration;
+                  // Repeated for timing alone.
                   for (int i = 0; i < repeat; ++i) {
                     evaluate();
                     acceleration = scene.acceleration(q, v, tau);
@@ -68,8 +43,7 @@ void bind(nb::class_<T>& bound) {
                       read_only_array(MatrixX(linearization.by_parameters().topRows(nv))));
                 });
           },
-          nb::arg("q"), nb::arg("v").none(), nb::arg("tau").none(), nb::arg("parameters"),
-          nb::arg("repeat") = 1)
+          "q"_a, "v"_a.none(), "tau"_a.none(), "parameters"_a, "repeat"_a = 1)
       .def(
           "contact_force_derivatives",
           [](T& self, nb::handle given_q, nb::handle given_v,
@@ -89,48 +63,29 @@ void bind(nb::class_<T>& bound) {
                   read_only_array(MatrixX(out.normal_force)), read_only_array(MatrixX(out.depth)));
             });
           },
-          nb::arg("q"), nb::arg("v").none(), nb::arg("parameters"))
+          "q"_a, "v"_a.none(), "parameters"_a)
       .def(
           "step_derivatives",
           [](T& self, const std::string& integrator, double dt, nb::handle given_q,
              nb::handle given_v, nb::handle given_tau,
              const std::vector<const Parameter*>& parameters) {
             const auto [q, v, tau] = self.arguments(given_q, given_v, given_tau);
-            return self.at(
-                q, v, [&, &q = q, &v = v, &tau = tau](SceneData& scene, auto&& evaluate) {
-                  const std::unique_ptr<Stepper> stepper = make_stepper(integrator, scene);
-                  const Relaxed relaxed(scene, stepper->is_implicit() ? 0 : dt);
-                  StepSlopes slopes(scene, copies(parameters));
-                  HeldTorques torques(tau);
-                  Chart chart(scene, torques);
-                  evaluate();
-                  const State start{0, q, v, self.bristles(scene), {}};
-                  State end;
-                  chart.begin(start);
-                  scene.evaluate(q, v, start.z, true);
-                  stepper->begin(chart);
-                  stepper->step(chart, dt, end);
-                  const Eigen::Index nv = v.size(),
-                                     first = static_cast<Eigen::Index>(parameters.size()),
-                                     all = first + 3 * nv;
-                  Tangent tangent{MatrixX::Zero(nv, all), MatrixX::Zero(nv, all),
-                                  MatrixX::Zero(start.z.size(), all)};
-                  MatrixX torque = MatrixX::Zero(nv, all);
-                  tangent.q.middleCols(first, nv).setIdentity();
-                  tangent.v.middleCols(first + nv, nv).setIdentity();
-                  torque.rightCols(nv).setIdentity();
-                  slopes.carry(chart, *stepper, dt, torque, tangent);
-                  scene.restart();
-                  MatrixX by(2 * nv, all);
-                  by << tangent.q, tangent.v;
-                  return nb::make_tuple(read_only_array(end.q), read_only_array(end.v),
-                                        read_only_array(MatrixX(by.middleCols(first, 2 * nv))),
-                                        read_only_array(MatrixX(by.rightCols(nv))),
-                                        read_only_array(MatrixX(by.leftCols(first))));
-                });
+            return self.at(q, v, [&, &q = q, &v = v, &tau = tau](SceneData& scene, auto&&) {
+              const Eigen::Index nv = v.size(), first = Eigen::Index(parameters.size());
+              // Made before the scene is evaluated: it asks contacts for their derivatives.
+              StepSlopes slopes(scene, copies(parameters));
+              HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
+              const State& end = step.take();
+              const Tangent tangent = step.derivatives(slopes);
+              MatrixX by(2 * nv, tangent.q.cols());
+              by << tangent.q, tangent.v;
+              return nb::make_tuple(read_only_array(end.q), read_only_array(end.v),
+                                    read_only_array(MatrixX(by.middleCols(first, 2 * nv))),
+                                    read_only_array(MatrixX(by.rightCols(nv))),
+                                    read_only_array(MatrixX(by.leftCols(first))));
+            });
           },
-          nb::arg("integrator"), nb::arg("dt"), nb::arg("q"), nb::arg("v").none(),
-          nb::arg("tau").none(), nb::arg("parameters"));
+          "integrator"_a, "dt"_a, "q"_a, "v"_a.none(), "tau"_a.none(), "parameters"_a);
 }
 
 }  // namespace
@@ -139,6 +94,8 @@ void bind(nb::class_<T>& bound) {
 void bind_derivatives(nanobind::module_& m, nanobind::class_<sphshell::Evaluations>& scene,
                       nanobind::class_<sphshell::OwnState>& state) {
   using namespace sphshell;
+  // A parameter as two pairs, with the number less and more a step; of what moves a body, kind and
+  // axis alone.
   nb::class_<Parameter>(m, "Parameter")
       .def(
           "__init__",
@@ -152,9 +109,8 @@ void bind_derivatives(nanobind::module_& m, nanobind::class_<sphshell::Evaluatio
                                  step,
                                  scale};
           },
-          nb::arg("pair"), nb::arg("kind"), nb::arg("axis") = 0,
-          nb::arg("less").none() = nb::none(), nb::arg("more").none() = nb::none(),
-          nb::arg("step") = 0.0, nb::arg("scale") = 1.0);
+          "pair"_a, "kind"_a, "axis"_a = 0, "less"_a.none() = nb::none(),
+          "more"_a.none() = nb::none(), "step"_a = 0.0, "scale"_a = 1.0);
   bind(scene);
   bind(state);
 }

@@ -21,12 +21,15 @@
 namespace sphshell {
 namespace {
 
+// An array (n, 3) of NumPy's.
 using RowPoints = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
+// Of a homogeneous transform, whose last row is not looked at.
 SE3 to_se3(const Eigen::Matrix4d& m) {
   return SE3(Eigen::Matrix3d(m.topLeftCorner<3, 3>()), Vec3(m.topRightCorner<3, 1>()));
 }
 
+// One geometry of three: a source, a ball of a positive radius, or a shell.
 std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matrix4d& placement_i,
                                 int joint_j, const Eigen::Matrix4d& placement_j, double radius,
                                 double ball, std::shared_ptr<Shell> shell, nb::object source,
@@ -38,10 +41,12 @@ std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matr
   pair->placement_i = to_se3(placement_i);
   pair->placement_j = to_se3(placement_j);
   pair->radius = radius;
-  pair->ball = ball;
-  pair->shell = std::move(shell);
-  if (!source.is_none()) pair->source = PythonSource(std::move(source));
-  pair->method = static_cast<Method>(method);
+  if (!source.is_none())
+    pair->geometry = SourcePoints{{}, PythonSource(std::move(source))};
+  else if (ball > 0)
+    pair->geometry = Ball{{}, ball};
+  else
+    pair->geometry = ShellSurface{{}, std::move(shell), static_cast<Method>(method)};
   pair->law = law;
   if (friction) pair->friction = *friction;
   return pair;
@@ -105,6 +110,8 @@ int visit_run(const Run& run, visitproc visit, void* arg) {
   return visit_sources(run.simulation.pairs(), visit, arg);
 }
 
+// Lets Python's garbage collector see what the object holds, so that cycles through callbacks are
+// freed.
 template <class T, int (*visit_parts)(const T&, visitproc, void*)>
 PyType_Slot* slots() {
   static PyType_Slot all[] = {{Py_tp_traverse, reinterpret_cast<void*>(&traverse<T, visit_parts>)},
@@ -112,58 +119,50 @@ PyType_Slot* slots() {
   return all;
 }
 
+// A method of q and v, which are checked: what answer(scene, evaluate, q, v) makes of a scene
+// there.
+template <class T, class Answer>
+void def_at_state(nb::class_<T>& bound, const char* name, Answer answer) {
+  bound.def(
+      name,
+      [answer](T& self, nb::handle given_q, nb::handle given_v) {
+        const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
+        return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
+          return answer(scene, evaluate, q, v);
+        });
+      },
+      "q"_a, "v"_a.none() = nb::none());
+}
+
 // What a scene answers at one state, with a memory of its own or without.
 template <class T>
 void bind_evaluations(nb::class_<T>& bound) {
-  bound
-      .def(
-          "external_forces",
-          [](T& self, nb::handle given_q, nb::handle given_v) {
-            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
-            return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
-              evaluate();
-              const Forces none(scene.touching() ? 0 : scene.external().size(),
-                                pinocchio::Force::Zero());
-              return to_python(scene.touching() ? scene.external() : none);
-            });
-          },
-          nb::arg("q"), nb::arg("v").none() = nb::none())
-      .def(
-          "joint_forces",
-          [](T& self, nb::handle given_q, nb::handle given_v) {
-            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
-            return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
-              evaluate();
-              const JointForces& joints = scene.joints();
-              return to_array(joints.act() ? joints.torque() : VectorX(VectorX::Zero(v.size())));
-            });
-          },
-          nb::arg("q"), nb::arg("v").none() = nb::none())
-      .def(
-          "contacts",
-          [](T& self, nb::handle given_q, nb::handle given_v) {
-            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
-            return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
-              std::vector<ContactRow> rows;
-              evaluate();
-              scene.log(q, v, rows);
-              return to_bytes(std::move(rows));
-            });
-          },
-          nb::arg("q"), nb::arg("v").none() = nb::none())
-      .def(
-          "contact_derivatives",
-          [](T& self, nb::handle given_q, nb::handle given_v) {
-            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
-            return self.at(q, v, [&, &q = q, &v = v](SceneData&, auto&& evaluate) {
-              Linearization& linearization = evaluate.linearization();
-              evaluate();
-              MatrixX by_q, by_v;
-              linearization.forces(q, v, by_q, by_v);
-              return std::pair(to_array(by_q), to_array(by_v));
-            });
-          },
-          nb::arg("q"), nb::arg("v").none() = nb::none());
+  def_at_state(bound, "external_forces", [](SceneData& scene, auto&& evaluate, auto&&...) {
+    evaluate();
+    const Forces none(scene.touching() ? 0 : scene.external().size(), pinocchio::Force::Zero());
+    return to_python(scene.touching() ? scene.external() : none);
+  });
+  def_at_state(bound, "joint_forces",
+               [](SceneData& scene, auto&& evaluate, const VectorX&, const VectorX& v) {
+                 evaluate();
+                 const JointForces& joints = scene.joints();
+                 return to_array(joints.act() ? joints.torque() : VectorX(VectorX::Zero(v.size())));
+               });
+  def_at_state(bound, "contacts",
+               [](SceneData& scene, auto&& evaluate, const VectorX& q, const VectorX& v) {
+                 std::vector<ContactRow> rows;
+                 evaluate();
+                 scene.log(q, v, rows);
+                 return to_bytes(std::move(rows));
+               });
+  def_at_state(bound, "contact_derivatives",
+               [](SceneData&, auto&& evaluate, const VectorX& q, const VectorX& v) {
+                 Linearization& linearization = evaluate.linearization();
+                 evaluate();
+                 MatrixX by_q, by_v;
+                 linearization.forces(q, v, by_q, by_v);
+                 return std::pair(to_array(by_q), to_array(by_v));
+               });
 }
 
 }  // namespace
@@ -174,17 +173,19 @@ void bind_derivatives(nanobind::module_& m, nanobind::class_<sphshell::Evaluatio
 
 void bind_dynamics(nanobind::module_& m) {
   using namespace sphshell;
+  // A pair is described in Python (dynamics/scene/pairs.py), which has checked all of it.
   nb::class_<Pair>(m, "Pair", nb::type_slots(slots<Pair, visit_pair>()))
       .def_rw("relaxation", &Pair::relaxation)
       .def_rw("group", &Pair::group)
-      .def(nb::new_(&make_pair), nb::arg("name"), nb::arg("joint_i"), nb::arg("placement_i"),
-           nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("ball"),
-           nb::arg("shell").none(), nb::arg("source").none(), nb::arg("method"), nb::arg("law"),
-           nb::arg("friction").none());
+      .def(nb::new_(&make_pair), "name"_a, "joint_i"_a, "placement_i"_a, "joint_j"_a,
+           "placement_j"_a, "radius"_a, "ball"_a, "shell"_a.none(), "source"_a.none(), "method"_a,
+           "law"_a, "friction"_a.none());
 
+  // NumPy's structured types of the rows that come as plain memory.
   m.def("contact_row_type", [] { return row_type<ContactRow>(kContactRowFields); });
   m.def("patch_row_type", [] { return row_type<PatchRow>(kPatchRowFields); });
 
+  // Joint components: arrays (nv) of damping and limits, then stops and dry friction one by one.
   nb::class_<JointEffects>(m, "JointEffects")
       .def(
           "__init__",
@@ -197,26 +198,24 @@ void bind_dynamics(nanobind::module_& m) {
                                     std::move(most_effort),
                                     std::move(speed)};
           },
-          nb::arg("damping"), nb::arg("least_effort"), nb::arg("most_effort"), nb::arg("speed"))
+          "damping"_a, "least_effort"_a, "most_effort"_a, "speed"_a)
       .def(
           "add_stop",
           [](JointEffects& self, int q, int v, double end, double sign, const NormalLaw& law) {
             self.stops.push_back({q, v, end, sign, law});
           },
-          nb::arg("q"), nb::arg("v"), nb::arg("end"), nb::arg("sign"), nb::arg("law"))
+          "q"_a, "v"_a, "end"_a, "sign"_a, "law"_a)
       .def(
           "add_friction",
           [](JointEffects& self, int v, double limit, double stiffness, double damping,
              double relaxation) {
             self.friction.push_back({v, limit, stiffness, damping, relaxation});
           },
-          nb::arg("v"), nb::arg("limit"), nb::arg("stiffness"), nb::arg("damping"),
-          nb::arg("relaxation"));
+          "v"_a, "limit"_a, "stiffness"_a, "damping"_a, "relaxation"_a);
 
-  m.def(
-      "model_fault", [](nb::handle model) { return model_fault(model_of(model)); },
-      nb::arg("model"));
+  m.def("model_fault", [](nb::handle model) { return model_fault(model_of(model)); }, "model"_a);
 
+  // Evaluations at single states, from any thread.
   nb::class_<Evaluations> scene(m, "Scene",
                                 nb::type_slots(slots<Evaluations, visit_evaluations>()));
   bind_evaluations(scene);
@@ -229,8 +228,7 @@ void bind_dynamics(nanobind::module_& m) {
             new (self) Evaluations(model_of(model), copies(pairs), std::move(joints),
                                    {model, std::move(shown), std::move(convert)});
           },
-          nb::arg("model"), nb::arg("shown"), nb::arg("pairs"), nb::arg("joints").none(),
-          nb::arg("convert"))
+          "model"_a, "shown"_a, "pairs"_a, "joints"_a.none(), "convert"_a)
       .def_prop_ro("bristle_size", &Evaluations::bristle_size)
       .def("rates",
            [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
@@ -260,8 +258,9 @@ void bind_dynamics(nanobind::module_& m) {
               return to_array(jacobian);
             });
           },
-          nb::arg("q"), nb::arg("v"), nb::arg("z"), nb::arg("tau"), nb::arg("repeat") = 1);
+          "q"_a, "v"_a, "z"_a, "tau"_a, "repeat"_a = 1);
 
+  // A state that remembers contacts and bristles, for a loop of the user's own.
   nb::class_<OwnState> state(m, "SceneState", nb::type_slots(slots<OwnState, visit_state>()));
   bind_evaluations(state);
   state
@@ -273,8 +272,7 @@ void bind_dynamics(nanobind::module_& m) {
             new (self) OwnState(model_of(model), copies(pairs), std::move(joints),
                                 {model, std::move(shown), std::move(convert)});
           },
-          nb::arg("model"), nb::arg("shown"), nb::arg("pairs"), nb::arg("joints").none(),
-          nb::arg("convert"))
+          "model"_a, "shown"_a, "pairs"_a, "joints"_a.none(), "convert"_a)
       .def("copy", [](const OwnState& self) { return new OwnState(self); })
       .def(
           "advance",
@@ -282,18 +280,19 @@ void bind_dynamics(nanobind::module_& m) {
             const StateArgument given = self.arguments(q, v, nb::none());
             self.advance(given.q, given.v, dt);
           },
-          nb::arg("q"), nb::arg("v").none(), nb::arg("dt"));
+          "q"_a, "v"_a.none(), "dt"_a);
   bind_derivatives(m, scene, state);
 
+  // Controllers by their parameters, checked in dynamics/control/.
   nb::class_<Controller>(m, "Controller");
   nb::class_<GravityCompensation, Controller>(m, "GravityCompensation")
-      .def(nb::init<VectorX>(), nb::arg("actuated"));
+      .def(nb::init<VectorX>(), "actuated"_a);
   nb::class_<JointPd, Controller>(m, "JointPd")
-      .def(nb::init<VectorX, VectorX, VectorX, bool, VectorX>(), nb::arg("kp"), nb::arg("kd"),
-           nb::arg("q_ref"), nb::arg("gravity"), nb::arg("actuated"));
+      .def(nb::init<VectorX, VectorX, VectorX, bool, VectorX>(), "kp"_a, "kd"_a, "q_ref"_a,
+           "gravity"_a, "actuated"_a);
   nb::class_<PythonController, Controller>(
       m, "PythonController", nb::type_slots(slots<PythonController, visit_controller>()))
-      .def(nb::init<nb::object>(), nb::arg("callable"));
+      .def(nb::init<nb::object>(), "callable"_a);
   nb::class_<PathSettings>(m, "Path").def(
       "__init__",
       [](PathSettings* self, std::vector<double> along, const RowPoints& points,
@@ -305,9 +304,8 @@ void bind_dynamics(nanobind::module_& m) {
                                 std::move(speeds),  std::move(accelerations), std::move(jerks),
                                 std::move(kinks)};
       },
-      nb::kw_only(), nb::arg("along"), nb::arg("points"), nb::arg("tangents"), nb::arg("normals"),
-      nb::arg("times"), nb::arg("places"), nb::arg("speeds"), nb::arg("accelerations"),
-      nb::arg("jerks"), nb::arg("kinks"));
+      nb::kw_only(), "along"_a, "points"_a, "tangents"_a, "normals"_a, "times"_a, "places"_a,
+      "speeds"_a, "accelerations"_a, "jerks"_a, "kinks"_a);
   nb::class_<CartesianImpedance, Controller>(m, "CartesianImpedance")
       .def(
           "__init__",
@@ -317,6 +315,7 @@ void bind_dynamics(nanobind::module_& m) {
              double rotational_damping, VectorX posture_stiffness, VectorX joint_damping,
              VectorX q_ref, VectorX actuated, bool decoupled) {
             ImpedanceSettings s;
+            // Field by field, as the order of an aggregate's fields is easily mistaken.
             s.joint = joint;
             s.frame = to_se3(frame);
             s.path_joint = path_joint;
@@ -334,12 +333,12 @@ void bind_dynamics(nanobind::module_& m) {
             s.decoupled = decoupled;
             new (self) CartesianImpedance(std::move(s), num_joints);
           },
-          nb::arg("num_joints"), nb::arg("joint"), nb::arg("frame"), nb::arg("path_joint"),
-          nb::arg("path_placement"), nb::arg("path"), nb::arg("stiffness"), nb::arg("damping"),
-          nb::arg("normal_force"), nb::arg("rotational_stiffness"), nb::arg("rotational_damping"),
-          nb::arg("posture_stiffness"), nb::arg("joint_damping"), nb::arg("q_ref"),
-          nb::arg("actuated"), nb::arg("decoupled"));
+          "num_joints"_a, "joint"_a, "frame"_a, "path_joint"_a, "path_placement"_a, "path"_a,
+          "stiffness"_a, "damping"_a, "normal_force"_a, "rotational_stiffness"_a,
+          "rotational_damping"_a, "posture_stiffness"_a, "joint_damping"_a, "q_ref"_a, "actuated"_a,
+          "decoupled"_a);
 
+  // Times in seconds; by keyword only.
   nb::class_<RunSettings>(m, "RunSettings")
       .def(
           "__init__",
@@ -354,18 +353,17 @@ void bind_dynamics(nanobind::module_& m) {
                                    patches,
                                    torques};
           },
-          nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
-          nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"),
-          nb::arg("patches"), nb::arg("torques"));
+          nb::kw_only(), "integrator"_a, "dt"_a, "rtol"_a, "atol"_a, "duration"_a, "start_time"_a,
+          "control_dt"_a, "record_dt"_a, "patches"_a, "torques"_a);
 
-  nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>(), nb::arg("what"));
+  nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>(), "what"_a);
   // Entered and left in one instruction of Python each, so that Ctrl-C cannot come between.
   nb::class_<PythonUse>(m, "Use")
-      .def(nb::init<OneUser&, std::string>(), nb::arg("user"), nb::arg("doing"),
-           nb::keep_alive<1, 2>())
+      .def(nb::init<OneUser&, std::string>(), "user"_a, "doing"_a, nb::keep_alive<1, 2>())
       .def("__enter__", &PythonUse::enter)
       .def("__exit__", [](PythonUse& self, nb::args) { self.leave(); });
 
+  // One run that goes on in pieces; each method is for one user at a time.
   nb::class_<Run>(m, "Simulation", nb::type_slots(slots<Run, visit_run>()))
       .def(
           "__init__",
@@ -379,16 +377,15 @@ void bind_dynamics(nanobind::module_& m) {
             new (self) Run(own, copies(pairs), std::move(joints), settings, std::move(controller),
                            std::move(q0), std::move(v0), copies(sensors));
           },
-          nb::arg("model"), nb::arg("pairs"), nb::arg("joints").none(),
-          nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"), nb::arg("settings"),
-          nb::arg("sensors"))
+          "model"_a, "pairs"_a, "joints"_a.none(), "controller"_a.none(), "q0"_a, "v0"_a,
+          "settings"_a, "sensors"_a)
       .def(
           "differentiate",
           [](Run& self, const std::vector<const Parameter*>& parameters, bool by_q0, bool by_v0) {
             const Use use(self.user, "differentiate");
             self.simulation.differentiate({copies(parameters), by_q0, by_v0});
           },
-          nb::arg("parameters"), nb::arg("by_q0"), nb::arg("by_v0"))
+          "parameters"_a, "by_q0"_a, "by_v0"_a)
       .def("take_sensitivities",
            [](Run& self) {
              const Use use(self.user, "take");
@@ -401,7 +398,7 @@ void bind_dynamics(nanobind::module_& m) {
             const ReleaseGil released;
             return static_cast<int>(self.simulation.advance(wall_seconds, until));
           },
-          nb::arg("wall_seconds"), nb::arg("until") = std::numeric_limits<double>::infinity())
+          "wall_seconds"_a, "until"_a = std::numeric_limits<double>::infinity())
       .def("deep_start",
            [](Run& self) {
              const Use use(self.user, "start");
@@ -414,14 +411,14 @@ void bind_dynamics(nanobind::module_& m) {
             const Use use(self.user, "change");
             self.simulation.change(copies(pairs), std::move(joints), std::move(controller));
           },
-          nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none())
+          "pairs"_a, "joints"_a.none(), "controller"_a.none())
       .def(
           "take_over",
           [](Run& self, const Run& before) {
             const Use use(self.user, "take_over");
             self.simulation.take_over(before.simulation);
           },
-          nb::arg("before"))
+          "before"_a)
       .def(
           "push",
           [](Run& self, int joint, const Vec3& point, const Vec3& force, const Vec3& anchor,
@@ -429,15 +426,15 @@ void bind_dynamics(nanobind::module_& m) {
             const Use use(self.user, "push");
             self.simulation.push(joint, point, {force, anchor, stiffness, damping}, frame);
           },
-          nb::arg("joint"), nb::arg("point"), nb::arg("force_world"), nb::arg("anchor_world"),
-          nb::arg("stiffness"), nb::arg("damping"), nb::arg("frame"))
+          "joint"_a, "point"_a, "force_world"_a, "anchor_world"_a, "stiffness"_a, "damping"_a,
+          "frame"_a)
       .def(
           "record_patches",
           [](Run& self, bool on) {
             const Use use(self.user, "record");
             self.simulation.record_patches(on);
           },
-          nb::arg("on"))
+          "on"_a)
       .def("take",
            [](Run& self) {
              const Use use(self.user, "take");
@@ -464,6 +461,7 @@ void bind_dynamics(nanobind::module_& m) {
       .def_prop_ro(
           "v", [](Run& self) { return to_array(alone<&Simulation::v>(self)); },
           nb::rv_policy::automatic)
+      // State and figures at any time during the run.
       .def_prop_ro("counts", [](Run& self) { return to_dict(alone<&Simulation::counts>(self)); })
       .def_prop_ro("last_step", &alone<&Simulation::last_step>)
       .def_prop_ro("wall_time", &alone<&Simulation::wall_time>)

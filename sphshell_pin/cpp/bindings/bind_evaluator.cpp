@@ -7,10 +7,9 @@
 #include <pinocchio/spatial.hpp>
 
 #include "bindings/evaluations.hpp"
+#include "bindings/held_step.hpp"
 #include "dynamics/scene/chain.hpp"
 #include "dynamics/scene/contact_row.hpp"
-#include "dynamics/derivatives/step_derivatives.hpp"
-#include "dynamics/integrators/table.hpp"
 #include "dynamics/derivatives/linearization.hpp"
 
 #include <nanobind/eigen/dense.h>
@@ -27,6 +26,7 @@ using Rows = Eigen::Ref<RowMajor>;
 
 constexpr int kForce = 4;  // numbers of a pair: normal force, force in the world
 
+// Arrays are written in place: their sizes must be right.
 void check_forces(const SceneData& scene, const Rows& forces, Eigen::Index columns) {
   check_count("rows of forces", forces.rows(),
               kForce * static_cast<Eigen::Index>(scene.pairs().size()));
@@ -95,6 +95,7 @@ void differentiate_into(Evaluations& self, const VectorX& q, const VectorX& v, c
     Linearization& linearization = evaluate.linearization();
     evaluate();
     MatrixX jacobian;
+    // Rows of accelerations, columns of (u, v): those of bristles are left out.
     linearization.rates(q, v, self.bristles(scene), tau, jacobian);
     by_state = jacobian.topLeftCorner(nv, 2 * nv);
     by_tau = linearization.inverse_mass();
@@ -102,66 +103,16 @@ void differentiate_into(Evaluations& self, const VectorX& q, const VectorX& v, c
   });
 }
 
-// A step from (q, v) under held torques, with bristles that begin unstretched.
-class Step {
- public:
-  Step(SceneData& scene, const std::string& integrator, double dt, const VectorX& q,
-       const VectorX& v, const VectorX& tau)
-      : scene_(scene),
-        before_(scene.least_relaxation()),
-        torques_(tau),
-        stepper_(make_stepper(integrator, scene)),
-        chart_(scene, torques_),
-        start_{0, q, v, VectorX::Zero(scene.bristle_size()), {}} {
-    // Explicit steps of this length hold bristles back.
-    scene.relax_in(stepper_->is_implicit() ? 0 : dt);
-    scene.restart();
-    chart_.begin(start_);
-    scene.evaluate(q, v, start_.z, true);
-  }
-  ~Step() {
-    scene_.restart();
-    scene_.relax_in(before_);
-  }
-  void take(double dt) {
-    stepper_->begin(chart_);
-    stepper_->step(chart_, dt, end_);
-  }
-  Chart& chart() { return chart_; }
-  const Stepper& stepper() const { return *stepper_; }
-  const State& end() const { return end_; }
-
- private:
-  class Held : public Torques {
-   public:
-    explicit Held(const VectorX& tau) : tau_(tau) {}
-    const VectorX& torque(double, const VectorX&, const VectorX&) override { return tau_; }
-    bool follow_state() const override { return false; }
-    bool follow_time() const override { return false; }
-
-   private:
-    const VectorX& tau_;
-  };
-
-  SceneData& scene_;
-  const double before_;
-  Held torques_;
-  std::unique_ptr<Stepper> stepper_;
-  Chart chart_;
-  const State start_;
-  State end_;
-};
-
 // Fills next (nq + nv), where a step leads, and the forces at its start.
 void step_into(Evaluations& self, const std::string& integrator, double dt, const VectorX& q,
                const VectorX& v, const VectorX& tau, Out next, Rows forces) {
   self.at(q, v, [&](SceneData& scene, auto&&) {
     check_count("tau", tau.size(), v.size());
     check_count("next", next.size(), q.size() + v.size());
-    Step step(scene, integrator, dt, q, v, tau);
+    HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
     sum_forces(scene, q, v, forces);
-    step.take(dt);
-    next << step.end().q, step.end().v;
+    const State& end = step.take();
+    next << end.q, end.v;
   });
 }
 
@@ -174,16 +125,10 @@ void differentiate_step_into(Evaluations& self, const std::string& integrator, d
     check_count("tau", tau.size(), nv);
     check_slopes(by_state, by_tau, 2 * nv, nv);
     StepSlopes slopes(scene, {});
-    Step step(scene, integrator, dt, q, v, tau);
+    HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
     sum_slopes(slopes.linearization(), scene, q, v, forces_by_state);
-    step.take(dt);
-    Tangent tangent{MatrixX::Zero(nv, 3 * nv), MatrixX::Zero(nv, 3 * nv),
-                    MatrixX::Zero(scene.bristle_size(), 3 * nv)};
-    MatrixX torque = MatrixX::Zero(nv, 3 * nv);
-    tangent.q.leftCols(nv).setIdentity();
-    tangent.v.middleCols(nv, nv).setIdentity();
-    torque.rightCols(nv).setIdentity();
-    slopes.carry(step.chart(), step.stepper(), dt, torque, tangent);
+    step.take();
+    const Tangent tangent = step.derivatives(slopes);
     by_state << tangent.q.leftCols(2 * nv), tangent.v.leftCols(2 * nv);
     by_tau << tangent.q.rightCols(nv), tangent.v.rightCols(nv);
   });
@@ -232,6 +177,7 @@ void differentiate_frame_into(Evaluations& self, const Frame& frame, const Vecto
     if (by_q.rows() == 3)
       slope.topLeftCorner<3, 3>() = world_from_frame.rotation();
     else
+      // d log6(M exp(x)) / dx at x = 0, with twists in the frame itself.
       pinocchio::Jlog6(frame.reference.actInv(world_from_frame), slope);
     by_q.setZero();
     for (int k = 0; k < chain.size(); ++k)
@@ -245,23 +191,21 @@ void differentiate_frame_into(Evaluations& self, const Frame& frame, const Vecto
 void bind_evaluator(nanobind::module_& m) {
   using namespace sphshell;
   using namespace sphshell::evaluator;
-  m.def("evaluate_into", &evaluate_into, nb::arg("scene"), nb::arg("q"), nb::arg("v"),
-        nb::arg("tau"), nb::arg("acceleration").noconvert(), nb::arg("forces").noconvert());
-  m.def("differentiate_into", &differentiate_into, nb::arg("scene"), nb::arg("q"), nb::arg("v"),
-        nb::arg("tau"), nb::arg("by_state").noconvert(), nb::arg("by_tau").noconvert(),
-        nb::arg("forces_by_state").noconvert());
+  // Outputs are written where the optimizer wants them: noconvert() refuses what would have to be
+  // copied.
+  m.def("evaluate_into", &evaluate_into, "scene"_a, "q"_a, "v"_a, "tau"_a,
+        "acceleration"_a.noconvert(), "forces"_a.noconvert());
+  m.def("differentiate_into", &differentiate_into, "scene"_a, "q"_a, "v"_a, "tau"_a,
+        "by_state"_a.noconvert(), "by_tau"_a.noconvert(), "forces_by_state"_a.noconvert());
   nb::class_<Frame>(m, "Frame")
-      .def(nb::init<int, const Eigen::Matrix4d&, const Eigen::Matrix4d&>(), nb::arg("joint"),
-           nb::arg("placement"), nb::arg("reference"));
-  m.def("frame_into", &frame_into, nb::arg("scene"), nb::arg("frame"), nb::arg("q"),
-        nb::arg("residual").noconvert());
-  m.def("differentiate_frame_into", &differentiate_frame_into, nb::arg("scene"), nb::arg("frame"),
-        nb::arg("q"), nb::arg("by_q").noconvert());
-  m.def("step_into", &step_into, nb::arg("scene"), nb::arg("integrator"), nb::arg("dt"),
-        nb::arg("q"), nb::arg("v"), nb::arg("tau"), nb::arg("next").noconvert(),
-        nb::arg("forces").noconvert());
-  m.def("differentiate_step_into", &differentiate_step_into, nb::arg("scene"),
-        nb::arg("integrator"), nb::arg("dt"), nb::arg("q"), nb::arg("v"), nb::arg("tau"),
-        nb::arg("by_state").noconvert(), nb::arg("by_tau").noconvert(),
-        nb::arg("forces_by_state").noconvert());
+      .def(nb::init<int, const Eigen::Matrix4d&, const Eigen::Matrix4d&>(), "joint"_a,
+           "placement"_a, "reference"_a);
+  m.def("frame_into", &frame_into, "scene"_a, "frame"_a, "q"_a, "residual"_a.noconvert());
+  m.def("differentiate_frame_into", &differentiate_frame_into, "scene"_a, "frame"_a, "q"_a,
+        "by_q"_a.noconvert());
+  m.def("step_into", &step_into, "scene"_a, "integrator"_a, "dt"_a, "q"_a, "v"_a, "tau"_a,
+        "next"_a.noconvert(), "forces"_a.noconvert());
+  m.def("differentiate_step_into", &differentiate_step_into, "scene"_a, "integrator"_a, "dt"_a,
+        "q"_a, "v"_a, "tau"_a, "by_state"_a.noconvert(), "by_tau"_a.noconvert(),
+        "forces_by_state"_a.noconvert());
 }

@@ -14,6 +14,7 @@ nb::tuple columns(const Foundation& foundation) {
   const auto& points = foundation.points();
   std::vector<int> patch, element, number;
   std::vector<double> depth, center, force, energy, slope, point, normal, area, pressure, push;
+  // Column by column, as Python's structured results have them.
   for (const FoundationRow& row : rows) {
     patch.push_back(row.patch), element.push_back(row.element);
     depth.push_back(row.depth), energy.push_back(row.sum.energy);
@@ -40,6 +41,7 @@ nb::tuple columns(const Foundation& foundation) {
 
 void bind_foundation(nanobind::module_& m) {
   using namespace sphshell;
+  // For pictures and tests of the pressure: scenes have foundations of their own.
   nb::class_<Foundation>(m, "Foundation")
       .def(nb::init<>())
       .def(
@@ -49,13 +51,12 @@ void bind_foundation(nanobind::module_& m) {
             self.find(shell, static_cast<Method>(method), center, radius, true, points);
             return columns(self);
           },
-          nb::arg("shell"), nb::arg("center"), nb::arg("radius"), nb::arg("method"),
-          nb::arg("points") = false)
+          "shell"_a, "center"_a, "radius"_a, "method"_a, "points"_a = false)
       .def(
           "find_on_ball",
           [](Foundation& self, double ball, const Vec3& center, double radius, bool points) {
             self.find_on_ball(ball, center, radius, points);
             return columns(self);
           },
-          nb::arg("ball"), nb::arg("center"), nb::arg("radius"), nb::arg("points") = false);
+          "ball"_a, "center"_a, "radius"_a, "points"_a = false);
 }

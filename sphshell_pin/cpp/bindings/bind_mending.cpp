@@ -17,12 +17,14 @@ using In = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 template <typename T, int Columns>
 using InRows = nb::ndarray<const T, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
 
+// A list of numbers as an array of that many columns.
 template <std::size_t Columns, typename T>
 Array<T> rows_of(std::vector<T> values) {
   const std::size_t rows = values.size() / Columns;
   return to_array(std::move(values), {rows, Columns});
 }
 
+// For loops over plain memory, which may take seconds.
 template <typename Loop>
 auto without_gil(Loop&& loop) {
   const ReleaseGil released;
@@ -43,8 +45,8 @@ std::vector<T> copy(const In<T>& values) {
 
 void bind_mending(nanobind::module_& module) {
   using namespace sphshell;
-  using namespace nb::literals;
 
+  // Each takes and returns arrays; what they mean is in mending.hpp.
   module.def(
       "mend_weld",
       [](InRows<double, 3> points, double tolerance) {

@@ -26,6 +26,7 @@ double residual(const std::vector<double>& energy) {
   return sum;
 }
 
+// The pairs whose sphere went through their shell.
 nb::list through(const Outcome& outcome) {
   nb::list pairs;
   for (const Event& event : outcome.record.events)
@@ -38,6 +39,7 @@ nb::list through(const Outcome& outcome) {
 
 void bind_rollout(nanobind::module_& m) {
   using namespace sphshell;
+  // What a run of a rollout leaves behind; its record is converted only when it is asked for.
   nb::class_<Outcome>(m, "Outcome")
       .def_prop_ro("status", [](const Outcome& self) { return static_cast<int>(self.status); })
       .def_ro("fault", &Outcome::fault)
@@ -55,13 +57,14 @@ void bind_rollout(nanobind::module_& m) {
       .def_prop_ro("residual", [](const Outcome& self) { return residual(self.record.energy); })
       .def_prop_ro("through", &through);
 
+  // Runs of one model on threads of their own.
   nb::class_<Rollout>(m, "Rollout")
       .def(
           "__init__",
           [](Rollout* self, nb::handle model, int threads) {
             new (self) Rollout(model_of(model), threads);
           },
-          nb::arg("model"), nb::arg("threads"))
+          "model"_a, "threads"_a)
       .def(
           "add",
           [](Rollout& self, const std::vector<const Pair*>& pairs,
@@ -73,17 +76,18 @@ void bind_rollout(nanobind::module_& m) {
             self.add({copies(pairs), std::move(joints), settings, std::move(controller),
                       std::move(q0), std::move(v0), copies(sensors)});
           },
-          nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none(), nb::arg("q0"),
-          nb::arg("v0"), nb::arg("settings"), nb::arg("sensors"))
+          "pairs"_a, "joints"_a.none(), "controller"_a.none(), "q0"_a, "v0"_a, "settings"_a,
+          "sensors"_a)
       // Threads may want the interpreter for a user's routine.
       .def(
           "wait",
           [](Rollout& self, std::size_t left, double seconds) {
             self.give_back();
             const ReleaseGil released;
+            // What finished runs lent is released first, under the interpreter's lock.
             return self.wait(left, seconds);
           },
-          nb::arg("left"), nb::arg("seconds"))
+          "left"_a, "seconds"_a)
       .def("stop",
            [](Rollout& self) {
              {

@@ -6,10 +6,12 @@
 #include <nanobind/stl/vector.h>
 
 namespace nb = nanobind;
+using namespace nb::literals;
 
 void bind_sensors(nb::module_& m) {
   using namespace sphshell;
   using Parameters = Eigen::Matrix<double, 10, 1>;
+  // What is measured is set at construction, the way of the signal by fields.
   nb::class_<Sensor>(m, "Sensor")
       .def_static(
           "force_torque",
@@ -20,6 +22,8 @@ void bind_sensors(nb::module_& m) {
             kind.joint = joint;
             kind.frame = SE3(Eigen::Matrix3d(frame.topLeftCorner<3, 3>()),
                              Vec3(frame.topRightCorner<3, 1>()));
+            // Mass, first and second moments, as of Pinocchio's dynamic parameters; no mass:
+            // nothing is beyond the sensor.
             kind.inertia = inertia[0] > 0 ? pinocchio::Inertia::FromDynamicParameters(inertia)
                                           : pinocchio::Inertia::Zero();
             kind.children = std::move(children);
@@ -30,8 +34,8 @@ void bind_sensors(nb::module_& m) {
             sensor.kind = std::move(kind);
             return sensor;
           },
-          nb::kw_only(), nb::arg("joint"), nb::arg("frame"), nb::arg("inertia"),
-          nb::arg("children"), nb::arg("pairs_i"), nb::arg("pairs_j"), nb::arg("frames"))
+          nb::kw_only(), "joint"_a, "frame"_a, "inertia"_a, "children"_a, "pairs_i"_a, "pairs_j"_a,
+          "frames"_a)
       .def_static(
           "joint_torque",
           [](int index) {
@@ -39,7 +43,7 @@ void bind_sensors(nb::module_& m) {
             sensor.kind = JointTorque{index};
             return sensor;
           },
-          nb::kw_only(), nb::arg("index"))
+          nb::kw_only(), "index"_a)
       .def_static(
           "contact_switch",
           [](std::vector<int> pairs, double threshold, double release) {
@@ -47,7 +51,7 @@ void bind_sensors(nb::module_& m) {
             sensor.kind = ContactSwitch{std::move(pairs), threshold, release};
             return sensor;
           },
-          nb::kw_only(), nb::arg("pairs"), nb::arg("threshold"), nb::arg("release"))
+          nb::kw_only(), "pairs"_a, "threshold"_a, "release"_a)
       .def_prop_ro("size", &Sensor::size)
       .def_rw("rate", &Sensor::rate)
       .def_rw("delay", &Sensor::delay)
@@ -55,5 +59,5 @@ void bind_sensors(nb::module_& m) {
       .def_rw("range", &Sensor::range)
       .def_rw("noise", &Sensor::noise)
       .def_rw("seed", &Sensor::seed);
-  m.def("normal_noise", &normal_noise, nb::arg("seed"), nb::arg("sample"), nb::arg("value"));
+  m.def("normal_noise", &normal_noise, "seed"_a, "sample"_a, "value"_a);
 }

@@ -19,12 +19,15 @@
 namespace sphshell {
 namespace {
 
+// Copied as a block: three doubles are a Vec3.
 std::vector<Vec3> rows(const Points& table) {
   static_assert(sizeof(Vec3) == 3 * sizeof(double));
   const auto* first = reinterpret_cast<const Vec3*>(table.data());
   return {first, first + table.shape(0)};
 }
 
+// Arrays were checked in Python: triangles (m, 3), the element of each, and of CAD the face and
+// three normals of each.
 std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& triangles,
                                   const Ints& element, double crease_angle, int side,
                                   const std::optional<Ints>& face,
@@ -44,6 +47,7 @@ std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& tria
                                  crease_angle, static_cast<Side>(side), cad);
 }
 
+// Points, normals, depths, elements, features, weights, and dn_dc where asked for.
 nb::tuple columns(const std::vector<Contact>& contacts, bool dn_dc) {
   const std::size_t k = contacts.size();
   std::vector<double> point, normal, depth, weight, slope;
@@ -86,6 +90,8 @@ nb::tuple contacts(const Shell& shell, const Vec3& center, double radius, int me
 
 constexpr std::size_t kGrain = 64;  // fewer queries are not worth a thread
 
+// Depth of the deepest contact and number of minima, of each sphere. Each thread has scratch of its
+// own.
 auto contacts_batch(const Shell& shell, const Points& centers, const Doubles& radii, int method,
                     int threads) {
   const std::size_t n = centers.shape(0);
@@ -109,6 +115,7 @@ auto contacts_batch(const Shell& shell, const Points& centers, const Doubles& ra
   return nb::make_tuple(to_array(std::move(depth)), to_array(std::move(count)));
 }
 
+// Points, normals, signed distances and elements.
 auto closest_points(const Shell& shell, const Points& points, bool smooth, int threads) {
   const std::size_t n = points.shape(0);
   if (smooth) checked_method(shell, static_cast<int>(Method::Smooth));
@@ -151,6 +158,7 @@ std::vector<T> per_edge(const Shell& shell, Get&& get) {
   return out;
 }
 
+// Both ends of each edge between elements (n, 2).
 Array<int> edge_vertices(const Shell& shell) {
   std::vector<int> out;
   for (const Edge& edge : shell.topology().edges)
@@ -186,6 +194,7 @@ Array<double> corner_normals(const Shell& shell) {
   return to_array(std::move(out), {n, 3, 3});
 }
 
+// Per triangle, see Bending; empty without curved elements.
 Array<std::uint8_t> bending(const Shell& shell) {
   std::vector<std::uint8_t> out(shell.curved() ? shell.triangles().size() : 0);
   for (std::size_t t = 0; t < out.size(); ++t)
@@ -196,6 +205,8 @@ Array<std::uint8_t> bending(const Shell& shell) {
 // Rows of kind, point, axis and the two radii, as CleanedSurface.face_shapes in Python has them.
 using FaceShapes = nb::ndarray<const double, nb::shape<-1, 9>, nb::c_contig, nb::device::cpu>;
 
+// A face of no known kind has a negative one: its triangles lie on no face then, and its number
+// stays taken.
 std::shared_ptr<const Faces> known_faces(const Ints& of, const FaceShapes& shapes) {
   auto out = std::make_shared<Faces>();
   for (std::size_t i = 0; i < shapes.shape(0); ++i) {
@@ -234,6 +245,7 @@ Array<std::uint8_t> exact_faces(const Shell& shell) {
   return to_array(std::move(out));
 }
 
+// Kinds (n,) and numbers (n, 8) of all faces.
 nb::tuple faces(const Shell& shell) {
   std::vector<int> kind;
   std::vector<double> numbers;
@@ -248,6 +260,7 @@ nb::tuple faces(const Shell& shell) {
   return nb::make_tuple(to_array(std::move(kind)), to_array(std::move(numbers), {n, 8}));
 }
 
+// Per corner (n, 3), see CurvedShell::divided.
 Array<std::uint8_t> normals_set_aside(const Shell& shell) {
   std::vector<std::uint8_t> out;
   if (shell.curved())
@@ -261,11 +274,12 @@ Array<std::uint8_t> normals_set_aside(const Shell& shell) {
 
 void bind_shell(nanobind::module_& m) {
   using namespace sphshell;
+  // Behind the Shell of Python, which has read, checked and triangulated the surface.
   nb::class_<Shell> shell(m, "Shell");
   shell
-      .def(nb::new_(&make_shell), nb::arg("vertices"), nb::arg("triangles"),
-           nb::arg("triangle_element"), nb::arg("crease_angle"), nb::arg("side"),
-           nb::arg("face").none() = nb::none(), nb::arg("normals").none() = nb::none())
+      .def(nb::new_(&make_shell), "vertices"_a, "triangles"_a, "triangle_element"_a,
+           "crease_angle"_a, "side"_a, "face"_a.none() = nb::none(),
+           "normals"_a.none() = nb::none())
       .def("__reduce_ex__",
            [](const Shell&, int) -> nb::object {
              raise_own("NotPicklable",
@@ -284,16 +298,12 @@ void bind_shell(nanobind::module_& m) {
             // Under the GIL: two threads may ask for the first curved query at once.
             return curve(shell, std::move(options));
           },
-          nb::arg("normals").none(), nb::arg("exact") = false,
-          nb::arg("straight").none() = nb::none(), nb::arg("rounding") = 0.0,
-          nb::arg("faces") = true, nb::arg("known").none() = nb::none(),
-          nb::arg("shapes").none() = nb::none())
-      .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"),
-           nb::arg("gradient") = false)
-      .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
-           nb::arg("method"), nb::arg("threads"))
-      .def("closest_points", &closest_points, nb::arg("points"), nb::arg("smooth"),
-           nb::arg("threads") = 1)
+          "normals"_a.none(), "exact"_a = false, "straight"_a.none() = nb::none(),
+          "rounding"_a = 0.0, "faces"_a = true, "known"_a.none() = nb::none(),
+          "shapes"_a.none() = nb::none())
+      .def("contacts", &contacts, "center"_a, "radius"_a, "method"_a, "gradient"_a = false)
+      .def("contacts_batch", &contacts_batch, "centers"_a, "radii"_a, "method"_a, "threads"_a)
+      .def("closest_points", &closest_points, "points"_a, "smooth"_a, "threads"_a = 1)
       .def_prop_ro("num_elements", &Shell::num_elements)
       .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
       .def_prop_ro("num_edges",

@@ -15,6 +15,7 @@ PyObject* bytes_of(const T* first, std::size_t count) {
                                        static_cast<Py_ssize_t>(count * sizeof(T)));
 }
 
+// A tuple that owns the items; null, and all items released, where one of them is null.
 PyObject* pack(const std::vector<PyObject*>& items) {
   PyObject* out = PyTuple_New(static_cast<Py_ssize_t>(items.size()));
   bool complete = out != nullptr;
@@ -54,6 +55,7 @@ Routine::~Routine() {
   object_.reset();
 }
 
+// A number from Python: a float, as the wrapper has checked.
 double call_law(nb::handle callable, const std::vector<double>& where) {
   const AcquireGil gil;
   const nb::object answer = gil.call(callable, [&] {
@@ -64,6 +66,8 @@ double call_law(nb::handle callable, const std::vector<double>& where) {
   return PyFloat_AsDouble(answer.ptr());
 }
 
+// Poses go to Python as pinocchio.SE3, arrays come back as plain memory; the number of a contact in
+// the list is its element.
 void PythonSource::operator()(const SE3& pose_i, const SE3& pose_j,
                               std::vector<Contact>& out) const {
   const AcquireGil gil;
@@ -83,6 +87,8 @@ PythonController::~PythonController() {
   callable_.reset();
 }
 
+// The contacts are those of the state, as rows; the torques of the answer were checked by the
+// wrapper.
 void PythonController::torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
                               VectorX& tau) {
   std::vector<ContactRow> rows;
@@ -107,7 +113,8 @@ int visit_law(const NormalLaw& law, visitproc visit, void* arg) {
 }
 
 int visit_pair(const Pair& pair, visitproc visit, void* arg) {
-  if (const auto* source = pair.source.target<PythonSource>()) Py_VISIT(source->object().ptr());
+  if (const auto* points = std::get_if<SourcePoints>(&pair.geometry))
+    if (const auto* own = points->source.target<PythonSource>()) Py_VISIT(own->object().ptr());
   return visit_law(pair.law, visit, arg);
 }
 

@@ -33,9 +33,11 @@ class Routine {
 class PythonSource : public Routine {
  public:
   using Routine::Routine;
+  // Appends the contacts that the user's function finds, but for those without a depth.
   void operator()(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& out) const;
 };
 
+// What the user's function of these numbers returns.
 double call_law(nb::handle callable, const std::vector<double>& where);
 
 // A function of a law: the C function at an address, which `object` keeps alive, or without one
@@ -74,6 +76,7 @@ class PythonController : public Controller {
   const std::vector<double>* readings_ = nullptr;  // of the run's sensors
 };
 
+// For Python's garbage collector: the Python objects that a law, a pair or pairs hold.
 int visit_law(const NormalLaw& law, visitproc visit, void* arg);
 int visit_pair(const Pair& pair, visitproc visit, void* arg);
 int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg);

@@ -11,6 +11,7 @@
 
 namespace sphshell {
 
+// Sizes only: values were checked where they came from Python.
 inline void check_state(const SceneData& scene, const VectorX& q, const VectorX& v) {
   check_count("q", q.size(), scene.body().model().nq);
   check_count("v", v.size(), scene.body().model().nv);

@@ -15,6 +15,7 @@
 namespace sphshell {
 
 namespace nb = nanobind;
+using namespace nb::literals;
 
 [[noreturn]] inline void sleep_for_ever() {
   for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
@@ -31,6 +32,7 @@ auto or_sleep(Wait&& wait) noexcept {
   }
 }
 
+// Lets other threads of Python run while C++ computes.
 class ReleaseGil {
  public:
   ReleaseGil() noexcept : state_(PyEval_SaveThread()) {}

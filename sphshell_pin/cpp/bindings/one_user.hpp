@@ -31,6 +31,7 @@ class OneUser {
   bool in_ = false;
 };
 
+// Holds the object as long as it lives.
 class Use {
  public:
   Use(OneUser& user, const char* doing) : user_(user) { user_.enter(doing); }

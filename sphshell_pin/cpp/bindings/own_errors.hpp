@@ -9,6 +9,7 @@
 namespace sphshell {
 
 namespace nb = nanobind;
+using namespace nb::literals;
 
 template <class... Args>
 [[noreturn]] void raise_own(const char* error, const Args&... args) {

@@ -2,6 +2,7 @@
 
 namespace sphshell {
 
+// What numpy.dtype takes: names, formats, offsets and the size of a row.
 nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size) {
   nb::list names, formats, offsets;
   for (std::size_t i = 0; i < count; ++i) {
@@ -19,6 +20,8 @@ nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size) {
   return out;
 }
 
+// Rows of times and states (n, ...); contacts of all rows one behind the other, with the row of
+// each; events and sensor readings column by column.
 nb::dict to_dict(Record record, int nq, int nv) {
   nb::dict out;
   const std::size_t n = record.t.size();
@@ -67,6 +70,7 @@ nb::dict to_dict(const Counts& counts) {
   return out;
 }
 
+// (pair, depth) or None.
 nb::object to_python(const std::optional<DeepStart>& start) {
   if (!start) return nb::none();
   return nb::make_tuple(start->pair, start->depth);

@@ -24,6 +24,7 @@ template <class Row, std::size_t count>
 nb::dict row_type(const RowField (&fields)[count]) {
   return row_type(fields, count, sizeof(Row));
 }
+// Columns by their names, moved and not copied.
 nb::dict to_dict(Record record, int nq, int nv);
 nb::dict to_dict(SensitivityRecord record);
 nb::dict to_dict(const Counts& counts);

@@ -12,6 +12,7 @@
 
 namespace sphshell {
 
+// Of a model: q (nq), v and tau (nv).
 struct StateArgument {
   VectorX q, v, tau;
 };
@@ -41,6 +42,7 @@ class StateArguments {
   }
 
  private:
+  // False where one of them needs a conversion, or is wrong.
   bool read_all(nb::handle q, nb::handle v, nb::handle tau, StateArgument& out) const {
     return read(q, model_.nq, out.q) && read(v, model_.nv, out.v) &&
            read(tau, model_.nv, out.tau) &&
@@ -48,6 +50,7 @@ class StateArguments {
            (model_.nq == model_.nv || pinocchio::isNormalized(model_, out.q, 1e-3));
   }
 
+  // False unless it is a contiguous array of float64 with that many finite numbers, or None.
   bool read(nb::handle given, Eigen::Index size, VectorX& out) const {
     if (given.is_none()) {
       out.setZero(size);

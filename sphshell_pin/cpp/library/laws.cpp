@@ -21,6 +21,7 @@ struct Both {
   double young[2], poisson[2];
 };
 
+// Without a second material both bodies are of the first one.
 Both checked(const Materials& m) {
   check_positive("young", m.young, " [Pa]");
   check_poisson("poisson", m.poisson);
@@ -35,6 +36,8 @@ Both checked(const Materials& m) {
   return {{m.young, *m.young_2}, {m.poisson, *m.poisson_2}};
 }
 
+// numbers(): the parameters in the order of the core's laws, checked as Python's dataclasses check
+// them.
 core::Numbers numbers(const ImpactLaw& law) {
   check_power(law.stiffness, law.exponent);
   check_not_negative("damping", law.damping, " [N s/m]");
@@ -53,10 +56,12 @@ core::Numbers numbers(const HertzLaw& law) {
   check_not_negative("dissipation", law.dissipation, " [s/m]");
   check_not_negative("relaxation_time", law.relaxation_time, " [s]");
   check_not_negative("radius", law.radius, " [m]");
+  // 4/3 sqrt(R): Hertz's scale of a sphere of that radius on a plane; 0: the gap's own.
   const double scale = law.radius > 0 ? 4.0 / 3.0 * std::sqrt(law.radius) : 0.0;
   return {modulus, law.dissipation, law.relaxation_time, scale};
 }
 
+// Starts at zero and rises from row to row.
 void check_column(const std::string& name, const std::vector<double>& column) {
   if (column.size() < 2)
     throw InvalidParameter(name, std::to_string(column.size()) + " rows",
@@ -148,6 +153,7 @@ core::Numbers numbers(const MindlinFriction& law) {
 }
 
 // Of a force that depends on nothing but depth and gap rate.
+// Hertz's law and foundations need the bodies that touch.
 const core::NormalLaw& alone(const core::NormalLaw& law) {
   if (law.hertz())
     throw InvalidParameter("radius", "0", "must be given where nothing is touched [m]");
@@ -157,6 +163,7 @@ const core::NormalLaw& alone(const core::NormalLaw& law) {
 
 }  // namespace
 
+// 1 / E* = sum of (1 - nu^2) / E over both bodies.
 double Materials::modulus() const {
   const Both both = checked(*this);
   double softness = 0;

@@ -6,6 +6,7 @@
 namespace sphshell_pin {
 namespace {
 
+// To the library's own type, which does not change with the core's.
 void convert(const std::vector<core::Contact>& from, std::vector<Contact>& to) {
   to.clear();
   for (const core::Contact& c : from)
@@ -15,6 +16,7 @@ void convert(const std::vector<core::Contact>& from, std::vector<Contact>& to) {
 
 }  // namespace
 
+// Enumerators can be made of any number.
 core::Method checked(Method method) {
   const int number = static_cast<int>(method);
   if (number < 0 || number > 2)
@@ -45,6 +47,7 @@ const std::vector<Contact>& Query::contacts(const Shell& shell, const Eigen::Vec
   check_positive("radius", radius, " [m]");
   const core::Method how = checked(method);
   const auto& found = impl_->query.find(*shell.impl().with(method), center, radius, how);
+  // Shown: contacts of one group as one. Terms: each minimum and saddle, as forces are made of.
   core::merge_groups(found, center, radius, impl_->merged);
   convert(found, impl_->terms);
   convert(impl_->merged, impl_->shown);
@@ -58,6 +61,7 @@ ClosestPoint Query::closest_point(const Shell& shell, const Eigen::Vector3d& poi
   checked(method);
   const core::Shell& surface = *shell.impl().with(method);
   core::SurfacePoint at = surface.closest_point(point);
+  // The flat shell's point first, as a start.
   if (method == Method::Smooth) at = core::on_curved(surface, point, at, impl_->query);
   return {at.point, at.normal, at.distance, at.element};
 }

@@ -19,6 +19,7 @@ constexpr std::size_t kMostNames = 20;  // in a message
 std::string in_quotes(const std::string& name) { return "'" + name + "'"; }
 
 // As check_model of sphshell_pin/dynamics/scene/models.py.
+// Pinocchio's algorithms read these arrays without looking at their lengths.
 void check_model(const Model& model) {
   const auto count = static_cast<std::size_t>(model.njoints);
   const auto check_length = [&](const char* name, std::size_t found) {
@@ -35,6 +36,7 @@ void check_model(const Model& model) {
   check_length("nvs", model.nvs.size());
   for (std::size_t j = 0; j < count; ++j) {
     const std::string at = "[" + std::to_string(j) + "]", joint = in_quotes(model.names[j]);
+    // Also excludes cycles: a parent has a lower number.
     if (model.parents[j] >= std::max<std::size_t>(j, 1))
       throw InvalidParameter("model.parents" + at, std::to_string(model.parents[j]),
                              "must come before joint " + joint);
@@ -64,6 +66,7 @@ void check_model(const Model& model) {
 // Names may repeat (a link called as its joint): a body's frame comes first, then an operational
 // frame, then any other.
 const pinocchio::Frame& find_frame(const Model& model, const std::string& name) {
+  // All frames are looked at: names are few, and may repeat.
   const pinocchio::Frame* found = nullptr;
   const auto rank = [](const pinocchio::Frame& frame) {
     return frame.type == pinocchio::BODY ? 0 : frame.type == pinocchio::OP_FRAME ? 1 : 2;
@@ -79,10 +82,12 @@ const pinocchio::Frame& find_frame(const Model& model, const std::string& name) 
   throw FrameNotFound(text);
 }
 
+// A rigid placement: finite, with a rotation.
 void check_placement(const SE3& placement) {
   const Eigen::Matrix3d r = placement.rotation();
   if (!r.allFinite() || !placement.translation().allFinite())
     throw InvalidParameter("placement", shown_all(placement.translation()), "must be finite");
+  // Orthonormal to 1e-6, as numbers in a file are.
   if ((r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-6 ||
       r.determinant() < 0)
     throw InvalidParameter("placement.rotation",
@@ -90,6 +95,7 @@ void check_placement(const SE3& placement) {
                            "must be a rotation: orthonormal, determinant +1");
 }
 
+// The size that the model asks for, and finite numbers.
 void check_size(const char* name, const Eigen::VectorXd& x, Eigen::Index size, const Model& model) {
   if (x.size() != size)
     throw InvalidParameter(name, "a vector of size " + std::to_string(x.size()),
@@ -116,6 +122,7 @@ struct Scene::Impl {
   std::vector<core::Pair> pairs;
 
   // A sphere as a frame at its center, in its joint.
+  // `joint` receives the number of the joint that carries the frame.
   SE3 center_of(const Sphere& sphere, int& joint) const {
     check_positive("radius", sphere.radius, " [m]");
     check_point("offset", sphere.offset);
@@ -140,17 +147,18 @@ Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;
 
+// Frames are found by name once, and kept as joint and placement.
 int Scene::add_contact(const Sphere& sphere, const Shell& shell, const NormalLaw& law,
                        const FrictionLaw& friction, const Mount& mount) {
   core::Pair pair;
-  pair.method = checked(mount.method);
+  const core::Method method = checked(mount.method);
   check_placement(mount.placement);
   pair.placement_i = impl_->center_of(sphere, pair.joint_i);
   const pinocchio::Frame& frame = find_frame(impl_->model, mount.frame);
   pair.joint_j = static_cast<int>(frame.parentJoint);
   pair.placement_j = frame.placement * mount.placement;
   pair.radius = sphere.radius;
-  pair.shell = shell.impl().with(mount.method);
+  pair.geometry = core::ShellSurface{{}, shell.impl().with(mount.method), method};
   pair.law = law.impl().law;
   pair.friction = friction.impl().law;
   pair.name = sphere.frame + "-" + mount.frame;
@@ -163,7 +171,7 @@ int Scene::add_contact(const Sphere& sphere, const Sphere& other, const NormalLa
   pair.placement_i = impl_->center_of(sphere, pair.joint_i);
   pair.placement_j = impl_->center_of(other, pair.joint_j);
   pair.radius = sphere.radius;
-  pair.ball = other.radius;
+  pair.geometry = core::Ball{{}, other.radius};
   pair.law = law.impl().law;
   pair.friction = friction.impl().law;
   pair.name = sphere.frame + "-" + other.frame;
@@ -184,6 +192,7 @@ struct SceneState::Impl {
   core::SceneState state;
   core::Forces none;  // where nothing touches
 
+  // A state copies the scene's model and pairs: what is done to the scene later does not change it.
   explicit Impl(const Scene::Impl& scene)
       : state(scene.model, scene.pairs, nullptr),
         none(static_cast<std::size_t>(scene.model.njoints), pinocchio::Force::Zero()) {}
@@ -208,6 +217,7 @@ const std::vector<pinocchio::Force>& SceneState::external_forces(const Eigen::Ve
   return scene.touching() ? scene.external() : impl_->none;
 }
 
+// Rows as runs record them, in the library's own types.
 std::vector<SceneContact> SceneState::contacts(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   using Vec3 = Eigen::Vector3d;
   impl_->evaluate(q, v);

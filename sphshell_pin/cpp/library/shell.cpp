@@ -23,8 +23,10 @@ constexpr double kLeastSize = 1e-12, kMostSize = 1e15;
 
 std::array<int, 4> corners_of(const Element& e) { return {e.first, e.second, e.third, e.fourth}; }
 
+// As in "vertex 3", counted from 0.
 std::string numbered(const char* what, std::size_t k) { return what + (" " + std::to_string(k)); }
 
+// Finite vertices, and elements of three or four that exist; what they form is checked later.
 void check_surface(const Points& vertices, const std::vector<Element>& elements) {
   if (vertices.size() < 3)
     throw InvalidShell("a surface needs at least 3 vertices; " + std::to_string(vertices.size()) +
@@ -46,6 +48,7 @@ void check_surface(const Points& vertices, const std::vector<Element>& elements)
   }
 }
 
+// The square of the longest edge [m^2].
 double longest_edge2(const Vec3& a, const Vec3& b, const Vec3& c) {
   return std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
 }
@@ -59,6 +62,8 @@ bool is_flat(const Points& p, const Triangle& t) {
 
 // Whether a quad is split between its corners 1 and 3, and not 0 and 2: see examine_quads in
 // sphshell_pin/shell/polygons.py.
+// The diagonal whose worse triangle has the better shape; of equal ones that at the smallest point,
+// which does not depend on the numbering.
 bool other_diagonal(const std::array<Vec3, 4>& p) {
   Vec3 normal = (p[2] - p[0]).cross(p[3] - p[1]);
   const double length = normal.norm();
@@ -98,6 +103,7 @@ Eigen::AlignedBox3d box_of(const Points& vertices) {
   return box;
 }
 
+// Options by themselves, before anything is built.
 void check(const ShellOptions& options, std::size_t vertices) {
   const double angle = options.crease_angle;
   if (!(angle >= 0 && angle <= M_PI))
@@ -114,8 +120,10 @@ void check(const ShellOptions& options, std::size_t vertices) {
       throw InvalidShell(numbered("normal", i) + " is not finite: " + shown_all(normals[i]));
 }
 
+// The diagonal of the box, of the vertices that elements use.
 void check_box(const Points& vertices, const std::vector<Triangle>& triangles) {
   const double size = core::bounds(vertices, triangles).diagonal().norm();
+  // Squares of single-precision numbers must neither vanish nor overflow.
   if (!(size >= kLeastSize && size <= kMostSize))
     throw InvalidShell("the shell's box has a diagonal of " + shown(size) +
                        " m: it must be between 1e-12 and 1e15 m, as the search tree is in single "
@@ -131,6 +139,7 @@ Shell::Shell(Points vertices, const std::vector<Element>& elements, const ShellO
   std::vector<Triangle> triangles;
   std::vector<int> owner;
   for (std::size_t k = 0; k < elements.size(); ++k) {
+    // Checked element by element: the first fault is reported with its number.
     const std::vector<Triangle> parts = split(vertices, elements[k]);
     Vec3 area = Vec3::Zero();
     for (const Triangle& t : parts) {
@@ -174,6 +183,7 @@ Surface weld(const Surface& surface, double tolerance) {
   const core::Weld merged =
       core::weld(surface.vertices.front().data(), surface.vertices.size(), tolerance);
   Surface out;
+  // Of each vertex its place among those that are kept, in the order in which elements use them.
   std::vector<int> place(surface.vertices.size(), -1);
   const auto placed = [&](int vertex) {
     if (place[vertex] < 0) {
@@ -196,6 +206,7 @@ Surface weld(const Surface& surface, double tolerance) {
     parts.erase(std::remove_if(parts.begin(), parts.end(),
                                [&](const Triangle& t) { return is_flat(points, t); }),
                 parts.end());
+    // A quad with one flat half becomes the triangle of the other half.
     if (parts.size() == all) {
       const int fourth = element.fourth;
       out.elements.push_back({placed(element.first), placed(element.second), placed(element.third),

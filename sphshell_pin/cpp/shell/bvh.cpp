@@ -9,6 +9,8 @@ namespace sphshell {
 
 Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
          std::vector<int>& order) {
+  // Built by Coal, and copied: boxes in single precision, about the middle, with both children's
+  // boxes in one node.
   coal::BVHModel<coal::AABB> tree;
   coal::MatrixX3s points(vertices.size(), 3);
   for (std::size_t i = 0; i < vertices.size(); ++i) points.row(i) = vertices[i].transpose();
@@ -47,6 +49,7 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
   order.clear();
   order.reserve(triangles.size());
   std::vector<int> stack;
+  // Appends the triangles of a subtree to `order`, from left to right.
   const auto make_leaf = [&](int root) {
     const int first = static_cast<int>(order.size());
     stack.assign(1, root);
@@ -70,6 +73,7 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
   struct Task {
     int source, parent, side, depth;
   };
+  // Depth first with a stack of its own: degenerate trees are deep.
   std::vector<Task> tasks{{0, -1, 0, 0}};
   while (!tasks.empty()) {
     const Task task = tasks.back();
@@ -78,6 +82,7 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     if (size[task.source] <= kLeafSize) {
       id = make_leaf(task.source);
     } else {
+      // Walks have a stack of fixed size.
       if (task.depth + 2 >= kMaxDepth)
         throw std::length_error("the bounding-box tree of the shell is too deep");
       const auto& node = source(task.source);

@@ -14,6 +14,7 @@
 
 namespace sphshell {
 
+// Asks for a line of memory that is read soon; changes nothing else.
 inline void prefetch(const void* address) {
 #if defined(__GNUC__) || defined(__clang__)
   __builtin_prefetch(address);
@@ -22,6 +23,7 @@ inline void prefetch(const void* address) {
 #endif
 }
 
+// Axis-aligned boxes in single precision, rounded outward, about the middle of the shell.
 class Bvh {
  public:
   // `order` receives the triangles in the order of the tree's leaves: store them so, and what the
@@ -139,6 +141,7 @@ class Bvh {
     int child[2];  // >= 0 a node, < 0 a leaf
   };
 
+  // The square of the distance from c to a child's box, 0 inside.
   static float distance2(const Node& n, int side, const float c[3]) {
     float sum = 0;
     for (int k = 0; k < 3; ++k) {

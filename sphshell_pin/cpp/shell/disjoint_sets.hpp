@@ -9,12 +9,14 @@
 
 namespace sphshell {
 
+// Numbers from 0 to count - 1, each a set of its own at first.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t count) : parent_(count) {
     std::iota(parent_.begin(), parent_.end(), 0);
   }
 
+  // Path halving.
   std::int32_t find(std::int32_t i) {
     while (parent_[i] != i) {
       parent_[i] = parent_[parent_[i]];
@@ -23,6 +25,7 @@ class DisjointSets {
     return i;
   }
 
+  // The lower root stays, so that results do not depend on the order of merges.
   void merge(std::int32_t a, std::int32_t b) {
     a = find(a);
     b = find(b);

@@ -56,12 +56,14 @@ class PointTree {
   }
 
  private:
+  // from, to: the members in the node's subtree.
   struct Node {
     Box box;
     std::size_t from, to;
     std::int32_t right;  // the left child follows its parent; -1 in a leaf
   };
 
+  // Halved at the median along the widest side of the box.
   void build(std::size_t from, std::size_t to) {
     const std::size_t self = nodes_.size();
     Node node{{}, from, to, -1};

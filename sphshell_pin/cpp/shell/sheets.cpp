@@ -18,9 +18,11 @@ Sheets::Sheets(const Topology& topology) : rim(topology.face_normal.size(), 0) {
       rim[triangle_of(h)] |= static_cast<std::uint8_t>(1 << side_of(h));
     }
   }
+  // Triangles that edges connect which are no border.
   sheet = sets.labels();
   closed.assign(static_cast<std::size_t>(sets.count()), 1);
   for (std::size_t t = 0; t < rim.size(); ++t)
+    // A sheet with any border edge is open.
     if (rim[t]) closed[static_cast<std::size_t>(sheet[t])] = 0;
 }
 

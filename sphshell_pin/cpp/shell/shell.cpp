@@ -23,6 +23,8 @@ Shell::Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::v
       side_(side),
       topology_(vertices_, triangles_, element_, crease_angle, cad),
       bvh_(vertices_, triangles_, order_) {
+  // Facets are stored in the order of the tree's leaves, so that what is visited together lies
+  // together in memory; facet_of_ leads from a triangle to its facet.
   size_ = bounds(vertices_, triangles_).diagonal().norm();
   facet_of_.resize(order_.size());
   for (std::size_t f = 0; f < order_.size(); ++f) facet_of_[order_[f]] = static_cast<int>(f);
@@ -34,6 +36,8 @@ Shell::Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::v
 void Shell::build_facets(const std::vector<int>& order) {
   for (const Edge& edge : topology_.edges) {
     if (edge.count == 1 || (edge.count == 2 && edge.kind != EdgeClass::NonManifold)) continue;
+    // Edges of more than two triangles, or wound against each other, keep a list of all their half-
+    // edges.
     manifold_.emplace_back();
     for (int i = 0; i < edge.count; ++i)
       manifold_.back().push_back(facet_half_edge(topology_.incidence[edge.begin + i]));
@@ -72,6 +76,7 @@ std::vector<Owned> Shell::assign_owners(const std::function<bool(int t, int u)>&
       if (flat(triangle_of(h), triangle_of(g))) continue;
       twin = facet_half_edge(g);
     } else {
+      // The number of a list, as a code below the others.
       twin = edge.count == 1 ? kBoundary : kManifold - many_sided++;
     }
     // A vertex inside a flat region has no edge that reaches this line, and needs no test.
@@ -87,6 +92,7 @@ std::vector<Owned> Shell::assign_owners(const std::function<bool(int t, int u)>&
 double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents) const {
   constexpr double kAny = std::numeric_limits<double>::infinity();
   if (topology_.vertex_on_rim[vertex]) return kAny;
+  // All edges at the vertex, projected along the axis, sorted by their direction around it.
   const Vec3 first = axis.unitOrthogonal(), second = axis.cross(first);
   // A direction in the plane, of unit length; `turn` grows with its angle, by 4 all round and by 2
   // half round.
@@ -111,6 +117,7 @@ double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tang
     if (!(flat > 0)) return kAny;
     rise = std::max(rise, std::abs(edge.dot(axis)) / flat);
     x /= flat, y /= flat;
+    // Grows with the angle like atan2, without calling it.
     const double across = x / (std::abs(x) + std::abs(y));
     bearing[i] = {y >= 0 ? 1 - across : 3 + across, x, y};
   }
@@ -122,6 +129,7 @@ double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tang
     if (next.turn - here.turn + (i + 1 < count ? 0 : 4) >= 2) return kAny;
     least = std::min(least, here.x * next.x + here.y * next.y);
   }
+  // cos(g / 2) from cos(g).
   const double narrow = std::sqrt(std::max(0.0, 0.5 * (1 + least)));
   return narrow > 0.05 ? rise / narrow : kAny;
 }
@@ -135,6 +143,8 @@ void Shell::build_cones() {
       if (facet.owned.twin[k] >= 0) {
         const Vec3& other = facets_[triangle_of(facet.owned.twin[k])].normal;
         const double cosine = facet.normal.dot(other);
+        // The normals of an edge are between those of its two facets: the tangent of the angle to
+        // the other one.
         tangent = std::max(tangent, cosine > 0.05 ? facet.normal.cross(other).norm() / cosine
                                                   : std::numeric_limits<double>::infinity());
       } else if (facet.owned.twin[k] != kNotOwned) {
@@ -148,6 +158,7 @@ void Shell::build_cones() {
     for (const Vec3& corner : facet.corner) reach = std::max(reach, (corner - middle).norm());
     NormalCone& cone = cones_[f];
     for (int k = 0; k < 3; ++k) {
+      // About the tree's origin, in single precision, which `reach` and `tan_opening` allow for.
       cone.middle[k] = static_cast<float>(middle[k] - origin()[k]);
       cone.axis[k] = static_cast<float>(facet.normal[k]);
     }
@@ -163,6 +174,7 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   bvh_.nearest(point, [&](int f) {
     const ClosestPoint c = closest_on_triangle(point, facets_[f].corner, facets_[f].normal);
     const double d2 = (point - c.point).squaredNorm();
+    // Of equal distances the first triangle's point, whatever the order of the tree.
     const bool better = d2 < best || (d2 == best && order_[f] < order_[which]);
     if (better) best = d2, at = c, which = f;
     return best;
@@ -170,6 +182,8 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   const Facet& facet = facets_[which];
   const int t = order_[which];
   Vec3 normal = facet.normal;
+  // closest_on_triangle: 0 the face, 1 to 3 an edge, 4 to 6 a vertex. The pseudo-normal of that
+  // feature gives the sign of the distance.
   if (at.feature >= 4) {
     normal = topology_.vertex_normal[triangles_[t][at.feature - 4]];
   } else if (at.feature >= 1) {

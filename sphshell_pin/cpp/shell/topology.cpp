@@ -29,6 +29,7 @@ double coordinate_scale(const std::vector<Vec3>& vertices, const std::vector<Tri
 }
 
 // Twice the area vector. Of a needle only the two shorter edges give an accurate one.
+// The cross product of the two shorter edges: the rounding of the longest one does not enter.
 Vec3 area_vector(const std::vector<Vec3>& v, const Triangle& t) {
   int apex = 0;  // opposite the longest edge
   double longest = -1;
@@ -52,6 +53,7 @@ void build_edges(std::size_t vertices, const std::vector<Triangle>& triangles, T
     return std::pair(t[k], t[next_corner(k)]);
   };
   const auto add = [&](int low, int high, const std::uint64_t* first, const std::uint64_t* last) {
+    // Half-edges with the same two vertices are one edge: for_each_edge() sorts them together.
     Edge edge{};
     edge.first_vertex = low, edge.last_vertex = high;
     edge.begin = static_cast<int>(out.incidence.size());
@@ -104,6 +106,7 @@ void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Tri
     normal[label[t]] += area[t];
     if (!seen[label[t]]) origin[label[t]] = vertices[triangles[t][0]], seen[label[t]] = 1;
   }
+  // Of the summed areas of each face.
   for (Vec3& m : normal) m.normalize();
   for (int t = 0; t < n; ++t)
     for (int v : triangles[t])
@@ -118,10 +121,13 @@ void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Tri
   }
 }
 
+// In [0, pi], accurate at both ends.
 double angle_between(const Vec3& m, const Vec3& n) {
   return std::atan2(m.cross(n).norm(), m.dot(n));
 }
 
+// Kinds of edges that are not boundaries: not manifold, or smooth or a crease by the angle, within
+// CAD faces by their normals.
 void classify_edges(const std::vector<Triangle>& triangles, double crease_angle,
                     const CadFaces& cad, Topology& out) {
   for (Edge& edge : out.edges) {
@@ -144,6 +150,7 @@ void classify_edges(const std::vector<Triangle>& triangles, double crease_angle,
   }
 }
 
+// Elements that smooth or inner edges connect: one region of the surface without a crease.
 void build_patches(const std::vector<int>& element, Topology& out) {
   const std::size_t count = element.empty() ? 0 : static_cast<std::size_t>(element.back()) + 1;
   DisjointSets sets(count);
@@ -155,6 +162,8 @@ void build_patches(const std::vector<int>& element, Topology& out) {
   out.num_patches = sets.count();
 }
 
+// Compressed rows: the neighbors of vertex v are neighbors[neighbor_begin[v]] up to
+// neighbor_begin[v + 1].
 void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                     Topology& out) {
   const std::size_t n = vertices.size();
@@ -182,11 +191,14 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
       const Vec3& p = vertices[triangles[t][k]];
       const Vec3 a = vertices[triangles[t][next_corner(k)]] - p;
       const Vec3 b = vertices[triangles[t][previous_corner(k)]] - p;
+      // Weighted with the angle at the vertex, so that the sum does not depend on the
+      // triangulation.
       out.vertex_normal[triangles[t][k]] +=
           std::atan2(a.cross(b).norm(), a.dot(b)) * out.face_normal[t];
     }
 }
 
+// Corners that edges connect are one fan. A vertex with several fans joins sheets in a point only.
 void find_pinches(std::size_t vertices, const std::vector<Triangle>& triangles, Topology& out) {
   const int corners = static_cast<int>(3 * triangles.size());
   DisjointSets fans(corners), pieces(triangles.size());
@@ -230,6 +242,8 @@ Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
   return box;
 }
 
+// Positive where the surface is convex: the far corner of the second triangle is below the plane of
+// the first.
 double Topology::angle(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                        const Edge& edge) const {
   if (edge.count != 2 || edge.kind == EdgeClass::NonManifold) return 0;
@@ -246,6 +260,8 @@ const Pinch* Topology::pinch_at(int vertex) const {
   return at == pinches.end() || at->vertex != vertex ? nullptr : &*at;
 }
 
+// Within a face of CAD everything is smooth; between two where their normals are the same at both
+// ends.
 bool CadFaces::smooth(int h, int g) const {
   const int t = triangle_of(h), u = triangle_of(g);
   if (face[t] == face[u]) return true;
@@ -257,6 +273,7 @@ bool CadFaces::smooth(int h, int g) const {
 
 Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                    const std::vector<int>& element, double crease_angle, const CadFaces& cad) {
+  // Each step uses what those before it found.
   build_edges(vertices.size(), triangles, *this);
   build_planar_faces(vertices, triangles, element,
                      kPlanarTolerance * coordinate_scale(vertices, triangles), *this);

@@ -16,6 +16,7 @@ namespace {
 // Of the radius: a step of the center for second derivatives, and a distance without direction.
 constexpr double kMove = 1e-5, kNoDistance = 1e-6;
 
+// In [0, pi]; accurate for small and for nearly opposite vectors, where acos is not.
 double angle_between(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
@@ -28,6 +29,8 @@ constexpr double kOneLine = 1e-8;
 // nearest to it.
 Eigen::Matrix<double, 2, 3> parameters_by(const CubicPatch& patch, double u, double v) {
   const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v);
+  // The pseudo-inverse of the 3 by 2 matrix [x_u x_v]. Where the tangents are along one line the
+  // normal matrix has rank one, and is its own pseudo-inverse over the square of its trace.
   const double a = xu.dot(xu), b = xu.dot(xv), c = xv.dot(xv), trace = a + c;
   const double det = xu.cross(xv).squaredNorm();
   Eigen::Matrix2d inverse;
@@ -50,6 +53,7 @@ double beyond_linear(double x) {
 // The point of an element nearest to one that is on it but for round-off.
 Eigen::Vector2d parameters_of(const CubicPatch& patch, const Facet& facet, const Vec3& point) {
   auto [u, v] = closest_on_facet(facet, point);
+  // Gauss-Newton: the residual vanishes at the solution, so it converges quadratically.
   for (int i = 0; i < 8; ++i) {
     const Eigen::Vector2d step = parameters_by(patch, u, v) * (point - patch.point(u, v));
     u += step[0], v += step[1];
@@ -70,6 +74,7 @@ const Primitive* Curvature::face_at(const Place& place) const {
   return place.feature == Feature::Face ? field_.shell().curved()->face_of(place.facet) : nullptr;
 }
 
+// Of a face of known shape the gradient of its distance, which is defined on the surface too.
 Vec3 Curvature::direction_of(const Place& place, const Vec3& center) const {
   Vec3 out;
   if (const Primitive* face = face_at(place)) {
@@ -107,6 +112,8 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
   for (int i = 0; i < 3; ++i) {
     out.second.col(i).setZero(), out.tilt_by.col(i).setZero();
     for (int sign : {1, -1}) {
+      // Central differences of the exact first derivatives, with parameters and normal moved by
+      // their own derivatives.
       const Vec3 moved = sign * step * Vec3::Unit(i);
       Place there = place;
       there.at += motion.parameters * moved;
@@ -119,21 +126,28 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
       out.tilt_by.col(i) += sign / (2 * step) * other.tilt;
     }
   }
+  // Second derivatives are symmetric; the differences are to their own error only.
   out.second = (0.5 * (out.second + out.second.transpose())).eval();
   return out;
 }
 
+// The shape at a place, with first derivatives by the center. The gap's second derivative is I / R
+// + curvature of the shell, both in the tangent plane. `motion` returns how place and normal follow
+// the center; it is zero where the center is on the surface, as nothing is known there.
 ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& center,
                                  const Vec3& normal, double radius, Motion& motion) {
   const CubicPatch& patch = place.patch;
   const double distance = (center - place.point()).dot(normal);  // negative if pushed back out
   motion.parameters.setZero(), motion.normal.setZero();
+  // On the surface itself the direction to the center is undefined.
   const bool moves = std::abs(distance) > kNoDistance * radius;
   CurvatureField::Local local;
   Eigen::Matrix<double, 7, 3> local_by;
   local_by.setZero();
   if (const Primitive* face = face_at(place)) {
+    // Seen from the other side a surface curves the other way.
     const double sign = direction_of(place, center).dot(normal) < 0 ? -1 : 1;
+    // The Hessian of a face's distance on the face is its curvature tensor.
     const auto tensor_at = [&](const Vec3& from) -> CurvatureField::Tensor {
       return sign * CurvatureField::tensor(face->hessian(face->onto(from)));
     };
@@ -153,6 +167,7 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
       motion.parameters = parameters_by(patch, u, v) * dx_dc;
     }
     const double sign = normal_of(patch, u, v).dot(normal) < 0 ? -1 : 1;
+    // By the chain rule: the field's derivatives by u, v times those of u, v by the center.
     const CurvatureField::Expansion here = sign * field_.at(place.facet, u, v);
     local = here.col(0);
     local_by = here.rightCols<2>() * motion.parameters;
@@ -175,6 +190,7 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
       for (int sign : {1, -1}) {
         Place there = place;
         there.at += sign * step * motion.parameters.col(i);
+        // On a side or a corner the curvature also depends on the normal's angle between the walls.
         const Vec3 turned = (normal + sign * step * motion.normal.col(i)).normalized();
         local_by.col(i) += sign / (2 * step) * between_walls(there, turned);
       }
@@ -183,12 +199,17 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
   Mat3 slope;
   ContactShape out = shape_of_gap(curvature + Mat3::Identity() / radius, normal, radius, &slope);
   // The slope lies in the tangent plane, which turns with the normal.
+  // d scale = slope : d(curvature) for what stays in the plane; for the plane's turning by dn it is
+  // -2 (slope curvature n) . dn.
   const Vec3 turn = 2 * slope * (curvature * normal);
   for (int i = 0; i < 3; ++i)
     out.gradient[i] =
         (slope.array() * CurvatureField::matrix(local_by.col(i).head<6>()).array()).sum() -
         turn.dot(motion.normal.col(i));
   // The rise comes on with the depth, so that a touch begins where it is found.
+  // With size = |rise| and x = depth / size the corrected depth is depth + rise (1 - e^-x) for rise
+  // > 0 and depth - size (1 - e^-x) for rise < 0: zero at zero depth, the full rise a few sizes
+  // deeper. Its derivative gives the tilt.
   const double rise = local[6];
   depth = std::max(depth, 0.0);  // where a difference reaches beyond it
   const double size = std::abs(rise), x = rise == 0 ? 0 : depth / size;
@@ -209,6 +230,7 @@ CurvatureField::Local Curvature::between_walls(const Place& place, const Vec3& n
     find_walls_of_side(place.facet, place.index, place.at[0]);
   else
     find_walls_of_vertex(place.facet, place.index);
+  // One wall on both sides means that the walls do not differ.
   if (walls_.size() == 1 && walls_[0].first.normal == walls_[0].second.normal) {
     // A border: from one side of the only wall to its other side.
     const Wall& only = walls_[0].first;
@@ -223,6 +245,8 @@ CurvatureField::Local Curvature::between_walls(const Place& place, const Vec3& n
     const double from_a = angle_between(sign * normal, a.normal);
     const double from_b = angle_between(sign * normal, b.normal);
     const double apart = from_a + from_b;
+    // The detour is zero where the normal is on the arc between both walls: that arc has all the
+    // weight there, and 1e-12 keeps it finite.
     const double detour = std::max(apart - angle_between(a.normal, b.normal), 1e-12);
     const double share = apart > 0 ? from_a / apart : 0.5;
     const double weight = 1 / (detour * detour);
@@ -238,6 +262,8 @@ Curvature::Wall Curvature::wall(int facet, double u, double v) {
   return {field_.at(facet, u, v).col(0), normal_of(patch, u, v)};
 }
 
+// The elements at an edge in their order; neighbors are a pair of walls. Of the other triangle the
+// half-edge may run the other way: then t counts from its other end.
 void Curvature::find_walls_of_side(int facet, int side, double t) {
   const Shell& shell = field_.shell();
   const Topology& topology = shell.topology();
@@ -261,6 +287,8 @@ void Curvature::find_walls_of_vertex(int facet, int corner) {
     const auto [u, v] = corner_parameters(c % 3);
     return wall(c / 3, u, v);
   };
+  // Breadth first, over the edges at the vertex: all corners of the surface that are connected
+  // there.
   corners_.assign(1, 3 * facet + corner);
   for (std::size_t i = 0; i < corners_.size(); ++i)
     for_each_beside(shell, corners_[i], [&](int other, const Edge&) {
@@ -279,12 +307,15 @@ void Curvature::find_walls_of_vertex(int facet, int corner) {
   if (walls_.empty()) walls_.emplace_back(wall_at(corners_[0]), wall_at(corners_[0]));
 }
 
+// Depths, scales and their derivatives are sums over a group with the weights, like the energies
+// that they belong to; the half axes shown are those of the first.
 void merge_shapes(const std::vector<Contact>& contacts, const std::vector<ContactShape>& shapes,
                   std::vector<ContactShape>& shown) {
   shown.clear();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     if (!leads(contacts, i)) continue;
     shown.push_back(shapes[i]);
+    // Alone: its own shape.
     if (contacts[i].group < 0) continue;
     ContactShape& whole = shown.back();
     whole.scale = whole.depth = 0;

@@ -48,9 +48,12 @@ class Curvature {
   Vec3 direction_of(const Place& place, const Vec3& center) const;  // of either sign
   ContactShape shape_at(const Place& place, double depth, const Vec3& center, const Vec3& normal,
                         double radius, Motion& motion);
+  // Curvature and rise on a side or a corner, at the angle of the normal.
   CurvatureField::Local between_walls(const Place& place, const Vec3& normal);
+  // Both fill walls_ with the pairs of walls that meet there.
   void find_walls_of_side(int facet, int side, double t);
   void find_walls_of_vertex(int facet, int corner);
+  // What the field and the element say at a point.
   Wall wall(int facet, double u, double v);
 
   CurvatureField field_;

@@ -27,6 +27,7 @@ bool is_reversed(const Shell& shell, int half_edge, int other) {
 }
 
 // How fast the normals of an element turn: the most along a side [1/m].
+// By the chord of the normals over the chord of the corners.
 double bend_of(const Shell& shell, int facet) {
   if (shell.curved()->facets()[facet].flat) return 0;
   const Facet& flat = shell.facets()[facet];
@@ -70,6 +71,8 @@ Mat3 CurvatureField::matrix(const Tensor& t) {
   return out;
 }
 
+// Each side's polynomial is blended into the element, and the middle is lifted by what is missing
+// there.
 Eigen::RowVector3d CurvatureField::Rise::at(double u, double v) const {
   const double b[3] = {1 - u - v, u, v};
   static constexpr double kBy[3][2] = {{-1, -1}, {1, 0}, {0, 1}};
@@ -101,6 +104,8 @@ void CurvatureField::Rise::set_side(int k, const double (&at)[4]) {
   odd_[k][1] = (near - apart) / 0.08, odd_[k][0] = apart - 0.16 * odd_[k][1];
 }
 
+// From the shape of the face, by central differences of its curvature; from the cubic of the cell;
+// or zero where the element is flat.
 CurvatureField::Expansion CurvatureField::at(int facet, double u, double v) {
   Expansion out = Expansion::Zero();
   if (const Primitive* face = shell_->curved()->face_of(facet)) {
@@ -128,6 +133,8 @@ CurvatureField::Tensor CurvatureField::tensor(const Mat3& m) {
 }
 
 // The tensors at a third and two thirds of a side, as the fits of the element say.
+// By the fit's tensor and its derivative along the side: a cubic in Bezier form has b1 = b0 + b0' /
+// 3.
 std::pair<CurvatureField::Tensor, CurvatureField::Tensor> CurvatureField::along_side(int facet,
                                                                                      int side) {
   const CurvedFacet& curved = shell_->curved()->facets()[facet];
@@ -162,6 +169,8 @@ const CurvatureField::Cell& CurvatureField::cell(int facet) {
   for (int k = 0; k < 3; ++k) {
     const Fan& here = fan(facet, k);
     corner[k] = here.tensor;
+    // The usual choice of the middle ordinate, b111 = (sum of the side ordinates) / 4 - (sum of the
+    // corners) / 6, with which a quadratic is reproduced.
     middle -= tensor(here.fit.tensor()) / 6;
     std::tie(first[k], last[k]) = along_side(facet, k);
     middle += (first[k] + last[k]) / 4;
@@ -184,6 +193,7 @@ const CurvatureField::Cell& CurvatureField::cell(int facet) {
   out.c03 = corner[2] - b0 + 3 * (v1 - v2);
   out.c21 = 3 * (2 * u1 - b0 - u2 + v1 - 2 * middle + first[1]);
   out.c12 = 3 * (2 * v1 - b0 - v2 + u1 - 2 * middle + last[1]);
+  // The sums above convert Bezier ordinates to coefficients of u^i v^j.
   made.rise = rise_of(facet);
   cell_of_.emplace(facet, static_cast<int>(cells_.size()));
   cells_.push_back(made);
@@ -207,6 +217,8 @@ double CurvatureField::beyond(int facet, double u, double v) {
   return sum / weights;
 }
 
+// At four points of each side, by the side's owner, so that both elements agree; limited to a share
+// of the bulge.
 CurvatureField::Rise CurvatureField::rise_of(int facet) {
   const LargeArray<CurvedFacet>& cells = shell_->curved()->facets();
   const double bulge = cells[facet].bulge;
@@ -256,6 +268,7 @@ const CurvatureField::Fan& CurvatureField::fan(int facet, int corner) {
   const std::size_t first = fans_.size();
   Tensor flattest = Tensor::Constant(std::numeric_limits<double>::infinity());
   for (int c : all) {
+    // Part of a fan that was fitted with another of its corners.
     if (fan_of_.count(c)) continue;
     const VertexCurvature fit = fit_at(c);
     for (int one : corners_) fan_of_.emplace(one, static_cast<int>(fans_.size()));
@@ -272,6 +285,7 @@ VertexCurvature CurvatureField::fit_at(int corner) {
   collect_fan(corner, false, corners_);
   const int first = corners_[0];
   const bool exact = shell_->curved()->exact();
+  // The neighbors of the vertex; of flat elements nothing is fitted, their curvature is zero.
   around_.clear();
   const auto add_around = [&](const std::vector<int>& corners) {
     for (int c : corners)
@@ -286,6 +300,8 @@ VertexCurvature CurvatureField::fit_at(int corner) {
         collect_fan(c / 3 * 3 + k, false, beside_);
         add_around(beside_);
       }
+    // Sorted by coordinates, so that points that are met twice are neighbors, and the sums of the
+    // fit do not depend on the numbering.
     const auto before = [](const OrientedPoint& a, const OrientedPoint& b) {
       return std::lexicographical_compare(a.point.data(), a.point.data() + 3, b.point.data(),
                                           b.point.data() + 3);

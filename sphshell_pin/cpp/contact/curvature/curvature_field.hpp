@@ -31,8 +31,10 @@ class CurvatureField {
   explicit CurvatureField(const Shell& shell) : shell_(&shell) {}
   const Shell& shell() const { return *shell_; }
 
+  // Of a facet at its parameters; of a face of known shape, from that shape.
   Expansion at(int facet, double u, double v);
 
+  // Between a symmetric matrix and its six numbers.
   static Mat3 matrix(const Tensor& t);
   static Tensor tensor(const Mat3& m);
 
@@ -60,12 +62,16 @@ class CurvatureField {
     Tensor tensor;  // that holds at the vertex, where others are joined to them
   };
 
+  // What was fitted for a facet, or for the fan of a corner; made where it is asked for first.
   const Cell& cell(int facet);
   const Fan& fan(int facet, int corner);
+  // The fit to the vertices around a corner's fan.
   VertexCurvature fit_at(int corner);
   void collect_fan(int corner, bool all, std::vector<int>& corners) const;
+  // Half-edges 3 facet + side, of which one owns what both elements share.
   int owner_of_side(int facet, int side);
   std::pair<Tensor, Tensor> along_side(int facet, int side);
+  // How far the fits say that the surface lies beyond the element [m].
   double beyond(int facet, double u, double v);
   Rise rise_of(int facet);
 

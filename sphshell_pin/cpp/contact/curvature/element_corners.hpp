@@ -8,13 +8,16 @@
 namespace sphshell {
 
 // Where two sides go on into each other at their corner, that of a point next to it.
+// Unit, x_u x x_v.
 inline Vec3 normal_of(const CubicPatch& patch, double u, double v) {
   const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v), n = xu.cross(xv);
   if (n.squaredNorm() > 1e-16 * xu.squaredNorm() * xv.squaredNorm()) return n.normalized();
+  // Moved towards the middle of the element by a thousandth.
   const double a = u + 1e-3 * (1.0 / 3 - u), b = v + 1e-3 * (1.0 / 3 - v);
   return patch.along_u(a, b).cross(patch.along_v(a, b)).normalized();
 }
 
+// (0, 0), (1, 0), (0, 1).
 inline std::pair<double, double> corner_parameters(int k) {
   return {k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
 }
@@ -22,6 +25,7 @@ inline std::pair<double, double> corner_parameters(int k) {
 // Whether two unit normals are one: those of a smooth vertex agree to round-off.
 inline bool is_one_normal(const Vec3& a, const Vec3& b) { return a.dot(b) > 1 - 1e-10; }
 
+// The vertex at a corner.
 inline int vertex_of(const Shell& shell, int corner) {
   return shell.triangles()[shell.triangle_of_facet(corner / 3)][corner % 3];
 }
@@ -33,6 +37,7 @@ inline Vec3 normal_at(const Shell& shell, int corner) {
   return normal_of(shell.curved()->facets()[facet].patch(shell.facets()[facet]), u, v);
 }
 
+// The edge that a facet's side is.
 inline const Edge& edge_at(const Shell& shell, int facet, int side) {
   const Topology& topology = shell.topology();
   return topology.edges[topology.edge_of[3 * shell.triangle_of_facet(facet) + side]];

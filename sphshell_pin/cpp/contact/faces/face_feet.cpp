@@ -17,6 +17,8 @@ constexpr int kMostRepeats = 8;
 }  // namespace
 
 void FaceFeet::clear(const CurvedShell& surface) {
+  // Feet of earlier rounds count as unknown; cleared only for another surface, or where the counter
+  // wraps around.
   if (feet_.size() != surface.faces().shapes.size() || of_ != &surface || ++round_ == 0) {
     feet_.assign(surface.faces().shapes.size(), Foot());
     of_ = &surface;
@@ -30,6 +32,8 @@ void FaceFeet::add(const Shell& shell, int f, const Sphere& sphere, bool want_dn
   const FaceCell& cell = surface.face_cells()[f];
   const Primitive& shape = surface.faces().shapes[cell.face];
   Foot& foot = feet_[cell.face];
+  // The first facet of the face in this query: the closest point of the whole surface, in closed
+  // form.
   if (foot.round != round_) {
     foot.round = round_;
     foot.distance = shape.distance(sphere.center, foot.normal);
@@ -39,8 +43,10 @@ void FaceFeet::add(const Shell& shell, int f, const Sphere& sphere, bool want_dn
   }
   if (foot.claimed) return;
   const NormalCone& cone = surface.cones()[f];
+  // The facet's ball excludes most facets before the exact test.
   const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
   Vec3 point = foot.point, normal = foot.normal;
+  // On the axis any direction will do: towards this facet.
   if (foot.anywhere) {
     shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
     point = sphere.center - foot.distance * normal;
@@ -62,6 +68,9 @@ void FaceFeet::add(const Shell& shell, int f, const Sphere& sphere, bool want_dn
   minima.push_back({contact, f, 0, foot.distance * cell.sign < 0});
 }
 
+// Side by side of the facet: the point must be on the inner side of what bounds it there. Inner: a
+// plane between facets of one face. Shared: the other face cuts. Tangent: both faces touch along
+// the side, and the sign of their distance says nothing. Cubic: the curve itself.
 bool holds(const Shell& shell, int f, const Vec3& point, const Vec3& outward, double tolerance) {
   const CurvedShell& surface = *shell.curved();
   const std::vector<Primitive>& shapes = surface.faces().shapes;
@@ -81,6 +90,7 @@ bool holds(const Shell& shell, int f, const Vec3& point, const Vec3& outward, do
     }
     const Vec3 in = outward.cross(d).normalized();
     const double inside = in.dot(point - p);
+    // Farther from the chord than the curve bulges: the curve need not be looked at.
     if (inside > cell.bulge[k]) continue;
     if (inside < -double(cell.bulge[k])) return false;
     if (cell.side[k] == FaceCell::Side::Shared) {
@@ -119,6 +129,7 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
   const Primitive& other = shapes[cell.across[k]];
   const Vec3 &p = shell.facets()[f].corner[k], &q = shell.facets()[f].corner[next_corner(k)];
   const Vec3 chord = q - p;
+  // Along the half-edge's direction.
   const auto tangent_at = [&](const Vec3& x) -> Vec3 {
     const Vec3 tangent = intersection_at(shape, other, x).tangent;
     if (tangent.isZero(0)) return chord.normalized();  // an end where both are tangent
@@ -129,6 +140,9 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
   for (int i = 0; i < kMostRepeats; ++i) {
     const Intersection here = intersection_at(shape, other, x);
     const Vec3 from = x - center;
+    // Newton's method on the curve that is the intersection of two faces: a step along the tangent
+    // by the second-order expansion of the distance, and back onto both faces by `offset`. Where
+    // the distance is not convex the step is that of steepest descent.
     const double bend = 1 + from.dot(here.curvature);
     const double step =
         std::clamp(-from.dot(here.tangent) / (bend > 0.05 ? bend : 1.0), -most, most);
@@ -137,6 +151,7 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
     if (moved.squaredNorm() < 1e-30 * from.squaredNorm()) break;
   }
   // Beyond an end that end is the nearest.
+  // Regions of features overlap by this: no center is between two of them.
   const double gap = surface.gap();
   if ((center - p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm()) {
     out.t = 0, out.point = p;
@@ -150,6 +165,8 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
   return out;
 }
 
+// On the curve of two faces as on any curve: tangent tangent^T over the second derivative of half
+// the square of the distance.
 Mat3 dx_dc_of(const Shell& shell, int f, int k, const SideFoot& foot, const Vec3& center) {
   const CurvedShell& surface = *shell.curved();
   if (!surface.face_cells().empty() && surface.face_cells()[f].side[k] != FaceCell::Side::Cubic &&
@@ -163,6 +180,8 @@ Mat3 dx_dc_of(const Shell& shell, int f, int k, const SideFoot& foot, const Vec3
   return dx_dc_of(surface.facets()[f].side(shell.facets()[f], k), foot.t, center);
 }
 
+// Of a face of known shape from its normal, else from the cubic patch; made perpendicular to the
+// side.
 Vec3 inward(const Shell& shell, int h, double t, const Vec3& point, const Vec3& along) {
   const CurvedShell& surface = *shell.curved();
   const int f = triangle_of(h), k = side_of(h);

@@ -13,6 +13,7 @@ namespace sphshell {
 // facet that holds it claims it.
 class FaceFeet {
  public:
+  // Before each query; in constant time.
   void clear(const CurvedShell& surface);
   // Adds the closest point of the face that a facet lies on, if it is in the facet and no other has
   // claimed it.
@@ -41,6 +42,7 @@ struct SideFoot {
   double t;  // of the cubic
   Vec3 point, tangent;
 };
+// On the exact intersection curve by Newton's method, from the cubic's closest point.
 SideFoot nearest_on_side(const Shell& shell, int facet, int side, const Vec3& center);
 // How it follows the center (3, 3).
 Mat3 dx_dc_of(const Shell& shell, int facet, int side, const SideFoot& foot, const Vec3& center);

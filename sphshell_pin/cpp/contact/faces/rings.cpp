@@ -12,6 +12,7 @@ namespace {
 // Nearer to the axis than this share of the circle's radius, and rounding, a center is on it.
 constexpr double kOnRing = 1e-9, kRounding = 1e-11;
 
+// 0 within rounding of the axis, 1 where the circle no longer counts.
 double share_of(double off) { return std::max(0.0, off - kRounding) / kOnRing; }
 
 // A circle about an axis, and how far off that axis a center is, as a share of kOnRing.
@@ -20,6 +21,7 @@ struct Circle {
   double radius, off;
 };
 
+// The parallel circle of a surface of revolution through the closest point.
 bool circle_of_face(const Primitive& shape, const Vec3& foot, const Vec3& center, Circle& out) {
   if (shape.kind == FaceKind::Plane || shape.kind == FaceKind::Sphere) return false;
   const auto beside = [&](const Vec3& x) -> Vec3 {
@@ -42,6 +44,7 @@ bool is_whole(const Shell& shell, int face, const Circle& circle, const Vec3& fo
   // In the half-plane through the axis: the normal, and the tangent across the circle.
   const Vec3 outward = (foot - circle.middle) / circle.radius;
   const double n_off = normal.dot(outward), n_along = normal.dot(circle.axis);
+  // Returns the place of x along the tangent across the circle; `away`: along the normal.
   const auto across = [&](const Vec3& x, double& away) {
     const Vec3 y = x - circle.middle;
     const double along = y.dot(circle.axis), off = (y - along * circle.axis).norm();
@@ -58,6 +61,7 @@ bool is_whole(const Shell& shell, int face, const Circle& circle, const Vec3& fo
       const double end = across(shell.facets()[f].corner[next_corner(k)], away[1]);
       // The other side of a torus' tube is another circle.
       if (std::max(std::abs(away[0]), std::abs(away[1])) > circle.radius) continue;
+      // A side that is parallel to the circle cuts it only if it is the circle.
       const bool level = std::abs(begin - end) <= surface.gap();
       const double reach = level ? 0 : surface.gap() + double(cell.bulge[k]);
       if (std::min(begin, end) < reach && std::max(begin, end) > -reach &&
@@ -68,6 +72,9 @@ bool is_whole(const Shell& shell, int face, const Circle& circle, const Vec3& fo
   return true;
 }
 
+// The osculating circle of the curve in which two faces meet: a center on its axis is as far from
+// all of it. That is where 1 + (foot - center) . curvature, the second derivative of half the
+// square of the distance along the curve, vanishes.
 bool circle_of_border(const Shell& shell, const Minimum& at, const Vec3& center, Circle& out) {
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[at.facet];
@@ -86,6 +93,7 @@ bool circle_of_border(const Shell& shell, const Minimum& at, const Vec3& center,
 }
 
 // The angle [rad] of a side about the axis of its circle.
+// By atan2, so that half a turn is accurate too.
 double angle_of(const Shell& shell, const Minimum& at, const Circle& circle) {
   const Facet& facet = shell.facets()[at.facet];
   const Vec3 p = facet.corner[at.index] - circle.middle;
@@ -93,6 +101,7 @@ double angle_of(const Shell& shell, const Minimum& at, const Circle& circle) {
   return std::atan2(std::abs(p.cross(q).dot(circle.axis)), p.dot(q));
 }
 
+// The rest of the query reads these two.
 void mark(Minimum& minimum, const Circle& circle) {
   minimum.axis = circle.axis, minimum.off_axis = circle.off;
 }
@@ -101,6 +110,7 @@ void mark(Minimum& minimum, const Circle& circle) {
 
 void find_rings(const Shell& shell, const Sphere& sphere, const std::vector<int>& facets,
                 std::vector<Minimum>& minima) {
+  // Faces of revolution by their own axis; borders by the circle that their sides share.
   constexpr double kTurn = 6.283185307179586;
   const CurvedShell& surface = *shell.curved();
   const auto is_border = [](const Minimum& at) { return at.contact.feature == Feature::Edge; };
@@ -114,6 +124,7 @@ void find_rings(const Shell& shell, const Sphere& sphere, const std::vector<int>
       mark(at, circle);
     if (!is_border(at) || at.off_axis < 1) continue;
     if (!circle_of_border(shell, at, sphere.center, circle)) continue;
+    // Sides are of one circle if its middle and radius agree.
     const double same = 1e-6 * circle.radius;
     const auto on_circle = [&](const Minimum& other) {
       Circle its;
@@ -121,6 +132,7 @@ void find_rings(const Shell& shell, const Sphere& sphere, const std::vector<int>
              (its.middle - circle.middle).norm() < same &&
              std::abs(its.radius - circle.radius) < same;
     };
+    // The sides must make a full turn: else it is an arc with ends, whose corners count.
     double turn = 0;
     for (const Minimum& other : minima)
       if (on_circle(other)) turn += angle_of(shell, other, circle);
@@ -136,6 +148,7 @@ void find_rings(const Shell& shell, const Sphere& sphere, const std::vector<int>
   }
 }
 
+// The component of the normal across the axis fades with the distance from the axis.
 Contact ring_of(const Minimum& minimum, const Sphere& sphere) {
   Contact out = minimum.contact;
   const Vec3 level = out.normal.dot(minimum.axis) * minimum.axis;

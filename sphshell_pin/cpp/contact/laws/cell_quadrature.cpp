@@ -13,6 +13,7 @@ constexpr int kMostRootHalvings = 14;
 }  // namespace
 
 void Sextic::halve(Sextic& low, Sextic& high) const {
+  // Each pass leaves one coefficient of either half at its ends.
   double work[7];
   std::copy_n(f, 7, work);
   for (int n = 0; n < 7; ++n) {
@@ -27,6 +28,7 @@ double Sextic::root() const {
   // In powers of t.
   double c[7];
   std::copy_n(f, 7, c);
+  // Forward differences of the Bernstein coefficients, times binomials.
   for (int n = 1; n < 7; ++n)
     for (int i = 6; i >= n; --i) c[i] -= c[i - 1];
   static constexpr double kBinomial[7] = {1, 6, 15, 20, 15, 6, 1};
@@ -34,6 +36,7 @@ double Sextic::root() const {
   const bool begins_inside = f[0] < 0;
   double a = 0, b = 1, t = f[0] / (f[0] - f[6]);
   for (int i = 0; i < 60 && b - a > 1e-15; ++i) {
+    // Horner's rule for the value and the slope together.
     double value = c[6], slope = 0;
     for (int k = 5; k >= 0; --k) slope = slope * t + value, value = value * t + c[k];
     if (value == 0) return t;
@@ -47,6 +50,7 @@ double Sextic::root() const {
 }
 
 void Sextic::roots(double begin, double end, int depth, double* out, int& count) const {
+  // Descartes: as many roots as sign changes, or fewer by an even number.
   int changes = 0;
   for (int i = 0; i < 6; ++i) changes += (f[i] < 0) != (f[i + 1] < 0);
   if (changes == 0) return;
@@ -64,6 +68,7 @@ void Sextic::roots(double begin, double end, int depth, double* out, int& count)
 
 // The arc from a to b, counterclockwise round the region, in pieces that are nearly straight.
 bool CellQuadrature::add_arc(const Vec2& a, const Vec2& b, const Part& w, int depth) {
+  // Halved at the point over the middle of its chord until it is nearly straight.
   const Arc arc(*this, a, b);
   if (arc.lean() > kFlatArc) {
     if (count_ >= kMostPieces - 8) return false;
@@ -85,6 +90,8 @@ bool CellQuadrature::add_loop(const Part& w, bool& found) {
   CellPoint lowest;
   if (!find_minimum(patch_, Vec3::Zero(), {start.x(), start.y()}, lowest)) return true;
   if (!(lowest.point.squaredNorm() < radius2_)) return true;
+  // A closed curve round the point nearest to the ball's center, if that is in the part: four
+  // points of it, and the arcs between them.
   const Vec2 center(lowest.u, lowest.v);
   for (int k = 0; k < 3; ++k) {
     const Vec2 d = w.corner[next_corner(k)] - w.corner[k], from = center - w.corner[k];
@@ -108,6 +115,7 @@ bool CellQuadrature::root_towards(const Vec2& from, const Vec2& direction, const
   for (int k = 0; k < 3; ++k) {
     const Vec2 d = w.corner[next_corner(k)] - w.corner[k], to = w.corner[k] - from;
     const double across = direction.x() * d.y() - direction.y() * d.x();
+    // Up to the side of the triangle that the ray meets first.
     if (across > 0) most = std::min(most, (to.x() * d.y() - to.y() * d.x()) / across);
   }
   if (!(most > 0) || !std::isfinite(most)) return false;

@@ -29,6 +29,7 @@ struct Sextic {
   }
 
   void halve(Sextic& low, Sextic& high) const;  // by de Casteljau
+  // The one root where the ends have opposite signs.
   double root() const;
   // Appends its roots between the ends in their order; at most 6.
   void roots(double begin, double end, int depth, double* out, int& count) const;
@@ -80,6 +81,7 @@ class CellQuadrature {
     const Vec3 x = patch_.point(w.x(), w.y());
     visit(x, patch_.along_u(w.x(), w.y()).cross(patch_.along_v(w.x(), w.y())), weight);
   }
+  // One ray of Green's formula: Gauss's points from the pole to w, with the Jacobian s.
   template <class Visit>
   void sector(const Vec2& pole, const Vec2& w, const Vec2& dw, double weight, const GaussRule& rule,
               Visit& visit) {
@@ -98,6 +100,7 @@ class CellQuadrature {
     if (value) *value = x.squaredNorm() - radius2_;
     return {gu, gv};
   }
+  // From parameters to meters in the facet's plane (an upper triangular matrix), and back.
   Vec2 to_plane(const Vec2& d) const {
     return {axes_.a * d.x() + axes_.b * d.y(), axes_.c * d.y()};
   }
@@ -106,6 +109,9 @@ class CellQuadrature {
     return {(d.x() - axes_.b * v) / axes_.a, v};
   }
 
+  // Pieces of the circle rho = R from a to b, each flat enough for a graph over its chord; a whole
+  // loop of it inside the part; and a point of it along a ray. False where they fail: the part is
+  // then divided.
   bool add_arc(const Vec2& a, const Vec2& b, const Part& w, int depth);
   bool add_loop(const Part& w, bool& found);
   bool root_towards(const Vec2& from, const Vec2& direction, const Part& w, Vec2& out) const;
@@ -135,6 +141,8 @@ class CellQuadrature::Arc {
     out_ = Vec2(chord.y(), -chord.x()) / length_;
     out_parameters_ = cell.to_parameters(out_);
     const Vec2 ga = cell.gradient(a), gb = cell.gradient(b);
+    // The gradient of rho^2 points out of the ball; where it leans far from the chord's normal the
+    // arc is no graph over the chord.
     lean_ = std::min(ga.dot(out_) / ga.norm(), gb.dot(out_) / gb.norm());
     rise_a_ = -ga.dot(chord) / ga.dot(out_), rise_b_ = -gb.dot(chord) / gb.dot(out_);
   }
@@ -143,7 +151,9 @@ class CellQuadrature::Arc {
   double lean() const { return length_ > 0 ? lean_ : -1; }
   const Vec2& out() const { return out_parameters_; }
 
+  // Newton's method across the chord.
   ArcPoint at(double t) const {
+    // The cubic that has the arc's slopes at both ends: Newton's start.
     double s = t * (1 - t) * ((1 - t) * rise_a_ - t * rise_b_);
     Vec2 w, g;
     for (int i = 0; i < 12; ++i) {
@@ -156,6 +166,7 @@ class CellQuadrature::Arc {
       if (std::abs(step) < 1e-7 * length_) break;
     }
     w = a_ + t * chord_ + s * out_parameters_;
+    // By implicit differentiation of rho = R.
     const double slope = -g.dot(chord_plane_) / g.dot(out_);
     return {w, chord_ + slope * out_parameters_};
   }
@@ -166,6 +177,7 @@ class CellQuadrature::Arc {
   double length_ = 0, lean_ = -1, rise_a_ = 0, rise_b_ = 0;
 };
 
+// Into four similar triangles by the middles of the sides.
 template <class Visit>
 void CellQuadrature::divide(const Part& w, int level, Visit& visit) {
   const Vec2 half[3] = {(w.corner[0] + w.corner[1]) / 2, (w.corner[1] + w.corner[2]) / 2,
@@ -241,6 +253,8 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
     middle = patch_.polar(w.corner[0], w.corner[1], w.corner[2]);
   }
   for (int k = 0; k < 3; ++k) net[k][3] = net[next_corner(k)][0];
+  // Bounds from the convex hull of the control points: low on the distance from the center, high2
+  // on its square, size2 on the size of the part.
   const Vec3 towards = (net[0][0] + net[1][0] + net[2][0]).normalized();
   double low = middle.dot(towards), high2 = middle.squaredNorm(), size2 = 0;
   for (int k = 0; k < 3; ++k) {
@@ -250,6 +264,7 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
     }
     size2 = std::max(size2, (net[k][3] - net[k][0]).squaredNorm());
   }
+  // All of it is outside the ball.
   if (low >= radius_) return;
   // Where p is analytic decides on the order.
   double size = std::sqrt(size2);
@@ -261,6 +276,7 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
                                            : ratio < 0.5  ? 5
                                            : ratio < 0.8  ? 6
                                                           : 7);
+  // All of it is inside: a rule for triangles.
   if (high2 <= radius2_) return whole(w, order, visit);
 
   count_ = 0;
@@ -269,6 +285,8 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
   Vec2 exit, first_entry;
   for (int k = 0; k < 3; ++k) {
     const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
+    // Walks round the triangle: pieces of the sides inside the ball, and arcs from where the
+    // boundary leaves the ball to where it comes back.
     const Sextic along(net[k][0], net[k][1], net[k][2], net[k][3], radius2_);
     double t[8];
     int count = 0;
@@ -293,6 +311,7 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
       inside = !inside, from = to;
     }
   }
+  // A root was missed: divided parts have fewer.
   if (has_exit != has_entry) fails = true;
   if (has_exit && has_entry) fails = fails || !add_arc(exit, first_entry, w, 0);
   const bool looped = !any;

@@ -17,6 +17,7 @@ struct Dual {
 
   Dual(double x = 0) : value(x), slope(Slope::Zero()) {}
   Dual(double x, const Slope& s) : value(x), slope(s) {}
+  // The variable number i itself.
   static Dual seed(double x, int i) {
     Dual out(x);
     out.slope[i] = 1;
@@ -38,6 +39,7 @@ struct Dual {
   friend Dual operator*(const Dual& a, const Dual& b) {
     return {a.value * b.value, a.value * b.slope + b.value * a.slope};
   }
+  // (a / b)' = (a' - (a / b) b') / b: one division of values.
   friend Dual operator/(const Dual& a, const Dual& b) {
     const double ratio = a.value / b.value;
     return {ratio, (a.slope - ratio * b.slope) / b.value};
@@ -51,6 +53,7 @@ struct Dual {
   friend Dual operator*(double a, const Dual& b) { return {a * b.value, a * b.slope}; }
   friend Dual operator/(const Dual& a, double b) { return {a.value / b, a.slope / b}; }
 
+  // Branches of a law are decided by values: at a kink the derivative is that of the branch taken.
   friend bool operator<(const Dual& a, const Dual& b) { return a.value < b.value; }
   friend bool operator>(const Dual& a, const Dual& b) { return a.value > b.value; }
   friend bool operator<=(const Dual& a, const Dual& b) { return a.value <= b.value; }
@@ -75,6 +78,7 @@ struct Dual {
 
 namespace Eigen {
 
+// What Eigen asks of a scalar type, so that vectors and matrices of duals work.
 template <int N>
 struct NumTraits<sphshell::Dual<N>> : NumTraits<double> {
   using Real = sphshell::Dual<N>;

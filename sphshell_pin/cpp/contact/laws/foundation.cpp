@@ -14,6 +14,8 @@ namespace sphshell {
 namespace {
 
 // What one quadrature point adds: x relative to the center, `area` its area vector.
+// p = (R^2 - rho^2) / (2 rho) over kappa; the energy by the divergence theorem is an integral over
+// the surface as well, see FoundationSum.
 void add_point(const Vec3& x, const Vec3& area, double radius2, bool slopes, FoundationSum& sum) {
   const double rho2 = x.squaredNorm(), over = 1 / std::sqrt(rho2), inside = radius2 - rho2;
   const double p = inside * over / 2, size = area.norm();
@@ -26,6 +28,7 @@ void add_point(const Vec3& x, const Vec3& area, double radius2, bool slopes, Fou
   sum.slope += area * ((radius2 * over * over + 1) / 2 * over * x).transpose();
 }
 
+// A triangle as a cubic patch, so that one quadrature serves both.
 CubicPatch flat_patch(const Vec3 (&corner)[3]) {
   CubicPatch out;
   for (Vec3* c : {&out.c20, &out.c11, &out.c02, &out.c30, &out.c21, &out.c12, &out.c03})
@@ -41,6 +44,7 @@ Vec3 FoundationRow::normal() const {
   return length > 0 ? Vec3(sum.force / length) : Vec3::UnitZ();
 }
 
+// A ball moves little from call to call: the broad phase follows it.
 Foundation::Foundation() : broad_(true) {
   rows_.reserve(16);
   points_.reserve(4096);
@@ -53,6 +57,7 @@ Foundation& Foundation::operator=(const Foundation&) {
 }
 Foundation::~Foundation() = default;
 
+// One row a patch; few are in reach at once, so a search in order is enough.
 FoundationRow& Foundation::row_of(int patch, int sheet, int element) {
   for (FoundationRow& row : rows_)
     if (row.patch == patch) return row;
@@ -72,6 +77,7 @@ void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& r
   along.roots(0, 1, 0, t, count);
   t[count] = 1;
   const GaussRule rule = gauss_rule(8);
+  // Between the roots of rho^2 = R^2 the side is inside and outside in turn.
   bool inside = along.f[0] < 0;
   double from = 0;
   for (int i = 0; i <= count; ++i, inside = !inside) {
@@ -80,6 +86,7 @@ void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& r
       const double length = (side.point(to) - side.point(from)).norm();
       const double near = std::min(
           {side.point(from).norm(), side.point((from + to) / 2).norm(), side.point(to).norm()});
+      // q is steep near the center: panels are no longer than half the distance from it.
       const int panels = std::clamp(static_cast<int>(std::ceil(2 * length / near)), 1, 24);
       for (int panel = 0; panel < panels; ++panel)
         for (int j = 0; j < rule.size; ++j) {
@@ -110,6 +117,7 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
   const CurvedShell* curved = method == Method::Smooth ? shell.curved() : nullptr;
   const double bulge = curved ? curved->bulge() : 0, radius2 = radius * radius;
   const LargeArray<NormalCone>& cones = curved ? curved->cones() : shell.cones();
+  // No tolerance: the border of the overlap bears no pressure.
   const Sphere sphere{center, radius, 0};
   broad_.find(shell, cones, bulge, sphere);
   const Sheets& sheets = shell.sheets();
@@ -119,6 +127,7 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
   for (int f : broad_.overlapping) {
     const NormalCone& cone = cones[f];
     const Vec3 middle(cone.middle[0], cone.middle[1], cone.middle[2]);
+    // By the ball around the facet, in single precision: see BroadPhase.
     const double most = radius + 1.00001 * cone.reach + 1e-6 * (shell.size() + radius);
     if ((local - middle).squaredNorm() > most * most) continue;
     const Facet& facet = shell.facets()[f];
@@ -167,12 +176,15 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
     const int number = static_cast<int>(&row - rows_.data());
     for (std::size_t i = first_point; i < points_.size(); ++i) points_[i].row = number;
     row.sum.add(sum);
+    // A curved facet may be nearer than its flat one by the bulge: its depth is found later, if it
+    // can matter.
     const double nearest = closest_on_triangle(Vec3::Zero(), corner, facet.normal).point.norm();
     if (!flat)
       counted_.push_back({f, number, nearest - curved->cells()[f].bulge});
     else if (radius - nearest > row.depth)
       row.depth = radius - nearest, row.element = facet.element;
     for (int k = 0; k < 3; ++k) {
+      // Bit k: side k is a border of its sheet.
       if (!(sheets.rim[triangle] >> k & 1)) continue;
       CubicCurve side{corner[k], corner[next_corner(k)] - corner[k], Vec3::Zero(), Vec3::Zero()};
       if (!flat) {
@@ -192,6 +204,7 @@ void Foundation::find_depths(const Shell& shell, const Vec3& center, double radi
   const CurvedShell& curved = *shell.curved();
   const auto look = [&](const Counted& at) {
     FoundationRow& row = rows_[at.row];
+    // No closer than what the row has already.
     if (at.nearest >= radius - row.depth) return;
     const Facet& facet = shell.facets()[at.facet];
     const CurvedFacet& bent = curved.facets()[at.facet];
@@ -217,6 +230,7 @@ void Foundation::find_depths(const Shell& shell, const Vec3& center, double radi
 void Foundation::finish(const Shell& shell, const Vec3& center, double radius) {
   const Sheets& sheets = shell.sheets();
   for (FoundationRow& row : rows_)
+    // Center of pressure; the quadrature is about the ball's center.
     row.center = center + row.sum.first / std::max(row.sum.pressure, 1e-300);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const int sheet = rows_[i].sheet;
@@ -226,6 +240,7 @@ void Foundation::finish(const Shell& shell, const Vec3& center, double radius) {
     double energy = 0;
     for (const FoundationRow& row : rows_)
       if (row.sheet == sheet) energy += row.sum.energy;
+    // Without a stated side the orientation is the one in which the energy is positive.
     const bool turned = shell.side() == Side::Both ? energy < 0 : shell.side() == Side::Inside;
     // From behind a closed shell the solid angle is less by a full one.
     const bool behind = sheets.closed[sheet] && (turned ? energy > 0 : energy < 0);
@@ -244,6 +259,8 @@ void Foundation::finish(const Shell& shell, const Vec3& center, double radius) {
 void Foundation::find_on_ball(double ball, const Vec3& center, double radius, bool points) {
   rows_.clear();
   points_.clear();
+  // e: distance of the centers; rho from near to far: points of the ball inside the sphere. Of
+  // equal centers there is no direction.
   const double e = center.norm(), R2 = radius * radius, E = e * e + ball * ball;
   const double near = std::abs(e - ball), far = std::min(radius, e + ball);
   if (!(near < far) || e == 0) return;
@@ -271,16 +288,20 @@ void Foundation::find_on_ball(double ball, const Vec3& center, double radius, bo
       points_.push_back({ball * n, n, area / kRound, p, p * area / kRound * n, 0});
     }
   }
+  // By symmetry the force is along the line of centers, a polynomial in rho.
   const double force = M_PI / (2 * e * e) * pushed;
+  // Leibniz: the bounds near and far move with e.
   const double ends = (R2 - far * far) * (E - far * far) -
                       (e < ball ? -1 : 1) * (R2 - near * near) * (E - near * near);
   const double slope = -2 * force / e + M_PI / (2 * e * e) * (2 * e * turned + ends);
   if (e < ball) {
+    // The center inside the ball: a full ball of radius r overlaps as well.
     const double r = std::min(radius, ball - e);
     energy += M_PI * (R2 * r * r - r * r * r * r / 2);
   }
   sum.force = force * axis;
   sum.energy = energy;
+  // Along the axis the slope of the force, across it force / distance, as the axis turns.
   sum.slope =
       slope * axis * axis.transpose() + force / e * (Mat3::Identity() - axis * axis.transpose());
   rows_.push_back({0, 0, 0, radius - (e - ball), center + sum.first / sum.pressure, sum});

@@ -58,8 +58,11 @@ class Foundation {
     int facet, row;
     double nearest;
   };
+  // The row of a patch, a new one where it had none.
   FoundationRow& row_of(int patch, int sheet, int element);
+  // What the border of an open sheet adds.
   void add_rim(const CubicCurve& side, double radius, FoundationRow& row, bool points);
+  // The depths of rows on curved facets; and what is done once all facets are counted.
   void find_depths(const Shell& shell, const Vec3& center, double radius);
   void finish(const Shell& shell, const Vec3& center, double radius);
 

@@ -24,6 +24,7 @@ struct ContactForce {
 };
 
 // x, or the nearest to it in the ball.
+// The projection P of the friction laws.
 template <class S>
 Vector3<S> in_ball(const Vector3<S>& x, const S& radius) {
   using std::sqrt;
@@ -81,6 +82,7 @@ struct CoulombFriction {
   template <class S>
   S over_speed(const S& speed2) const {
     using std::sqrt;
+    // A cubic that rises from zero with a horizontal tangent at v_static, divided by the speed.
     if (speed2 < v_static * v_static)
       return mu_static * (3 - speed2 / (v_static * v_static)) / (2 * v_static);
     const S speed = sqrt(speed2);
@@ -156,21 +158,25 @@ struct BristleFriction : Sticking {
       arm = arm_of(disc(m, radius));
       w += arm * m.spin * m.normal;
     }
+    // mu(|w|) N [N].
     const S limit = stribeck(S(w.squaredNorm())) * out.normal;
     Vector3<S> z = m.bristle;
     if (!torsional) z -= z.dot(m.normal) * m.normal;
     const Vector3<S> stretched = stiffness * z;
     out.stiffness = stiffness;
+    // What the bristle can hold elastically; the rest relaxes.
     const Vector3<S> held = in_ball(stretched, limit) / stiffness;
     out.stretch2 = held.squaredNorm();
     out.bristle_rate = w - (z - held) / relaxation;
     const Vector3<S> all = -in_ball(Vector3<S>(stretched + damping * w), limit);
     const S along = all.dot(m.normal);
     out.friction = all - along * m.normal;
+    // Along the normal the force on the arm is a moment.
     out.torsion = arm * along;
   }
 };
 
+// Most rings of a bristle, for arrays of fixed size.
 inline constexpr int kMostRings = 8;
 
 // The same with the stiffness of two elastic bodies that touch on a disc of radius a (Mindlin, J.
@@ -234,6 +240,7 @@ struct MindlinFriction : Sticking {
     const S a = disc(m, radius);
     if (!(a > 0)) return;
     const Vector3<S>& n = m.normal;
+    // a ~ sqrt(depth), so a' / a = depth' / (2 depth), and depth' = -n . v.
     const S growth = -0.5 * n.dot(m.relative) / m.depth;  // a' / a
     const S disc_arm = torsional ? arm_of(a) : S(0);
     const S speed2 = out.slip.squaredNorm() + (disc_arm * m.spin) * (disc_arm * m.spin);
@@ -245,6 +252,7 @@ struct MindlinFriction : Sticking {
       const Vector3<S> part = x.dot(n) * n;
       return across * (x - part) + along * part;
     };
+    // Rates are accumulated, as a ring gives its neighbors what passes over the common edge.
     if (m.outer_rate) std::fill_n(m.outer_rate, rings - 1, Vector3<S>::Zero());
     for (int i = 0; i < rings; ++i) {
       const Ring& part = parts[i];
@@ -259,6 +267,8 @@ struct MindlinFriction : Sticking {
       const double k = shear * part.width, k_along = twist * part.cube / (unit_arm * unit_arm);
       out.stretch2 += scaled(held, S(1 / k), S(1 / k_along)).dot(held) / (shear * a * a);
 
+      // Relaxation with the stiffer direction's rate in both, so that neither is faster than asked
+      // for.
       const double stiffest = torsional ? std::max(k, k_along) : k;
       const Vector3<S> slip = a * w - (load - held) / (stiffest * relaxation);
       rate(out, m, i) += scaled(slip, S(part.width), S(arm * (k_along / shear)));
@@ -317,6 +327,7 @@ struct FrictionLaw {
   bool torsional() const { return has_state() && sticking()->torsional; }
   // States of a contact, of three numbers each.
   int rings() const { return has_state() ? sticking()->rings : 1; }
+  // Whether it resists rolling.
   bool rolls() const {
     const MindlinFriction* mindlin = std::get_if<MindlinFriction>(&law);
     return mindlin && mindlin->rolling > 0;

@@ -3,6 +3,7 @@
 
 namespace sphshell {
 
+// The integral of f is about the sum of weights[i] f(nodes[i]).
 struct GaussRule {
   int size;
   const double* nodes;
@@ -41,6 +42,7 @@ inline constexpr double kGaussWeights8[] = {
     0.18134189168918083, 0.15685332293894344, 0.11119051722668721, 0.05061426814518853};
 
 // Of 3 to 8 nodes: exact for polynomials of degree 2 n - 1.
+// Gauss-Legendre.
 inline GaussRule gauss_rule(int n) {
   switch (n) {
     case 3:

@@ -15,6 +15,7 @@ struct Elliptic {
   double k, e, d;
 
   explicit Elliptic(double complement) {
+    // Abramowitz and Stegun 17.6: K = pi / (2 M(1, k')), and E = K (1 - sum of 2^(n-1) c_n^2).
     double a = 1, b = complement, c2 = (1 - b) * (1 + b), power = 0.5, sum = 0, sum_over = 0;
     const double m = c2;
     // The first term is m / 2, so that its share of (K - E) / m is exact for m = 0 as well.
@@ -41,13 +42,16 @@ struct Ellipse {
 
   explicit Ellipse(double complement) {
     const Elliptic of(complement);
+    // Johnson 4.26 in the form that has no cancellation as k' goes to 1, the circle.
     A = complement * of.d;
     // ((a/b)^2 E - K) / e^2 = (E - k'^2 K) / (k'^2 e^2), and E - k'^2 K = e^2 (K - D).
     B = (of.k - of.d) / complement;
     depth = complement * of.k;
     load = 2 * M_PI / 3 * complement;
   }
+  // 0 for the sphere, growing with the ratio of the curvatures.
   double s() const { return std::log((A + B) * (A + B) / (4 * A * B)); }
+  // From force = 4/3 (A + B)^-1/2 e^f depth^3/2 with load and depth of this ellipse.
   double f() const { return std::log(0.75 * load / (depth * std::sqrt(depth)) * std::sqrt(A + B)); }
   // From a^2 / depth, see Hertz.
   double slope() const { return (1 / (4 * depth) - 0.25 / (A + B)) / (0.5 / A - 1 / (A + B)); }
@@ -67,6 +71,7 @@ struct Table {
         f[0] = 0, slope[0] = kSlopeOfSphere;
         continue;
       }
+      // s rises with -ln k', so bisection inverts it; 80 halvings are below round-off.
       double low = x, high = x + 2;
       for (int n = 0; n < 80; ++n) {
         x = 0.5 * (low + high);
@@ -80,6 +85,7 @@ struct Table {
   static constexpr double kSlopeOfSphere = 1.0 / 3;
 };
 
+// Made at the first use; thread-safe by the language.
 const Table& table() {
   static const Table made;
   return made;
@@ -87,11 +93,15 @@ const Table& table() {
 
 }  // namespace
 
+// Beyond the table's end, at needles of B / A = 1e11, the last row holds.
 Hertz::Hertz(double trace, double determinant) {
   const Table& t = table();
+  // trace = 2 (A + B), determinant = 4 A B: trace^2 / (4 determinant) = (A + B)^2 / (4 A B).
   const double s = std::max(0.0, std::log(trace * trace / (4 * determinant)));
   const double at = std::min(s / Table::kStep, Table::kRows - 1.0);
   const int i = std::min(static_cast<int>(at), Table::kRows - 2);
+  // Cubic Hermite interpolation with the exact slopes: its error is of the order of the step to the
+  // fourth.
   const double x = at - i, h = Table::kStep;
   const double rise = t.f[i + 1] - t.f[i], m0 = h * t.slope[i], m1 = h * t.slope[i + 1];
   const double c2 = 3 * rise - 2 * m0 - m1, c3 = m0 + m1 - 2 * rise;
@@ -99,8 +109,10 @@ Hertz::Hertz(double trace, double determinant) {
   slope = (m0 + x * (2 * c2 + 3 * x * c3)) / h;
 }
 
+// A circle of that radius on a plane has the area of the ellipse.
 double ContactShape::disc_radius() const { return std::sqrt(half_axis2[0] * half_axis2[1]); }
 
+// Both grow with the root of the depth.
 Eigen::Vector2d ContactShape::half_axes(double depth) const {
   return {std::sqrt(half_axis2[0] * depth), std::sqrt(half_axis2[1] * depth)};
 }
@@ -109,10 +121,12 @@ ContactShape shape_of_gap(const Eigen::Matrix3d& gap, const Eigen::Vector3d& nor
                           Eigen::Matrix3d* slope) {
   const Eigen::Vector3d east = normal.unitOrthogonal(), north = normal.cross(east);
   const double xx = east.dot(gap * east), xy = east.dot(gap * north), yy = north.dot(gap * north);
+  // Eigenvalues of a symmetric 2 by 2 matrix (Mohr's circle): mean -+ spread.
   const double mean = 0.5 * (xx + yy), half = 0.5 * (xx - yy), spread = std::hypot(half, xy);
   ContactShape out;
   out.gradient.setZero(), out.second.setZero();
   out.conformity = 1 - radius * (mean - spread);
+  // A gap that hardly opens would have an infinite ellipse.
   const double least = (1 - kMostConformal) / radius;
   const double curvature[2] = {std::max(mean - spread, least), std::max(mean + spread, least)};
   const double trace = curvature[0] + curvature[1];
@@ -120,6 +134,7 @@ ContactShape shape_of_gap(const Eigen::Matrix3d& gap, const Eigen::Vector3d& nor
   out.scale = hertz.scale;
   const double angle = spread > 0 ? 0.5 * std::atan2(xy, half) : 0;  // of the larger curvature
   const Eigen::Vector3d across = std::cos(angle) * east + std::sin(angle) * north;
+  // The longer half axis lies along the smaller curvature.
   out.axis = normal.cross(across);
   if (slope) slope->setZero();
   for (int i = 0; i < 2; ++i) {
@@ -127,6 +142,7 @@ ContactShape shape_of_gap(const Eigen::Matrix3d& gap, const Eigen::Vector3d& nor
     const double by = (2 * hertz.slope - 0.5) / trace - hertz.slope / curvature[i];
     out.half_axis2[i] = -4 * by;
     const Eigen::Vector3d& direction = i == 0 ? out.axis : across;
+    // Where the curvature was limited the scale does not change with it.
     if (slope && curvature[i] > least) *slope += out.scale * by * direction * direction.transpose();
   }
   return out;

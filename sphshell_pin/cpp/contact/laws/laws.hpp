@@ -32,6 +32,7 @@ S step(const S& x, double x0, double h0, double x1, double h1) {
   return h0 + (h1 - h0) * u * u * (3 - 2 * u);
 }
 
+// The usual exponents without pow(), which is slow and differs between processors in the last bit.
 template <class S>
 S power(const S& x, double exponent) {
   using std::pow, std::sqrt;
@@ -47,6 +48,7 @@ struct NormalForce {
   S elastic;  // its part that derives from the potential [N]
 };
 
+// Contacts do not pull: damping cannot make the force negative.
 template <class S>
 NormalForce<S> push(const S& total, const S& elastic) {
   return {total < 0 ? S(0) : total, elastic};
@@ -157,6 +159,8 @@ struct TableLaw {
       h.push_back(starts[i + 1] - starts[i]);
       secants.push_back((forces[i + 1] - forces[i]) / h[i]);
     }
+    // Weighted mean of the neighboring secants, at most three times the smaller one: with that the
+    // cubic is monotone.
     for (std::size_t i = 1; i < last; ++i)
       slopes[i] = std::min((h[i - 1] * secants[i] + h[i] * secants[i - 1]) / (h[i - 1] + h[i]),
                            3 * std::min(secants[i - 1], secants[i]));
@@ -169,6 +173,7 @@ struct TableLaw {
     slopes[last] = last > 1 ? end(last - 1, last - 2, 0.1) : secants[0];
     double energy = 0;
     for (std::size_t i = 0; i < last; ++i) {
+      // Hermite form to powers of x.
       const double bend = slopes[i] + slopes[i + 1] - 2 * secants[i];
       pieces.push_back(
           {{forces[i], slopes[i], (secants[i] - slopes[i] - bend) / h[i], bend / (h[i] * h[i])},
@@ -176,6 +181,8 @@ struct TableLaw {
       energy = energy_at(pieces.back(), h[i]);
     }
     pieces.push_back({{forces[last], slopes[last], 0, 0}, energy});
+    // Four intervals a row on average: most of them hold one piece, which is then found without a
+    // search.
     const std::size_t count = 4 * last;
     std::vector<std::uint32_t> found;
     for (std::size_t k = 0; k <= count; ++k) found.push_back(piece_at(starts[last] * k / count));
@@ -215,6 +222,7 @@ struct TableLaw {
     return std::upper_bound(first, end, depth, deeper) - starts.begin() - 1;
   }
 
+  // The integral of the cubic, by Horner's rule.
   static double energy_at(const Piece& p, double x) {
     return p.energy + (((p.c[3] / 4 * x + p.c[2] / 3) * x + p.c[1] / 2) * x + p.c[0]) * x;
   }
@@ -233,6 +241,8 @@ struct FoundationLaw {
 
   template <class S>
   NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    // Integral of kappa (R^2 - rho^2) / (2 rho) over the plane's disc: kappa times the volume of
+    // the cap.
     const S elastic = modulus / thickness * M_PI * depth * depth * (radius - depth / 3);
     if (!needs_rate()) return {elastic, elastic};
     return push(S(elastic - elastic * dissipation * gap_rate), elastic);
@@ -267,6 +277,7 @@ struct FunctionLaw {
       const double elastic = at(depth, 0);
       return push(gap_rate == 0 ? elastic : at(depth, gap_rate), elastic);
     } else {
+      // The chain rule by hand: a user's function takes doubles only.
       const double d = depth.value, rate = gap_rate.value;
       const auto by_depth = [&](double r) {
         return slope([&](double x) { return at(x, r); }, d, kStep * d);
@@ -292,10 +303,12 @@ struct FunctionLaw {
   }
 
  private:
+  // Calls the user's function, and checks what it returns.
   double at(double depth, double gap_rate) const {
     return finite(function(depth, gap_rate, parameters.data()), "force", depth, gap_rate);
   }
 
+  // Central difference of fourth order.
   template <class Function>
   static double slope(const Function& f, double x, double h) {
     return (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h);

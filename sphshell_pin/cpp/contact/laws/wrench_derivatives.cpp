@@ -8,24 +8,27 @@ namespace sphshell {
 namespace {
 
 // The law's outputs and their derivatives in axes that turn with the normal.
+// By: the derivative with respect to each input of the law, a column of three for scalars, a 3 by 3
+// matrix for vectors.
 struct LawSlopes {
   struct By {
     Vec3 depth, spin, scale;
-    Mat3 relative, stretch, rolling, outer[kMostRings - 1];
+    Mat3 relative, rolling, stretch[kMostRings];
   };
-  Vec3 force, moment, rate;  // force and moment on the sphere but for the weight
-  By force_by, moment_by, rate_by;
-  Vec3 outer[kMostRings - 1];  // rates of the rings behind the first
-  By outer_by[kMostRings - 1];
+  Vec3 force, moment, rate[kMostRings];  // force and moment on the sphere but for the weight
+  By force_by, moment_by, rate_by[kMostRings];
 };
 
 // Seeds: depth, relative velocity and, of 8, spin and stretch, of 9, the scale as well, last; of
 // 12, rolling, and of more the rings behind the first. The normal needs none, as a law does not
 // change with the axes it is written in.
+// The number of seeds is fixed at compile time, so that the arithmetic of Dual has no loop of
+// unknown length; of the six combinations the smallest that has all inputs is taken.
 constexpr int kSpin = 4, kStretch = 5, kRolling = 8, kOuter = 11;
 constexpr int rings_of(int seeds) { return seeds > kOuter ? (seeds - kOuter) / 3 + 1 : 1; }
 constexpr bool has_scale(int seeds) { return seeds > kRolling; }
 
+// Sorts the derivatives of a vector by the seeds they belong to.
 template <int N>
 void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
   for (int i = 0; i < 3; ++i) {
@@ -34,21 +37,25 @@ void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
     by.relative.row(i) = x[i].slope.template segment<3>(1);
     if constexpr (N > kSpin) {
       by.spin[i] = x[i].slope[kSpin];
-      by.stretch.row(i) = x[i].slope.template segment<3>(kStretch);
+      by.stretch[0].row(i) = x[i].slope.template segment<3>(kStretch);
     }
     if constexpr (N > kOuter) {
       by.rolling.row(i) = x[i].slope.template segment<3>(kRolling);
       for (int k = 1; k < rings_of(N); ++k)
-        by.outer[k - 1].row(i) = x[i].slope.template segment<3>(kOuter + 3 * (k - 1));
+        by.stretch[k].row(i) = x[i].slope.template segment<3>(kOuter + 3 * (k - 1));
     }
     by.scale[i] = has_scale(N) ? x[i].slope[N - 1] : 0;
   }
-  if constexpr (N <= kSpin) by.spin.setZero(), by.stretch.setZero();
+  if constexpr (N <= kSpin) by.spin.setZero(), by.stretch[0].setZero();
 }
 
+// One evaluation of the laws on dual numbers: the values are those of the simulation, as the code
+// is the same template.
 template <int N>
 void differentiate(const NormalLaw& law, const FrictionLaw& friction, const ContactSite& site,
                    double relaxation, const ContactKinematics<double>& at, LawSlopes& out) {
+  // Depth, velocity and, where the law has them, spin, stretches, rolling and scale become
+  // variables; the normal is constant.
   using S = Dual<N>;
   ContactKinematics<S> m;
   m.depth = S::seed(at.depth, 0);
@@ -65,7 +72,8 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, const Cont
   Vector3<S> states[most + 1], rates[most + 1];
   if constexpr (most > 0) {
     for (int k = 0; k < outer; ++k)
-      for (int i = 0; i < 3; ++i) states[k][i] = S::seed(site.outer[k][i], kOuter + 3 * k + i);
+      for (int i = 0; i < 3; ++i)
+        states[k][i] = S::seed(site.stretch[k + 1][i], kOuter + 3 * k + i);
     m.outer = states;
     m.outer_rate = rates;
   }
@@ -74,15 +82,14 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, const Cont
   Vector3<S> moment = f.torsion * m.normal;
   if constexpr (N > kOuter) moment += f.rolling;
   read<N>(moment, out.moment, out.moment_by);
-  read<N>(f.bristle_rate, out.rate, out.rate_by);
-  for (int k = 0; k < outer; ++k) read<N>(rates[k], out.outer[k], out.outer_by[k]);
+  read<N>(f.bristle_rate, out.rate[0], out.rate_by[0]);
+  for (int k = 0; k < outer; ++k) read<N>(rates[k], out.rate[k + 1], out.rate_by[k + 1]);
 }
 
 // The rate of a stretch's turning with the normal, added to its slopes; see
 // SceneData::rate_of_turning.
-void add_turning(const ContactSite& site, const Vec3& stretch, const Mat3& normal_by_place,
-                 const Eigen::RowVector3d& weight_by_place, Mat3& rate_by_place,
-                 Matrix36& rate_by_twist, Mat3& rate_by_stretch) {
+void add_turning(const ContactSite& site, int k, const Mat3& normal_by_place,
+                 const Eigen::RowVector3d& weight_by_place, ContactSlopes::Ring& ring) {
   const Contact& contact = site.contact;
   const Vec3 spin = site.twist.tail<3>();
   const Mat3 normal_rate_by_velocity = contact.dn_dc / contact.weight;
@@ -93,11 +100,13 @@ void add_turning(const ContactSite& site, const Vec3& stretch, const Mat3& norma
   const Mat3 by_place = by_velocity * cross_matrix(spin) -
                         cross_matrix(normal_rate) * normal_by_place -
                         turning * weight_by_place / contact.weight;
-  const Mat3 against_stretch = -cross_matrix(stretch);
-  rate_by_place += against_stretch * by_place;
-  rate_by_twist.leftCols<3>() += against_stretch * by_velocity;
-  rate_by_twist.rightCols<3>() -= against_stretch * by_velocity * cross_matrix(site.place);
-  rate_by_stretch += cross_matrix(turning);
+  // The rate is turning x stretch = -stretch x turning, in the shell's frame, with turning = n x
+  // n'.
+  const Mat3 against_stretch = -cross_matrix(site.stretch[k]);
+  ring.rate_by_place += against_stretch * by_place;
+  ring.rate_by_twist.leftCols<3>() += against_stretch * by_velocity;
+  ring.rate_by_twist.rightCols<3>() -= against_stretch * by_velocity * cross_matrix(site.place);
+  ring.rate_by_stretch[k] += cross_matrix(turning);
 }
 
 }  // namespace
@@ -109,6 +118,8 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   const double weight = contact.weight;
 
   // How the contact follows its place.
+  // dn_dc is the derivative of weight * n: its part along n is that of the weight, the rest turns
+  // n. The depth falls as the center moves along n. The point is c - (R - depth) n.
   Mat3 normal_by = Mat3::Zero(), point_by = Mat3::Zero();
   Eigen::RowVector3d depth_by = -n.transpose(), weight_by = Eigen::RowVector3d::Zero();
   if (site.follows) {
@@ -127,7 +138,8 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   m.normal = n;
   m.relative = site.twist.head<3>() + spin.cross(point);
   m.spin = n.dot(spin);
-  m.bristle = site.stretch;
+  m.bristle = site.stretch[0];
+  // Relative velocity at the contact point, from the twist about the shell's origin: v + w x p.
   LawSlopes at;
   const bool rolls = friction.rolls();
   const Mat3 across = Mat3::Identity() - n * n.transpose();
@@ -153,18 +165,23 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
 
   // The turning of the normal is a rotation of all vectors of the law, and what is left of their
   // change goes through its slopes.
+  // The rotation vector of the normal's turning by a displacement of the place: n x dn.
   const Mat3 turned_by = cross_matrix(n) * normal_by;
   const Mat3 relative_by = cross_matrix(spin) * point_by + cross_matrix(m.relative) * turned_by;
   const Mat3 stretch_by = cross_matrix(m.bristle) * turned_by;
   const Eigen::RowVector3d spin_by = spin.transpose() * normal_by;
+  // Change at a fixed twist: the law's inputs change in the axes that turn, and the result turns
+  // with them; -[value]x is that turning.
   const auto by_place = [&](const Vec3& value, const LawSlopes::By& by) -> Mat3 {
     Mat3 all = by.depth * depth_by + by.relative * relative_by + by.spin * spin_by +
-               by.stretch * stretch_by + by.scale * scale_by - cross_matrix(value) * turned_by;
+               by.stretch[0] * stretch_by + by.scale * scale_by - cross_matrix(value) * turned_by;
     if (rolls) all += by.rolling * across * cross_matrix(spin) * turned_by;
-    for (int k = 0; k < outer; ++k) all += by.outer[k] * cross_matrix(site.outer[k]) * turned_by;
+    for (int k = 1; k <= outer; ++k)
+      all += by.stretch[k] * cross_matrix(site.stretch[k]) * turned_by;
     return all;
   };
   const Mat3 arm = cross_matrix(point);
+  // At a fixed place: relative velocity is v - p x w, spin is n . w, rolling the rest of w.
   const auto by_twist = [&](const LawSlopes::By& by) -> Matrix36 {
     Matrix36 all;
     all << by.relative, by.spin * n.transpose() - by.relative * arm;
@@ -172,6 +189,7 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     return all;
   };
 
+  // Product rule in the weight; the moment about the shell's origin is p x f + m.
   const Vec3 force = weight * at.force;
   const Mat3 force_by_place = at.force * weight_by + weight * by_place(at.force, at.force_by);
   const Matrix36 force_by_twist = weight * by_twist(at.force_by);
@@ -187,6 +205,8 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     // Of the force at the sphere's center, see SceneData::compute_force.
     const HertzLaw& hertz = *law.hertz();
     const ContactShape& shape = *site.shape;
+    // With W = scale w(depth): the force beside the normal is scale w' tilt - w grad(scale), and w'
+    // = push.
     const double energy = hertz.energy(m.depth, 1);
     const NormalForce<Dual<1>> unit =
         hertz.force(Dual<1>::seed(m.depth, 0), Dual<1>(0), Dual<1>(1));
@@ -205,35 +225,23 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     out.by_depth.tail<3>() += site.place.cross(by_depth);
   }
   if (!friction.has_state()) return;
+  // The stretch z acts through the law alone; z is in the shell's frame like everything else.
   const auto by_stretch = [&](const Mat3& force, const Mat3& moment) -> Matrix63 {
     Matrix63 all;
     all.topRows<3>() = weight * force;
     all.bottomRows<3>() = weight * (arm * force + moment);
     return all;
   };
-  out.by_stretch = by_stretch(at.force_by.stretch, at.moment_by.stretch);
-  out.rate = at.rate;
-  out.rate_by_depth = at.rate_by.depth;
-  out.rate_by_place = by_place(at.rate, at.rate_by);
-  out.rate_by_twist = by_twist(at.rate_by);
-  out.rate_by_stretch = at.rate_by.stretch;
-  if (site.follows)
-    add_turning(site, site.stretch, normal_by, weight_by, out.rate_by_place, out.rate_by_twist,
-                out.rate_by_stretch);
-  for (int k = 0; k < outer; ++k) {
-    ContactSlopes::Ring& ring = out.outer[k];
-    const LawSlopes::By& by = at.outer_by[k];
-    ring.by_stretch = by_stretch(at.force_by.outer[k], at.moment_by.outer[k]);
-    ring.rate = at.outer[k];
+  for (int k = 0; k <= outer; ++k) {
+    ContactSlopes::Ring& ring = out.rings[k];
+    const LawSlopes::By& by = at.rate_by[k];
+    ring.by_stretch = by_stretch(at.force_by.stretch[k], at.moment_by.stretch[k]);
+    ring.rate = at.rate[k];
     ring.rate_by_depth = by.depth;
-    ring.rate_by_place = by_place(at.outer[k], by);
+    ring.rate_by_place = by_place(at.rate[k], by);
     ring.rate_by_twist = by_twist(by);
-    ring.first_by_stretch = at.rate_by.outer[k];
-    ring.rate_by_first = by.stretch;
-    for (int i = 0; i < outer; ++i) ring.rate_by_outer[i] = by.outer[i];
-    if (site.follows)
-      add_turning(site, site.outer[k], normal_by, weight_by, ring.rate_by_place, ring.rate_by_twist,
-                  ring.rate_by_outer[k]);
+    std::copy_n(by.stretch, outer + 1, ring.rate_by_stretch);
+    if (site.follows) add_turning(site, k, normal_by, weight_by, ring);
   }
 }
 

@@ -12,6 +12,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Matrix63 = Eigen::Matrix<double, 6, 3>;
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
+// [x]: [x] y = x cross y.
 inline Mat3 cross_matrix(const Vec3& x) {
   Mat3 out;
   out << 0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0;
@@ -29,13 +30,14 @@ struct ContactSite {
   double radius;       // of the sphere [m]
   double disc_radius;  // that the laws take: see Pair::disc_radius [m]
   Vector6 twist;
-  Vec3 stretch;                         // of the bristle [m]
-  Vec3 outer[kMostRings - 1];           // of its rings behind the first
+  Vec3 stretch[kMostRings] = {};        // of the bristle's rings [m]
   const ContactShape* shape = nullptr;  // of Hertz's law
   // By its place, of a contact point that is no point of the sphere's normal.
   const Mat3* point_by = nullptr;
 };
 
+// Derivatives at a ContactSite. `place`: a displacement of what the contact follows, `twist`: the
+// relative twist, `depth`: alone.
 struct ContactSlopes {
   Eigen::RowVector3d depth_by_place;
   Mat3 normal_by_place;
@@ -43,20 +45,14 @@ struct ContactSlopes {
   Matrix63 by_place;  // of the wrench
   Matrix6 by_twist;
   Vector6 by_depth;  // where the contact stays where it is
-  Matrix63 by_stretch;
-  Vec3 rate, rate_by_depth;  // of the bristle; without its turning with the normal
-  Mat3 rate_by_place;
-  Matrix36 rate_by_twist;
-  Mat3 rate_by_stretch;
-  // The same of the rings of a bristle behind the first.
+  // Of each ring of a bristle, whose state is a stretch.
   struct Ring {
-    Vec3 rate, rate_by_depth;
-    Matrix63 by_stretch;
+    Matrix63 by_stretch;       // of the wrench
+    Vec3 rate, rate_by_depth;  // of the stretch; without its turning with the normal
     Mat3 rate_by_place;
     Matrix36 rate_by_twist;
-    Mat3 first_by_stretch;  // of the first ring's rate
-    Mat3 rate_by_first, rate_by_outer[kMostRings - 1];
-  } outer[kMostRings - 1];
+    Mat3 rate_by_stretch[kMostRings];  // by that of each ring
+  } rings[kMostRings];
 };
 
 // Exact, but that the contact's turn is held where the bristle turns with the normal: what that

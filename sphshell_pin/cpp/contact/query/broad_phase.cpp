@@ -17,6 +17,7 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
     const bool same = followed_ == &shell && followed_radius_ == sphere.radius;
     const double moved = same ? (sphere.center - last_).norm() : sphere.radius;
     last_ = sphere.center;
+    // Still within the ball that the last search covered: its candidates are a superset.
     if (same && (sphere.center - anchor_).squaredNorm() <= margin_ * margin_) return;
     // A slow sphere stays near for many calls; for a fast one a wider ball does not pay.
     if (moved < 0.01 * sphere.radius)
@@ -42,6 +43,8 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
 void BroadPhase::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
                               const Sphere& sphere, double margin, const CellBounds* cells) {
   const Facet* facets = shell.facets().data();
+  // In single precision about the shell's origin; 1e-6 and 1.000001 cover its rounding, so that
+  // nothing is lost.
   const Vec3 local = sphere.center - shell.origin();
   const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
   const float radius = float(sphere.radius);
@@ -51,6 +54,9 @@ void BroadPhase::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& 
   for (int f : overlapping) {
     const NormalCone& cone = cones[f];
     const float x = c[0] - cone.middle[0], y = c[1] - cone.middle[1], z = c[2] - cone.middle[2];
+    // In the coordinates of the cone: height along its axis, distance from the axis by Pythagoras.
+    // The center lies within the cone if that distance is below the reach of the facet plus height
+    // x tan(opening).
     const float height = std::abs(x * cone.axis[0] + y * cone.axis[1] + z * cone.axis[2]);
     const float allowed = cone.reach + slack + (height + slack) * cone.tan_opening;
     const float square = x * x + y * y + z * z;

@@ -9,6 +9,8 @@
 
 namespace sphshell {
 
+// The facets that may hold a minimum of the distance: by the tree of boxes, then by cones of
+// normals.
 class BroadPhase {
  public:
   explicit BroadPhase(bool follow);

@@ -14,6 +14,8 @@ using Vec2 = Eigen::Vector2d;
 
 // |x(u, v) - c|^2 / 2 at a point of a patch: half the square of the distance, with its first
 // derivatives and the second ones, those of a plane first.
+// With f = |x(u, v) - c|^2 / 2: f_u = (x - c) . x_u and f_uv = x_u . x_v + (x - c) . x_uv. The fuu,
+// fuv, fvv are the first term alone, the metric of the surface; huu, huv, hvv are the Hessian.
 struct Expansion {
   Vec3 from;  // x - c
   double gu, gv, fuu, fuv, fvv;
@@ -29,6 +31,7 @@ struct Expansion {
     hvv = fvv + from.dot(patch.along_vv(u, v));
   }
 
+  // Positive definite, with a margin against round-off relative to the area element.
   bool convex() const { return huu > 0 && huu * hvv - huv * huv > 1e-9 * fuu * fvv; }
 
   // Newton's step. Where the distance is not convex, its first-order part is: it leads downhill
@@ -36,16 +39,22 @@ struct Expansion {
   Vec2 step() const {
     const bool second = convex();
     const double a = second ? huu : fuu, b = second ? huv : fuv, c = second ? hvv : fvv;
+    // Cramer's rule for the 2 by 2 system.
     const double determinant = a * c - b * b;
     return {-(c * gu - b * gv) / determinant, -(a * gv - b * gu) / determinant};
   }
 };
 
+// How far a parameter point is outside the triangle u, v >= 0, u + v <= 1; negative within.
 double outside(double u, double v) { return std::max({-u, -v, u + v - 1}); }
 
 // A lower bound of |x|^2 over a part of a patch: the least of its 28 coefficients in Bernstein's
 // form, of degree 6.
 double least2_of(const CubicPatch& patch, const Vec2 (&corner)[3]) {
+  // The square of a polynomial of degree 3 has degree 6. Its Bernstein coefficients are the
+  // products of the control points, weighted by multinomial coefficients; the polynomial lies in
+  // their convex hull, so the least coefficient bounds it from below. The control points of the
+  // part come from the polar form (blossom) of the patch at the part's corners.
   static constexpr double kWeight3[4][4] = {{1, 3, 3, 1}, {3, 6, 3, 0}, {3, 3, 0, 0}, {1}};
   static constexpr double kFactorial[7] = {1, 1, 2, 6, 24, 120, 720};
   Vec3 net[4][4];
@@ -70,6 +79,9 @@ double least2_of(const CubicPatch& patch, const Vec2 (&corner)[3]) {
 // Round-off of squares of distances, as a share.
 constexpr double kSame = 4e-15;
 
+// Global minimum of the distance over one cell by branch and bound. Bounds of the second
+// derivatives over the cell (CellBounds) decide for each part whether the distance falls all over
+// it (no minimum within), is convex on it (one minimum: descend) or neither (divide into four).
 class CellSearch {
  public:
   CellSearch(const Facet& facet, const CurvedFacet& curved, const CellBounds& bounds, const Vec3& x,
@@ -77,14 +89,20 @@ class CellSearch {
       : axes_(facet), patch_(curved.patch(facet)), radius_(radius), out_(out) {
     const Vec3 from = x - facet.corner[0];
     const double height = facet.normal.dot(from), side = axes_.a + std::abs(axes_.b) + axes_.c;
+    // Bounds on the eigenvalues of the Hessian over the whole cell, with the farthest that a point
+    // of the facet is from the center's projection.
     whole_ = bounds.curvature(height, (from - height * facet.normal).norm() + side);
     // From here on x is the origin, for the sake of round-off.
     patch_.c00 -= x;
     least_ = radius * radius;
+    // Bound on the first derivatives of x by the coordinates in the facet's plane; a flat facet has
+    // 1.
     steepest_ = 1 + double(bounds.stretch) + double(bounds.slope);
     bend_ = std::hypot(std::max(std::abs(bounds.low), std::abs(bounds.high)), bounds.sway);
     Vec3 uuu = 6 * patch_.c30, uuv = 2 * patch_.c21, uvv = 2 * patch_.c12, vvv = 6 * patch_.c03;
+    // Third derivatives of a cubic are constant.
     twist_ = third(uuu, uuv, uvv, vvv);
+    // Corners, then sides: upper bounds that are certain and spare most of the search.
     static constexpr double kCorner[3][2] = {{0, 0}, {1, 0}, {0, 1}};
     for (int k = 0; k < 3; ++k) {
       const Vec3 point = facet.corner[k] - x;
@@ -113,6 +131,7 @@ class CellSearch {
 
  private:
   // Bound on the size of the third derivatives, over the facet.
+  // The Frobenius norm, with each mixed derivative counted as often as it occurs.
   double third(const Vec3& uuu, const Vec3& uuv, const Vec3& uvv, const Vec3& vvv) const {
     // d/dx = d/du / a; d/dy = (d/dv - (b / a) d/du) / c.
     const double p = axes_.b / axes_.a, a = axes_.a, c = axes_.c;
@@ -122,6 +141,8 @@ class CellSearch {
                      3 * xyy.squaredNorm() + yyy.squaredNorm());
   }
 
+  // One part, a triangle in parameters. All derivatives are taken in the facet's plane in meters,
+  // where the bounds hold.
   void look_into(const Vec2 (&corner)[3], int halvings) {
     const Vec2 middle = (corner[0] + corner[1] + corner[2]) / 3;
     Expansion here(patch_, middle.x(), middle.y(), Vec3::Zero());
@@ -139,10 +160,13 @@ class CellSearch {
                            (bend_ * bend_ + steepest_ * twist_) * reach * reach;
     const double low = std::max(bend.low - differs, whole_.low);
     const double high = std::min(bend.high + differs, whole_.high);
+    // By Taylor: the gradient differs from that of the middle by at most max |eigenvalue| x reach.
     const double slope = std::hypot(here.gu, here.gv);
     if (slope > std::max(high, -low) * reach) return;  // falls all over it
+    // Second-order lower bound of the square of the distance on the part.
     const double bound = distance2 - 2 * slope * reach + std::min(low, 0.0) * reach * reach;
     if (bound >= least_ * (1 - kSame)) return;
+    // Convex: one descent finds the minimum. At the last division what a descent finds is taken.
     if (low > 0 || halvings == kMostHalvings) return descend(middle);
     if (halvings == 0) descend(middle);  // what it finds spares parts
     if (nothing_below(halvings == 0 ? whole2_ : least2_of(patch_, corner))) return;
@@ -156,12 +180,15 @@ class CellSearch {
   }
 
   // What a part may hold beyond what is known cannot be felt.
+  // An improvement below a share kLevel of the depth changes the force by as little.
   bool nothing_below(double bound2) const {
     const double distance = std::sqrt(least_), depth = std::max(0.0, radius_ - distance);
     return bound2 >= least_ - 2 * kLevel * distance * depth;
   }
 
   // Downhill at every step, and never leaving the cell.
+  // Damped Newton: the step is halved until the distance does not grow and the point stays inside.
+  // Then plain Newton refines to round-off, and is taken if it found the same minimum.
   void descend(const Vec2& start) {
     double u = start.x(), v = start.y(), now = patch_.point(u, v).squaredNorm();
     for (int i = 0; i < 3 * kMostIterations; ++i) {
@@ -205,6 +232,8 @@ std::pair<double, double> on_side(int k, double t) {
   return k == 0 ? std::pair(t, 0.0) : k == 1 ? std::pair(1 - t, t) : std::pair(0.0, 1 - t);
 }
 
+// Normal equations of the projection on the plane; clamped one parameter after the other, which is
+// a start for Newton's method, not the exact closest point of the triangle.
 std::pair<double, double> closest_on_facet(const Facet& facet, const Vec3& x) {
   const Vec3 e1 = facet.corner[1] - facet.corner[0], e2 = facet.corner[2] - facet.corner[0];
   const Vec3 d = x - facet.corner[0];
@@ -214,6 +243,8 @@ std::pair<double, double> closest_on_facet(const Facet& facet, const Vec3& x) {
   return {u, std::clamp((a * q - b * p) / area2, 0.0, 1.0 - u)};
 }
 
+// Steps are limited to half the parameter range; an iterate that is far outside (by more than the
+// cell itself) has left the patch's reach and ends the search.
 bool find_minimum(const CubicPatch& patch, const Vec3& x, std::pair<double, double> start,
                   CellPoint& out) {
   auto [u, v] = start;
@@ -239,6 +270,8 @@ bool find_nearest(const Facet& facet, const CurvedFacet& curved, const CellBound
   return true;
 }
 
+// By the implicit function theorem: the closest point solves f_u = f_v = 0, so d(u, v)/dc = H^-1
+// [x_u x_v]^T, and dx/dc = [x_u x_v] H^-1 [x_u x_v]^T, with H the Hessian of half the square.
 Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Vec3& x) {
   const Expansion here(patch, u, v, x);
   Eigen::Matrix<double, 3, 2> along;
@@ -249,6 +282,7 @@ Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Vec3& x) {
   return along * second.inverse() * along.transpose();
 }
 
+// The same in one dimension: x' x'^T / (|x'|^2 + (x - c) . x'').
 Mat3 dx_dc_of(const CubicCurve& side, double t, const Vec3& x) {
   const Vec3 along = side.tangent(t);
   const double second = along.squaredNorm() + (side.point(t) - x).dot(side.second(t));

@@ -41,6 +41,7 @@ bool find_nearest(const Facet& facet, const CurvedFacet& curved, const CellBound
 
 // How the closest point follows x (3, 3): the second derivatives of the distance decide. Zero
 // where they do not.
+// u, v and t are those of the closest point to x.
 Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Vec3& x);
 Mat3 dx_dc_of(const CubicCurve& side, double t, const Vec3& x);
 

@@ -17,6 +17,8 @@ struct Quintic {
 
   Quintic() = default;
   Quintic(const CubicCurve& side, const Vec3& x) {
+    // b_i: Bernstein control points of the cubic x(t) - x; d_i: those of its derivative, degree 2.
+    // The product of both has degree 5 and these six coefficients, weighted by binomials.
     const Vec3 b0 = side.c0 - x, d0 = side.c1, d1 = side.c1 + side.c2;
     const Vec3 d2 = side.c1 + 2 * side.c2 + 3 * side.c3;
     const Vec3 b1 = b0 + d0 / 3, b2 = b1 + d1 / 3, b3 = b2 + d2 / 3;
@@ -30,6 +32,7 @@ struct Quintic {
     const double from2 = std::max(b0.squaredNorm(), b3.squaredNorm());
     const double along2 = std::max({d0.squaredNorm(), d1.squaredNorm(), d2.squaredNorm()});
     for (double& value : q)
+      // Set to zero, so that sign_changes() does not count it.
       if (value * value < kQuinticRoundOff * kQuinticRoundOff * from2 * along2) value = 0;
   }
 
@@ -42,12 +45,14 @@ struct Quintic {
     return {std::max(count, 0), was};
   }
 
+  // Bernstein's form, grouped: C(5, i) s^(5 - i) t^i q_i.
   double at(double t) const {
     const double s = 1 - t, t2 = t * t, s2 = s * s;
     return s2 * s2 * (s * q[0] + 5 * t * q[1]) + 10 * s2 * t2 * (s * q[2] + t * q[3]) +
            t2 * t2 * (5 * s * q[4] + t * q[5]);
   }
 
+  // Degree 4, of the differences of neighboring coefficients.
   double slope(double t) const {
     const double s = 1 - t, t2 = t * t, s2 = s * s;
     return 5 *
@@ -88,10 +93,12 @@ struct Quintic {
 // where the derivative has no root or one; parts with more are halved until theirs are apart, or
 // the distance varies by round-off only.
 inline double nearest_on_side(const CubicCurve& side, const Vec3& x) {
+  // A straight side: the projection, clamped.
   if (side.c2.isZero(0) && side.c3.isZero(0))
     return std::clamp((x - side.c0).dot(side.c1) / side.c1.squaredNorm(), 0.0, 1.0);
   const Quintic whole(side, x);
   const auto [changes, rises] = whole.sign_changes();
+  // Falls at first and rises after one root: that is the minimum, and no end is nearer.
   if (changes == 1 && rises) return whole.rising_root();
   const auto distance2 = [&](double t) { return (side.point(t) - x).squaredNorm(); };
   double best = 0, least = distance2(0);
@@ -105,6 +112,7 @@ inline double nearest_on_side(const CubicCurve& side, const Vec3& x) {
     Quintic quintic;
     double from, width;
   };
+  // A stack of parts, without heap. Each division pops one part and pushes two.
   constexpr int kMost = 64;
   Part parts[kMost];
   int count = 1;
@@ -117,6 +125,8 @@ inline double nearest_on_side(const CubicCurve& side, const Vec3& x) {
       if (up) try_at(part.from + part.width * part.quintic.rising_root());
       continue;
     }
+    // The derivative is below its largest coefficient: with that, and the part's width, the
+    // distance cannot vary by more than a share of what is known.
     double steepest = 0;
     for (double value : part.quintic.q) steepest = std::max(steepest, std::abs(value));
     try_at(part.from + part.width / 2);

@@ -11,6 +11,8 @@
 namespace sphshell {
 namespace {
 
+// The contact at t on side k of facet f, as a saddle has it. Its ends are corners, which do not
+// move with the center.
 Minimum on_side(const Shell& shell, int f, int k, double t, const Sphere& sphere, bool want_dn_dc) {
   const Facet& facet = shell.facets()[f];
   const bool vertex = t == 0 || t == 1;
@@ -28,11 +30,15 @@ Minimum on_side(const Shell& shell, int f, int k, double t, const Sphere& sphere
 
 }  // namespace
 
+// Slots of an earlier round count as empty, so nothing is written here; only where the counter
+// wraps around the table is emptied.
 void FacetTable::clear() {
   count_ = 0;
   if (++round_ == 0) slots_.clear(), round_ = 1;
 }
 
+// Open addressing with linear probing; 2654435761 is Knuth's multiplicative hash, 2^32 over the
+// golden ratio. The size is a power of two and the table at most a quarter full, so the loop ends.
 FacetTable::Slot& FacetTable::slot(int facet) {
   const std::size_t mask = slots_.size() - 1;
   std::size_t i = static_cast<std::uint32_t>(facet) * 2654435761u & mask;
@@ -40,6 +46,7 @@ FacetTable::Slot& FacetTable::slot(int facet) {
   return slots_[i];
 }
 
+// Grows by a factor of four before it would be more than a quarter full.
 int FacetTable::number(int facet, bool& added) {
   if (slots_.size() < 4 * (static_cast<std::size_t>(count_) + 1)) {
     std::vector<Slot> old(std::max<std::size_t>(1024, 4 * slots_.size()), Slot{0, 0, 0});
@@ -58,6 +65,10 @@ int FacetTable::find(int facet) {
   return at.round == round_ ? at.number : kNone;
 }
 
+// Four passes: one minimum a cell; the cells around each minimum, over the highest sides first; the
+// spanning forest of these sides, of which those between two minima are saddles; what is left. Ties
+// are broken by feature, element and facet, so that the result does not depend on the order in
+// which the tree of boxes was walked.
 void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
                        std::vector<Minimum>& minima) {
   std::sort(minima.begin(), minima.end(), [](const Minimum& x, const Minimum& y) {
@@ -89,16 +100,19 @@ void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc
   find_saddles(shell, sphere, want_dn_dc, minima);
 }
 
+// Union-find with path halving.
 int Components::root(int cell) {
   while (parent_[cell] != cell) cell = parent_[cell] = parent_[parent_[cell]];
   return cell;
 }
 
+// By the number of the facet in cells_, if it has been reached.
 bool Components::belongs_to(int facet, int component) {
   const int cell = cells_.find(facet);
   return cell != FacetTable::kNone && root(cell) == component;
 }
 
+// Each cell a component of its own; the first ones are those of the minima.
 void Components::reset_components(std::size_t minima) {
   parent_.resize(std::size_t(cells_.size()));
   std::iota(parent_.begin(), parent_.end(), 0);
@@ -110,6 +124,7 @@ void Components::reset_components(std::size_t minima) {
 void Components::connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima) {
   const double same = kSamePlace * sphere.radius;
   const auto point = [&](int i) -> const Vec3& { return minima[i].contact.point; };
+  // Sorted along x only neighbors are compared: sheets seldom have many minima.
   by_x_.resize(minima.size());
   std::iota(by_x_.begin(), by_x_.end(), 0);
   std::sort(by_x_.begin(), by_x_.end(), [&](int i, int j) { return point(i).x() < point(j).x(); });
@@ -125,12 +140,17 @@ void Components::connect_equal_points(const Sphere& sphere, const std::vector<Mi
     }
 }
 
+// Order of the heap: shallower ones below; of equal ones that of the higher facet and side.
 bool Components::lower(const SaddleCandidate& a, const SaddleCandidate& b) {
   return a.depth != b.depth   ? a.depth < b.depth
          : a.facet != b.facet ? a.facet > b.facet
                               : a.side > b.side;
 }
 
+// Pushes the ways out of a cell: to the other fans of a vertex where sheets meet in that point
+// only, and over the sides. `reach` is larger than the radius by the bulge, the most that a curved
+// side is off its chord: the depth from the chord is an upper bound, cheap, and made exact in
+// expand() if it comes up at all.
 void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f, int cell,
                                 int component) {
   const Facet& facet = shell.facets()[f];
@@ -152,6 +172,8 @@ void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f,
     }
   }
   for (int k = 0; k < 3; ++k) {
+    // beyond: the half-edge on the other side where there is one triangle there, kBoundary where
+    // there is none, else the edge is shared by more than two.
     const int beyond = bounds.beyond[k];
     if (beyond == kBoundary || (beyond >= 0 && belongs_to(triangle_of(beyond), component)))
       continue;
@@ -203,6 +225,7 @@ void Components::grow_components(const Shell& shell, const Sphere& sphere, std::
 
 // Takes one more candidate into account; returns the component then, -1 once it leads nowhere.
 // Bounds are made exact where they come up first.
+// `open` is sorted by depth: where its highest candidate is outside the sphere, all are.
 int Components::expand(const Shell& shell, const Sphere& sphere, int component) {
   std::vector<SaddleCandidate>& open = components_[component].open;
   if (open.empty()) return -1;
@@ -213,7 +236,9 @@ int Components::expand(const Shell& shell, const Sphere& sphere, int component) 
     open.clear();
     return -1;
   }
+  // Reached meanwhile by another way: this one closes a loop.
   if (belongs_to(candidate.to, component)) return component;
+  // Put back with its exact depth: it may not be the highest any more.
   if (candidate.kind == SaddleCandidate::Kind::Bound) {
     const SideFoot foot = nearest_on_side(shell, candidate.facet, candidate.side, sphere.center);
     candidate.t = foot.t;
@@ -236,6 +261,7 @@ int Components::expand(const Shell& shell, const Sphere& sphere, int component) 
   const int other = root(candidate.to);
   if (other == component) return component;
   tree_.push_back(candidate);
+  // The longer heap is kept, so that each candidate is moved O(log n) times.
   const int kept =
       components_[component].open.size() < components_[other].open.size() ? other : component;
   const int gone = kept == component ? other : component;
@@ -250,6 +276,10 @@ int Components::expand(const Shell& shell, const Sphere& sphere, int component) 
 }
 
 // The shallower of two minima ends at the saddle that merges their components (Kruskal).
+// The sides of the forest join the cells in order of falling depth. Where two components with a
+// minimum each are joined, the side's closest point is a saddle between these minima. Where it is
+// hardly shallower than the shallower minimum, both are left out: the energy changes by the
+// difference of their U alone.
 void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
                               std::vector<Minimum>& minima) {
   std::sort(tree_.begin(), tree_.end(),
@@ -276,6 +306,8 @@ void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool wan
         candidate.kind == SaddleCandidate::Kind::Side
             ? on_side(shell, candidate.facet, candidate.side, candidate.t, sphere, want_dn_dc)
             : minima[candidate.minimum];
+    // Force and energy of a saddle are subtracted; so is the derivative of its normal, which dn_dc
+    // holds with the weight.
     saddle.contact.weight = -1;
     saddle.contact.dn_dc *= -1;
     saddle.contact.group = -1;
@@ -309,6 +341,7 @@ void Components::group_if_nearly_one(std::vector<Minimum>& minima, int deeper, i
   leader_[leader_of(shallower)] = leader_of(deeper);
 }
 
+// Union-find again, over minima, with path halving.
 int Components::leader_of(int minimum) {
   while (leader_[minimum] != minimum) minimum = leader_[minimum] = leader_[leader_[minimum]];
   return minimum;

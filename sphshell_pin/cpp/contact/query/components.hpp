@@ -9,8 +9,10 @@
 namespace sphshell {
 
 // From a facet to a small number; keeps its memory.
+// A hash table that is emptied in constant time, as one is filled for each query.
 class FacetTable {
  public:
+  // In constant time.
   void clear();
   // The number of a facet, a new one where it had none: then `added` is set.
   int number(int facet, bool& added);
@@ -48,6 +50,8 @@ class Components {
   // Where two cells meet: over a side, at its closest point, first only bounded from above; or at
   // the closest point of both.
   struct SaddleCandidate {
+    // Bound: depth is an upper bound from the chord. Side: exact. CommonPoint: of two minima at one
+    // place.
     enum class Kind { Bound, Side, CommonPoint };
     double depth;
     Kind kind;
@@ -63,18 +67,23 @@ class Components {
     std::vector<SaddleCandidate> open;
   };
 
+  // Whether a comes after b.
   static bool lower(const SaddleCandidate& a, const SaddleCandidate& b);
+  // The component of a cell, by its first cell; and whether a facet is in it already.
   int root(int cell);
   bool belongs_to(int facet, int component);
   void reset_components(std::size_t minima);
+  // The ways out of a cell, onto the heap of its component.
   void add_candidates(const Shell& shell, const Sphere& sphere, int facet, int cell, int component);
   void connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima);
+  // Finds cells and the sides between them, as far as they decide on saddles.
   void grow_components(const Shell& shell, const Sphere& sphere, std::size_t minima);
   int expand(const Shell& shell, const Sphere& sphere, int component);
   void find_saddles(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
                     std::vector<Minimum>& minima);
   void group_if_nearly_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
                            Contact& saddle);
+  // The minimum that a group is shown in place of.
   int leader_of(int minimum);
 
   FacetTable cells_;                   // the first of them hold the minima, in their order

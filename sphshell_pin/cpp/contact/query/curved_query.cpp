@@ -15,6 +15,7 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
   const CurvedShell& surface = *shell.curved();
   // Where nothing is bent there is no need to look.
   const CellBounds* cells = surface.bulge() > 0 ? surface.cells().data() : nullptr;
+  // All zero: a facet whose element is its flat triangle.
   const CellBounds flat{};
   broad.find(shell, surface.cones(), surface.bulge(), sphere, cells);
   outlooks_.clear(), borders_.clear();
@@ -29,10 +30,12 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
     const Outlook outlook(f, shell.facets()[f], surface.cones()[f], cells ? cells[f] : flat,
                           sphere);
     if (outlook.empty()) continue;
+    // Control points are read in the next loop; until then they come into the cache.
     for (int line = 0; line < int(sizeof(CurvedFacet)); line += 64)
       prefetch(reinterpret_cast<const char*>(&surface.facets()[f]) + line);
     outlooks_.push_back(outlook);
   }
+  // The order of minima is made unique later, by Components::merge().
   const Task task{shell, sphere, want_dn_dc, minima};
   for (const Outlook& outlook : outlooks_) {
     const Owned& owned = surface.facets()[outlook.facet].owned;
@@ -52,6 +55,10 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
   if (minima.size() > 1) components_.merge(shell, sphere, want_dn_dc, minima);
 }
 
+// Decides from bounds alone which features of a cell may hold a minimum: what is left out here is
+// certain to hold none. Two tests: by the cone of normals the projection of the center must be near
+// the feature; by the gradient at the middle and bounds of the second derivatives the distance must
+// be able to stop falling there.
 CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
                               const CellBounds& bounds, const Sphere& sphere)
     : facet(f),
@@ -74,6 +81,7 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
     edge[k] = at.corner[next_corner(k)] - at.corner[k];
     across[k] = at.normal.dot(edge[k].cross(sphere.center - at.corner[k]));
     length2[k] = edge[k].squaredNorm();
+    // Beyond side k by more than the lean: the element holds no minimum at all.
     const bool far = across[k] * across[k] > lean * lean * length2[k];
     if (far && across[k] < 0) return;
     near_side[k] = !far || across[k] < 0;
@@ -82,6 +90,7 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
   // differs from it no more than its second derivative makes of the way there.
   const Vec3 middle = (at.corner[0] + at.corner[1] + at.corner[2]) / 3;
   const Vec3 aside = sphere.center - middle - height * at.normal;
+  // How far the element's middle is from that of its flat facet.
   const Vec3 offset(bounds.offset[0], bounds.offset[1], bounds.offset[2]);
   const double raised = offset.dot(at.normal), size = aside.norm(), reach = cone.reach;
   const Vec3 descent = aside - (offset - raised * at.normal) +
@@ -95,6 +104,7 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
   within = descent.squaredNorm() <= differs * differs;
   bool forward[3], backward[3];  // along side k the distance may not fall; nor back along it
   for (int k = 0; k < 3; ++k) {
+    // Compared with products that hold the side's length, squared.
     const double limit2 = differs * differs * length2[k];
     const double along = descent.dot(edge[k]), inward = at.normal.dot(edge[k].cross(descent));
     const bool steep = along * along > limit2;
@@ -126,6 +136,7 @@ void CurvedQuery::add_bent(const Task& task, const Outlook& outlook) {
   }
   const auto& [u, v, point] = found.at;
   if (!sphere.reaches(point)) return;
+  // Needed where the center is on the surface, and to know on which side it is.
   const Vec3 outward = patch.along_u(u, v).cross(patch.along_v(u, v)).normalized();
   Contact contact = contact_at(point, outward, sphere, facet.element, found.feature);
   if (want_dn_dc) {
@@ -138,6 +149,7 @@ void CurvedQuery::add_bent(const Task& task, const Outlook& outlook) {
   minima.push_back({contact, f, found.index, (sphere.center - point).dot(outward) < 0});
 }
 
+// Of an element without a bulge: the plane's closed form, inside all three sides.
 void CurvedQuery::add_flat(const Task& task, const Outlook& outlook) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const Facet& facet = shell.facets()[outlook.facet];
@@ -180,6 +192,9 @@ void CurvedQuery::add_edge(const Task& task, int f, int k) {
   if (foot.t <= 0 || foot.t >= 1) return;
   const Vec3 &point = foot.point, along = foot.tangent.normalized();
   if (!sphere.reaches(point)) return;
+  // `in` points from the side into an element, tangential to it: the distance falls that way where
+  // the center is ahead. By gap() the regions of features overlap, so that none is lost between
+  // two.
   const auto rises = [&, &shell = shell, &sphere = sphere](int h) {
     const bool same = shell.facets()[triangle_of(h)].corner[side_of(h)] == facet.corner[k];
     const Vec3 in = inward(shell, h, same ? foot.t : 1 - foot.t, point, along);

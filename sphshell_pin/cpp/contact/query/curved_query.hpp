@@ -11,6 +11,7 @@
 
 namespace sphshell {
 
+// Minima of the distance on curved elements, with their saddles. Keeps its memory.
 class CurvedQuery {
  public:
   void find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
@@ -40,6 +41,8 @@ class CurvedQuery {
     std::vector<Minimum>& minima;
   };
 
+  // Each adds the minimum of one feature, if there is one: within a flat or a bent cell, on the
+  // border of a face, on a side, at a corner.
   void add_flat(const Task& task, const Outlook& outlook);
   void add_bent(const Task& task, const Outlook& outlook);
   void add_border(const Task& task, int facet);

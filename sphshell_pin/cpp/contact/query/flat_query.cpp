@@ -13,6 +13,7 @@ namespace sphshell {
 namespace {
 
 // Whether a minimum is found at a vertex, on a triangle that one of a fan's corners belongs to.
+// tolerance [m]: how far from the vertex the minimum may be.
 bool has_minimum(const Shell& shell, const std::vector<Minimum>& minima, int vertex,
                  const std::vector<int>& fan, double tolerance) {
   return std::any_of(minima.begin(), minima.end(), [&](const Minimum& at) {
@@ -26,6 +27,7 @@ bool has_minimum(const Shell& shell, const std::vector<Minimum>& minima, int ver
 }  // namespace
 
 FlatQuery::FlatQuery() {
+  // Usual numbers, so that first queries do not grow them one by one.
   faces_.reserve(64);
   edges_.reserve(64);
   vertices_.reserve(64);
@@ -33,6 +35,8 @@ FlatQuery::FlatQuery() {
 
 void FlatQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
                      std::vector<Minimum>& minima) {
+  // Face, edge and vertex minima of the candidates; then those found twice, those that another
+  // element passes through, and vertices where sheets meet in a point only.
   broad.find(shell, shell.cones(), 0, sphere);
   find_features(shell, sphere, broad.candidates);
   if (faces_.empty() && edges_.empty() && vertices_.empty()) return;
@@ -55,6 +59,7 @@ void FlatQuery::find_features(const Shell& shell, const Sphere& sphere,
   faces_.clear(), edges_.clear(), vertices_.clear();
   const Vec3& center = sphere.center;
   const double tolerance2 = sphere.tolerance * sphere.tolerance;
+  // Wider by round-off: the exact test is made where the contact is built.
   const double wide_reach2 = sphere.radius * sphere.radius * (1 + 1e-12);
   for (int f : candidates) {
     const Facet& facet = shell.facets()[f];
@@ -68,6 +73,7 @@ void FlatQuery::find_features(const Shell& shell, const Sphere& sphere,
     }
     if (inside) faces_.push_back(f);
     for (int k = 0; k < 3; ++k) {
+      // Each edge and each vertex is owned by one facet, which alone reports it.
       if (facet.owned.twin[k] != kNotOwned && side[k].not_within && !side[k].past_first &&
           !side[k].past_second) {
         const Vec3& a = facet.corner[k];
@@ -89,6 +95,8 @@ void FlatQuery::find_features(const Shell& shell, const Sphere& sphere,
 // likewise an edge and its ends. Both are found only within round-off of their common border.
 void FlatQuery::drop_neighbors(const Shell& shell) {
   if (edges_.empty() && vertices_.empty()) return;
+  // Edges and vertices of faces that hold a minimum, then the ends of edges that do: those of the
+  // list are dropped.
   taken_edges_.clear();
   taken_vertices_.clear();
   for (int face : faces_) {
@@ -99,6 +107,7 @@ void FlatQuery::drop_neighbors(const Shell& shell) {
     }
   }
   std::sort(taken_edges_.begin(), taken_edges_.end());
+  // Vertex numbers, lower one first, name an edge.
   const auto edge_taken = [&](const OnEdge& e) {
     return std::binary_search(taken_edges_.begin(), taken_edges_.end(),
                               std::pair<int, int>(std::minmax(e.from, e.to)));
@@ -116,6 +125,8 @@ void FlatQuery::drop_neighbors(const Shell& shell) {
                   vertices_.end());
 }
 
+// Closed forms: dx/dc is the projection on the plane for a face (its normal stays), on the line for
+// an edge, zero for a vertex.
 void FlatQuery::add_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
                            std::vector<Minimum>& minima) {
   const Vec3& center = sphere.center;
@@ -225,6 +236,7 @@ void FlatQuery::drop_crossed(const Shell& shell, const Sphere& sphere,
 void FlatQuery::find_pinched(const Shell& shell, const Sphere& sphere,
                              const std::vector<int>& overlapping, double tolerance,
                              const std::vector<Minimum>& minima) {
+  // The vertices of this kind that the sphere reaches, deepest first, each once.
   pinched_.clear();
   for (int f : overlapping)
     for (int vertex : shell.triangles()[shell.triangle_of_facet(f)])

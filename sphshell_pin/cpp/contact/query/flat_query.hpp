@@ -9,6 +9,7 @@
 
 namespace sphshell {
 
+// Minima of the distance on flat facets. Keeps its memory.
 class FlatQuery {
  public:
   FlatQuery();
@@ -25,6 +26,8 @@ class FlatQuery {
     int facet, corner, vertex;
   };
 
+  // The features whose normal cone holds the center; and those that a simpler one makes
+  // superfluous.
   void find_features(const Shell& shell, const Sphere& sphere, const std::vector<int>& candidates);
   void drop_neighbors(const Shell& shell);
   void add_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,

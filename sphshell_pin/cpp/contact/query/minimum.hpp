@@ -9,6 +9,7 @@
 
 namespace sphshell {
 
+// A contact, and where on the shell it is.
 struct Minimum {
   Contact contact;
   int facet;    // that holds it
@@ -19,6 +20,7 @@ struct Minimum {
   double off_axis = 1;
 };
 
+// From a point of the shell to the center, unit; `if_equal` where both are one.
 inline Vec3 direction(const Vec3& point, const Vec3& center, const Vec3& if_equal) {
   const Vec3 d = center - point;
   const double length = d.norm();
@@ -41,6 +43,7 @@ inline Mat3 dn_dc_of(const Contact& contact, double radius, const Mat3& dx_dc) {
   const double distance = radius - contact.depth;
   if (!(distance > 0)) return Mat3::Zero();
   const Vec3& n = contact.normal;
+  // n = (c - x) / d: dn = (I - n n^T)(dc - dx) / d, and dx is tangential already.
   return (Mat3::Identity() - n * n.transpose() - dx_dc) / distance;
 }
 

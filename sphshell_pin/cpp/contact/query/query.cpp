@@ -17,6 +17,9 @@ struct FeatureNormal {
   bool rim;  // on the border of an open sheet: no inside there
 };
 
+// Sum of the faces' normals weighted by their angles at a vertex, of both faces at an edge
+// (Baerentzen and Aanaes, IEEE TVCG 11 (2005) 243): its sign tells inside from outside for a
+// closest point.
 FeatureNormal feature_normal(const Shell& shell, const Minimum& at) {
   const Topology& topology = shell.topology();
   const int t = shell.triangle_of_facet(at.facet);
@@ -36,6 +39,7 @@ FeatureNormal feature_normal(const Shell& shell, const Minimum& at) {
 // out through the nearest point.
 void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum>& minima) {
   const double sign = shell.side() == Side::Outside ? 1.0 : -1.0;
+  // On a border there is no inside: such features face every center.
   const auto faces_center = [&](const Minimum& at) {
     if (at.contact.feature == Feature::Face) return at.behind == (sign < 0);
     const FeatureNormal n = feature_normal(shell, at);
@@ -50,6 +54,7 @@ void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum
     out.contact.dn_dc = -out.contact.dn_dc;
     out.contact.depth = 2 * sphere.radius - out.contact.depth;
     out.contact.group = -1;
+    // On the wrong side the depth counts from the far side of the sphere: r + distance.
     minima.assign(1, out);
     return;
   }
@@ -58,6 +63,7 @@ void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum
                minima.end());
   for (Minimum& at : minima)
     if (at.contact.depth == sphere.radius)
+      // The center is on the surface, where its direction is undefined.
       at.contact.normal = sign * feature_normal(shell, at).outward.normalized();
 }
 
@@ -74,6 +80,7 @@ void find_elements(const Shell& shell, const Sphere& sphere, BroadPhase& broad,
     return closest_on_triangle(center, corner, topology.face_normal[t]);
   };
   const int last = static_cast<int>(element.size()) - 1;
+  // The triangles of a quad are neighbors in the list.
   const auto is_nearest_of_element = [&](int t, double d2) {
     // Of the two triangles of a quad the nearer one counts.
     for (int u : {t - 1, t + 1}) {
@@ -138,6 +145,7 @@ void Query::want_dn_dc() { parts_->want_dn_dc = true; }
 const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, double radius,
                                         Method method) {
   contacts.clear();
+  // Round-off grows with the coordinates, which are of the size of shell and sphere.
   const Sphere sphere{center, radius, kRoundOff * (shell.size() + radius)};
   if (method == Method::Elements) {
     find_elements(shell, sphere, parts_->broad, contacts);
@@ -189,6 +197,7 @@ Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3
   whole.normal.normalize();
   // As one contact its weight is 1, wherever the sphere is.
   whole.dn_dc -= (whole.normal * (whole.normal.transpose() * whole.dn_dc)).eval();
+  // On the sphere's normal at the common depth, which need not be a point of the shell.
   whole.point = center - (radius - whole.depth) * whole.normal;
   return whole;
 }
@@ -201,6 +210,8 @@ void merge_groups(const std::vector<Contact>& contacts, const Vec3& center, doub
 }
 
 SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Query& query) {
+  // The curved surface is no farther from the flat one than the bulge: a sphere of this radius
+  // reaches it.
   const double reach = std::abs(at.distance) + 1.01 * shell.curved()->bulge();
   const auto& found = query.find(shell, point, reach + 1e-9 * shell.size(), Method::Smooth);
   if (found.empty()) return at;

@@ -16,6 +16,8 @@ struct SideTest {
   double t;                      // closest point along the side, 0 to 1
 };
 
+// The sums are left multiplied by the side's length, and compared squared: no root and no division
+// is needed. tolerance2: square of the round-off of a coordinate [m^2].
 inline SideTest test_side(const Facet& facet, int k, const Vec3& center, double tolerance2) {
   const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
   const Vec3 from = center - facet.corner[k];
@@ -42,6 +44,8 @@ inline bool side_holds(const Facet& facet, int k, const Vec3& center, double tol
   return inward <= 0 || inward * inward <= tolerance2 * edge.squaredNorm();
 }
 
+// `code` of a facet's side: kBoundary, the other half-edge, or, below kManifold, an edge of more
+// than two triangles, all of which are asked.
 inline bool edge_is_minimum(const Shell& shell, int code, const Vec3& center, double tolerance2) {
   if (code == kBoundary) return true;
   const auto holds = [&](int h) {
@@ -58,6 +62,7 @@ inline bool rises_along(const Vec3& edge, const Vec3& from, double tolerance) {
   return !(along > 0 && along * along > tolerance * tolerance * edge.squaredNorm());
 }
 
+// The center is in the normal cone of the vertex: the polar cone of the edges that leave it.
 inline bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& center,
                               double tolerance) {
   const std::vector<Vec3>& p = shell.vertices();

@@ -23,6 +23,7 @@ ContactTracker::ContactTracker() {
   at_.reserve(64);
 }
 
+// Pythagoras: the circle in which a plane at that depth cuts the sphere.
 double ContactTracker::disc(const Contact& contact, double radius) {
   if (radius == 0) return std::numeric_limits<double>::infinity();
   const double distance = radius - contact.depth;
@@ -45,6 +46,7 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
     }
     for (std::size_t j = 0; j < contacts.size(); ++j) {
       const Contact& c = contacts[j];
+      // A minimum does not go on as a saddle.
       if (places_[i].saddle != (c.weight < 0)) continue;
       const double apart = (places_[i].point - c.point).norm();
       if (apart < std::max({places_[i].reach, disc(c, radius), moved}))
@@ -66,6 +68,7 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
     if (pairing.from < static_cast<int>(known_)) keep_side(contacts[pairing.to], place, radius);
   }
   for (std::size_t j = 0; j < contacts.size(); ++j) {
+    // A new contact. It is known to later stages of the step, and forgotten by restart().
     if (at_[j] >= 0) continue;
     const Contact& c = contacts[j];
     at_[j] = static_cast<int>(places_.size());
@@ -75,6 +78,8 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
   return at_;
 }
 
+// Turns the contact back where the normal has flipped although the sphere was deep: then its center
+// has passed through the sheet, and the nearest point lies on the far side.
 void ContactTracker::keep_side(Contact& c, const Place& place, double radius) {
   if (radius == 0 || place.depth < kDeep * radius || c.normal.dot(place.normal) >= 0) return;
   // Round a border the normal may turn by any angle in a step, and comes to no other side; nor does
@@ -87,6 +92,7 @@ void ContactTracker::keep_side(Contact& c, const Place& place, double radius) {
   pushed_through_ = true;
 }
 
+// The numbers of contacts that went on stay; those of contacts that are gone are never given again.
 void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& center,
                             double radius) {
   next_.clear();

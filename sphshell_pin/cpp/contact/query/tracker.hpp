@@ -47,6 +47,7 @@ class ContactTracker {
     int from, to;
   };
 
+  // The radius of the disc of contact [m]; infinite of no sphere.
   static double disc(const Contact& contact, double radius);
   void keep_side(Contact& contact, const Place& place, double radius);
 

@@ -53,6 +53,7 @@ void CartesianImpedance::torque(SceneData& scene, double t, const VectorX& q, co
   const SE3 pose = joint * s_.frame;
   const pinocchio::Motion twist = s_.frame.actInv(body.velocity(s_.joint));
   const Vec3 velocity = pose.rotation() * twist.linear(), spin = pose.rotation() * twist.angular();
+  // The orientation at the first call is the one that is held.
   if (!started_) hold_ = pose.rotation(), started_ = true;
 
   const TargetPath::Target on_path = path_.at(t - late_);
@@ -68,10 +69,13 @@ void CartesianImpedance::torque(SceneData& scene, double t, const VectorX& q, co
     normal.normalize();
     offset -= offset.dot(normal) * normal;
   }
+  // Spring and damper towards the target; along the normal the constant force instead of the
+  // spring.
   Vec3 force = s_.stiffness * offset + s_.damping * (target_velocity - velocity);
   if (s_.normal_force != 0) force -= s_.normal_force * normal;
   Vec3 moment = -s_.rotational_damping * spin;
   if (s_.rotational_stiffness != 0)
+    // log3: the rotation vector from the frame's orientation to the held one.
     moment += s_.rotational_stiffness *
               pinocchio::log3(Eigen::Matrix3d(hold_ * pose.rotation().transpose()));
 
@@ -111,6 +115,8 @@ pinocchio::Force CartesianImpedance::wrench_of_motion(Multibody& body, const Vec
     const SE3& carrier = body.world_from_joint(s_.path_joint);
     const pinocchio::Motion &w = body.velocity(s_.path_joint), drift = body.drift(s_.path_joint);
     const Vec3 r = carrier.actInv(path.act(target.point));
+    // Acceleration of a point that moves on a turning carrier: drift, centripetal and Coriolis
+    // terms.
     const Vec3 along = s_.path_placement.rotation() * target.velocity;
     wanted +=
         carrier.rotation() * (drift.linear() + drift.angular().cross(r) +
@@ -121,6 +127,7 @@ pinocchio::Force CartesianImpedance::wrench_of_motion(Multibody& body, const Vec
   const SE3 pose = body.world_from_joint(s_.joint) * s_.frame;
   body.task(q, s_.joint, s_.frame, jacobian_, mobility_);
   Eigen::Matrix<double, 6, 1> error;
+  // The linear part is that of the frame's origin: spatial acceleration plus spin x v.
   error << pose.rotation().transpose() * wanted - drift.linear() -
                twist.angular().cross(twist.linear()),
       -drift.angular();
@@ -128,6 +135,8 @@ pinocchio::Force CartesianImpedance::wrench_of_motion(Multibody& body, const Vec
   // Without a hold of the orientation that is left to the spring of the posture.
   const int rows = s_.rotational_stiffness != 0 || s_.rotational_damping != 0 ? 6 : 3;
   const MatrixX mobility = (jacobian_ * mobility_).topLeftCorner(rows, rows);
+  // Lambda by the eigenvectors of J M^-1 J^T, without the directions in which the frame cannot
+  // move.
   const Eigen::SelfAdjointEigenSolver<MatrixX> by_axis(mobility);
   const double least = kMobility * by_axis.eigenvalues()[rows - 1];
   Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();

@@ -51,6 +51,7 @@ class JointPd : public Controller {
   bool gravity_;
 };
 
+// Parameters of CartesianImpedance; units as in dynamics/control/impedance.py.
 struct ImpedanceSettings {
   int joint = 0;                // that carries the controlled frame
   SE3 frame = SE3::Identity();  // in that joint

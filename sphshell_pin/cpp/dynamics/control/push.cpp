@@ -2,6 +2,7 @@
 
 namespace sphshell {
 
+// The entry of the joint that was pushed before is cleared: bias() reads all of them.
 void Push::set(int joint, const Eigen::Vector3d& point, const PointForce& force, int frame) {
   if (!opposed_.empty()) opposed_[joint_].setZero();
   joint_ = joint;
@@ -17,6 +18,7 @@ pinocchio::Force Push::on_joint(const Multibody& body) const {
     const Eigen::Vector3d x = pose.act(point_);
     world += force_.stiffness * (force_.anchor - x) - force_.damping * body.velocity_at(joint_, x);
   }
+  // Into the joint's frame, about its origin.
   const Eigen::Vector3d force = pose.rotation().transpose() * world;
   return {force, point_.cross(force)};
 }

@@ -14,6 +14,7 @@ struct PointForce {
   bool is_zero() const { return force.isZero(0) && stiffness == 0 && damping == 0; }
 };
 
+// The force that a user applies to a body while a run goes on.
 class Push {
  public:
   // A force at a point of the joint's frame; a zero one ends the push. `frame`: the number of the

@@ -7,6 +7,7 @@ namespace sphshell {
 
 TargetPath::Place TargetPath::in_phase(std::size_t phase, double t) const {
   if (phase + 1 == s_.times.size()) return {s_.places[phase], 0.0, 0.0};
+  // Constant jerk over a phase.
   const double x = t - s_.times[phase], v = s_.speeds[phase];
   const double a = s_.accelerations[phase], j = s_.jerks[phase];
   if (t < s_.times[phase]) return {s_.places[phase], 0.0, 0.0};
@@ -23,6 +24,7 @@ TargetPath::Target TargetPath::at(double t) {
   while (piece_ > 0 && place < along[piece_]) --piece_;
   const std::size_t i = piece_, j = std::min(i + 1, along.size() - 1);
   const double length = along[j] - along[i];
+  // Share of the piece of the path, in arc length.
   const double u = length > 0 ? std::clamp((place - along[i]) / length, 0.0, 1.0) : 0.0;
   const Vec3 chord = s_.points[j] - s_.points[i];
   Target target;

@@ -7,6 +7,7 @@
 
 namespace sphshell {
 
+// The curve by points, and the place along it by phases of constant jerk.
 struct PathSettings {
   std::vector<double> along;          // arc length at the points, increasing from 0 [m]
   std::vector<Vec3> points;           // [m]
@@ -30,9 +31,11 @@ class TargetPath {
 
   explicit TargetPath(PathSettings settings) : s_(std::move(settings)) {}
 
+  // On the path at time t [s].
   Target at(double t);
   bool moves() const { return s_.times.size() > 1; }
   bool same_curve(const TargetPath& other) const { return s_.along == other.s_.along; }
+  // The next time after t at which the motion is not smooth; infinite without one.
   double next_kink(double t) const;
   // When the target sets out.
   double begin() const { return s_.times.front(); }

@@ -30,11 +30,14 @@ MatrixX beside_kinks(const MatrixX& before, const MatrixX& here, const MatrixX& 
 
 }  // namespace
 
+// Methods without derivatives of their own: along the dense output, which solves the same equations
+// to their tolerance.
 void Stepper::carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
   slopes.along(chart, *this, h, 1, tangent);
 }
 
 void SemiImplicitEuler::carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
+  // The method's own formulas, differentiated line by line.
   Changes at = slopes.at_origin(), rates;
   slopes.rates(chart, chart.origin().t, start_, at, rates);
   at.w += h * rates.w;
@@ -44,9 +47,11 @@ void SemiImplicitEuler::carry(StepSlopes& slopes, Chart& chart, double h, Tangen
   slopes.finish(chart, y_, at, tangent);
 }
 
+// Every stage's state changes with the stages before it.
 void RungeKutta4::carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
   const double t = chart.origin().t;
   const Changes start = slopes.at_origin();
+  // One set of changes for each stage.
   std::vector<Changes> rates(k_.size());
   slopes.rates(chart, t, start_, start, rates[0]);
   for (std::size_t i = 0; i < rows_.size(); ++i) {

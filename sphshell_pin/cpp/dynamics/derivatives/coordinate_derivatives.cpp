@@ -19,6 +19,8 @@ Mat3 turn_by(const Vec3& angle) {
 // c of u' = w + [u, w] / 2 + c [u, [u, w]], and its derivative by the square of |u|.
 struct Curve {
   double c, slope;
+  // 1/12 + a^2/720 + ...: the series where the closed form would cancel. Derivative of the
+  // exponential map of SO(3) and its inverse.
   explicit Curve(double a2) : c(1.0 / 12 + a2 / 720), slope(1.0 / 720) {
     if (a2 < 1e-6) return;
     const double half = 0.5 * std::sqrt(a2), cot = 1 / std::tan(half), sine = std::sin(half);
@@ -55,6 +57,7 @@ void ChartSlopes::begin(Chart& chart, const VectorX& y) {
     const Mat3 cross = cross_matrix(u);
     const Vec3 once = u.cross(w);
     s.turn = turn_by(u);
+    // u' = (I + [u] / 2 + c [u]^2) w, and its derivative by u.
     s.rate_by_w = Mat3::Identity() + 0.5 * cross + curve.c * cross * cross;
     s.angle = s.rate_by_w.inverse();
     s.rate_by_u = -0.5 * cross_matrix(w) -
@@ -80,6 +83,8 @@ void ChartSlopes::place(const MatrixX& origin, const MatrixX& u, const MatrixX& 
       v.middleRows<2>(i) = back * w.middleRows<2>(i) - aside * u.row(i + 2);
       continue;
     }
+    // Changes of body frames: the chart's axes turn with the origin's change, and the body's with
+    // u.
     const Mat3 back = s.turn.transpose();
     const int angle = s.group == Group::Rigid ? i + 3 : i;
     const MatrixX turned = s.angle * u.middleRows<3>(angle);
@@ -113,6 +118,7 @@ void ChartSlopes::rates(const VectorX& acceleration, const VectorX& v, const Mat
     if (s.group == Group::Rotation) continue;
     // turn (a + spin x v)
     const Vec3 linear = v.segment<3>(i), spin = v.segment<3>(i + 3);
+    // Product rule over turn, acceleration, spin and velocity.
     const Vec3 all = acceleration.segment<3>(i) + spin.cross(linear);
     w_rate.middleRows<3>(i) =
         (s.turn * (w_rate.middleRows<3>(i) - cross_matrix(linear) * v_by.middleRows<3>(i + 3) +
@@ -122,6 +128,8 @@ void ChartSlopes::rates(const VectorX& acceleration, const VectorX& v, const Mat
   }
 }
 
+// The Lie bracket of each group: rotation v x x; rigid motion both parts; planar by the right
+// angle.
 void add_turning(const Multibody& body, const VectorX& v, MatrixX& matrix) {
   for (const CurvedSegment& s : body.curved()) {
     const int i = s.index_v;

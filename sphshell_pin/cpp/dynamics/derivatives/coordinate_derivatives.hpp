@@ -14,6 +14,7 @@ struct Tangent {
 // origin: `origin` is the change of that, in its tangent space.
 class ChartSlopes {
  public:
+  // The maps at y, for the calls below.
   void begin(Chart& chart, const VectorX& y);
 
   // The changes of q and v that go with those of origin, u and w.

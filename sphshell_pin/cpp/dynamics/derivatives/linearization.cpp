@@ -14,6 +14,7 @@ Matrix36 displacement_at(const Vec3& place) {
 
 }  // namespace
 
+// One chain of joints for each pair; contacts carry dn_dc from the next evaluation on.
 Linearization::Linearization(SceneData& scene) : scene_(scene) {
   scene.want_dn_dc();
   scene.body().want_derivatives();
@@ -29,6 +30,7 @@ Linearization::Linearization(SceneData& scene) : scene_(scene) {
 void Linearization::forces(const VectorX& q, const VectorX& v, MatrixX& by_q, MatrixX& by_v) {
   force_.setZero(v.size());
   add_contacts(q, v, nullptr);
+  // Of J^T F: both the wrench's change and that of J count.
   by_q = by_q_;
   by_v = by_v_;
 }
@@ -41,6 +43,7 @@ void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, 
   auto by_q = jacobian.topLeftCorner(nv, nv), by_v = jacobian.block(0, nv, nv, nv);
   force_ = tau;
   const bool joints_act = scene_.joints().act(), any = scene_.touching() || joints_act;
+  // Order of rows: v', then z'; of columns: u, v, z.
   by_parameters_.setZero(nv + z.size(), static_cast<Eigen::Index>(parameters_.size()));
   if (any) add_contacts(q, v, &jacobian);
   if (joints_act) add_joints(q, v, z, jacobian);
@@ -55,6 +58,7 @@ void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, 
   if (!parameters_.empty())
     by_parameters_.topRows(nv) = (inverse_mass_ * by_parameters_.topRows(nv)).eval();
   // What was written as generalized forces by z.
+  // dv'/dz = M^-1 of the generalized force by z.
   const auto pass_through_inertia = [&](Eigen::Index z) {
     auto column = jacobian.col(2 * nv + z).head(nv);
     column_.setZero();
@@ -106,6 +110,7 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
       const ContactSite site = site_of(active[next], chain.twist());
       find_slopes(active[next], site);
       sum.wrench += slopes_.wrench;
+      // The sum over the contacts of a pair first: the chain's products are then made once a pair.
       sum.by_displacement += slopes_.by_place * displacement_at(site.place);
       sum.by_twist += slopes_.by_twist;
       if (jacobian && active[next].slot >= 0) add_bristle(active[next], site, chain, *jacobian);
@@ -113,6 +118,8 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
     }
     chain.add_force(sum.wrench, force_, by_q_);
     for (int m = 0; m < chain.size(); ++m) {
+      // Chain rule: a velocity changes the twist by its axis, a coordinate moves the place by its
+      // axis and changes the twist by twist_by_q.
       const Vector6 by_v = sum.by_twist * chain.axes().col(m);
       const Vector6 by_q =
           sum.by_displacement * chain.axes().col(m) + sum.by_twist * chain.twist_by_q().col(m);
@@ -128,45 +135,29 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
 }
 
 void Linearization::find_slopes(const ActiveContact& active, const ContactSite& site) {
-  const Pair& pair = scene_.pairs()[active.pair];
-  if (active.row >= 0)
-    scene_.foundation(active).slopes(pair, active.row, scene_.relaxation(pair), site,
-                                     active.force.normal, slopes_);
-  else
-    contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
+  std::visit([&](const auto& forces) { forces.slopes(scene_, active, site, slopes_); },
+             scene_.forces_of(active));
 }
 
 void Linearization::add_bristle(const ActiveContact& active, const ContactSite& site,
                                 const Chain& chain, MatrixX& jacobian) {
-  const Eigen::Index nv = force_.size(), z = 3 * active.slot;
-  const Matrix36 by_displacement = slopes_.rate_by_place * displacement_at(site.place);
-  auto rate = jacobian.middleRows<3>(nv + z);
-  for (int m = 0; m < chain.size(); ++m) {
-    const int k = chain.velocity(m);
-    const auto axis = chain.axes().col(m);
-    // Joints that mimic another have its velocity.
-    rate.col(k) += by_displacement * axis + slopes_.rate_by_twist * chain.twist_by_q().col(m);
-    rate.col(nv + k) += slopes_.rate_by_twist * axis;
-    jacobian.block<1, 3>(k, 2 * nv + z) += axis.transpose() * slopes_.by_stretch;
-  }
-  rate.middleCols<3>(2 * nv + z) = slopes_.rate_by_stretch;
-  const int outer = rings_of(active) - 1;
-  for (int r = 0; r < outer; ++r) {
-    const ContactSlopes::Ring& ring = slopes_.outer[r];
-    const Eigen::Index own = 2 * nv + z + 3 * (r + 1);
+  const Eigen::Index nv = force_.size();
+  const int rings = rings_of(active);
+  for (int r = 0; r < rings; ++r) {
+    const ContactSlopes::Ring& ring = slopes_.rings[r];
+    const Eigen::Index z = 3 * (active.slot + r);
     const Matrix36 by_displacement = ring.rate_by_place * displacement_at(site.place);
-    auto ring_rate = jacobian.middleRows<3>(nv + z + 3 * (r + 1));
+    auto rate = jacobian.middleRows<3>(nv + z);
     for (int m = 0; m < chain.size(); ++m) {
       const int k = chain.velocity(m);
       const auto axis = chain.axes().col(m);
-      ring_rate.col(k) += by_displacement * axis + ring.rate_by_twist * chain.twist_by_q().col(m);
-      ring_rate.col(nv + k) += ring.rate_by_twist * axis;
-      jacobian.block<1, 3>(k, own) += axis.transpose() * ring.by_stretch;
+      // Joints that mimic another have its velocity.
+      rate.col(k) += by_displacement * axis + ring.rate_by_twist * chain.twist_by_q().col(m);
+      rate.col(nv + k) += ring.rate_by_twist * axis;
+      jacobian.block<1, 3>(k, 2 * nv + z) += axis.transpose() * ring.by_stretch;
     }
-    rate.middleCols<3>(own) = ring.first_by_stretch;
-    ring_rate.middleCols<3>(2 * nv + z) = ring.rate_by_first;
-    for (int i = 0; i < outer; ++i)
-      ring_rate.middleCols<3>(2 * nv + z + 3 * (i + 1)) = ring.rate_by_outer[i];
+    for (int i = 0; i < rings; ++i)
+      rate.middleCols<3>(2 * nv + 3 * (active.slot + i)) = ring.rate_by_stretch[i];
   }
 }
 
@@ -179,12 +170,14 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
   const PairState& state = scene_.states()[active.pair];
   const auto& turn = state.world_from_j.rotation();
   ContactSite site{
-      active.contact, state.center, !pair.source, pair.radius,         scene_.disc_radius(active),
-      twist,          Vec3::Zero(), {},           scene_.shape(active)};
-  if (pair.source) site.place = site.contact.point;
-  if (active.slot >= 0) site.stretch = turn.transpose() * active.kinematics.bristle;
+      active.contact, state.center, pair.has_sphere(),   pair.radius, scene_.disc_radius(active),
+      twist,          {},           scene_.shape(active)};
+  if (!site.follows) site.place = site.contact.point;
+  // z is in the shell's frame; that of the first ring was taken to the world for the forces.
+  site.stretch[0].setZero();
+  if (active.slot >= 0) site.stretch[0] = turn.transpose() * active.kinematics.bristle;
   for (int i = 1; i < rings_of(active); ++i)
-    site.outer[i - 1] = scene_.stretches().segment<3>(3 * (active.slot + i));
+    site.stretch[i] = scene_.stretches().segment<3>(3 * (active.slot + i));
   return site;
 }
 

@@ -59,6 +59,7 @@ class Linearization {
   void add_joints(const VectorX& q, const VectorX& v, const VectorX& z, MatrixX& jacobian);
   void add_bristle(const ActiveContact& active, const ContactSite& site, const Chain& chain,
                    MatrixX& jacobian);
+  // Fills slopes_, as the pair's kind of forces has them.
   void find_slopes(const ActiveContact& active, const ContactSite& site);
   Eigen::RowVector3d plain_depth_by_place(
       const ContactSite& site) const;  // of the slopes found last
@@ -76,6 +77,7 @@ class Linearization {
                        const ContactSite& site, Answer& answer);
   void add_parameters(const ActiveContact& active, const ContactSite& site, const Chain& chain);
   int rings_of(const ActiveContact& active) const;  // 0 without a bristle
+  // The contact in the shell's frame, where bodies i and j move with this relative twist.
   ContactSite site_of(const ActiveContact& active, const Vector6& twist) const;
 
   SceneData& scene_;

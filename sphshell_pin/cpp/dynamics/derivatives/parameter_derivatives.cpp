@@ -11,18 +11,9 @@ Vec3 motion_of(const Vector6& twist, const Vec3& place) {
   return twist.head<3>() + twist.tail<3>().cross(place);
 }
 
-// The wrench of a foundation's row, about the origin of the shell's frame.
-Vector6 foundation_wrench(const FoundationPair& foundation, const Pair& pair, int row,
-                          const ContactSite& site, double relaxation, ContactSlopes& scratch) {
-  const Vec3 spin = site.twist.tail<3>(), velocity = site.twist.head<3>() + spin.cross(site.place);
-  const FoundationForce found = foundation.force(pair, row, velocity, spin);
-  const double normal = std::max(0.0, site.contact.normal.dot(found.normal));
-  foundation.slopes(pair, row, relaxation, site, normal, scratch);
-  return scratch.wrench;
-}
-
 }  // namespace
 
+// The depth without the rise of a curved shell falls along the normal alone.
 Eigen::RowVector3d Linearization::plain_depth_by_place(const ContactSite& site) const {
   Eigen::RowVector3d out = slopes_.depth_by_place;
   if (site.shape) out += site.shape->tilt.transpose();
@@ -35,8 +26,8 @@ Linearization::Answer Linearization::answer_of(const Parameter& parameter,
   using Kind = Parameter::Kind;
   Answer out;
   const int rings = rings_of(active);
-  const auto ring_of = [&](int i) { return i == 0 ? nullptr : &slopes_.outer[i - 1]; };
   for (int i = 0; i < rings; ++i) out.rates[i].setZero();
+  // A moved sphere, or a shell moved the other way: the slopes by place and twist are known.
   if (parameter.kind == Kind::Offset || parameter.kind == Kind::Placement) {
     const Pair& pair = scene_.pairs()[active.pair];
     const SE3& world_from_j = scene_.states()[active.pair].world_from_j;
@@ -56,56 +47,37 @@ Linearization::Answer Linearization::answer_of(const Parameter& parameter,
     out.normal = slopes_.normal_by_place * moved;
     for (int i = 0; i < rings; ++i)
       out.rates[i] =
-          ring_of(i) ? Vec3(ring_of(i)->rate_by_place * moved + ring_of(i)->rate_by_twist * twist)
-                     : Vec3(slopes_.rate_by_place * moved + slopes_.rate_by_twist * twist);
+          slopes_.rings[i].rate_by_place * moved + slopes_.rings[i].rate_by_twist * twist;
     return out;
   }
   if (parameter.kind != Kind::Field) {
+    // A radius makes the contact deeper by as much, and by what the curved shell's rise adds.
     out.plain_depth = 1;
     out.depth = site.shape ? 1 + site.shape->tilt.dot(site.contact.normal) : 1;
-    if (active.row < 0) out.wrench = out.depth * slopes_.by_depth;
-    for (int i = 0; i < rings && active.row < 0; ++i)
-      out.rates[i] = out.depth * (ring_of(i) ? ring_of(i)->rate_by_depth : slopes_.rate_by_depth);
+    const bool held =
+        std::visit([](const auto& forces) { return std::decay_t<decltype(forces)>::kDepthHeld; },
+                   scene_.forces_of(active));
+    if (held) out.wrench = out.depth * slopes_.by_depth;
+    for (int i = 0; i < rings && held; ++i)
+      out.rates[i] = out.depth * slopes_.rings[i].rate_by_depth;
   }
   add_differences(parameter, active, site, out);
   return out;
 }
 
-// What follows from a parameter at a contact whose depth is held; of a foundation, all of it.
+// What follows from a parameter besides the depth.
 void Linearization::add_differences(const Parameter& parameter, const ActiveContact& active,
                                     const ContactSite& site, Answer& answer) {
-  using Kind = Parameter::Kind;
-  const int rings = rings_of(active);
   for (const double sign : {1.0, -1.0}) {
     const Pair& pair = sign > 0 ? parameter.more : parameter.less;
-    const double share = sign / (2 * parameter.step), relaxation = scene_.relaxation(pair);
-    ContactSite other = site;
-    if (active.row >= 0) {
-      FoundationPair foundation;
-      std::vector<Contact> contacts;
-      foundation.find(pair, site.place, true, contacts);
-      const std::size_t row = static_cast<std::size_t>(active.row);
-      if (row >= contacts.size()) continue;
-      other.contact = contacts[row];
-      other.radius = pair.radius;
-      other.disc_radius = pair.disc_radius();
-      answer.wrench +=
-          share * foundation_wrench(foundation, pair, active.row, other, relaxation, other_slopes_);
-    } else {
-      ContactShape shape;
-      other.disc_radius = pair.disc_radius();
-      if (site.shape) {
-        shape = scene_.shape_of(active.pair, pair, site.contact);
-        shape.depth = site.shape->depth;
-        other.shape = &shape;
-        other.disc_radius = shape.disc_radius();
-      }
-      if (parameter.kind == Kind::Ball) other.contact.point = pair.ball * site.contact.normal;
-      contact_slopes(pair.law, pair.friction, relaxation, other, other_slopes_);
-      answer.wrench += share * other_slopes_.wrench;
-    }
-    for (int i = 0; i < rings; ++i)
-      answer.rates[i] += share * (i == 0 ? other_slopes_.rate : other_slopes_.outer[i - 1].rate);
+    const double share = sign / (2 * parameter.step);
+    const bool found = std::visit(
+        [&](const auto& one) { return one.changed(scene_, pair, active, site, other_slopes_); },
+        scene_.forces_of(active));
+    if (!found) continue;
+    answer.wrench += share * other_slopes_.wrench;
+    for (int i = 0; i < rings_of(active); ++i)
+      answer.rates[i] += share * other_slopes_.rings[i].rate;
   }
 }
 
@@ -118,6 +90,7 @@ void Linearization::add_parameters(const ActiveContact& active, const ContactSit
     const Answer answer = answer_of(parameters_[c], active, site);
     for (int m = 0; m < chain.size(); ++m) {
       const auto axis = chain.axes().col(m);
+      // The shell's frame, in which axes are written, moves with the placement.
       const Vector6 axis_moved =
           -pinocchio::Motion(answer.moved).cross(pinocchio::Motion(axis)).toVector();
       by_parameters_(chain.velocity(m), c) +=
@@ -156,6 +129,7 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     auto along = out.normal_force.row(row_of[i]);
     auto depth = out.depth.row(row_of[i]), plain = out.plain_depth.row(row_of[i]);
     // One column, from changes in the shell's frame.
+    // Product rule for force . normal.
     const auto add = [&](Eigen::Index column, const Vec3& force_by, const Vec3& normal_by,
                          double depth_by, double plain_by) {
       world.col(column) += turn * force_by;
@@ -174,6 +148,7 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     }
     // The shell's frame turns with its body.
     const Vec3 force_world = turn * force;
+    // In the world the force also turns with every joint that carries the shell.
     for (std::size_t j : body.model().supports[pair.joint_j]) {
       for (int k = 0; j > 0 && k < body.model().nvExtendeds[j]; ++k) {
         const Vec3 axis = body.axes().col(body.model().idx_vExtendeds[j] + k).tail<3>();
@@ -182,7 +157,7 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     }
     for (int r = 0; r < rings_of(active); ++r)
       for (int k = 0; k < 3; ++k) {
-        const Matrix63& by = r == 0 ? slopes_.by_stretch : slopes_.outer[r - 1].by_stretch;
+        const Matrix63& by = slopes_.rings[r].by_stretch;
         add(2 * nv + 3 * (active.slot + r) + k, by.topRows<3>().col(k), Vec3::Zero(), 0, 0);
       }
     for (std::size_t c = 0; c < parameters_.size(); ++c) {

@@ -165,6 +165,7 @@ void Sensitivities::reorder_bristles(const VectorX& z) {
   now_.z = out;
 }
 
+// Within a step the changes are carried to the row anew, from the start of the step.
 void Sensitivities::add_row(const State& state, double share) {
   const Tangent* at = chart_ ? &next_ : &now_;
   if (chart_ && share < 1) {

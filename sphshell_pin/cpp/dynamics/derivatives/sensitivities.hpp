@@ -36,9 +36,11 @@ class Sensitivities : public RowFollower {
   bool torques_remember() const { return slopes_.torques_remember(); }
 
  private:
+  // Adds what an event at the end of the step does to the changes.
   void jump(const State& to);
   std::vector<char> touching_pairs() const;
   Eigen::RowVectorXd time_of(const State& at, const std::vector<char>& touched, bool ends);
+  // Stretches of bristles that begin, and their new order.
   void begin_contacts(const State& to);
   void reorder_bristles(const VectorX& z);
 

@@ -37,10 +37,12 @@ void StepSlopes::carry(Chart& chart, const Stepper& stepper, double h, const Mat
   origin_ = nullptr, torque_ = nullptr;
 }
 
+// At the origin u is zero whatever the origin is: its change is that of the chart itself.
 StepSlopes::Coordinates StepSlopes::at_origin() const {
   return {MatrixX::Zero(origin_->q.rows(), origin_->q.cols()), origin_->v, origin_->z};
 }
 
+// From coordinates of the chart to changes of q and v.
 void StepSlopes::finish(Chart& chart, const VectorX& y, const Coordinates& by, Tangent& out) {
   chart_slopes_.begin(chart, y);
   chart_slopes_.place(origin_->q, by.u, by.w, out.q, out.v);
@@ -48,6 +50,7 @@ void StepSlopes::finish(Chart& chart, const VectorX& y, const Coordinates& by, T
 }
 
 // At state_, which is evaluated.
+// v' by (u, v, z), with what the controller's torques add through the inverse inertia.
 void StepSlopes::linearize(Chart& chart, double t) {
   Torques& torques = chart.torques();
   follows_ = torques.follow_state();
@@ -74,6 +77,7 @@ void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& 
   const VectorX rates = scene_.bristle_rates(), here = torque(t, q, v);
   const std::size_t contacts = scene_.active().size();
   // Torques may jump where a contact begins or ends: they are differenced on this side of it.
+  // Central; where the set of contacts changes on one side, one-sided.
   const auto difference = [&](Eigen::Index column, double step, const auto& move) {
     VectorX sum = VectorX::Zero(nv);
     double span = 0;
@@ -124,6 +128,7 @@ void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& 
   if (torque(t, q, v) != here) remembers_ = true;
 }
 
+// By the chain rule through (u, v, z), and the parameters directly.
 MatrixX StepSlopes::held(const Tangent& at) const {
   const Eigen::Index nv = at.q.rows();
   MatrixX out = torque_slopes_.leftCols(nv) * at.q + torque_slopes_.middleCols(nv, nv) * at.v;
@@ -148,6 +153,8 @@ void StepSlopes::rates(Chart& chart, double t, const VectorX& y, const Coordinat
   linearize(chart, t);
   chart_slopes_.begin(chart, y);
   chart_slopes_.place(origin_->q, by.u, by.w, q_by_, v_by_);
+  // Rows of the Jacobian times the changes, block by block, plus what held torques and parameters
+  // add.
   out.w.noalias() = jacobian_.topLeftCorner(nv, nv) * q_by_;
   out.w.noalias() += jacobian_.block(0, nv, nv, nv) * v_by_;
   out.w.noalias() += jacobian_.topRightCorner(nv, nz) * by.z;
@@ -163,6 +170,8 @@ void StepSlopes::rates(Chart& chart, double t, const VectorX& y, const Coordinat
   chart_slopes_.rates(y_, state_.v, by.u, by.w, v_by_, out.u, out.w);
 }
 
+// At the positions of the origin, which change by its change, with the velocity v, which changes by
+// v_by.
 const MatrixX& StepSlopes::bristle_rates(Chart& chart, const VectorX& v, const MatrixX& v_by) {
   const State& from = chart.origin();
   const Eigen::Index nv = chart.nv(), nz = chart.nz();
@@ -183,6 +192,7 @@ void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double sh
   origin_ = nullptr, torque_ = nullptr;
 }
 
+// Errors are measured in units of the parameters: each column times its scale.
 void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double share, Tangent& out) {
   const Path path{chart, stepper, h};
   const Eigen::Index nv = chart.nv(), nz = chart.nz();
@@ -200,6 +210,7 @@ void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double sh
 // Halves are taken until they agree: in free flight a body may turn far in a step; where friction
 // begins to slip, or a law is clamped, the derivatives of the rates jump within one.
 void StepSlopes::follow(const Path& path, double from, double to, int depth, MatrixX& changes) {
+  // One step of Radau's method against two of half the length.
   MatrixX once = changes;
   const bool touching = radau(path, from, to, once);
   if (depth >= kMostHalvings) {
@@ -228,6 +239,7 @@ void StepSlopes::follow(const Path& path, double from, double to, int depth, Mat
 
 bool StepSlopes::radau(const Path& path, double from, double to, MatrixX& changes) {
   constexpr int kStages = 3;
+  // Radau IIA of order 5 (Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5).
   static const double kRoot = std::sqrt(6.0);
   static const double kNode[kStages] = {(4 - kRoot) / 10, (4 + kRoot) / 10, 1};
   static const double kA[kStages][kStages] = {
@@ -261,11 +273,13 @@ bool StepSlopes::radau(const Path& path, double from, double to, MatrixX& change
     for (Eigen::Index k = 2 * nv; k < n; ++k)
       if (!slope[i].row(k).isZero(0) || !slope[i].col(k).isZero(0)) lives[k] = 1;
   }
+  // Only rows that something couples to enter the linear system: most slots of bristles are spare.
   std::vector<Eigen::Index> live;
   for (Eigen::Index k = 0; k < n; ++k)
     if (lives[k]) live.push_back(k);
   const Eigen::Index size = static_cast<Eigen::Index>(live.size());
   MatrixX part = changes(live, Eigen::all);
+  // (I - h A (x) J) K = J y + f, all stages at once, for all columns of changes.
   MatrixX system = MatrixX::Identity(kStages * size, kStages * size), right(kStages * size, m);
   for (int i = 0; i < kStages; ++i) {
     const MatrixX a = slope[i](live, live);

@@ -60,11 +60,13 @@ class StepSlopes {
     const Stepper& stepper;
     double h;
   };
+  // Halves a part of the path until the changes agree.
   void follow(const Path& path, double from, double to, int depth, MatrixX& changes);
   // One step between two shares of the path; whether anything touches there.
   bool radau(const Path& path, double from, double to, MatrixX& changes);
   // The rates at a state, and how the last ones answer.
   void linearize(Chart& chart, double t);
+  // Of (v', z') by the parameters, at a held state.
   MatrixX by_parameters() const;
 
   SceneData& scene_;

@@ -8,6 +8,7 @@ namespace {
 using Group = CurvedSegment::Group;
 using Vec2 = Eigen::Vector2d;
 
+// exp of a rotation vector [rad].
 Eigen::Matrix3d rotation(const Vec3& angle) {
   const double a = angle.norm();
   return a > 0 ? Eigen::AngleAxisd(a, angle / a).toRotationMatrix() : Eigen::Matrix3d::Identity();
@@ -15,6 +16,8 @@ Eigen::Matrix3d rotation(const Vec3& angle) {
 
 // The rate of u where exp(u) turns with the angular velocity w, in turning axes.
 Vec3 angle_rate(const Vec3& u, const Vec3& w) {
+  // u' = w + [u, w] / 2 + c [u, [u, w]], c = (1 - |u| / 2 cot(|u| / 2)) / |u|^2, by its series near
+  // zero.
   const double a2 = u.squaredNorm();
   const double half = 0.5 * std::sqrt(a2);
   const double c = a2 > 1e-6 ? (1 - half / std::tan(half)) / a2 : 1.0 / 12 + a2 / 720;
@@ -32,6 +35,7 @@ Chart::Chart(SceneData& scene, Torques& torques)
       v_(nv_),
       u_(nv_) {}
 
+// Contacts that stages of an earlier step have seen are forgotten.
 void Chart::begin(const State& origin) {
   origin_ = &origin;
   scene_.restart();
@@ -44,10 +48,13 @@ void Chart::place(const VectorX& y, VectorX& q, VectorX& v) const {
   for (const CurvedSegment& s : scene_.body().curved()) {
     const int i = s.index_v, k = s.index_q;
     if (s.group == Group::Rigid) {
+      // Position: the origin's plus u in the axes R0. Pinocchio's own exponential of SE(3) would
+      // couple it with the rotation. Velocity: from the axes R0 into the body's.
       const Eigen::Quaterniond axes(Eigen::Map<const Eigen::Vector4d>(origin_->q.data() + k + 3));
       q.segment<3>(k) = origin_->q.segment<3>(k) + axes * Vec3(u_.segment<3>(i));
       v.segment<3>(i) = (rotation(-u_.segment<3>(i + 3)) * v.segment<3>(i)).eval();
     } else if (s.group == Group::Planar) {
+      // The same in the plane; q holds cosine and sine.
       Eigen::Matrix2d axes;
       axes << origin_->q[k + 2], -origin_->q[k + 3], origin_->q[k + 3], origin_->q[k + 2];
       q.segment<2>(k) = origin_->q.segment<2>(k) + axes * u_.segment<2>(i);
@@ -61,6 +68,8 @@ const VectorX& Chart::fill(double t, const VectorX& q, const VectorX& v, VectorX
   ++evaluations_;
   const VectorX& tau = torques_.torque(t, q, v);
   out.resize(size());
+  // Pinocchio's acceleration of a free body is that of components in the turning body; in axes that
+  // stand still it is a + spin x v.
   out.segment(nv_, nv_) = scene_.acceleration(q, v, tau);
   for (const CurvedSegment& s : scene_.body().curved()) {
     const int i = s.index_v, a = nv_ + i;
@@ -73,6 +82,7 @@ const VectorX& Chart::fill(double t, const VectorX& q, const VectorX& v, VectorX
   }
   out.segment(2 * nv_, nz()) = scene_.bristle_rates();
   const Powers& powers = scene_.powers();
+  // The work of damping, friction and control is integrated like the state.
   out.tail<kWork>() << powers.damping, powers.friction, tau.dot(v);
   return tau;
 }
@@ -99,6 +109,7 @@ void Chart::rate(double t, const VectorX& y, VectorX& out) {
     if (s.group == Group::Rigid) {
       const Vec3 u = y.segment<3>(i + 3), w = y.segment<3>(nv_ + i + 3);
       out.segment<3>(i + 3) = angle_rate(u, w);
+      // Into the axes of the chart, where the step began.
       out.segment<3>(nv_ + i) = (rotation(u) * out.segment<3>(nv_ + i)).eval();
     } else if (s.group == Group::Rotation) {
       out.segment<3>(i) = angle_rate(y.segment<3>(i), y.segment<3>(nv_ + i));

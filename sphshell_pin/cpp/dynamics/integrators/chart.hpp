@@ -16,6 +16,7 @@ struct Ledger {
   double control = 0;   // given by the controller
 };
 
+// Of a run, at time t [s].
 struct State {
   double t = 0;
   VectorX q, v;
@@ -27,6 +28,7 @@ struct State {
 class Torques {
  public:
   virtual ~Torques() = default;
+  // tau (nv), valid until the next call.
   virtual const VectorX& torque(double t, const VectorX& q, const VectorX& v) = 0;
   // What a linearization has to vary: false where torques are held.
   virtual bool follow_state() const = 0;
@@ -51,6 +53,7 @@ class Chart {
   // The forces have been evaluated at `origin`.
   void begin(const State& origin);
   Eigen::Index size() const { return 2 * nv_ + origin_->z.size() + kWork; }
+  // y', with one evaluation of the scene.
   void rate(double t, const VectorX& y, VectorX& out);
   // The rate at y = (0, v, z, work) of the origin.
   void rate_at_origin(VectorX& out);
@@ -71,6 +74,7 @@ class Chart {
 
  private:
   void place(const VectorX& y, VectorX& q, VectorX& v) const;
+  // Writes w', z' and the powers; returns the torques.
   const VectorX& fill(double t, const VectorX& q, const VectorX& v, VectorX& out);
 
   SceneData& scene_;

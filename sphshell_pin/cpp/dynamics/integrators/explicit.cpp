@@ -7,10 +7,12 @@ void SemiImplicitEuler::begin(Chart& chart) {
   chart.rate_at_origin(rate_);
 }
 
+// All but the positions by the rates at the start; positions with the new velocities.
 void SemiImplicitEuler::step(Chart& chart, double h, State& out) {
   const int nv = chart.nv(), all = static_cast<int>(start_.size());
   y_ = start_;
   y_.segment(nv, all - nv - Chart::kWork) += h * rate_.segment(nv, all - nv - Chart::kWork);
+  // First the velocities, then the positions with the new velocities: symplectic Euler.
   y_.head(nv) = h * y_.segment(nv, nv);
   // Bristles are springs: they move like positions, with the new velocity.
   if (chart.nz() > 0)
@@ -22,16 +24,19 @@ void SemiImplicitEuler::step(Chart& chart, double h, State& out) {
   chart.finish(chart.origin().t + h, y_, out);
 }
 
+// The first stage is the rate at the start, which steps of any length share.
 void ExplicitRungeKutta::begin(Chart& chart) {
   chart.start(start_);
   chart.rate_at_origin(rate_);
   k_[0] = rate_;
 }
 
+// Each stage is an evaluation at the state that the stages before it predict.
 void ExplicitRungeKutta::step(Chart& chart, double h, State& out) {
   const double t = chart.origin().t;
   h_ = h;
   for (std::size_t i = 0; i < rows_.size(); ++i) {
+    // Zeros of the tableau cost nothing.
     stage_ = start_;
     for (std::size_t j = 0; j <= i; ++j)
       if (rows_[i].a[j] != 0) stage_ += h * rows_[i].a[j] * k_[j];
@@ -43,10 +48,12 @@ void ExplicitRungeKutta::step(Chart& chart, double h, State& out) {
   chart.finish(t + h, y_, out);
 }
 
+// Kutta's classical tableau.
 RungeKutta4::RungeKutta4()
     : ExplicitRungeKutta({{0.5, {0.5}}, {0.5, {0, 0.5}}, {1, {0, 0, 1}}},
                          {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6}) {}
 
+// The tableau of the pair 5(4) with seven stages; the last one is the first of the next step.
 DormandPrince::DormandPrince()
     : ExplicitRungeKutta(
           {{1.0 / 5, {1.0 / 5}},
@@ -58,6 +65,7 @@ DormandPrince::DormandPrince()
           {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}) {}
 
 void DormandPrince::step(Chart& chart, double h, State& out) {
+  // Weights of order 5 less those of order 4.
   static constexpr double kError[7] = {71.0 / 57600,      0,          -71.0 / 16695, 71.0 / 1920,
                                        -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
   ExplicitRungeKutta::step(chart, h, out);
@@ -67,6 +75,7 @@ void DormandPrince::step(Chart& chart, double h, State& out) {
 }
 
 void DormandPrince::interpolate(double theta, VectorX& y) const {
+  // Shampine's continuous extension, as in Hairer's code DOPRI5.
   static constexpr double kDense[7] = {
       -12715105075.0 / 11282082432.0,  0,
       87487479700.0 / 32700410799.0,   -10690763975.0 / 1880347072.0,

@@ -13,6 +13,8 @@ constexpr double kDifference = 1e-7;
 
 }  // namespace
 
+// The Jacobian of (u, w, z) in blocks: u' = w, and (w', z') from Linearization; work is no part of
+// it.
 void ImplicitStepper::begin(Chart& chart) {
   nv_ = chart.nv();
   nz_ = chart.nz();
@@ -79,6 +81,8 @@ void ImplicitStepper::to_chart(Chart& chart) {
       // The body sees its linear velocity turn as it turns.
       jacobian_.block(nv_, i + 3, nv_ + nz_, 3) +=
           (jacobian_.block(nv_, w, nv_ + nz_, 3) * skew(linear)).eval();
+      // The derivative of (rotation of a + spin x v) at u = 0, where the rotation's derivative is
+      // -[ . ]x.
       jacobian_.block<3, 3>(w, i + 3) += skew(spin) * skew(linear) - skew(acceleration);
       jacobian_.block<3, 3>(w, w) += skew(spin);
       jacobian_.block<3, 3>(w, w + 3) -= skew(linear);
@@ -98,12 +102,14 @@ void ImplicitStepper::to_chart(Chart& chart) {
   }
 }
 
+// I / (gamma h) - J: scaled so that h enters on the diagonal alone.
 void ImplicitStepper::factorize(double gamma_h) {
   matrix_ = -jacobian_;
   matrix_.diagonal().array() += 1 / gamma_h;
   lu_.compute(matrix_);
 }
 
+// Right-hand sides hold no work: it is integrated by quadrature.
 void ImplicitStepper::solve(VectorX& x) {
   const int n = 2 * nv_ + nz_;
   solution_ = lu_.solve(x.head(n));
@@ -111,6 +117,7 @@ void ImplicitStepper::solve(VectorX& x) {
   x.tail<Chart::kWork>().setZero();
 }
 
+// (I / h - J) k = f(y) + h f_t; y + k is the end. One Newton step of the implicit Euler method.
 void LinearlyImplicitEuler::step(Chart& chart, double h, State& out) {
   factorize(h);
   const int n = static_cast<int>(rate_of_time_.size());
@@ -128,6 +135,7 @@ void LinearlyImplicitEuler::step(Chart& chart, double h, State& out) {
 }
 
 void Rodas::step(Chart& chart, double h, State& out) {
+  // Coefficients of RODAS in the transformed form, which needs no product with the Jacobian.
   static constexpr double kGamma = 0.25;
   static constexpr double kNode[kStages] = {0, 0.386, 0.21, 0.63, 1, 1};
   static constexpr double kTime[kStages] = {0.25, -0.1043, 0.1035, -0.0362, 0, 0};
@@ -162,6 +170,7 @@ void Rodas::step(Chart& chart, double h, State& out) {
     g_[i].head(n) += h * kTime[i] * rate_of_time_;
     solve(g_[i]);
   }
+  // Stiffly accurate: the last stage's increment is the estimate of the error.
   error_ = g_[kStages - 1];
   y_ = stage_ + error_;
   chart.finish(t + h, y_, out);
@@ -170,6 +179,7 @@ void Rodas::step(Chart& chart, double h, State& out) {
 // The powers of stiff contacts are smooth on the motion but not at the stages: Simpson's rule.
 void Rodas::complete(Chart& chart, State& out) {
   const double t = chart.origin().t;
+  // Two evaluations more, at the middle of the dense output and at the end.
   power_[0] = rate_.tail<Chart::kWork>();
   interpolate(0.5, middle_);
   chart.rate(t + 0.5 * h_, middle_, rate_at_stage_);
@@ -180,12 +190,14 @@ void Rodas::complete(Chart& chart, State& out) {
   chart.finish(t + h_, y_, out);
 }
 
+// The dense output of Hairer's code; work by the parabola through the powers.
 void Rodas::interpolate(double theta, VectorX& y) const {
   static constexpr double kD[2][5] = {{10.12623508344586, -7.487995877610167, -34.80091861555747,
                                        -7.992771707568823, 1.025137723295662},
                                       {-0.6762803392801253, 6.087714651680015, 16.43084320892478,
                                        24.76722511418386, -6.594389125716872}};
   const double rest = 1 - theta;
+  // Hermite-like: linear, plus a bubble with the dense output's coefficients.
   y = rest * start_ + theta * y_;
   for (int j = 0; j < 5; ++j) y += theta * rest * (kD[0][j] + theta * kD[1][j]) * g_[j];
   // The integral of the parabola through the powers.

@@ -16,6 +16,7 @@ class ImplicitStepper : public Stepper {
   bool is_implicit() const override { return true; }
 
  protected:
+  // Of I / gamma_h - Jacobian.
   void factorize(double gamma_h);
   // In place; work is no part of the system.
   void solve(VectorX& x);
@@ -24,6 +25,7 @@ class ImplicitStepper : public Stepper {
   VectorX rate_of_time_;
 
  private:
+  // How torques change with the state, and with time; and the Jacobian in coordinates of the chart.
   void linearize_torques(Chart& chart);
   void add_time(Chart& chart);
   void to_chart(Chart& chart);

@@ -8,6 +8,7 @@ namespace sphshell {
 class StepSlopes;
 struct Tangent;
 
+// An integration method: one step at a time, which may be repeated.
 class Stepper {
  public:
   virtual ~Stepper() = default;

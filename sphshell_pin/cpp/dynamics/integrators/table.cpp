@@ -12,6 +12,7 @@ namespace {
 
 template <class Method>
 std::unique_ptr<Stepper> make(SceneData& scene) {
+  // Implicit methods linearize the scene and are made for it.
   if constexpr (std::is_constructible_v<Method, SceneData&>)
     return std::make_unique<Method>(scene);
   else

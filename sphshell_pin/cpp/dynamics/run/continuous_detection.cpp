@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "shell/curved/curved.hpp"
-
 namespace sphshell {
 namespace {
 
@@ -16,11 +14,18 @@ constexpr double kSeen = 1e-3;
 constexpr double kTurn = 0.5;
 constexpr double kMostTurned = 16;
 
+// A lower bound of the distance from a center to what is on body j [m].
+double distance_of(const Pair& pair, const Vec3& center) {
+  return pair.ask([&](const auto& one) { return one.distance(center); });
+}
+
 }  // namespace
 
+// One known distance for each pair and each cluster.
 Guard::Guard(const SceneData& scene)
     : known_(scene.pairs().size()), known_of_cluster_(scene.clusters().size()) {}
 
+// Where each sphere is at the begin of the step, and whether it touches.
 void Guard::begin(const SceneData& scene) {
   for (std::size_t k = 0; k < known_.size(); ++k) {
     known_[k].center = scene.states()[k].center;
@@ -53,6 +58,9 @@ bool Guard::is_clear(const SceneData& scene, const Cluster& cluster, Known& know
          moved <= slack + gap(scene.pairs()[cluster.first], cluster.radius, known);
 }
 
+// The share of the step up to which no sphere can have passed through anything unseen; 1 and more:
+// all of it. A touching sphere may move by kTouching of its radius, another one by its gap and
+// kApart.
 double Guard::allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end) {
   double share = std::numeric_limits<double>::infinity();
   const double h = to.t - from.t;
@@ -69,7 +77,7 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to, bool
       }
     }
     const Pair& pair = scene.pairs()[k];
-    if (pair.source) continue;
+    if (!pair.has_sphere()) continue;
     const double radius = pair.least_radius();
     Known& known = known_[k];
     const Excursion& excursion = scene.excursions()[k];
@@ -84,28 +92,21 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to, bool
     if (moved <= slack) continue;
     double limit = slack + (known.touching ? 0 : gap(pair, pair.radius, known));
     if (gap_at_end && moved > limit && !known.touching)
-      limit += std::max(0.0, distance(pair, scene.states()[k].center) - pair.radius);
+      limit += std::max(0.0, distance_of(pair, scene.states()[k].center) - pair.radius);
     share = std::min(share, limit / moved);
   }
   if (turned > kTurn) scene.body().kinematics(to.q, to.v);
   return share;
 }
 
-// A lower bound of the distance to the shell, or to the ball.
-double Guard::distance(const Pair& pair, const Vec3& center) {
-  if (pair.ball > 0) return center.norm() - pair.ball;
-  const double distance = std::abs(pair.shell->closest_point(center).distance);
-  const bool is_curved = pair.method == Method::Smooth && pair.shell->curved() != nullptr;
-  return is_curved ? distance - pair.shell->curved()->bulge() : distance;
-}
-
 // A lower bound of the gap of a sphere at the begin of the step; the distance is looked up where
 // the one known is worn out.
 double Guard::gap(const Pair& pair, double radius, Known& known) {
+  // The distance known at the anchor, less the way since: still a lower bound.
   double distance = known.distance - (known.center - known.anchor).norm();
   if (known.distance < 0 || distance < std::max(2 * radius, 0.5 * known.distance)) {
     known.anchor = known.center;
-    distance = known.distance = Guard::distance(pair, known.center);
+    distance = known.distance = distance_of(pair, known.center);
   }
   return std::max(0.0, distance - radius);
 }

@@ -31,7 +31,7 @@ class Guard {
     double distance = -1;
   };
 
-  static double distance(const Pair& pair, const Vec3& center);
+  // Lower bounds at the begin of the step, and the length of a center's path, in meters.
   static double gap(const Pair& pair, double radius, Known& known);
   bool is_clear(const SceneData& scene, const Cluster& cluster, Known& known) const;
   double path(SceneData& scene, std::size_t k, const State& from, const State& to);

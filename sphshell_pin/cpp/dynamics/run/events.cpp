@@ -44,6 +44,7 @@ void Events::begin() {
 }
 
 bool Events::changed(std::size_t k) const {
+  // Numbers of contacts, less saddles, and of clamped ones.
   const Start state = now(k);
   return state.pieces != at_begin_[k].pieces || state.clamped != at_begin_[k].clamped;
 }
@@ -65,6 +66,7 @@ bool Events::met_at(double theta, const Motion& motion, const Chart& chart) {
 // A sphere that is larger by the margin has contacts with a gap, too.
 void Events::measure(std::size_t k, double margin, Gauges& out) {
   for (std::vector<double>& values : out) values.clear();
+  // Behind the pairs come the stops of joints.
   if (k >= scene_.pairs().size()) {
     const std::size_t i = k - scene_.pairs().size();
     const StopState& state = scene_.joints().stops()[i];
@@ -76,13 +78,10 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
     return;
   }
   const Pair& pair = scene_.pairs()[k];
-  if (pair.ball > 0)
-    out[Minimum].push_back(pair.radius + pair.ball - scene_.states()[k].center.norm());
-  if (pair.shell) {
-    query_.find(*pair.shell, scene_.states()[k].center, pair.radius + margin, pair.method);
-    for (const Contact& contact : query_.contacts)
-      out[contact.weight > 0 ? Minimum : Saddle].push_back(contact.depth - margin);
-  }
+  const Vec3& center = scene_.states()[k].center;
+  pair.ask([&](const auto& one) { one.find_near(center, pair.radius, margin, query_); });
+  for (const Contact& contact : query_.contacts)
+    out[contact.weight > 0 ? Minimum : Saddle].push_back(contact.depth);
   for (const ActiveContact& active : scene_.active()) {
     if (active.pair != static_cast<int>(k)) continue;
     const ContactKinematics<double>& m = active.kinematics;
@@ -93,6 +92,9 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
     std::sort(values.begin(), values.end(), std::greater<double>());
 }
 
+// Root finding on a continuous quantity (a depth, or the unclamped force), with the sign of met(),
+// so that the step ends on the right side whatever else happens. TOMS 748: Alefeld, Potra and Shi,
+// ACM Trans. Math. Softw. 21 (1995) 327.
 double Events::locate(double before, double after, double tolerance, const Motion& motion,
                       const Chart& chart) {
   met_at(after, motion, chart);
@@ -113,6 +115,7 @@ double Events::locate(double before, double after, double tolerance, const Motio
   double known = 0;
   Vec3 from = end;
   if (kind < kKinds) {
+    // Sorted from large to small: the quantity with this index is the one that passes through zero.
     const long counts[] = {count_positive(before_[kind]), count_positive(after_[kind])};
     index = static_cast<std::size_t>(std::min(counts[0], counts[1]));
     const bool comes = counts[1] > counts[0];

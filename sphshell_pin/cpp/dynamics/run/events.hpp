@@ -45,7 +45,9 @@ class Events {
   enum Kind { Minimum, Saddle, Clamp, kKinds };
   using Gauges = std::array<std::vector<double>, kKinds>;
 
+  // Whether contacts of pair or stop k have come or gone since begin().
   bool changed(std::size_t k) const;
+  // The quantities whose signs change at events, sorted.
   void measure(std::size_t k, double margin, Gauges& out);
 
   SceneData& scene_;

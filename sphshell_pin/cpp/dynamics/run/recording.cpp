@@ -23,6 +23,7 @@ constexpr std::uintmax_t kMostPeakLooks = 50;
 
 }  // namespace
 
+// Summaries of the pairs, then of the joints' stops.
 Recorder::Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches)
     : start_(start),
       end_(end),
@@ -50,6 +51,7 @@ void Recorder::record_torques(TorquesAt torques, Eigen::Index nv) {
                             std::numeric_limits<double>::quiet_NaN());
 }
 
+// What is asked for goes on being recorded, from nothing.
 Record Recorder::take() {
   Record next;
   if (record_.patches) next.patches.emplace();
@@ -57,6 +59,7 @@ Record Recorder::take() {
   return std::exchange(record_, std::move(next));
 }
 
+// A row of its own; what was recorded before is put back.
 Record Recorder::snapshot(SceneData& scene, const State& state) {
   Record recorded = take();
   const long rows = std::exchange(rows_, 0);
@@ -72,6 +75,7 @@ void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& ste
     // The end is a row, and none stands a round-off before it.
     const double last = end_ - 1e-9 * record_dt_;
     bool moved = false;
+    // Rows between accepted steps are evaluated on the dense output.
     for (; due() < to.t && due() < last; ++next_row_) {
       const double share = (due() - from.t) / (to.t - from.t);
       stepper.interpolate(share, y_);
@@ -91,6 +95,7 @@ void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& ste
   add_row(scene, to);
 }
 
+// Contacts, state, energies, torques and sensitivities at one time.
 void Recorder::add_row(SceneData& scene, const State& state, double share) {
   scene.log(state.q, state.v, record_.contacts, record_.patches ? &*record_.patches : nullptr);
   record_.contact_row.resize(record_.contacts.size(), double(rows_));
@@ -98,6 +103,7 @@ void Recorder::add_row(SceneData& scene, const State& state, double share) {
   record_.q.insert(record_.q.end(), state.q.begin(), state.q.end());
   record_.v.insert(record_.v.end(), state.v.begin(), state.v.end());
   const Powers& powers = scene.powers();
+  // Columns of Record::energy, in this order [J]; the energy that bristles hold is not lost yet.
   const double kinetic = scene.body().kinetic_energy(state.q, state.v);
   const double potential = scene.body().potential_energy(state.q);
   const Ledger& ledger = state.ledger;
@@ -118,6 +124,7 @@ void Recorder::add_touch(std::size_t k, const Touch& now, double t, double h, in
   PairSummary& summary = summaries_[k];
   PairStatus& status = status_[k];
   const Touch before = std::exchange(status.touch, now);
+  // Over a step that begins in touch; the impulse by the trapezoidal rule.
   if (before.touching) summary.contact_time += h;
   summary.impulse += 0.5 * h * (before.normal_force + now.normal_force);
   if (now.touching != before.touching) {
@@ -146,6 +153,8 @@ Recorder::Touch Recorder::touch_of(const SceneData& scene, std::size_t k) const 
   return {now.touching, now.force, now.depth};
 }
 
+// Peaks between the ends of a step, on its dense output: looked for only where the rate at the
+// higher end says that there is one.
 void Recorder::add_peaks(SceneData& scene, const Chart& chart, const Stepper& stepper,
                          const State& from, const State& to) {
   bool moved = false;
@@ -164,6 +173,7 @@ void Recorder::add_peaks(SceneData& scene, const Chart& chart, const Stepper& st
     for (const auto& [of, most] : {std::pair(&Touch::normal_force, &PairSummary::peak_force),
                                    std::pair(&Touch::depth, &PairSummary::max_depth)}) {
       // Towards its higher end a rate that has changed its sign falls.
+      // A quantity that still grows backwards from its higher end has its peak within the step.
       const bool rises = last.*of > first.*of;
       const double higher = rises ? last.*of : first.*of;
       if (!(higher > 0) || higher < kNearPeak * summary.*most) continue;
@@ -183,6 +193,7 @@ void Recorder::add_peaks(SceneData& scene, const Chart& chart, const Stepper& st
   scene.evaluate(to.q, to.v, to.z);
 }
 
+// Events and sums of an accepted step of length h that ends at t.
 void Recorder::add_step(const SceneData& scene, double t, double h) {
   const std::size_t pairs = scene.pairs().size();
   for (std::size_t k = 0; k < pairs; ++k) {
@@ -191,6 +202,7 @@ void Recorder::add_step(const SceneData& scene, double t, double h) {
     const auto add_event = [&](Event::Kind kind) { record_.events.push_back({t, number, kind}); };
     PairStatus& status = status_[k];
     add_touch(k, touch_of(scene, k), t, h, number, Event::Kind::Touch);
+    // Warnings, once each time a threshold is passed.
     const bool beyond = now.conformity > kMostConformal || now.half_axis > kLargestEllipse;
     if (beyond && !status.beyond_hertz) add_event(Event::Kind::BeyondHertz);
     status.beyond_hertz = beyond;
@@ -207,6 +219,8 @@ void Recorder::add_step(const SceneData& scene, double t, double h) {
     add_touch(k, touch_of(scene, k), t, h, static_cast<int>(k - pairs), Event::Kind::Stop);
 }
 
+// Of the velocities that have a limit: times during which efforts were cut, peak speeds, and events
+// where either begins or ends.
 void Recorder::add_limits(const SceneData& scene, const VectorX& v, const std::vector<char>& cut,
                           double t, double h) {
   for (std::size_t i = 0; i < limits_.size(); ++i) {

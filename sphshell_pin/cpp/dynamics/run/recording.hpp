@@ -9,6 +9,7 @@
 
 namespace sphshell {
 
+// At time t [s], of a pair, a joint stop or a joint.
 struct Event {
   enum class Kind : int {
     Touch,
@@ -77,6 +78,7 @@ class RowFollower {
   virtual void add_row(const State& state, double share) = 0;
 };
 
+// What a run leaves behind: rows, events, sums and peaks of each pair.
 class Recorder {
  public:
   // Rows every `record_dt` from `start` to `end` [s], and at `end`; 0: at the end of every step.
@@ -129,6 +131,7 @@ class Recorder {
     bool cut = false, too_fast = false;
   };
 
+  // Of pair or stop k at the state of the scene; and peaks that it raises.
   Touch touch_of(const SceneData& scene, std::size_t k) const;
   static void raise_peaks(PairSummary& summary, const Touch& now, double t);
   void add_touch(std::size_t k, const Touch& now, double t, double h, int number,

@@ -6,6 +6,7 @@
 
 namespace sphshell {
 
+// Threads wait for tasks from now on.
 Rollout::Rollout(const pinocchio::Model& model, int threads) : model_(model) {
   try {
     while (static_cast<int>(threads_.size()) < threads) threads_.emplace_back([this] { work(); });
@@ -23,6 +24,7 @@ void Rollout::add(Task task) {
   added_.notify_one();
 }
 
+// Until no more than `left` tasks are unfinished, or for so long [s]; returns how many are done.
 std::size_t Rollout::wait(std::size_t left, double seconds) {
   std::unique_lock lock(mutex_);
   finished_.wait_for(lock, std::chrono::duration<double>(seconds),
@@ -35,6 +37,7 @@ std::vector<Lent> Rollout::give_back() {
   return std::exchange(lent_, {});
 }
 
+// Runs under way see the flag and end after their step.
 void Rollout::stop() {
   {
     const std::lock_guard lock(mutex_);
@@ -45,6 +48,7 @@ void Rollout::stop() {
   threads_.clear();
 }
 
+// Takes the tasks in the order in which they were added, until stop().
 void Rollout::work() {
   for (;;) {
     std::size_t number;

@@ -48,6 +48,7 @@ class Rollout {
   Rollout(const Rollout&) = delete;
   Rollout& operator=(const Rollout&) = delete;
 
+  // Any free thread takes it up.
   void add(Task task);
   // Waits until `left` runs or fewer are not finished, for `seconds` at most; returns how many are.
   std::size_t wait(std::size_t left, double seconds);
@@ -61,6 +62,7 @@ class Rollout {
   const pinocchio::Model& model() const { return model_; }
 
  private:
+  // A thread's loop; and one run, whose errors become part of its outcome.
   void work();
   Outcome run(Task task, Lent& lent) const;
 

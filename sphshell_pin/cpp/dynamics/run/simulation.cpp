@@ -16,11 +16,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-bool is_closed(const Shell& shell) {
-  const std::vector<Edge>& edges = shell.topology().edges;
-  return std::none_of(edges.begin(), edges.end(), [](const Edge& edge) { return edge.count == 1; });
-}
-
+// With bristles that are not stretched.
 State state_at(double t, VectorX q, VectorX v, int bristle_size) {
   return {t, std::move(q), std::move(v), VectorX::Zero(bristle_size), {}};
 }
@@ -70,17 +66,17 @@ void Simulation::differentiate(SensitivitySettings settings) {
   recorder_.set_follower(sensitivities_.get());
 }
 
+// See the declaration; a contact source knows no radius that a depth could be compared with.
 std::optional<DeepStart> Simulation::deep_start() {
   if (!started_) start();
   for (std::size_t k = 0; k < scene_.pairs().size(); ++k) {
     const Pair& pair = scene_.pairs()[k];
-    if (pair.source) continue;
-    double depth = scene_.states()[k].depth;
-    if (pair.shell && pair.shell->side() != Side::Both && depth == 0) {
-      const double distance = pair.shell->closest_point(scene_.states()[k].center).distance;
-      const double outside = pair.shell->side() == Side::Outside ? distance : -distance;
-      if (outside < 0 && is_closed(*pair.shell)) depth = pair.radius - outside;
-    }
+    if (!pair.has_sphere()) continue;
+    const PairState& state = scene_.states()[k];
+    double depth = state.depth;
+    if (depth == 0)
+      depth =
+          pair.ask([&](const auto& one) { return one.depth_behind(state.center, pair.radius); });
     if (depth > kDeepStart * pair.least_radius()) return DeepStart{static_cast<int>(k), depth};
   }
   return {};
@@ -88,6 +84,7 @@ std::optional<DeepStart> Simulation::deep_start() {
 
 Simulation::Status Simulation::advance(double wall_seconds, double until,
                                        const std::atomic<bool>* stop) {
+  // The clock is looked at every 16 steps, or at each where steps are slow.
   until_ = until;
   if (finished_) return Status::Finished;
   const auto start_of_call = std::chrono::steady_clock::now();
@@ -129,6 +126,8 @@ Record Simulation::take() {
   return out;
 }
 
+// Fixed steps end on a grid that is computed from the start, so that rounding does not add up;
+// others at the next time at which torques change.
 double Simulation::end_of_step() const {
   if (settings_.dt > 0)
     return grid_ + 1 >= grid_steps_ ? end()
@@ -139,6 +138,7 @@ double Simulation::end_of_step() const {
   return out;
 }
 
+// One step, or a part of a fixed step that had to be divided: the next call goes on.
 Simulation::Status Simulation::step() {
   if (fine_steps_ == 0) hold_torques();
   if (sensors_) sensors_->begin_step(scene_, *this, stepping_.state(), push_);
@@ -159,6 +159,7 @@ Simulation::Status Simulation::step() {
     if (stepping_.fine() && stepping_.proposal() > 0.5 * settings_.dt) stepping_.set_fine(false);
     ++grid_;
     ++steps_;
+    // Rows of fixed steps: of the steps whose number is a multiple of the ratio.
     const long every =
         settings_.record_dt > 0 ? std::max(1L, std::lround(settings_.record_dt / settings_.dt)) : 1;
     if (status == Status::Running && (grid_ % every == 0 || at_end()))
@@ -176,6 +177,8 @@ Simulation::Status Simulation::replace_fixed_step(double end) {
 
 // False where no step is short enough.
 bool Simulation::make_controlled(double end) {
+  // Sensors and rows within the step need its dense output, so they come before the step is
+  // accepted.
   if (controller_) kink_ = controller_->next_kink(time());
   switch (stepping_.make_controlled(end)) {
     case Stepping::Made::Stuck:
@@ -202,11 +205,13 @@ bool Simulation::make_controlled(double end) {
   return true;
 }
 
+// Before the step is accepted, as the scene must still know where it began.
 void Simulation::differentiate_step() {
   const KeptCuts kept(cut_);
   sensitivities_->step(stepping_.chart(), stepping_.stepper(), stepping_.state(), stepping_.next());
 }
 
+// Sensors, derivatives and recording see the step, each at its place in this order.
 void Simulation::accept() {
   const double before = time();
   if (sensors_ && settings_.dt > 0) {
@@ -301,6 +306,7 @@ Record Simulation::snapshot() {
 }
 
 void Simulation::push(int joint, const Vec3& point, const PointForce& force, int frame) {
+  // The spring and damper of a push need the joint's placement and velocity.
   scene_.need_velocity_of(joint);
   // The next step begins with what was evaluated here, maybe without this joint.
   scene_.body().kinematics(q(), v());
@@ -309,6 +315,7 @@ void Simulation::push(int joint, const Vec3& point, const PointForce& force, int
 }
 
 void Simulation::take_over(const Simulation& before) {
+  // Both runs have a controller, or neither goes on.
   if (!controller_ || !before.controller_) return;
   controller_->take_over(*before.controller_, time());
   next_control_ = time();
@@ -320,6 +327,7 @@ void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
   State& state = stepping_.state();
   scene_.restart();
   scene_.evaluate(state.q, state.v, state.z, true);
+  // At the same state, with the laws before and after the change.
   const double before = scene_.powers().elastic;
   scene_.change(std::move(pairs), std::move(joints));
   if (controller && controller != controller_) {

@@ -45,6 +45,7 @@ struct Lent {
   std::shared_ptr<Controller> controller;
 };
 
+// A run that goes on in pieces: steps, controllers, sensors, recording.
 class Simulation : private Torques {
  public:
   enum class Status : int { Running = 0, Finished = 1, Diverged = 2, Stuck = 3 };
@@ -121,6 +122,8 @@ class Simulation : private Torques {
   bool follow_time() const override;
 
   void start();
+  // Parts of a step, in their order: its length, the step itself (divided where a fixed one is too
+  // long), derivatives, acceptance, and the torques that are held from then on.
   void begin_sensors();
   Status step();
   Status replace_fixed_step(double end);

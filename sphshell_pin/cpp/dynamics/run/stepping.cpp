@@ -43,6 +43,7 @@ Stepping::Stepping(SceneData& scene, Torques& torques, const StepSettings& setti
   set_fine(false);
 }
 
+// A fixed step that the guard refuses is divided by a method with error control.
 void Stepping::set_fine(bool fine) {
   if (fine && !fine_stepper_)
     fine_stepper_ = make_stepper(stepper_->is_implicit() ? "implicit" : "adaptive", scene_);
@@ -51,6 +52,7 @@ void Stepping::set_fine(bool fine) {
   scene_.relax_in(is_explicit ? settings_.dt : 0);
 }
 
+// Forgets the history of step lengths: the right-hand side is another one from here on.
 void Stepping::restart() {
   scene_.evaluate(state_.q, state_.v, state_.z, true);
   last_ = scene_.powers();
@@ -63,11 +65,13 @@ void Stepping::restart() {
   last_error_ = 1;
 }
 
+// Of the steps that replace a fixed one, or those asked for.
 Stepping::Tolerances Stepping::tolerances() const {
   if (settings_.dt > 0) return {kFineTolerance, 1e-2 * kFineTolerance};
   return {settings_.rtol, settings_.atol};
 }
 
+// False where the motion was too long for collision detection: nothing has been changed then.
 bool Stepping::make_fixed(double end) {
   chart_.begin(state_);
   active_->begin(chart_);
@@ -86,7 +90,9 @@ bool Stepping::make_fixed(double end) {
 
 Stepping::Made Stepping::make_controlled(double end) {
   const double left = end - state_.t;
+  // Below this a step does not change the time by a reliable amount.
   const double shortest = 8 * spacing(end);
+  // Nothing is left but rounding.
   if (left <= spacing(end)) {
     state_.t = end;
     return Made::Nothing;
@@ -99,6 +105,8 @@ Stepping::Made Stepping::make_controlled(double end) {
   double h = proposal_ > 0.95 * left ? left : std::min(proposal_, 0.5 * left);
   if (free_) h = predicted_step(h);
   h = std::min(std::max(h, 4 * shortest), left);
+  // Steps are made until one is kept: its error is small, no sphere has moved too far, and it ends
+  // at an event if there was one.
   const double order = active_->order_of_error();
   bool rejected = false;
   int event_steps = 0, kink_rejections = 0;
@@ -149,6 +157,7 @@ Stepping::Made Stepping::make_controlled(double end) {
     }
     ++rejected_;
     rejected = true;
+    // error ~ h^order: the step for which the error would be 0.9 of its limit.
     const double power = -1 / (limit < 1 ? kOrderAtKink : order);
     if (limit < 1) ++kink_rejections;
     h *= error < 1e300 ? std::clamp(0.9 * std::pow(error / limit, power), 0.1, 0.9) : 0.1;
@@ -156,6 +165,7 @@ Stepping::Made Stepping::make_controlled(double end) {
   active_->complete(chart_, next_);
   if (after_event_)
     for (const ActiveContact& active : scene_.active())
+      // A contact that begins at the end of the step has had no time to be stretched.
       if (active.slot >= 0 && scene_.is_new(active))
         next_.z.segment(3 * active.slot, 3 * scene_.pairs()[active.pair].friction.rings())
             .setZero();
@@ -223,6 +233,8 @@ double Stepping::error_norm() const {
     if (active.slot < 0 || scene_.is_new(active)) continue;
     const FrictionLaw& friction = scene_.pairs()[active.pair].friction;
     const double stiffness = active.force.stiffness;
+    // The stretch at which the contact begins to slip: what errors are compared with while it is
+    // small.
     const double limit = friction.sticking()->mu_static * active.force.normal / stiffness;
     for (int i = 0; i < friction.rings(); ++i) {
       const auto stretch = [&](const VectorX& z) {
@@ -261,6 +273,7 @@ double Stepping::first_step() {
   const double rtol = tolerances().rtol;
   const VectorX &start = active_->start(), &rate = active_->rate();
   const double speed = weighted(rate, start);
+  // An explicit Euler step that changes the state by a hundredth of its size.
   const double h = speed > 0 ? 0.01 / (rtol * speed) : 1e-6;
   probe_ = start + h * rate;
   scene_.restart();
@@ -274,6 +287,7 @@ double Stepping::first_step() {
 void Stepping::accept() {
   const Powers now = scene_.powers();
   const double h = next_.t - state_.t;
+  // By the trapezoidal rule from the powers at both ends.
   if (active_->leaves_work()) {
     next_.ledger.damping += 0.5 * h * (last_.damping + now.damping);
     next_.ledger.friction += 0.5 * h * (last_.friction + now.friction);

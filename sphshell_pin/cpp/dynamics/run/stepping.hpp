@@ -10,6 +10,7 @@
 
 namespace sphshell {
 
+// dt > 0: fixed steps; else the tolerances hold.
 struct StepSettings {
   std::string integrator = "semi-implicit-euler";  // a name of integrators/table.cpp
   double dt = 0;                                   // of a fixed step [s]; 0: the error decides
@@ -43,6 +44,7 @@ class Stepping {
   bool at_event() const { return after_event_; }
   // Steps of the fixed length are replaced by controlled ones where a sphere moves too far.
   bool fine() const { return active_ != stepper_.get(); }
+  // Whether fixed steps are divided by a method with error control.
   void set_fine(bool fine);
 
   double proposal() const { return proposal_; }  // of the next controlled step [s]

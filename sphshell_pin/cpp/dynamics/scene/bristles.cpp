@@ -28,12 +28,15 @@ Vec3 flattened(const Vec3& x, const Vec3& normal) {
 
 }  // namespace
 
+// One pool of spare slots for each group.
 Bristles::Bristles(std::vector<int> groups)
     : groups_(std::move(groups)),
       known_(groups_.size()),
       pools_(groups_.empty() ? 0 : static_cast<std::size_t>(groups_.back()) + 1),
       rings_(groups_.size(), 0) {}
 
+// A group with more pairs has more spare slots, up to kMostSpare; a pool is shared from its second
+// pair on.
 void Bristles::add(std::size_t k, int rings) {
   rings_[k] = rings;
   Pool& pool = pools_[groups_[k]];
@@ -42,12 +45,16 @@ void Bristles::add(std::size_t k, int rings) {
   pool.count = std::min(pool.count + kSpare, kMostSpare);
   pool.taken.reserve(kMostSpare);
   size_ = 0;
+  // Without contacts there are spare slots only, one pool behind the other.
   for (Pool& one : pools_) {
     one.first = size_;
     size_ += one.count * one.rings;
   }
 }
 
+// A known contact has its slots; a new one takes a spare, and keeps it for the step, so that the
+// stages of a step find the same state. -1: none is left, and the contact has no bristle until the
+// step is accepted.
 int Bristles::slot(std::size_t k, int place) {
   if (!rings_[k]) return -1;
   const Known& known = known_[k];
@@ -97,6 +104,7 @@ void Bristles::assign(std::size_t k, const std::vector<Contact>& contacts,
     for (int ring = 0; ring < rings; ++ring) {
       Vec3 x = stretch(k, at[i], ring, z);
       const Vec3& normal = contacts[i].normal;
+      // The stretch turns with the normal by the shortest rotation.
       if (!turned) x = Eigen::Quaterniond::FromTwoVectors(places[at[i]].normal, normal) * x;
       stretches_.push_back(torsional ? x : flattened(x, normal));
     }
@@ -134,6 +142,8 @@ void Bristles::assign(std::size_t k, const std::vector<Contact>& contacts,
     const int minimum = nearest(point, places.data(), tracker.known(), [&](std::size_t p) {
       return !places[p].saddle && !places[p].taken && !is_used(static_cast<int>(p));
     });
+    // The sum of stretches, a saddle's with its negative weight, is what the successor's must be
+    // for the force not to jump.
     const int successor = minimum_near(point, [](int) { return true; });
     if (minimum < 0 || successor < 0) continue;
     used_.push_back(minimum);
@@ -144,6 +154,8 @@ void Bristles::assign(std::size_t k, const std::vector<Contact>& contacts,
   close(k, begin);
 }
 
+// Slots now are those of the accepted contacts, in their order, each group's spare ones behind
+// them.
 void Bristles::end(VectorX& z) {
   size_ = static_cast<int>(stretches_.size());
   z.resize(size());

@@ -32,6 +32,7 @@ class Bristles {
   // At an accepted state all slots are assigned anew: begin(), then each pair in its order, then
   // end(), which puts the stretches z in that order.
   void begin() { stretches_.clear(); }
+  // Of a pair without contacts, or without bristles.
   void assign_none(std::size_t k);
   // `turned`: the stretches have followed their normals already.
   void assign(std::size_t k, const std::vector<Contact>& contacts, const std::vector<int>& at,
@@ -52,7 +53,9 @@ class Bristles {
     std::vector<std::pair<std::size_t, int>> taken;  // pair, place
   };
 
+  // That of a contact in z, zero where it has no slot.
   Vec3 stretch(std::size_t k, int place, int ring, const VectorX& z);
+  // Ends the slots of pair k.
   void close(std::size_t k, std::size_t begin);
 
   std::vector<int> groups_;

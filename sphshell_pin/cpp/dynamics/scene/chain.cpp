@@ -4,6 +4,8 @@ namespace sphshell {
 Chain::Chain(const pinocchio::Model& model, int joint_j, int joint_i) {
   const auto& to_j = model.supports[joint_j];
   const auto& to_i = model.supports[joint_i];
+  // supports: the joints from the root to a joint. Behind the last common one the way goes up from
+  // body j, and down to body i.
   std::size_t common = 0;
   while (common < to_j.size() && common < to_i.size() && to_j[common] == to_i[common]) ++common;
   for (std::size_t k = to_j.size(); k > common; --k) add(model, static_cast<int>(to_j[k - 1]), -1);
@@ -25,6 +27,7 @@ void Chain::add(const pinocchio::Model& model, int joint, double sign) {
 void Chain::place(const Multibody& body, const pinocchio::SE3& world_from_shell, const VectorX& v) {
   using pinocchio::Motion;
   turns_.clear();
+  // From body i backwards: what a joint moves is all that is behind it in the chain.
   Motion behind = Motion::Zero();  // velocity of body i against the body behind the link
   for (auto link = links_.rbegin(); link != links_.rend(); ++link) {
     Motion own = Motion::Zero();
@@ -53,11 +56,14 @@ void Chain::place(const Multibody& body, const pinocchio::SE3& world_from_shell,
     }
 }
 
+// Generalized force of axis k: its scalar product with the wrench.
 void Chain::add_force(const Vector6& wrench, VectorX& force, MatrixX& by_q) const {
   for (int k = 0; k < size(); ++k) force[velocity_[k]] += axes_.col(k).dot(wrench);
   for (const Link& link : links_)
     for (int m = link.first; m < link.first + link.count; ++m) {
       const pinocchio::Motion axis(axes_.col(m));
+      // An axis that an earlier joint turns changes by [axis_m, axis_k]; with the wrench held, by
+      // the dual cross product.
       const Vector6 rate = axis.cross(pinocchio::Force(wrench)).toVector();
       for (int k = link.moved; k < size(); ++k)
         by_q(velocity_[k], velocity_[m]) -= axes_.col(k).dot(rate);

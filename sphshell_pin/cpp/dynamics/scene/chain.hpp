@@ -42,6 +42,7 @@ class Chain {
     int axis, by;
     Vector6 slope;
   };
+  // Appends a joint's axes to the chain.
   void add(const pinocchio::Model& model, int joint, double sign);
 
   std::vector<Link> links_;

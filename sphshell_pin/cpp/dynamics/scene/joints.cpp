@@ -6,6 +6,7 @@
 
 namespace sphshell {
 
+// Without any effect nothing is allocated, and evaluate() is not called.
 JointForces::JointForces(Effects effects, int nv)
     : effects_(std::move(effects)),
       act_(effects_ && (!effects_->stops.empty() || !effects_->friction.empty() ||
@@ -21,6 +22,7 @@ void JointForces::evaluate(const VectorX& q, const VectorX& v, const VectorRef& 
   powers_ = Powers();
   torque_.setZero();
   if (effects_->damping.size() > 0) {
+    // Viscous damping, -d v, and the power v d v that it takes.
     torque_ = -effects_->damping.cwiseProduct(v);
     powers_.damping = -torque_.dot(v);
   }
@@ -30,6 +32,7 @@ void JointForces::evaluate(const VectorX& q, const VectorX& v, const VectorRef& 
     state = {stop.depth(q)};
     state.touching = state.depth > 0;
     if (!state.touching) continue;
+    // As a gap rate: negative while moving farther beyond the end.
     const double rate = -stop.sign * v[stop.v];
     const NormalForce<double> push = stop.law.force(state.depth, rate);
     state.force = push.total;
@@ -40,6 +43,7 @@ void JointForces::evaluate(const VectorX& q, const VectorX& v, const VectorRef& 
   }
   for (std::size_t i = 0; i < effects_->friction.size(); ++i) {
     const DryFriction& dry = effects_->friction[i];
+    // As BristleFriction::add() in one dimension, with the projection on [-limit, limit].
     const double speed = v[dry.v], x = z[i], held = dry.clamped(dry.stiffness * x);
     const double force = -dry.clamped(dry.stiffness * x + dry.damping * speed);
     torque_[dry.v] += force;
@@ -49,6 +53,7 @@ void JointForces::evaluate(const VectorX& q, const VectorX& v, const VectorRef& 
   }
 }
 
+// Controller and joint components together: what forward dynamics takes.
 const VectorX& JointForces::added(const VectorX& tau) {
   sum_ = tau + torque_;
   return sum_;
@@ -63,6 +68,8 @@ void JointForces::slopes(const VectorX& q, const VectorX& v, const VectorRef& z,
   for (const JointStop& stop : effects_->stops) {
     const double depth = stop.depth(q);
     if (!(depth > 0)) continue;
+    // By the depth and the rate; the depth grows with sign q, the torque is -sign force: both signs
+    // cancel in the product.
     using S = Dual<2>;
     const S force = stop.law.force(S::seed(depth, 0), S::seed(-stop.sign * v[stop.v], 1)).total;
     out.push_back({stop.v, -1, -force.slope[0], force.slope[1], 0, 0, 0});
@@ -70,6 +77,7 @@ void JointForces::slopes(const VectorX& q, const VectorX& v, const VectorRef& z,
   for (std::size_t i = 0; i < effects_->friction.size(); ++i) {
     const DryFriction& dry = effects_->friction[i];
     const double spring = dry.stiffness * z[i];
+    // Where the projection is active its derivative is zero.
     const bool slides = std::abs(spring + dry.damping * v[dry.v]) > dry.limit;
     const bool gives_way = std::abs(spring) > dry.limit;
     out.push_back({dry.v, static_cast<int>(i), 0, slides ? 0 : -dry.damping,

@@ -8,9 +8,14 @@
 
 #include "contact/laws/laws.hpp"
 #include "dynamics/scene/multibody.hpp"
-#include "dynamics/scene/powers.hpp"
 
 namespace sphshell {
+
+// Of all contacts and joints: power lost in damping and friction, and energy stored.
+struct Powers {
+  double damping = 0, friction = 0;  // [W]
+  double elastic = 0, bristles = 0;  // [J]
+};
 
 // One end of the range of a coordinate whose rate is a velocity. Its law gives the generalized
 // force [N m or N] that pushes back at a depth [rad or m] beyond the end.
@@ -33,6 +38,7 @@ struct DryFriction {
   double clamped(double x) const { return std::clamp(x, -limit, limit); }
 };
 
+// The constant description, shared by all states of a scene.
 struct JointEffects {
   std::vector<JointStop> stops;
   std::vector<DryFriction> friction;
@@ -40,6 +46,7 @@ struct JointEffects {
   VectorX least_effort, most_effort, speed;  // (nv), infinite where there is no limit, or empty
 };
 
+// Of a stop at one state: depth [rad or m], force [N m or N].
 struct StopState {
   double depth = 0, force = 0;
   bool touching = false;

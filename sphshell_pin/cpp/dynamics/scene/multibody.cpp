@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kDifference = 1e-5;  // step of central differences in q [m or rad]
 
+// Segments of rotations, of planar and of rigid motion, also within composite joints.
 void find_curved(const pinocchio::JointModel& joint, std::vector<CurvedSegment>& out) {
   if (const auto* whole = boost::get<pinocchio::JointModelComposite>(&joint)) {
     for (const auto& part : whole->joints) find_curved(part, out);
@@ -51,6 +52,7 @@ Multibody::Multibody(const Multibody& other) = default;
 
 Multibody::~Multibody() = default;
 
+// With all ancestors, in ascending order: parents have lower numbers.
 void Multibody::need(int joint) {
   for (; joint > 0; joint = static_cast<int>(model_.parents[joint])) {
     const auto at = std::lower_bound(needed_.begin(), needed_.end(), joint);
@@ -60,6 +62,8 @@ void Multibody::need(int joint) {
 }
 
 void Multibody::kinematics(const VectorX& q) {
+  // The step of Pinocchio's own forward kinematics, for the joints on the way to contacts
+  // alone.
   using Step =
       pinocchio::impl::ForwardKinematicZeroStep<double, 0, pinocchio::JointCollectionDefaultTpl,
                                                 VectorX>;
@@ -77,6 +81,7 @@ void Multibody::kinematics(const VectorX& q, const VectorX& v) {
 
 // In reduced coordinates: with G the velocities of all joints per independent one, G^T M G, and
 // G^T of the bias forces, which is what Pinocchio's CRBA and RNEA return.
+// M a = tau - bias, by Cholesky's factorization.
 const VectorX& Multibody::solve(const VectorX& tau, const VectorX& bias) {
   mass_.compute(data_.M);
   solution_ = tau - bias;
@@ -142,6 +147,8 @@ void Multibody::acceleration_derivatives(const VectorX& q, const VectorX& v, con
 
 void Multibody::want_derivatives() {
   turning_.clear();
+  // Finds the joints whose axes turn, by trying: the derivative of their motion subspace S by their
+  // own coordinates is not zero.
   step_.setLinSpaced(model_.nv, 0.2, 0.7);  // anywhere but at a special place
   moved_ = pinocchio::neutral(model_);
   const VectorX q = pinocchio::integrate(model_, moved_, step_);
@@ -156,6 +163,8 @@ void Multibody::want_derivatives() {
   if (mimics_ && !differences_) unlock();
 }
 
+// The same tree with each mimic joint as a joint of its own kind; ratios: the velocities of its
+// joints by those of the model.
 void Multibody::unlock() {
   pinocchio::Model all;
   all.gravity = model_.gravity;
@@ -176,6 +185,7 @@ void Multibody::unlock() {
       Unlocked{all, pinocchio::Data(all), ratios, zero, zero, zero, pinocchio::neutral(all)});
 }
 
+// A mimic joint's coordinate is scaling x that of the joint it follows + offset.
 void Multibody::place_unlocked(const VectorX& q) {
   const pinocchio::Model& all = unlocked_->model;
   for (int j = 1; j < model_.njoints; ++j) {
@@ -189,6 +199,7 @@ void Multibody::place_unlocked(const VectorX& q) {
   }
 }
 
+// dS/dq by central differences in the joint's own frame, where nothing but the joint itself moves.
 void Multibody::turn_axes(const VectorX& q, TurningAxes& axes) {
   const int nv = model_.nvs[axes.joint], first = model_.idx_vs[axes.joint];
   axes.by_q.setZero();
@@ -221,11 +232,13 @@ const VectorX& Multibody::bias(const VectorX& q, const VectorX& v, const Forces&
   return pinocchio::rnea(model_, data_, q, v, zero_, external);
 }
 
+// a_gf holds the acceleration less gravity's.
 pinocchio::Motion Multibody::drift(int joint) const {
   if (joint == 0) return pinocchio::Motion::Zero();
   return data_.a_gf[joint] + data_.oMi[joint].actInv(model_.gravity);
 }
 
+// M^-1 J^T by the factorized mass matrix; J is brought from the joint's frame to the task's.
 void Multibody::task(const VectorX& q, int joint, const pinocchio::SE3& frame, Matrix6X& jacobian,
                      MatrixX& mobility) {
   using pinocchio::Convention;
@@ -251,6 +264,8 @@ void Multibody::difference(const VectorX& q0, const VectorX& q1, VectorX& out) c
   pinocchio::difference(model_, q0, q1, out);
 }
 
+// Scales for errors of q: |q| of plain coordinates; for positions of free and planar joints the
+// distance from the origin, the same for all axes; 1 rad for rotations.
 void Multibody::sizes(const VectorX& q, VectorX& out) const {
   out.setOnes(model_.nv);
   for (int j = 1; j < model_.njoints; ++j) {
@@ -268,6 +283,7 @@ void Multibody::sizes(const VectorX& q, VectorX& out) const {
 
 void Multibody::speeds(const VectorRef& v, VectorX& out) const {
   out = v.cwiseAbs();
+  // Components of one vector share a scale, so that the choice of axes does not matter.
   const auto together = [&](int i, int n) {
     out.segment(i, n).setConstant(v.segment(i, n).norm());
   };
@@ -283,6 +299,7 @@ double Multibody::kinetic_energy(const VectorX& q, const VectorX& v) {
   return 0.5 * v.dot(data_.M.selfadjointView<Eigen::Upper>() * v);
 }
 
+// Of models with mimic joints by hand: - sum of m g . (center of mass).
 double Multibody::potential_energy(const VectorX& q) {
   if (!mimics_) return pinocchio::computePotentialEnergy(model_, data_, q);
   pinocchio::forwardKinematics(model_, data_, q);

@@ -38,8 +38,10 @@ class Multibody {
   // Placements and, with v, velocities of the joints that were asked for by `need`, no others.
   void kinematics(const VectorX& q);
   void kinematics(const VectorX& q, const VectorX& v);
+  // From now on kinematics() places this joint, and those that carry it.
   void need(int joint);
 
+  // Forward dynamics (nv); `external`: forces on the joints' bodies, in the joints' frames.
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau);
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                               const Forces& external);
@@ -54,6 +56,7 @@ class Multibody {
   // To be called before both.
   void want_derivatives();
 
+  // The torque that holds the weight.
   const VectorX& gravity(const VectorX& q);
   // Torque that holds the bias forces and opposes `external`: rnea(q, v, 0, external).
   const VectorX& bias(const VectorX& q, const VectorX& v, const Forces& external);
@@ -74,12 +77,14 @@ class Multibody {
   const pinocchio::Motion& transmitted_velocity(int joint) const { return data_.v[joint]; }
   // Less the acceleration of gravity.
   const pinocchio::Motion& transmitted_acceleration(int joint) const { return data_.a_gf[joint]; }
+  // q exp(step), and the step that leads from q0 to q1, both in the tangent space of the first one.
   void integrate(const VectorX& q, const VectorX& step, VectorX& out) const;
   void difference(const VectorX& q0, const VectorX& q1, VectorX& out) const;
   // By which errors of coordinates and velocities are measured, per velocity component: lengths of
   // positions from the origin, 1 for turns; lengths of the vectors that components belong to.
   void sizes(const VectorX& q, VectorX& out) const;
   void speeds(const VectorRef& v, VectorX& out) const;
+  // In joules; the potential energy of the weight is zero at the world's origin.
   double kinetic_energy(const VectorX& q, const VectorX& v);
   double potential_energy(const VectorX& q);
 
@@ -96,6 +101,7 @@ class Multibody {
     const pinocchio::Motion& v = data_.v[joint];
     return pose.rotation() * (v.linear() + v.angular().cross(pose.actInv(point_world)));
   }
+  // In the world [rad/s]; zero of the world itself.
   Eigen::Vector3d angular_velocity(int joint) const {
     if (joint == 0) return Eigen::Vector3d::Zero();
     return data_.oMi[joint].rotation() * data_.v[joint].angular();
@@ -116,10 +122,13 @@ class Multibody {
     MatrixX ratios, by_q, by_v, by_a;
     VectorX q;
   };
+  // Makes unlocked_, and brings its coordinates to those of q.
   void unlock();
   void place_unlocked(const VectorX& q);
 
+  // Fills by_q of a joint at q.
   void turn_axes(const VectorX& q, TurningAxes& axes);
+  // M^-1 (tau - bias), with the mass matrix that CRBA has just left in data_.
   const VectorX& solve(const VectorX& tau, const VectorX& bias);
 
   pinocchio::Model model_;

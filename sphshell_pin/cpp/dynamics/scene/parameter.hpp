@@ -7,6 +7,7 @@
 
 namespace sphshell {
 
+// One column of derivatives.
 struct Parameter {
   // A field of law or friction, or something else that moves no body; the radius of the sphere, or
   // of the ball; a coordinate of the sphere's center, in its frame; of the shell's placement, a

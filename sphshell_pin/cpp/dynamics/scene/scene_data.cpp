@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "contact/query/ball.hpp"
-
 namespace sphshell {
 
 SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
@@ -14,6 +12,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
       pairs_(std::move(pairs)),
       clusters_(clusters_of(pairs_)),
       queries_(pairs_.size(), Query(true)),
+      forces_(pairs_.size()),
       shapes_(pairs_.size()),
       trackers_(pairs_.size()),
       states_(pairs_.size()),
@@ -23,12 +22,14 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
-    if (pair.law.foundation()) foundations_.resize(pairs_.size());
+    if (pair.law.foundation()) forces_[k] = FoundationForces();
     if (pair.friction.has_state()) {
       bristles_.add(k, pair.friction.rings());
+      // The states behind the first ring are not kept in the contacts: stretches_ keeps z.
       several_rings_ = several_rings_ || pair.friction.rings() > 1;
       if (pair.has_dn_dc()) queries_[k].want_dn_dc();
     }
+    // Only joints that carry something are placed, and only they receive forces.
     for (int j : {pair.joint_i, pair.joint_j}) {
       body_.need(j);
       if (j > 0 && std::find(loaded_.begin(), loaded_.end(), j) == loaded_.end())
@@ -51,6 +52,7 @@ void SceneData::need_velocity_of(int joint) {
   needs_velocity_ = true;
 }
 
+// Contacts, and the spare slots of bristles, that only rejected stages or steps have seen.
 void SceneData::restart() {
   for (ContactTracker& tracker : trackers_) tracker.restart();
   bristles_.restart();
@@ -75,7 +77,9 @@ void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, b
     const Pair& pair = pairs_[k];
     PairState& state = states_[k];
     state = PairState();
+    // Pairs of a cluster share the placement of the shell and one test against its box.
     if (cluster != clusters_.end() && k > cluster->last) ++cluster, far = false;
+    // Pairs of a cluster are neighbors in the list.
     const bool clustered = cluster != clusters_.end() && k >= cluster->first;
     if (clustered && k > cluster->first) {
       state.world_from_j = states_[k - 1].world_from_j;
@@ -89,6 +93,8 @@ void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, b
     excursion.moved = std::max(excursion.moved, (state.center - excursion.from).norm());
     excursion.touched = excursion.touched || !contacts.empty();
     ContactTracker& tracker = trackers_[k];
+    // Identities cost a search: they are looked up where something depends on them, which is a deep
+    // contact, whose side must be kept, or a bristle.
     if (!contacts.empty() && (identify || tracker.deep() || pair.friction.has_state())) {
       const std::vector<int>& at = tracker.match(contacts, state.center, pair.radius);
       for (std::size_t i = 0; i < contacts.size(); ++i)
@@ -107,6 +113,7 @@ void SceneData::evaluate_joints(const VectorX& q, const VectorX& v, const Vector
   if (joints_.act()) joints_.evaluate(q, v, z.tail(joints_.size()), relaxation_);
 }
 
+// Contacts depend on q alone, so only velocities and forces are computed anew.
 void SceneData::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
   if (active_.empty() && !joints_.act()) return;
   if (needs_velocity_) body_.kinematics(q, v);
@@ -123,6 +130,7 @@ void SceneData::accept(VectorX& z) {
     const Vec3& center = states_[k].center;
     excursions_[k].from = center;
     ContactTracker& tracker = trackers_[k];
+    // The common case of a pair far away.
     if (contacts.empty() && tracker.places().empty()) {
       tracker.move_to(center);
       bristles_.assign_none(k);
@@ -147,6 +155,7 @@ void SceneData::accept(VectorX& z) {
   compute_forces(z);
 }
 
+// As accept() does it, with a copy of the slots.
 void SceneData::reorder_bristles(VectorX& z) {
   if (!bristles_.any()) return;
   Bristles bristles = bristles_;
@@ -166,6 +175,7 @@ void SceneData::reorder_bristles(VectorX& z) {
 
 // Stretches of joints stay behind those of contacts.
 void SceneData::end_bristles(Bristles& bristles, VectorX& z) const {
+  // z is (bristles of contacts, springs of joints); the first part changes its size.
   const VectorX joints = z.tail(joints_.size());
   bristles.end(z);
   z.conservativeResize(bristles.size() + joints.size());
@@ -176,34 +186,21 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
   const Pair& pair = pairs_[k];
   PairState& state = states_[k];
   Query& query = queries_[k];
-  if (pair.source) {
-    query.contacts.clear();
-    pair.source(body_.world_from(pair.joint_i, pair.placement_i), state.world_from_j,
-                query.contacts);
-    // In the frame of body j, as those of a shell.
-    for (Contact& contact : query.contacts) {
-      contact.point = state.world_from_j.actInv(contact.point);
-      contact.normal = state.world_from_j.rotation().transpose() * contact.normal;
-    }
-    state.center.setZero();
-    return query.contacts;
+  if (pair.has_sphere()) {
+    const Vec3& center = pair.placement_i.translation();
+    state.center = state.world_from_j.actInv(
+        pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
   }
-  const Vec3& center = pair.placement_i.translation();
-  state.center = state.world_from_j.actInv(
-      pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
   if (far) {
     query.contacts.clear();
     return query.contacts;
   }
-  if (pair.law.foundation()) {
-    const bool slopes = wants_second_ || pair.friction.has_state();
-    foundations_[k].find(pair, state.center, slopes, query.contacts);
-    return query.contacts;
-  }
-  if (pair.ball > 0)
-    find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
-  else
-    query.find(*pair.shell, state.center, pair.radius, pair.method);
+  const auto pose_i = [&] { return body_.world_from(pair.joint_i, pair.placement_i); };
+  std::visit(
+      [&](auto& forces) {
+        forces.find(pair, pose_i, state.world_from_j, state.center, wants_second_, query);
+      },
+      forces_[k]);
   if (pair.needs_shape()) find_shapes(k);
   // Friction belongs to a place, and its spring should not be split and merged at every border
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
@@ -211,6 +208,7 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
   if (pair.friction.active() && query.contacts.size() > 1) {
     merge_groups(query.contacts, state.center, pair.radius, merged_);
     if (pair.needs_shape()) {
+      // The shapes are merged like their contacts.
       merge_shapes(query.contacts, shapes_[k], merged_shapes_);
       shapes_[k].swap(merged_shapes_);
     }
@@ -227,15 +225,19 @@ void SceneData::find_shapes(std::size_t k) {
 }
 
 ContactShape SceneData::shape_of(std::size_t k, const Pair& pair, const Contact& contact) {
-  if (pair.ball > 0 || pair.method != Method::Smooth) {
-    const double curvature = 1 / pair.radius + (pair.ball > 0 ? 1 / pair.ball : 0);
+  // Of geometry with one curvature everywhere the gap is that of two spheres, 1 / r_1 + 1 / r_2;
+  // else it is looked up.
+  const Shell* shell = pair.ask([](const auto& one) { return one.smooth_shell(); });
+  if (!shell) {
+    const double curvature =
+        1 / pair.radius + pair.ask([](const auto& one) { return one.curvature(); });
     ContactShape out = shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius);
     out.depth = contact.depth;
     return out;
   }
   const auto at = std::find_if(curvatures_.begin(), curvatures_.end(),
-                               [&](const Curvature& one) { return one.is_of(*pair.shell); });
-  Curvature& curvature = at == curvatures_.end() ? curvatures_.emplace_back(*pair.shell) : *at;
+                               [&](const Curvature& one) { return one.is_of(*shell); });
+  Curvature& curvature = at == curvatures_.end() ? curvatures_.emplace_back(*shell) : *at;
   return curvature.shape(contact, states_[k].center, pair.radius, wants_second_);
 }
 
@@ -245,13 +247,12 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
   active.slot = slot;
   active.contact_id = contact_id;
   active.contact = contact;
-  if (pairs_[k].law.foundation())
-    active.row = static_cast<int>(&contact - queries_[k].contacts.data());
-  if (pairs_[k].needs_shape())
-    active.shape = static_cast<int>(&contact - queries_[k].contacts.data());
+  active.index = static_cast<int>(&contact - queries_[k].contacts.data());
+  if (pairs_[k].needs_shape()) active.shape = active.index;
 }
 
 void SceneData::compute_forces(const VectorX& z) {
+  // z is the state of the bristles at which the joints were evaluated, too.
   powers_ = joints_.powers();
   bristle_rates_.setZero(bristle_size());
   bristle_rates_.tail(joints_.size()) = joints_.rates();
@@ -272,16 +273,16 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
   const SE3& world_from_j = states_[active.pair].world_from_j;
   ContactKinematics<double>& m = active.kinematics;
   active.point = world_from_j.act(active.contact.point);
+  // All kinematics in the world: the laws need no frame, as they depend on scalar products only.
   m.depth = active.contact.depth;
   m.normal = world_from_j.rotation() * active.contact.normal;
   m.relative.setZero();
   if (pair.needs_velocity()) m.relative = relative_velocity(pair, active.point);
-  if (pair.friction.torsional())
-    m.spin =
-        m.normal.dot(body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  if (pair.friction.torsional()) m.spin = m.normal.dot(relative_spin(pair));
+  // Hertz's law takes the corrected depth of the shape.
   if (const ContactShape* gap = shape(active)) m.scale = gap->scale, m.depth = gap->depth;
   if (pair.friction.rolls()) {
-    const Vec3 spin = body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j);
+    const Vec3 spin = relative_spin(pair);
     m.rolling = spin - spin.dot(m.normal) * m.normal;
   }
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
@@ -299,7 +300,7 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
     m.outer_rate = outer_rate;
   }
   active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair), m);
-  if (active.row >= 0) add_foundation(active, m);
+  std::visit([&](const auto& forces) { forces.complete(*this, active); }, forces_[active.pair]);
   m.outer = nullptr, m.outer_rate = nullptr;  // not beyond this evaluation
   // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
   // sphere's center alone: that is where the force acts.
@@ -317,6 +318,8 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
 }
 
 // How fast a stretch turns with the normal, in the shell's frame.
+// The normal turns with the angular velocity n x n'; a vector that turns with it changes by (n x
+// n') x z.
 Vec3 SceneData::rate_of_turning(const ActiveContact& active, const Vec3& stretch) const {
   const Pair& pair = pairs_[active.pair];
   if (!pair.has_dn_dc()) return Vec3::Zero();
@@ -324,6 +327,7 @@ Vec3 SceneData::rate_of_turning(const ActiveContact& active, const Vec3& stretch
   const Vec3 center_rate = state.world_from_j.rotation().transpose() *
                            relative_velocity(pair, state.world_from_j.act(state.center));
   const Contact& contact = active.contact;
+  // dn_dc holds the weight of the contact.
   const Vec3 normal_rate = contact.dn_dc * center_rate / contact.weight;
   return contact.normal.cross(normal_rate).cross(stretch);
 }
@@ -332,6 +336,8 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const ContactForce<double>& f = active.force;
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
+  // The force at the contact point; what acts at the sphere's center is moved there with its
+  // moment.
   ContactWrench out{active.point, weight * (f.normal * normal + f.friction),
                     weight * f.torsion * normal + weight * f.rolling + active.moment};
   if (active.shape >= 0) {
@@ -349,32 +355,21 @@ void SceneData::add_force(const ActiveContact& active) {
   const ContactForce<double>& f = active.force;
   const ContactKinematics<double>& m = active.kinematics;
   const double weight = active.contact.weight;
+  // Newton's third law: equal and opposite at one point.
   const ContactWrench on_i = wrench(active);
   apply(pair.joint_i, active.point, on_i.force, on_i.moment);
   apply(pair.joint_j, active.point, -on_i.force, -on_i.moment);
   PairState& state = states_[active.pair];
   if (weight > 0) ++state.count;
-  if (active.row < 0) {
-    state.pieces += weight > 0 ? 1 : -1;
-    if (f.normal == 0) ++state.clamped;
-  } else {
-    // The force of a foundation is smooth where a patch comes or goes: no event.
-    state.pieces = 1;
-  }
+  state.pieces += active.pieces;
+  if (active.clamped) ++state.clamped;
   state.depth = std::max(state.depth, m.depth);
   state.normal_force += weight * f.normal;
-  // The weight of several as one is the length of the sum of their normals.
-  const double share = weight > 0 ? 1 : weight;
-  if (active.row >= 0) {
-    powers_.damping += active.damping;
-    powers_.friction += active.sliding;
-    powers_.elastic += foundations_[active.pair].energy(pair, active.row);
-  } else {
-    powers_.damping += weight * damping_power(f, m);
-    powers_.friction += weight * friction_power(f, m);
-    powers_.elastic += share * pair.law.energy(m.depth, m.scale);
-  }
-  if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
+  powers_.damping += active.damping;
+  powers_.friction += active.sliding;
+  powers_.elastic += active.elastic;
+  if (active.slot >= 0)
+    powers_.bristles += 0.5 * (weight > 0 ? 1 : weight) * f.stiffness * f.stretch2;
   if (const ContactShape* gap = shape(active)) {
     state.conformity = std::max(state.conformity, gap->conformity);
     state.half_axis = std::max(state.half_axis, gap->half_axes(m.depth)[0] / pair.radius);
@@ -385,6 +380,7 @@ void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_worl
                       const Vec3& moment_world) {
   if (joint == 0) return;  // the world does not move
   const SE3& pose = body_.world_from_joint(joint);
+  // As Pinocchio wants it: in the joint's frame, the moment about the joint's origin.
   const Vec3 force = pose.rotation().transpose() * force_world;
   external_[joint].linear() += force;
   external_[joint].angular() +=
@@ -396,6 +392,11 @@ Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) con
          body_.velocity_at(pair.joint_j, point_world);
 }
 
+Vec3 SceneData::relative_spin(const Pair& pair) const {
+  return body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j);
+}
+
+// Without touching contacts ABA without external forces, which is faster.
 const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
   const VectorX& all = joints_.act() ? joints_.added(tau) : tau;
   return touching_ ? body_.acceleration(q, v, all, external_) : body_.acceleration(q, v, all);

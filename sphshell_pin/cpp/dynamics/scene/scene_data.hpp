@@ -10,9 +10,8 @@
 #include "dynamics/scene/bristles.hpp"
 #include "dynamics/scene/clusters.hpp"
 #include "dynamics/scene/contact_row.hpp"
-#include "dynamics/scene/foundation_pair.hpp"
 #include "dynamics/scene/joints.hpp"
-#include "dynamics/scene/pair.hpp"
+#include "dynamics/scene/pair_forces.hpp"
 
 namespace sphshell {
 
@@ -34,16 +33,22 @@ struct PairState {
   }
 };
 
+// One contact at one state, with what acts at it.
 struct ActiveContact {
   int pair, slot, contact_id;  // slot: of its bristle in z, or -1
   Contact contact;             // in the frame of the shell, or of a source, that of body j
   Vec3 point;                  // in the world
   ContactKinematics<double> kinematics;  // in the world
   ContactForce<double> force;
-  int row = -1;                     // of the foundation of its pair
-  Vec3 moment = Vec3::Zero();       // of that row's pressure, beyond that of its force at the point
+  int index = 0;                    // among the contacts of its pair
+  Vec3 moment = Vec3::Zero();       // of a pressure, beyond that of its force at the point
   double damping = 0, sliding = 0;  // power that it loses [W]
-  int shape = -1;                   // its number in those of the pair
+  double elastic = 0;               // energy that it stores [J]
+  // What it adds to PairState::pieces, as an event where it comes or goes. The patches of a
+  // foundation count once, all together: beside others one comes and goes smoothly.
+  int pieces = 0;
+  bool clamped = false;
+  int shape = -1;             // its number in those of the pair
   Vec3 climb = Vec3::Zero();  // at the sphere's center, as its stiffness changes with the place [N]
 };
 
@@ -125,6 +130,7 @@ class SceneData {
 
   bool touching() const { return touching_; }
   const std::vector<ActiveContact>& active() const { return active_; }
+  // All that the contact exerts, weights included.
   ContactWrench wrench(const ActiveContact& active) const;
   // Whether a contact with a bristle has begun since the last accepted state.
   bool is_new(const ActiveContact& active) const {
@@ -135,10 +141,13 @@ class SceneData {
   const std::vector<PairState>& states() const { return states_; }
   const std::vector<Excursion>& excursions() const { return excursions_; }
   const Powers& powers() const { return powers_; }
-  // Where the contact is a row of one: that foundation.
-  const FoundationPair& foundation(const ActiveContact& active) const {
-    return foundations_[active.pair];
-  }
+  // How the contact's pair makes forces of contacts.
+  const PairForces& forces_of(const ActiveContact& active) const { return forces_[active.pair]; }
+  const Pair& pair_of(const ActiveContact& active) const { return pairs_[active.pair]; }
+  const PairState& state_of(const ActiveContact& active) const { return states_[active.pair]; }
+  // Of body i against body j, in the world.
+  Vec3 relative_velocity(const Pair& pair, const Vec3& point_world) const;
+  Vec3 relative_spin(const Pair& pair) const;
   const std::vector<Pair>& pairs() const { return pairs_; }
   const std::vector<Cluster>& clusters() const { return clusters_; }
   const JointForces& joints() const { return joints_; }
@@ -146,27 +155,29 @@ class SceneData {
   const Multibody& body() const { return body_; }
 
  private:
+  // Contacts of pair k in the frame of body j, merged where friction acts; none where it is `far`.
   std::vector<Contact>& find_contacts(std::size_t k, bool far);
   void find_shapes(std::size_t k);
-  PatchRow patch_of(const ActiveContact& active, const ContactRow& row);
   void end_bristles(Bristles& bristles, VectorX& z) const;
   void evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z);
+  // Appends to active_, without forces yet.
   void add_contact(std::size_t k, const Contact& contact, int slot, int contact_id);
+  // Forces of all active contacts, one after the other: kinematics in the world, the laws, the
+  // wrench on both joints.
   void compute_forces(const VectorX& z);
   void compute_kinematics(ActiveContact& active, const VectorX& z);
   void compute_force(ActiveContact& active, const VectorX& z);
-  void add_foundation(ActiveContact& active, const ContactKinematics<double>& m);
   void add_force(const ActiveContact& active);
   void apply(int joint, const Vec3& point_world, const Vec3& force_world, const Vec3& moment_world);
+  // Of a stretch with the normal, in the shell's frame [m/s].
   Vec3 rate_of_turning(const ActiveContact& active, const Vec3& stretch) const;
-  Vec3 relative_velocity(const Pair& pair, const Vec3& point_world) const;
 
   Multibody body_;
   JointForces joints_;
   std::vector<Pair> pairs_;
   std::vector<Cluster> clusters_;
   std::vector<Query> queries_;
-  std::vector<FoundationPair> foundations_;  // beside the pairs, if any has one
+  std::vector<PairForces> forces_;
   std::vector<Contact> merged_;
   std::vector<Curvature> curvatures_;  // of the shells whose shape counts
   std::vector<std::vector<ContactShape>> shapes_;

@@ -1,7 +1,6 @@
 // What runs record of the contacts of a scene.
 #include <algorithm>
 
-#include "dynamics/scene/patch.hpp"
 #include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {
@@ -25,6 +24,7 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
     double depth = 0;  // corrected, where the shape counts
     // One without a place stands alone.
+    // Sums over the group: forces as vectors, corrected depths with their weights.
     const std::size_t first = i - begin, last = whole.group < 0 ? first + 1 : contacts.size();
     for (std::size_t k = first; k < last; ++k) {
       if (k != first && contacts[k].group != whole.group) continue;
@@ -46,10 +46,13 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     row.element = whole.element;
     row.contact_id = active.contact_id;
     row.feature = whole.feature;
-    if (patches) patches->push_back(patch_of(active, row));
+    if (patches)
+      std::visit([&](const auto& f) { patches->push_back(f.patch(*this, active, row)); },
+                 forces_[active.pair]);
   }
 }
 
+// Contacts of one group share the row of the one that leads it.
 int SceneData::rows_of_contacts(std::vector<int>& rows) const {
   rows.assign(active_.size(), -1);
   int count = 0;
@@ -63,17 +66,6 @@ int SceneData::rows_of_contacts(std::vector<int>& rows) const {
     ++count;
   }
   return count;
-}
-
-PatchRow SceneData::patch_of(const ActiveContact& active, const ContactRow& row) {
-  const Pair& pair = pairs_[active.pair];
-  if (pair.source) return unknown_patch(row.depth);
-  const auto& rotation = states_[active.pair].world_from_j.rotation();
-  if (active.row >= 0)
-    return foundations_[active.pair].patch(pair, active.row, rotation, row.normal_force);
-  const ContactShape gap =
-      active.shape < 0 ? shape_of(active.pair, pair, active.contact) : *shape(active);
-  return hertz_patch(gap, rotation, row.depth, row.normal_force);
 }
 
 }  // namespace sphshell

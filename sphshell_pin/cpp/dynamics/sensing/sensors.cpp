@@ -27,6 +27,8 @@ struct Weights {
 };
 
 Weights weights(double z) {
+  // 1 - e^-z; w1 and w2 by recursion of the integrals of u^n e^-z(1-u), by series where they would
+  // cancel.
   const double w0 = -std::expm1(-z);
   if (z > 0.03) {
     const double w1 = 1 - w0 / z;
@@ -50,6 +52,8 @@ bool has(const std::vector<int>& sorted, int one) {
 // The sum of 256 fair bits, whose steps two uniform numbers fill. It calls nothing of the system's
 // mathematical library, whose last digits differ between machines.
 double normal_noise(std::uint64_t seed, std::uint64_t sample, std::uint64_t value) {
+  // A function of seed, sample and value alone: noise does not depend on the order of runs or
+  // threads.
   const std::uint64_t key = mix(mix(mix(seed) ^ sample) ^ value);
   double sum = -128;
   for (std::uint64_t i = 0; i < 4; ++i)
@@ -79,6 +83,7 @@ Sensors::Sensors(std::vector<Sensor> sensors, const pinocchio::Model& model, dou
     values->resize(static_cast<std::size_t>(size));
 }
 
+// Before the first torque: at rest, without noise or delay.
 void Sensors::hold_still(SceneData& scene, const State& state, const Push& push) {
   acceleration_.setZero(state.v.size());
   read_all(scene, state, push);
@@ -88,6 +93,7 @@ void Sensors::hold_still(SceneData& scene, const State& state, const Push& push)
       readings_[channel.at + i] = value(channel, i, false);
 }
 
+// The first sample, with the first acceleration.
 void Sensors::begin(SceneData& scene, Torques& torques, const State& state, const Push& push) {
   begun_ = true;
   measure(scene, torques, state, push);
@@ -98,12 +104,14 @@ void Sensors::begin(SceneData& scene, Torques& torques, const State& state, cons
   deliver(state.t);
 }
 
+// Where a torque has jumped, the signal before the step is measured anew.
 void Sensors::begin_step(SceneData& scene, Torques& torques, const State& state, const Push& push) {
   if (!std::exchange(jumped_, false) || !known_) return;
   measure(scene, torques, state, push);
   before_ = measured_;
 }
 
+// Between the ends of a fixed step signals are linear in time.
 void Sensors::add_fixed(SceneData& scene, Torques& torques, const State& from, const State& to,
                         double dt, const Push& push) {
   const double next = next_due(), margin = hair(to.t);
@@ -114,6 +122,7 @@ void Sensors::add_fixed(SceneData& scene, Torques& torques, const State& from, c
     measure(scene, torques, to, push);
     if (used) {
       const double h = to.t - from.t;
+      // measured_ is overwritten by what march() asks for.
       const std::vector<double> start = known_ ? before_ : measured_, end = measured_;
       march(from.t, to.t, [&](double t, std::vector<double>& out) {
         const double share = (t - from.t) / h;
@@ -127,6 +136,7 @@ void Sensors::add_fixed(SceneData& scene, Torques& torques, const State& from, c
   deliver(to.t);
 }
 
+// Signals at any time within the step come from the dense output.
 void Sensors::add_dense(SceneData& scene, Torques& torques, const Chart& chart,
                         const Stepper& stepper, const State& from, const State& to,
                         const Push& push) {
@@ -179,6 +189,7 @@ void Sensors::filter(double h) {
       std::copy(after_.begin() + begin, after_.begin() + end, smooth_.begin() + begin);
       continue;
     }
+    // The exact solution of the low-pass filter for a parabola through start, middle and end.
     const Weights w = weights(2 * kPi * cutoff * h);
     for (std::size_t i = begin; i < end; ++i) {
       const double s0 = before_[i], b = 4 * middle_[i] - 3 * s0 - after_[i];
@@ -188,6 +199,7 @@ void Sensors::filter(double h) {
   }
 }
 
+// All samples of all sensors that are due; each is on its way for the sensor's delay.
 void Sensors::sample(double t) {
   const double limit = t + hair(t);
   for (Channel& channel : channels_)
@@ -215,6 +227,7 @@ double Sensors::value(Channel& channel, int i, bool noisy) const {
   return std::clamp(signal + noise, -sensor.range[i], sensor.range[i]);
 }
 
+// Readings arrive in the order of their samples.
 void Sensors::deliver(double t) {
   const double limit = t + hair(t);
   for (std::size_t k = 0; k < channels_.size(); ++k) {
@@ -278,6 +291,7 @@ void Sensors::read(const ForceTorque& sensor, SceneData& scene, const Push& push
   for (int child : sensor.children) sum += body.transmitted_to_parent(child);
   const SE3& pose = joint == 0 ? SE3::Identity() : body.world_from_joint(joint);
   const auto take_off = [&](const ContactWrench& wrench, double sign) {
+    // Into the joint's frame, about its origin.
     const Vec3 force = sign * (pose.rotation().transpose() * wrench.force);
     sum.linear() -= force;
     sum.angular() -= pose.actInv(wrench.point).cross(force) +
@@ -294,12 +308,14 @@ void Sensors::read(const ForceTorque& sensor, SceneData& scene, const Push& push
   Eigen::Map<Vec3>{out + 3} = seen.angular();
 }
 
+// Behind the gear: without the motor's own inertia.
 void Sensors::read(const JointTorque& sensor, SceneData& scene, const Push&, double* out) const {
   const Multibody& body = scene.body();
   const int k = sensor.index;
   *out = body.transmitted()[k] - body.model().armature[k] * acceleration_[k];
 }
 
+// The sum of the normal forces of its pairs [N].
 void Sensors::read(const ContactSwitch& sensor, SceneData& scene, const Push&, double* out) const {
   double sum = 0;
   for (int pair : sensor.pairs) sum += scene.states()[pair].normal_force;

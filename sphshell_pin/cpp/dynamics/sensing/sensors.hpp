@@ -36,6 +36,7 @@ struct ContactSwitch {
   int size() const { return 1; }
 };
 
+// What is measured, and what becomes of the signal on its way.
 struct Sensor {
   std::variant<ForceTorque, JointTorque, ContactSwitch> kind;
   double rate = 1000, delay = 0;     // [Hz], [s]
@@ -92,6 +93,7 @@ class Sensors {
     std::deque<Reading> under_way;
   };
 
+  // The signals at a state, into measured_: with the acceleration there, or with the last one.
   void measure(SceneData& scene, Torques& torques, const State& state, const Push& push);
   void read_all(SceneData& scene, const State& state, const Push& push);
   void read(const ForceTorque& sensor, SceneData& scene, const Push& push, double* out) const;
@@ -99,6 +101,8 @@ class Sensors {
   void read(const ContactSwitch& sensor, SceneData& scene, const Push& push, double* out) const;
   template <class Signal>
   void march(double from, double to, const Signal& signal);
+  // Moves the filters on by h; takes samples that are due at t; one value of a sample; hands over
+  // readings that have arrived by t.
   void filter(double h);
   void sample(double t);
   double value(Channel& channel, int i, bool noisy) const;
@@ -106,6 +110,7 @@ class Sensors {
   double due(const Channel& channel) const {
     return start_ + double(channel.sample) / channel.sensor.rate;
   }
+  // The time of the next sample of any sensor.
   double next_due() const;
   double hair(double t) const;
 

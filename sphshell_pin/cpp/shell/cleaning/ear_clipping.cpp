@@ -12,6 +12,7 @@ namespace {
 
 using Vec2 = PointTree<2>::Point;
 
+// Twice the signed area of the triangle a, b, c.
 double cross(const Vec2& a, const Vec2& b, const Vec2& c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
@@ -35,6 +36,7 @@ constexpr double kLast = 1e-6;   // factor on the shape of ears that would leave
 constexpr int kFew = 512;
 
 // The largest of n values that change one at a time, in O(log n).
+// A complete binary tree over the values, each node the larger of its children.
 class Tournament {
  public:
   void reset(int n) {
@@ -66,6 +68,8 @@ class Tournament {
   std::vector<double> value_;
 };
 
+// One polygon at a time: projected onto the plane of its area vector, then ears are cut off, the
+// best shape first, until three corners are left.
 class Clipper {
  public:
   Clipper(const PolygonView& polygons, const double* points, double tolerance)
@@ -100,6 +104,7 @@ class Clipper {
   void prepare(int n) {
     next_.resize(n);
     previous_.resize(n);
+    // The outline as a doubly linked list of corners.
     score_.resize(n);
     rank_.resize(n);
     order_.resize(n);
@@ -117,6 +122,7 @@ class Clipper {
               [&](int i, int j) { return vertex(i) != vertex(j) ? vertex(i) < vertex(j) : i < j; });
     for (int k = 0; k < n; ++k) {
       const int i = order_[k];
+      // Bridges to holes pass a vertex twice: its copies are found by sorting.
       first_copy_[i] = k > 0 && vertex(order_[k - 1]) == vertex(i) ? first_copy_[order_[k - 1]] : i;
       ++copies_[first_copy_[i]];
     }
@@ -152,6 +158,8 @@ class Clipper {
     shapes_.set(rank_[i], shape(flat_[previous_[i]], flat_[i], flat_[next_[i]]));
   }
 
+  // Cuts the ear at i off. Only its two neighbors change their shape; ears that were blocked by its
+  // vertex are looked at again once no copy of that is left.
   void remove(int i) {
     const int before = previous_[i], after = next_[i], copy = first_copy_[i];
     next_[before] = after;
@@ -185,6 +193,8 @@ class Clipper {
   void project(std::size_t polygon) {
     first_ = polygons_.offsets[polygon];
     const std::int64_t last = polygons_.offsets[polygon + 1];
+    // The first axis lies along the longest edge, so that coordinates do not depend on the
+    // polygon's first corner.
     std::array<double, 3> normal{}, along{};
     const double* origin = point(first_);
     double longest = 0.0;
@@ -236,6 +246,7 @@ class Clipper {
     blocker_[i] = -1;
     const double quality = shape(a, b, c);
     if (quality <= kFlat) return kBlocked;
+    // Rounding of the cross products: points on the border count as inside.
     const double slack = 1e-14 * std::max({squared(a, b), squared(b, c), squared(c, a)});
     const double base = squared(c, a), reach = tolerance_ * std::sqrt(base);
     bool sliver = false;

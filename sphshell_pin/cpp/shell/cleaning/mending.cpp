@@ -15,6 +15,7 @@
 namespace sphshell {
 namespace {
 
+// The finalizer of MurmurHash3: neighboring cells get distant slots.
 std::uint64_t mix(std::uint64_t key) {
   key ^= key >> 33;
   key *= 0xff51afd7ed558ccdULL;
@@ -28,6 +29,7 @@ class CellTable {
  public:
   explicit CellTable(std::size_t expected) {
     std::size_t size = 16;
+    // At most half full.
     while (size < 2 * expected) size *= 2;
     keys_.assign(size, kFree);
     heads_.assign(size, -1);
@@ -85,6 +87,7 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
     const double* p = points + 3 * i;
     std::array<std::uint64_t, 3> from{}, to{};
     for (int axis = 0; axis < 3; ++axis) {
+      // All cells that the ball of the tolerance meets: seldom more than one, as cells are wide.
       from[axis] = index(p[axis] - tolerance, axis);
       to[axis] = index(p[axis] + tolerance, axis);
     }
@@ -119,6 +122,7 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
   return out;
 }
 
+// A slot is a corner of a polygon, and stands for the edge from there to the next corner.
 EdgeTable edge_table(const PolygonView& polygons, std::size_t vertex_count) {
   const auto slots = static_cast<std::size_t>(polygons.offsets[polygons.count]);
   // The corner after each slot's own: slots are asked for in order, their polygons found as we go.
@@ -135,6 +139,7 @@ EdgeTable edge_table(const PolygonView& polygons, std::size_t vertex_count) {
       [&](std::size_t s) { return std::pair(polygons.corners[s], following[s]); },
       [&](int low, int high, const std::uint64_t* first, const std::uint64_t* last) {
         for (auto* word = first; word != last; ++word)
+          // A word holds the slot in its lower half.
           out.slot_edge[static_cast<std::uint32_t>(*word)] =
               static_cast<std::int32_t>(out.users.size());
         out.ends.push_back(low);
@@ -144,6 +149,7 @@ EdgeTable edge_table(const PolygonView& polygons, std::size_t vertex_count) {
   return out;
 }
 
+// Equal as cycles of corners, in either direction, from any corner on.
 Duplicates duplicate_polygons(const PolygonView& polygons, const std::int32_t* slot_edge,
                               const std::int32_t* users, std::size_t edge_count) {
   Duplicates out;
@@ -212,6 +218,7 @@ std::vector<double> triangle_shapes(const PolygonView& polygons, const double* p
     const std::int64_t from = polygons.offsets[p];
     if (polygons.offsets[p + 1] - from != 3) continue;
     const auto [a, b, c] = corners_of(points, polygons.corners + from);
+    // 2 area / longest edge^2, which does not depend on the size.
     const double area = (b - a).cross(c - a).norm();
     const double longest =
         std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
@@ -220,6 +227,7 @@ std::vector<double> triangle_shapes(const PolygonView& polygons, const double* p
   return out;
 }
 
+// Signed volume, area, the area that flips turn over, and the largest triangle.
 ComponentSums component_sums(const double* points, const std::int32_t* triangles,
                              const std::int32_t* triangle_polygon, std::size_t triangle_count,
                              const std::int32_t* component, const std::uint8_t* flip,
@@ -234,6 +242,8 @@ ComponentSums component_sums(const double* points, const std::int32_t* triangles
     const std::size_t p = triangle_polygon == nullptr ? t : triangle_polygon[t];
     const auto [a, b, c] = corners_of(points, triangles + 3 * t);
     const Vec3 vector_area = 0.5 * (b - a).cross(c - a);
+    // The volume of the tetrahedron from the middle to the triangle: by the divergence theorem
+    // their sum is the volume enclosed.
     const double area = vector_area.norm(), share = (a - middle).dot(vector_area) / 3.0;
     const std::int32_t owner = component[p];
     out.volume[owner] += flip[p] ? -share : share;
@@ -244,12 +254,14 @@ ComponentSums component_sums(const double* points, const std::int32_t* triangles
   return out;
 }
 
+// Breadth first over edges of two polygons: `flip` makes neighbors wound alike.
 Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edge,
                        const std::int32_t* users, std::size_t edge_count) {
   struct User {
     std::int32_t slot, polygon;
   };
   constexpr User kNone{-1, -1};
+  // The two polygons at each edge that has two.
   LargeArray<User> pair(2 * edge_count, kNone);
   for (std::size_t p = 0; p < polygons.count; ++p) {
     for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s) {
@@ -277,6 +289,7 @@ Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edg
         const User& twin = pair[2 * edge + (pair[2 * edge].slot == s ? 1 : 0)];
         const std::int32_t q = twin.polygon;
         if (q == p) continue;  // a seam of a polygon with itself tells nothing
+        // Neighbors that are wound alike pass their common edge in opposite directions.
         const bool same_way = polygons.corners[s] == polygons.corners[twin.slot];
         const std::uint8_t wanted = out.flip[p] ^ static_cast<std::uint8_t>(same_way);
         if (out.component[q] < 0) {
@@ -284,6 +297,7 @@ Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edg
           out.flip[q] = wanted;
           queue.push_back(q);
         } else if (out.flip[q] != wanted) {
+          // Two ways round lead to opposite windings: a Moebius strip.
           out.one_sided[label] = 1;
         }
       }

@@ -12,11 +12,13 @@
 
 namespace sphshell {
 
+// Polygons as rows of corners: polygon p has corners[offsets[p]] up to corners[offsets[p + 1]].
 struct PolygonView {
   const std::int64_t* offsets;
   const std::int32_t* corners;
   std::size_t count;
 
+  // The slot behind this one, round the polygon.
   std::int64_t next(std::size_t polygon, std::int64_t slot) const {
     return slot + 1 == offsets[polygon + 1] ? offsets[polygon] : slot + 1;
   }

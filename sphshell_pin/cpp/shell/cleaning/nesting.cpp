@@ -23,6 +23,7 @@ std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t
   }
   if (active.size() < 2) return depth;
   using Vec = std::array<double, 3>;
+  // Orthonormal rows, none of them along an axis.
   constexpr std::array<Vec, 3> kAxes = {{{0.81649658, -0.35355339, 0.45643546},
                                          {0.27735010, 0.93541435, 0.22839193},
                                          {-0.50770552, -0.05988616, 0.85945101}}};
@@ -44,6 +45,7 @@ std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t
       high[k] = std::max(high[k], query[c][k]);
     }
   }
+  // About one query in each cell.
   const auto cells = static_cast<std::int64_t>(std::ceil(std::sqrt(double(active.size()))));
   const auto cell_of = [&](double x, int k) {
     const double width = std::max(high[k] - low[k], 1e-300);
@@ -90,18 +92,22 @@ std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t
           if (!inside) continue;
           const Vec &a = corner[0], &b = corner[1], &d = corner[2];
           const double ux = b[0] - a[0], uy = b[1] - a[1], vx = d[0] - a[0], vy = d[1] - a[1];
+          // Barycentric coordinates of the query in the projection: the height of the triangle
+          // there.
           const double area = ux * vy - uy * vx;
           if (area == 0.0) continue;
           const double s = ((q[0] - a[0]) * vy - (q[1] - a[1]) * vx) / area;
           const double r = ((q[1] - a[1]) * ux - (q[0] - a[0]) * uy) / area;
           if (a[2] + s * (b[2] - a[2]) + r * (d[2] - a[2]) <= q[2]) continue;
           const std::uint64_t key = (std::uint64_t(c) << 32) | std::uint64_t(owner);
+          // The ray along the third axis crosses this triangle above the query.
           odd[key] = !odd[key];
         }
       }
     }
   }
   for (const auto& [key, value] : odd) {
+    // Inside each component with an odd number of crossings.
     if (value) ++depth[key >> 32];
   }
   return depth;

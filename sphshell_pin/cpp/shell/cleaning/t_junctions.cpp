@@ -19,6 +19,7 @@ bool meets(const PointTree<3>::Box& box, const double* a, const double* b, doubl
       if (a[axis] < low || a[axis] > high) return false;
       continue;
     }
+    // Where the line enters and leaves the slab of this axis.
     const double one = (low - a[axis]) / d, two = (high - a[axis]) / d;
     enter = std::max(enter, std::min(one, two));
     leave = std::min(leave, std::max(one, two));
@@ -51,6 +52,7 @@ Insertions find_t_junctions(const PolygonView& polygons, const double* points,
     if (k == 0 || open_polygons[k] != open_polygons[k - 1]) {
       for (std::int64_t s = from; s < to; ++s) {
         const auto corner = static_cast<std::size_t>(polygons.corners[s]);
+        // A polygon's own corners are no T-junctions on its edges.
         if (corner < owner.size()) owner[corner] = open_polygons[k];
       }
     }
@@ -70,6 +72,7 @@ Insertions find_t_junctions(const PolygonView& polygons, const double* points,
           std::hypot(e[0] - t * d[0], e[1] - t * d[1], e[2] - t * d[2]) <= tolerance) {
         hits.push_back({t, vertex});
       }
+      // More than `most` are not wanted: the search ends.
       return out.slot.size() + hits.size() > most;
     });
     std::sort(hits.begin(), hits.end(), [](const Hit& x, const Hit& y) {

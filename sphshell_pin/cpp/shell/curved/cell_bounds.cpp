@@ -19,6 +19,7 @@ Net control_points(const Facet& f, const CurvedFacet& curved) {
   Net net;
   for (int i = 0; i < 4; ++i)
     for (int j = 0; i + j < 4; ++j)
+      // Of the flat facet: evenly spread.
       net[i][j] = ((3 - i - j) * f.corner[0] + i * f.corner[1] + j * f.corner[2]) / 3;
   const auto offset = [&](int k, int i) { return curved.control_offset(k, i); };
   net[1][0] += offset(0, 0), net[2][0] += offset(0, 1);
@@ -35,12 +36,14 @@ double tan_opening_of(const Net& net, const Vec3& axis) {
   int n = 0;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; i + j < 3; ++j, ++n) {
+      // Control vectors of the derivatives by u and v, both of degree 2.
       a[n] = net[i + 1][j] - net[i][j];
       b[n] = net[i][j + 1] - net[i][j];
     }
   double most = 0, beside = 1;  // of the widest: squares of what is across the axis, and along it
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j) {
+      // x_u x x_v has degree 4; its control vectors are positive sums of these symmetric products.
       const Vec3 normal = a[i].cross(b[j]) + a[j].cross(b[i]);
       const double along = normal.dot(axis);
       if (!(along > 0)) return kAny;
@@ -61,6 +64,7 @@ CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) 
   for (const auto& [u, v] : kCorner) {
     Vec3 xx = patch.along_uu(u, v), xy = patch.along_uv(u, v), yy = patch.along_vv(u, v);
     axes.second(xx, xy, yy);
+    // The second fundamental form over the facet's plane, without normalization.
     const Eigenvalues bend(n.dot(xx), n.dot(xy), n.dot(yy));
     low = std::min(low, bend.low), high = std::max(high, bend.high);
     const auto flat = [&](const Vec3& d) { return d.squaredNorm() - n.dot(d) * n.dot(d); };
@@ -84,6 +88,7 @@ CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) 
     axes.first(d[0], d[1]);
     const double up[2] = {n.dot(d[0]), n.dot(d[1])};
     slope2 = std::max(slope2, up[0] * up[0] + up[1] * up[1]);
+    // x' less the identity, in the plane.
     const double xx = axes.x.dot(d[0]) - 1, yx = axes.y.dot(d[0]);
     const double xy = axes.x.dot(d[1]), yy = axes.y.dot(d[1]) - 1;
     stretch2 = std::max(stretch2, xx * xx + yx * yx + (xy * xy + yy * yy));
@@ -91,10 +96,12 @@ CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) 
   constexpr double kThird = 1.0 / 3;
   Vec3 x = patch.along_u(kThird, kThird), y = patch.along_v(kThird, kThird);
   axes.first(x, y);
+  // The gradient of the height over the plane, in the middle.
   const Vec3 lean = n.dot(x) * axes.x + n.dot(y) * axes.y;
   const Vec3 flat = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
   const Vec3 offset = patch.point(kThird, kThird) - flat;
   // Rounded outward.
+  // To single precision, so that what is certain in double precision stays certain.
   const auto up = [](double value) { return static_cast<float>(value + 1e-6 * std::abs(value)); };
   CellBounds out{-up(-low),
                  up(high),
@@ -127,6 +134,7 @@ void CurvedShell::build_cones(const Shell& shell) {
              return y.cross(shape.axis).norm() <= 1e-6 * shell.size();
            });
   };
+  // Two elements of one face, or coplanar flat ones, have no feature between them: nobody owns it.
   const std::vector<Owned> owned = shell.assign_owners([&](int t, int u) {
     const int face = faces_.of_triangle(t);
     const auto closed = [&](int one) {
@@ -142,6 +150,8 @@ void CurvedShell::build_cones(const Shell& shell) {
     const Facet& facet = flat[f];
     const Vec3& axis = facet.normal;
     const Net net = control_points(facet, facets_[f]);
+    // A cone must hold the normals of the element, and of the sides and corners that it owns: there
+    // those of the neighbors.
     double tangent = tan_opening_of(net, axis);
     const Owned& mine = facets_[f].owned;
     for (int k = 0; k < 3; ++k) {
@@ -158,6 +168,8 @@ void CurvedShell::build_cones(const Shell& shell) {
     }
     const bool closed = !face_cells_.empty() && face_cells_[f].closed;
     const Primitive* face = closed ? &faces_.shapes[face_cells_[f].face] : nullptr;
+    // The face's own normals at corners and at the middles of sides, a little wider for what is
+    // between.
     for (int i = 0; face != nullptr && i < 6; ++i) {
       const Vec3 &p = facet.corner[i % 3], &q = facet.corner[i < 3 ? i : next_corner(i - 3)];
       Vec3 n;
@@ -181,6 +193,7 @@ void CurvedShell::build_cones(const Shell& shell) {
   for (const CurvedFacet& curved : facets_) bulge_ = std::max<double>(bulge_, curved.bulge);
 }
 
+// Bounds of each element, and what lies beyond its sides.
 void CurvedShell::bound_cells(const Shell& shell) {
   const Topology& topology = shell.topology();
   cells_.assign(facets_.size(), CellBounds{});

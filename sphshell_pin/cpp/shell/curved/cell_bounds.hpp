@@ -16,6 +16,7 @@ struct FacetAxes {
   Vec3 x, y;
   double a, b, c;  // corner 1 is at (a, 0), corner 2 at (b, c)
 
+  // x along side 0, y into the facet.
   explicit FacetAxes(const Facet& facet) {
     const Vec3 first = facet.corner[1] - facet.corner[0];
     const Vec3 last = facet.corner[2] - facet.corner[0];
@@ -44,6 +45,7 @@ struct FacetAxes {
 struct Eigenvalues {
   double low, high;
   Eigenvalues(double xx, double xy, double yy) {
+    // Mohr's circle.
     const double middle = (xx + yy) / 2, away = std::hypot((xx - yy) / 2, xy);
     low = middle - away, high = middle + away;
   }
@@ -68,6 +70,8 @@ struct alignas(64) CellBounds {
   // Of the second derivative of |x - c|^2 / 2, seen from a center at `height` above the plane and
   // at most `aside` from the flat facet along it.
   Eigenvalues curvature(double height, double aside) const {
+    // Hessian = x'^T x' + (x - c) . x'': bounds of the metric, and of the curvature term over all
+    // heights that the element may have below the center.
     const double above = height + bulge, below = height - bulge;
     const auto [least, most] = std::minmax({above * low, above * high, below * low, below * high});
     const double shortest = std::max(0.0, 1 - double(stretch));
@@ -81,6 +85,7 @@ struct alignas(64) CellBounds {
 
 static_assert(sizeof(CellBounds) == 64);
 
+// From control points, in double precision, then rounded outward.
 CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge);
 
 }  // namespace sphshell

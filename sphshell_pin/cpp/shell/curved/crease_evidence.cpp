@@ -53,6 +53,7 @@ std::array<double, 2> off_mean(const Shell& shell, const Fans& fans, int f, cons
 
 }  // namespace
 
+// Per corner whether its normal tells more than those of its elements do.
 std::vector<char> independent_normals(const Shell& shell, const Fans& fans,
                                       const std::vector<Vec3>& normals) {
   std::vector<char> out(normals.size(), 0);
@@ -64,6 +65,8 @@ std::vector<char> independent_normals(const Shell& shell, const Fans& fans,
   return out;
 }
 
+// Whether nearly all normals that lean from their elements are means of theirs, to the digits of a
+// file.
 bool are_means(const Shell& shell, const Fans& fans, const std::vector<Vec3>& normals) {
   int leaning = 0, means = 0;
   for (int f = 0; f < fans.size(); ++f) {
@@ -86,6 +89,8 @@ SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
   const double length = along.norm();
   along /= length;
   const double height = a.cross(b).norm() / length;
+  // With the normal at the opposite corner, and those at the joint's ends, the element is a
+  // quadratic: its rise and its slope across the joint follow.
   const double at_first = -normals_[o].dot(a), at_last = -normals_[o].dot(b);
   const double far_first = a.dot(along), far_last = b.dot(along);
   const double bend_first = normals_[i].dot(along), bend_last = normals_[j].dot(along);
@@ -97,6 +102,7 @@ SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
   const double along_side = (bend_last - bend_first) / length;
   const double across = 2 * (far_last * at_first - far_first * at_last) / length;
   SideEstimate out;
+  // How far the element, by itself, has turned when it reaches the joint [rad].
   out.turn = static_cast<float>(std::asin(std::clamp(rise / height, -1.0, 1.0)));
   out.curvature =
       static_cast<float>((across + far_first * far_last * along_side) / (height * height));
@@ -105,6 +111,8 @@ SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
   return out;
 }
 
+// Whether the opposite corner's fan has elements on its far side: only then its normal knows
+// anything of the surface there.
 bool CreaseSearch::reaches_beyond(const Fans& fans, int h) const {
   const int o = opposite(h), fan = fans.of(o);
   const Vec3& r = points()[vertex(o)];
@@ -139,6 +147,7 @@ void CreaseSearch::classify_joints() {
     const SideEstimate a = estimate_side(now, joint.half_edge[0]),
                        b = estimate_side(now, joint.half_edge[1]);
     estimates_[e] = {a, b};
+    // The joint's turn less what both sides account for should be nothing.
     const float most = std::max({std::abs(joint.angle), std::abs(a.turn), std::abs(b.turn)});
     float rest = joint.angle - (a.known ? a.turn : 0) - (b.known ? b.turn : 0);
     // A side of which nothing is known may be anything from flat to as curved as the other.
@@ -153,6 +162,7 @@ void CreaseSearch::classify_joints() {
                 std::max(ca, cb) <= kAlike * std::min(ca, cb);
     core_[e] = alike_[e] && std::abs(joint.angle) >= most / 2;
     if (!core_[e]) return;
+    // The angle that rounded coordinates make.
     const double noise = kRounded * shell_.size() / std::min(a.height, b.height);
     evidence_[e] = static_cast<float>(
         -std::log(std::clamp(kChance * (off_[e] + noise) / most, kLeastProbability, 1.0)));
@@ -182,6 +192,7 @@ void CreaseSearch::weigh_runs() {
   for (std::size_t e = 0; e < count; ++e)
     if (core_[e]) open.push_back(e);
   for (int step = 0; step < kLongestRun && !open.empty(); ++step) {
+    // Each step carries evidence one joint farther along the run, to either side.
     next.assign(open.size(), {0, 0});
     for (std::size_t n = 0; n < open.size(); ++n) {
       const std::size_t e = open[n];

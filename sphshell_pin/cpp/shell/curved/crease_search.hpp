@@ -37,6 +37,7 @@ inline int curved_side(const std::array<SideEstimate, 2>& estimates) {
   return a.known && (!b.known || std::abs(a.curvature) >= std::abs(b.curvature)) ? 0 : 1;
 }
 
+// Divides fans of normals where the elements show a crease.
 class CreaseSearch {
  public:
   CreaseSearch(const Shell& shell, std::vector<Vec3> normals, bool given, const Faces& faces)
@@ -45,6 +46,7 @@ class CreaseSearch {
     start();
   }
 
+  // The normals after that; to be called once.
   CornerNormals divide();
 
  private:
@@ -61,9 +63,11 @@ class CreaseSearch {
   void list_joints();
   void start();
   Fans fans() const;
+  // Fills normals_ and divided_.
   void normals_of(const Fans& fans);
   SideEstimate estimate_side(const Fans& fans, int h) const;
   bool reaches_beyond(const Fans& fans, int h) const;
+  // Fills what is known of each joint, from estimates of both its sides.
   void classify_joints();
   void weigh_runs();
   float count_along(int vertex, const Eigen::Vector3f& direction,

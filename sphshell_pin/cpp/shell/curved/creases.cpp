@@ -19,6 +19,7 @@ constexpr int kMostRounds = 40;
 
 }  // namespace
 
+// Directions, turning angles and half-edges of all edges, and the edges at each vertex.
 void CreaseSearch::list_joints() {
   const Topology& topology = shell_.topology();
   const std::size_t count = topology.edges.size();
@@ -50,6 +51,8 @@ void CreaseSearch::start() {
   for (std::size_t e = 0; e < joints_.size(); ++e) {
     if (!joints_[e].exists()) continue;
     const auto [h, g] = joints_[e].half_edge;
+    // Given normals tell by themselves where they differ; settled joints likewise; else the angle
+    // decides.
     crease_[e] = given_ ? differ(h, Fans::after(g)) && differ(Fans::after(h), g)
                  : is_settled(e)
                      ? differ(h, Fans::after(g)) || differ(Fans::after(h), g)
@@ -72,6 +75,8 @@ void CreaseSearch::start() {
   };
   bool any =
       sharpen(std::max(kSurelySharp, shell_.crease_angle()), [](const Joint&) { return true; });
+  // A sharper edge beside it divides a fan, whose mean normal was wrong: then the crease angle
+  // itself is the limit there, and so on along the surface.
   while (any) {
     const Fans now = fans();
     any = sharpen(shell_.crease_angle(), [&](const Joint& joint) {
@@ -132,6 +137,8 @@ void CreaseSearch::extend_lines(std::vector<int> ends, May&& may) {
       int next = -1;
       float straightest = kOnward;
       at_vertex(end, [&](int other) {
+        // Of the angle between going on along the line and the other joint, seen from the common
+        // vertex.
         const float cosine = (edges[other].first_vertex == end ? 1.0f : -1.0f) *
                              onward.dot(joints_[other].direction);
         if (other == e || cosine < straightest) return;
@@ -159,6 +166,7 @@ bool CreaseSearch::add_creases() {
     return std::array<int, 4>{vertex(h), vertex(Fans::after(h)), vertex(opposite(h)),
                               vertex(opposite(g))};
   };
+  // The larger of the two estimates' heights over the joint.
   const auto height = [&](std::size_t e) {
     return double(std::max(estimates_[e][0].height, estimates_[e][1].height));
   };
@@ -185,10 +193,13 @@ bool CreaseSearch::add_creases() {
     if (harm > least && harm > largest(e)) doubtful.push_back({e, harm});
   }
   if (doubtful.empty()) return false;
+  // A second pass among the doubtful ones: only the worst of a neighborhood are divided in this
+  // round.
   std::fill(around.begin(), around.end(), 0.0);
   for (const auto& [e, harm] : doubtful) raise_around(e, harm);
   std::vector<int> added;
   for (const auto& [e, harm] : doubtful)
+    // Ties within a factor of two go together.
     if (harm >= largest(e) / 2) added.push_back(static_cast<int>(e));
   for (int e : added) crease_[e] = 1;
   extend_lines(std::move(added), [&](int e) { return !smooth_[e]; });
@@ -202,6 +213,7 @@ void CreaseSearch::separate_straight_walls() {
     if (crease_[e] || !smooth_[e] || core_[e] || alike_[e]) continue;
     const int side = curved_side(estimates_[e]);
     const SideEstimate &curved = estimates_[e][side], &wall = estimates_[e][1 - side];
+    // The curvature that is left for the wall, if the fillet takes its own turn.
     const double left = 2 * std::abs(joints_[e].angle - curved.turn) / wall.height;
     if (wall.height > kLongWall * curved.height && left <= kWall * std::abs(curved.curvature))
       added.push_back(static_cast<int>(e));
@@ -220,6 +232,8 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
       continue;
     constexpr double kTrust = 0.01;  // in the fan's own elements
     const Vec3& own = normals_[*fans.begin(f)];
+    // Least squares: perpendicular to what the sides' tangents would be, each mirrored from its
+    // other end, and near the own normal.
     Eigen::Matrix3d square = kTrust * Eigen::Matrix3d::Identity();
     Vec3 along = kTrust * own;
     double before = 0;
@@ -240,6 +254,8 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
     for (const int* c = fans.begin(f); c != fans.end(f); ++c) normals_[*c] = normal;
 }
 
+// Classification depends on the estimates, which change as fans are divided: repeated until nothing
+// changes.
 CornerNormals CreaseSearch::divide() {
   const auto before = std::count(crease_.begin(), crease_.end(), 1);
   for (int round = 0; round < kMostRounds; ++round) {

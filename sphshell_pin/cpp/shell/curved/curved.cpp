@@ -27,6 +27,7 @@ constexpr double kMostMoved = 3;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
+// Appends n where no equal one is there; edges have few normals at an end.
 void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
   for (const Vec3& other : normals)
     if ((n - other).squaredNorm() < kSameNormal * kSameNormal) return;
@@ -41,6 +42,7 @@ struct EdgeEnd {
 };
 
 // The angle [rad] between a tangent and a chord.
+// By atan2 of cross and dot product: exact for small angles too.
 double lean_of(const Vec3& tangent, const Vec3& d) {
   return std::atan2(d.cross(tangent).norm(), d.dot(tangent));
 }
@@ -51,6 +53,7 @@ double lean_of(const Vec3& tangent, const Vec3& d) {
 bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
   const std::vector<Vec3>& normals = end.normals;
   if (normals.size() > 2) return false;
+  // A border passes the vertex along its circle; other edges have their chord for a direction.
   const Vec3 direction = end.direction.isZero(0) || end.direction.dot(d) == 0 ? d : end.direction;
   out = direction - direction.dot(normals[0]) * normals[0];
   if (normals.size() == 2) out = normals[0].cross(normals[1]);
@@ -71,6 +74,7 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
 // `other`.
 Vec3 limited_lean(const Vec3& tangent, const Vec3& other, const Vec3& forward) {
   if (lean_of(tangent, forward) <= 2 * lean_of(other, forward)) return tangent;
+  // Within the plane of chord and tangent, turned back to twice the other's lean.
   const Vec3 aside = (tangent - tangent.dot(forward) * forward).normalized();
   const double along = other.dot(forward), off = forward.cross(other).norm();
   return (along * along - off * off) * forward + 2 * along * off * aside;  // twice the angle
@@ -87,6 +91,7 @@ std::array<Vec3, 2> control_offsets(const Vec3& d, const EdgeEnd& first, const E
     for (const Vec3& n : normals) most = std::max(most, std::abs(n.dot(d)) / length);
     return most;
   };
+  // The sine of the angle by which the chord leaves the tangent planes.
   const double at_first = steepest(first.normals), at_last = steepest(last.normals);
   if (std::max(at_first, at_last) <= 1e-14) return straight;
   // Flat at one end and not at the other: the edge leads from a plane into a bend, or to a groove.
@@ -98,6 +103,8 @@ std::array<Vec3, 2> control_offsets(const Vec3& d, const EdgeEnd& first, const E
     begin = limited_lean(begin, end, forward);
     end = limited_lean(end, before, forward);
   }
+  // Of a circular arc of half-angle a: handle length 2 L / (3 (1 + cos a)). The offset is what
+  // remains beside a third of the chord.
   const auto handle = [&](const Vec3& tangent) -> Vec3 {
     return 2 * length / (3 * (1 + tangent.dot(d) / length)) * tangent - d / 3;
   };
@@ -119,7 +126,10 @@ std::vector<Vec3> border_directions(const Shell& shell) {
       if (++count[v] == 1) {
         one[v] = away;
       } else {
+        // The tangent at the middle one of three points on a circle: the difference of the chords
+        // that leave it, each over the square of its length.
         sum[v] = away / away.squaredNorm() - one[v] / one[v].squaredNorm();
+        // A border with a corner beyond the crease angle has no direction there.
         const double cosine = -away.dot(one[v]) / (away.norm() * one[v].norm());
         corner[v] = count[v] > 2 || cosine < std::cos(shell.crease_angle());
       }
@@ -132,6 +142,8 @@ std::vector<Vec3> border_directions(const Shell& shell) {
 
 // Where a patch, continued beyond its sides, misses a vertex with its normal, and what lifting its
 // middle by `a` along the facet's normal would do about it: a least-squares problem in `a`.
+// Height and slope of the patch at the neighbor's vertex both count; slopes are weighted with the
+// mean square of the sides, so that all are lengths.
 class Continuation {
  public:
   Continuation(const Facet& facet, const CubicPatch& patch) : patch_(patch), up_(facet.normal) {
@@ -148,6 +160,8 @@ class Continuation {
     const double upright = n.dot(up_);
     if (upright < 0.5) return;
     // The parameters of the vertex's projection; raising the center does not change them.
+    // The corner opposite a side, mirrored: where the neighbor's vertex is if it is a
+    // parallelogram.
     static constexpr double kU[3] = {1, -1, 1}, kV[3] = {-1, 1, 1};
     Eigen::Vector2d at(kU[k], kV[k]);
     for (int i = 0; i < 6; ++i) {
@@ -155,10 +169,12 @@ class Continuation {
       at += tangents(at).inverse() * Eigen::Vector2d(r.dot(east_), r.dot(north_));
     }
     if (!(at.cwiseAbs().maxCoeff() < 4)) return;
+    // 6 u v w is the polynomial that the middle control point moves: zero on all sides.
     const double u = at.x(), v = at.y(), w = 1 - u - v;
     const Eigen::Matrix2d to_slope = tangents(at).transpose().inverse();
     const Eigen::Vector2d slope =
         to_slope * Eigen::Vector2d(patch_.along_u(u, v).dot(up_), patch_.along_v(u, v).dot(up_));
+    // The slope of the plane with normal n over the facet's plane.
     const Eigen::Vector2d wanted = -Eigen::Vector2d(n.dot(east_), n.dot(north_)) / upright;
     const Eigen::Vector2d gain = to_slope * Eigen::Vector2d(6 * v * (w - u), 6 * u * (w - v));
     const double rise = 6 * u * v * w;
@@ -181,6 +197,8 @@ class Continuation {
 
 }  // namespace
 
+// A corner compares its normal with the last one of its vertex: corners of a fan mostly come one
+// after another.
 SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normals)
     : which_(normals.size()) {
   LargeArray<int> latest(shell.vertices().size(), -1);
@@ -205,6 +223,7 @@ double tolerance_of(const Shell& shell, const CurveOptions& options) {
 std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions options) {
   const double tolerance = tolerance_of(*shell, options);
   std::shared_ptr<Shell> out = shell;
+  // Means of facet normals are no information: better ones are estimated.
   options.estimate =
       !options.exact && !options.normals.empty() && estimated_elsewhere(*shell, options.normals);
   if (options.faces && !options.known && !options.exact && shell->crease_angle() > 0) {
@@ -237,6 +256,8 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   if (!options.exact) {
     if (!regions)
       regions = std::make_shared<const CoplanarRegions>(shell, tolerance_of(shell, options));
+    // Normals that were given are kept but where faces are known; else they are estimated. Then
+    // fans are divided at the creases that the elements show.
     EstimatedNormals settled = given && !options.estimate
                                    ? settle_given_normals(shell, normals, faces_)
                                    : estimate_normals(shell, *regions, faces_);
@@ -253,6 +274,7 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   // A large part of what building takes at its highest.
   std::vector<Vec3>().swap(normals);
   give_back_freed_memory(shell.triangles().size());
+  // Sides first, as neighbors share them; then the middles, which each element has for itself.
   bend_edges(shell, options.straight, regions.get(), trust);
   std::vector<Trust>().swap(trust);
   raise_centers(shell);
@@ -267,12 +289,15 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   bound_cells(shell);
 }
 
+// Why an element is flat: its normals were set aside at a crease, or do not lean.
 Bending CurvedShell::bending(const Shell& shell, int triangle) const {
   if (!facets_[triangle_of(shell.facet_half_edge(3 * triangle))].flat) return Bending::Curved;
   const char* corner = &divided_[3 * triangle];
   return corner[0] || corner[1] || corner[2] ? Bending::Crease : Bending::Planar;
 }
 
+// Per triangle [m], from the turns of the flat elements at sides over which the curved ones are
+// smooth.
 std::vector<double> CurvedShell::chord_errors(const Shell& shell) const {
   const Topology& topology = shell.topology();
   const auto normal_at = [&](int corner) {
@@ -312,6 +337,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
   tangents_.spoke_.resize(topology.neighbors.size());
   LargeArray<int> fill(topology.neighbor_begin.begin(), topology.neighbor_begin.end() - 1);
   const std::vector<Vec3> borders = border_directions(shell);
+  // The surface is smooth over an edge where both elements have the same normals at both its ends.
   const auto goes_on = [&](const Edge& edge) {
     const int h = topology.incidence[edge.begin],
               g = topology.incidence[edge.begin + edge.count - 1];
@@ -393,6 +419,7 @@ void CurvedShell::raise_centers(const Shell& shell) {
       continuation.add(k, q, normals_[c], along, square);
     }
     // Neighbors whose normals contradict it must not pull an element away from its own sides.
+    // The least-squares solution of all neighbors together, limited.
     const double most = facets_[f].largest_offset();
     if (square > 0) facets_[f].rise = std::clamp(along / square, -most, most);
   });

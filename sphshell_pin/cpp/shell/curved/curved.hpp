@@ -26,6 +26,7 @@ template <class Value>
 struct Cubic2 {
   Value c00, c10, c01, c20, c11, c02, c30, c21, c12, c03;
 
+  // By Horner's rule; and the first derivatives.
   Value point(double u, double v) const {
     return c00 + u * (c10 + u * (c20 + u * c30)) + v * (c01 + v * (c02 + v * c03)) +
            u * v * (c11 + u * c21 + v * c12);
@@ -41,6 +42,7 @@ struct Cubic2 {
   Value along_vv(double u, double v) const { return 2 * c02 + 6 * v * c03 + 2 * u * c12; }
 };
 
+// A curved element: a cubic map of the triangle u, v >= 0, u + v <= 1.
 struct CubicPatch : Cubic2<Vec3> {
   // The polar form (blossom) at three points (u, v): of a part of the patch, a control point.
   Vec3 polar(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const Eigen::Vector2d& r) const;
@@ -67,6 +69,7 @@ class CurvedFacet {
   double largest_offset() const;
   void set_side(int k, const Vec3& first, const Vec3& last);
 
+  // The element in powers of u and v; corner 0 is at (0, 0), 1 at (1, 0), 2 at (0, 1).
   CubicPatch patch(const Facet& f) const;
   // Side k as a curve from its corner at t = 0 to the next at t = 1.
   CubicCurve side(const Facet& f, int k) const;
@@ -116,6 +119,7 @@ enum class Trust : char;
 // them.
 std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions options);
 
+// The curved elements of a shell, with what queries need of them. Constant once it is made.
 class CurvedShell {
  public:
   CurvedShell(const CurvedShell&) = delete;  // tangents_ refers to facets_
@@ -157,6 +161,7 @@ class CurvedShell {
  private:
   void bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight,
                   const CoplanarRegions* regions, const std::vector<Trust>& trust);
+  // The steps of the constructor, in their order.
   void raise_centers(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);

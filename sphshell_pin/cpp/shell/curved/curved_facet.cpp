@@ -8,6 +8,8 @@
 
 namespace sphshell {
 
+// Towards the opposite corner, so that it is tangential to the surface and leaves the side:
+// derivatives of the patch by u and v, combined.
 Vec3 CubicPatch::inward(int k, double t) const {
   switch (k) {
     case 0:
@@ -20,6 +22,8 @@ Vec3 CubicPatch::inward(int k, double t) const {
   }
 }
 
+// The blossom: symmetric, affine in each argument, and the patch itself where all three are one
+// (Ramshaw). Control points of any part of the patch are its values at that part's corners.
 Vec3 CubicPatch::polar(const Eigen::Vector2d& p, const Eigen::Vector2d& q,
                        const Eigen::Vector2d& r) const {
   const double u = p.x(), v = p.y(), a = q.x(), b = q.y(), x = r.x(), y = r.y();
@@ -38,12 +42,15 @@ Vec3 CurvedFacet::control_offset(int k, int i) const {
   Vec3 out;
   for (int axis = 0; axis < 3; ++axis) {
     const int at = 3 * i + axis;
+    // The high 16 and the low 32 bits of a signed integer, times a power of two: exact.
     const std::int64_t number = std::int64_t(high_[k][at]) * (std::int64_t(1) << 32) + low_[k][at];
     out[axis] = static_cast<double>(number) * unit;
   }
   return out;
 }
 
+// Rounded to the nearest multiple of a power of two, symmetrically about zero, so that both
+// directions of a side give the same numbers.
 void CurvedFacet::set_side(int k, const Vec3& first, const Vec3& last) {
   const double largest = std::max(first.cwiseAbs().maxCoeff(), last.cwiseAbs().maxCoeff());
   int exponent = 0;
@@ -61,12 +68,15 @@ void CurvedFacet::set_side(int k, const Vec3& first, const Vec3& last) {
   }
 }
 
+// Over the six of the sides.
 double CurvedFacet::largest_offset() const {
   double largest = 0;
   for (int i = 0; i < 6; ++i) largest = std::max(largest, control_offset(i / 2, i % 2).norm());
   return largest;
 }
 
+// As of a PN triangle (Vlachos et al., I3D 2001): a quarter of the sum of the side offsets; plus
+// the rise.
 Vec3 CurvedFacet::middle(const Facet& f) const {
   Vec3 sum = Vec3::Zero();
   for (int i = 0; i < 6; ++i) sum += 0.25 * control_offset(i / 2, i % 2);
@@ -82,6 +92,7 @@ CubicPatch CurvedFacet::patch(const Facet& f) const {
   const Vec3 middle =
       0.25 * a + 0.25 * b + 0.25 * c + 0.25 * d + 0.25 * g + 0.25 * e + rise * f.normal;
   CubicPatch out;
+  // Offsets are from the flat element's control points, so what is linear in u and v stands apart.
   out.c00 = f.corner[0];
   out.c10 = f.corner[1] - f.corner[0] + 3 * a;
   out.c01 = f.corner[2] - f.corner[0] + 3 * e;
@@ -95,11 +106,14 @@ CubicPatch CurvedFacet::patch(const Facet& f) const {
   return out;
 }
 
+// The four control points of the side, as powers of t.
 CubicCurve CurvedFacet::side(const Facet& f, int k) const {
   const Vec3 a = control_offset(k, 0), b = control_offset(k, 1);
   return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
 }
 
+// The derivative of the side at its end, pointing away from the vertex: three times the first
+// control vector.
 Vec3 Tangents::operator[](int i) const {
   const int h = spoke_[i] / 2, f = triangle_of(h), k = side_of(h);
   const Facet& facet = (*flat_)[f];

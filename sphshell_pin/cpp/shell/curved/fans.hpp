@@ -19,6 +19,7 @@ class Fans {
     const std::vector<Triangle>& triangles = shell.triangles();
     const Topology& topology = shell.topology();
     const int corners = 3 * static_cast<int>(triangles.size());
+    // Corners of two triangles at both ends of a smooth edge are one; opposed: wound alike.
     DisjointSets sets(corners);
     for (const Edge& edge : topology.edges) {
       if (edge.count != 2 || !is_smooth(edge)) continue;
@@ -28,6 +29,7 @@ class Fans {
       sets.merge(h, opposed ? g1 : g);
       sets.merge(h1, opposed ? g : g1);
     }
+    // Counting sort of the corners by fan.
     begin_.assign(corners + 1, 0);
     fan_of_.resize(corners);
     for (int c = 0; c < corners; ++c) ++begin_[(fan_of_[c] = sets.find(c)) + 1];
@@ -38,6 +40,7 @@ class Fans {
   }
 
   static int after(int corner) { return 3 * triangle_of(corner) + next_corner(side_of(corner)); }
+  // The corner before this one, in the same triangle.
   static int before(int corner) {
     return 3 * triangle_of(corner) + previous_corner(side_of(corner));
   }

@@ -28,6 +28,7 @@ Dominance::Dominance(const Shell& shell, const CoplanarRegions& regions)
     if (edge.count != 2 || edge.kind != EdgeClass::Smooth) continue;
     const double a = regions.height(topology.incidence[edge.begin]),
                  b = regions.height(topology.incidence[edge.begin + 1]);
+    // Heights over the common side, of coplanar regions as a whole.
     uneven_[e] = a > kMuchHigher * b || b > kMuchHigher * a;
   }
 }
@@ -49,6 +50,7 @@ bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& r
   };
   std::vector<Member> members;
   std::vector<Pair> sides;
+  // Fans have few regions: a search in order.
   const auto member = [&](int region) -> Member& {
     for (Member& m : members)
       if (m.region == region) return m;
@@ -90,6 +92,7 @@ bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& r
   Vec3 sum = Vec3::Zero();
   for (const int* c = begin; c != end; ++c) {
     const Member& m = member(regions_.of(*c / 3));
+    // The mean over the highest regions, weighted as any vertex normal.
     if (m.under == 0 && kMuchHigher * m.height >= highest)
       sum += max_weight(shell_, *c) * regions_.normal(m.region);
   }
@@ -104,6 +107,7 @@ void SagittaWitness::add(const Shell& shell, const Edge& edge) {
   const int a = regions_.of(triangle_of(h)), b = regions_.of(triangle_of(g));
   if (a == b) return;
   const double turn = std::abs(topology.angle(shell.vertices(), shell.triangles(), edge));
+  // turn x height / 8: the sagitta of an arc of that turn over that length.
   const auto s = static_cast<float>(turn * std::min(regions_.height(h), regions_.height(g)) / 8);
   sagitta_[a] = std::max(sagitta_[a], s);
   sagitta_[b] = std::max(sagitta_[b], s);
@@ -111,6 +115,7 @@ void SagittaWitness::add(const Shell& shell, const Edge& edge) {
   sides_.push_back({s, static_cast<float>((p[edge.last_vertex] - p[edge.first_vertex]).norm())});
 }
 
+// The weighted quantile by the lengths of the sides.
 void SagittaWitness::find_usual() {
   std::sort(sides_.begin(), sides_.end());
   double length = 0, below = 0;
@@ -123,6 +128,8 @@ void SagittaWitness::find_usual() {
   std::vector<std::pair<float, float>>().swap(sides_);
 }
 
+// A side of a smooth surface by the lesser witness of its two regions, a border or crease by the
+// larger one.
 double SagittaWitness::most(const Shell& shell, const Edge& edge, bool smooth, bool fitted) const {
   double least = std::numeric_limits<double>::infinity(), lowest = least, most = 0;
   for (int i = edge.begin; i < edge.begin + edge.count; ++i) {

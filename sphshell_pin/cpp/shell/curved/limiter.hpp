@@ -49,6 +49,7 @@ class SagittaWitness {
   double most(const Shell& shell, const Edge& edge, bool smooth, bool fitted) const;
 
  private:
+  // Counts the turn over an edge; and what is usual once all are counted.
   void add(const Shell& shell, const Edge& edge);
   void find_usual();
 

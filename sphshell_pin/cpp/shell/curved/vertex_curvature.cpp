@@ -32,6 +32,7 @@ class Powers {
   }
   // Of term i; `by` the coordinate to differentiate by, or -1.
   double term(int i, int by) const {
+    // A product of powers, of which one is differentiated.
     const int (&m)[3] = kPowers[i];
     double value = 1;
     for (int k = 0; k < 3; ++k) {
@@ -52,6 +53,8 @@ class Powers {
 
 }  // namespace
 
+// The shape operator: minus the second derivatives of the height, as positive curvature bends away
+// from the normal.
 Eigen::Matrix3d VertexCurvature::tensor() const {
   const Eigen::Matrix3d cross = second[1] * east * north.transpose();
   return -(second[0] * east * east.transpose() + cross + cross.transpose() +
@@ -69,6 +72,7 @@ Eigen::Matrix3d VertexCurvature::change(const Vec3& along) const {
          turn - turn.transpose();
 }
 
+// Newton's method along the direction for the implicit surface z = terms(x, y, z).
 double VertexCurvature::beyond(const Vec3& point, const Vec3& direction) const {
   double way = 0;
   const Vec3 along(east.dot(direction) / scale[0], north.dot(direction) / scale[1],
@@ -119,17 +123,22 @@ VertexCurvature fit_curvature(const Vec3& origin, const Vec3& normal,
     const Powers powers(x);
     const double apart2 = x[0] * x[0] + x[1] * x[1];
     if (!(apart2 > 0)) continue;
+    // Heights over a quadric grow with the square of the distance: with this weight far points
+    // count no more than near ones.
     add(powers.terms(), x[2], 1 / (apart2 * apart2));
     const double up = normal.dot(p.normal);
     if (!exact || up < kMostTilted) continue;
     const double slope[2] = {-out.east.dot(p.normal) / up * sx / sz,
                              -out.north.dot(p.normal) / up * sy / sz};
     for (int k = 0; k < 2; ++k)
+      // By implicit differentiation the slope of z is (terms_x) / (1 - terms_z).
       add(powers.terms(k) + slope[k] * powers.terms(2), slope[k], 1 / apart2);
   }
   square = square.selfadjointView<Eigen::Lower>();
   square.diagonal().array() += kUndetermined * square.diagonal().maxCoeff();
+  // Tikhonov's regularization: the higher terms are there only where the points ask for them.
   square.diagonal().segment<kCorrections>(kQuadric).array() += kCorrection;
+  // A normal that is given is not tilted.
   if (exact) square.diagonal().tail<2>().array() += 1 / kUndetermined;
   const Row c = square.ldlt().solve(along);
   if (!c.allFinite()) return out;

@@ -26,6 +26,7 @@ struct VertexCurvature {
   double beyond(const Vec3& point, const Vec3& direction) const;
 };
 
+// A vertex around, with its normal.
 struct OrientedPoint {
   Vec3 point, normal;
 };

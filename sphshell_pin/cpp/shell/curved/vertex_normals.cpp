@@ -42,6 +42,8 @@ bool is_cone_apex(const Shell& shell, const std::vector<Vec3>& normals, const in
     for (int far : {next_corner(k), previous_corner(k)}) {
       const Vec3 edge = shell.vertices()[triangle[far]] - shell.vertices()[triangle[k]];
       const double here = -normals[*c].dot(edge), there = normals[3 * t + far].dot(edge);
+      // On a circular arc a chord leaves both tangent planes by the same angle; on a cone's ruling
+      // that of the far end is zero.
       uneven += std::abs(here - there) / edge.norm();
       bent += (std::abs(here) + std::abs(there)) / edge.norm();
     }
@@ -62,6 +64,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
   if (points.size() < Terms + 3) return false;
   double size2 = 0;
   for (const Vec3& p : points) size2 += (p - origin).squaredNorm();
+  // Distances of about one, so that one pivot threshold serves all sizes.
   const double scale = std::sqrt(double(points.size()) / size2);
   Vec3 n = normal;
   // The frame turns with the normal: a few rounds settle both.
@@ -74,12 +77,15 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
       const Vec3 d = scale * (p - origin);
       const double x = d.dot(east), y = d.dot(north), z = d.dot(n);
       const double flat2 = x * x + y * y, full2 = d.squaredNorm();
+      // A point almost above the vertex is no neighbor on a graph over the plane.
       if (flat2 < 0.1 * full2) return false;
+      // Nearer points count more: residuals are taken relative to the distance.
       const double arc = full2 / flat2, weight = 1 / full2;
       Row row;
       row.template head<5>() << x, y, arc * x * x, arc * x * y, arc * y * y;
       if constexpr (Terms == 9)
         row.template tail<4>() << x * x * x, x * x * y, x * y * y, y * y * y;
+      // Normal equations.
       square.noalias() += weight * row * row.transpose();
       along += weight * z * row;
       heights2 += weight * z * z;
@@ -92,6 +98,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
     if (!(solver.vectorD().cwiseAbs().minCoeff() > kLeastPivot)) return false;
     const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
     if (round > 0 && heights2 - fit.dot(along) > most_uneven * heights2) return false;
+    // The gradient of the height at the origin tilts the normal.
     n = (n - fit[0] * east - fit[1] * north).normalized();
     // What a further round would turn it by is smaller than this by as much as it is small.
     if (round > 0 && fit.template head<2>().squaredNorm() < kSettledTilt * kSettledTilt) break;
@@ -102,6 +109,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
 
 }  // namespace
 
+// |a x b| / (|a|^2 |b|^2).
 double max_weight(const Shell& shell, int corner) {
   const Triangle& t = shell.triangles()[corner / 3];
   const int k = corner % 3;
@@ -122,6 +130,8 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   const Topology& topology = shell.topology();
   const int corners = 3 * static_cast<int>(shell.triangles().size());
   std::vector<Vec3> out(static_cast<std::size_t>(corners));
+  // In order of what is known best: faces, flat or sharp facets, the dominant facets of uneven
+  // fans, fits, averages.
   std::vector<Trust> trust(out.size(), Trust::Averaged);
   const auto known = [&](int c) { return faces.of_triangle(c / 3) >= 0; };
   for (int c = 0; c < corners; ++c)
@@ -164,6 +174,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     for (int v : vertices) at.push_back(shell.vertices()[v]);
     return shell.vertices()[fans.vertex(*fans.begin(fan))];
   };
+  // Whether both fits leave next to nothing and agree: an uneven sampling of a smooth surface.
   const auto fits_surely = [&](int fan) {
     const Vec3 origin = gather(fan, none, around, points);
     Vec3 quadratic = plain[*fans.begin(fan)], cubic = quadratic;
@@ -202,6 +213,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
       continue;
     }
     const double angle = spread(fan, false), limit = shell.crease_angle();
+    // The normal leans over the crease angle from one of its triangles.
     sharp[fan] = angle > limit || (angle > limit / 2 && is_cone_apex(shell, plain, begin, end));
     settled[fan] = sharp[fan] || std::all_of(begin, end, [&](int c) {
                      return topology.planar_face[c / 3] == topology.planar_face[*begin / 3];
@@ -222,6 +234,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     const Vec3 origin = gather(fan, sharp, near, at);
     const Vec3 own = plain[*fans.begin(fan)];
     Vec3 quadratic = own, cubic = own;
+    // Two models of different order: where both fit and agree the points determine the normal.
     const bool fits = fit_normal<5>(origin, at, quadratic);
     const bool fits_better = fit_normal<9>(origin, at, cubic);
     const auto agree = [](const Vec3& a, const Vec3& b, double angle) {
@@ -272,6 +285,7 @@ EstimatedNormals settle_given_normals(const Shell& shell, const std::vector<Vec3
   for (int c = 0; c < corners; ++c) {
     const int face = faces.of_triangle(c / 3);
     if (face >= 0 && (faces.normal(shell, c / 3, c % 3) - given[c]).norm() > kContradiction)
+      // One corner is enough: the face is given up as a whole.
       contradicted[face] = 1;
   }
   faces.give_up(contradicted);

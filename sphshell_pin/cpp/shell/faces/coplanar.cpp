@@ -19,6 +19,7 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     area[t] = static_cast<float>((p[c[1]] - p[c[0]]).cross(p[c[2]] - p[c[0]]).norm() / 2);
   }
   std::iota(order.begin(), order.end(), 0);
+  // The largest triangle of a region gives its plane, as its normal is the most exact.
   std::sort(order.begin(), order.end(),
             [&](int a, int b) { return area[a] != area[b] ? area[a] > area[b] : a < b; });
   for (const int first : order) {
@@ -57,6 +58,8 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
   }
 }
 
+// Area over the side's length, and no more than the region's extent: a region of several triangles
+// counts as a rectangle over the side.
 double CoplanarRegions::height(int half_edge) const {
   const int t = triangle_of(half_edge), k = side_of(half_edge);
   const Triangle& c = shell_.triangles()[t];

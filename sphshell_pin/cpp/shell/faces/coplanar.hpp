@@ -7,6 +7,7 @@
 
 namespace sphshell {
 
+// Connected triangles that lie in one plane within a tolerance, largest triangles first.
 class CoplanarRegions {
  public:
   // Triangles within `tolerance` [m] of the plane of the largest of them.

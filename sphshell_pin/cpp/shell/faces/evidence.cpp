@@ -42,6 +42,7 @@ bool are_equal_steps(const std::vector<double>& angles) {
   for (std::size_t i = 0; i < angles.size(); ++i)
     steps.push_back(i + 1 < angles.size() ? angles[i + 1] - angles[i]
                                           : angles[0] + 2 * M_PI - angles[i]);
+  // The largest step is the gap of an arc.
   steps.erase(std::max_element(steps.begin(), steps.end()));
   const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
   double mean = 0;
@@ -49,12 +50,14 @@ bool are_equal_steps(const std::vector<double>& angles) {
   return *most - *least < kEqualSteps * mean;
 }
 
+// So many distinct angles, or one less in equal steps, as who samples a circle makes them.
 bool enough(const std::vector<double>& angles, std::size_t many) {
   return angles.size() >= many || (angles.size() + 1 == many && are_equal_steps(angles));
 }
 
 }  // namespace
 
+// Vertices all of whose edges are inside the region.
 std::vector<int> Recognizer::inner_vertices(const Growth& growth) {
   mark(growth.triangles);
   const Topology& topology = shell_.topology();
@@ -107,6 +110,8 @@ bool Recognizer::is_over_determined(const Growth& growth) {
       vertices.size() < std::size_t(num_parameters(s.kind)) + kMoreThanParameters ||
       growth.deviation < kLeastDeviation * growth.window || !(s.radius > 0) || drifts_away(growth))
     return false;
+  // What a facet leans must be more than the tolerance could tilt it by: else its normal says
+  // nothing.
   std::vector<double> leans, tilts;
   for (const int t : triangles) {
     leans.push_back(lean(t, s));
@@ -117,6 +122,7 @@ bool Recognizer::is_over_determined(const Growth& growth) {
     return x[x.size() / 2];
   };
   if (median(tilts) > kMostTilt * median(leans)) return false;
+  // Small round regions need vertices inside: on a border alone many surfaces fit.
   const bool round = s.kind == FaceKind::Sphere || s.kind == FaceKind::Torus;
   if (round && triangles.size() < kSmall && inner_vertices(growth).size() < 2) return false;
   if (s.kind == FaceKind::Sphere) {
@@ -128,6 +134,7 @@ bool Recognizer::is_over_determined(const Growth& growth) {
     for (const int t : triangles) mean += facet_normal(t) / double(triangles.size());
     for (const int v : vertices) {
       s.distance(point(v), n);
+      // The Jacobian of distances by center and radius: nearly singular for a flat cap.
       const Eigen::Vector4d row(n.x(), n.y(), n.z(), 1);
       square += row * row.transpose();
       spread += (point(v) - middle) * (point(v) - middle).transpose();
@@ -161,6 +168,7 @@ bool Recognizer::is_over_determined(const Growth& growth) {
     if (s.kind == FaceKind::Torus) across.push_back(std::atan2(y.dot(s.axis), off - s.radius));
   }
   if (offs.empty()) return false;
+  // Angles nearer than what the tolerance is at that radius are one.
   const double gap = std::max(1e-3, 10 * growth.window / std::max(median(offs), 1e-300));
   around = distinct(std::move(around), gap);
   if (s.kind != FaceKind::Torus) return enough(around, 5);

@@ -16,6 +16,7 @@ constexpr double kLeastTurn = 1e-6;
 
 }  // namespace
 
+// Newton's method on both distances; quadratic where the faces cross at an angle.
 bool onto_both(const Primitive& one, const Primitive& other, Vec3& x) {
   for (int i = 0; i < kMostRepeats; ++i) {
     const Intersection here = intersection_at(one, other, x);
@@ -26,6 +27,8 @@ bool onto_both(const Primitive& one, const Primitive& other, Vec3& x) {
   return x.allFinite();
 }
 
+// The triple product chord . (n x m): zero where both normals are one along the chord, with a sign
+// to either side.
 double turn_between(const std::vector<Primitive>& shapes, int face, int other, const Vec3& chord,
                     const Vec3& x) {
   Vec3 n, m;
@@ -33,6 +36,7 @@ double turn_between(const std::vector<Primitive>& shapes, int face, int other, c
   return chord.dot(n.cross(m));
 }
 
+// The most that a face is off a facet of it, by its middle and those of its sides.
 double sagitta_of(const Facet& facet, const Primitive& shape) {
   const Vec3* p = facet.corner;
   double most = std::abs(shape.distance((p[0] + p[1] + p[2]) / 3));
@@ -46,12 +50,15 @@ namespace {
 // A plane or a cylinder through three points of a line or circle that is upright on a face with
 // normal n there.
 Primitive cutting(const Vec3& p, const Vec3& middle, const Vec3& q, const Vec3& n) {
+  // On a straight line: the plane through it and the normal. On a circle: its own plane where that
+  // is steep, else the cylinder over it.
   const Vec3 d = q - p, up = (middle - p).cross(q - middle);
   Primitive out{FaceKind::Plane, p, d.cross(n).normalized(), 0, 0};
   if (!(up.norm() > 1e-7 * d.squaredNorm())) return out;
   // The center of the circle, from the middle of its chord.
   const Vec3 axis = up.normalized(), toward = axis.cross(d).normalized();
   const double half = d.norm() / 2, rise = (middle - (p + q) / 2).dot(toward);
+  // Of the chord theorem: rise (2 r - rise) = half^2.
   const double away = (rise * rise - half * half) / (2 * rise);
   const Vec3 center = (p + q) / 2 + away * toward;
   if (std::abs(n.dot(axis)) < 0.7) return {FaceKind::Plane, center, axis, 0, 0};
@@ -106,6 +113,7 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
     out[f].face = faces.of_triangle(shell.triangle_of_facet(static_cast<int>(f)));
   }
   // What is bent, or has borders that ought to be.
+  // Flat facets of planes far from anything round stay as they are.
   std::vector<char> bent(out.size(), 0);
   const auto is_round = [&](int face) {
     return face >= 0 && faces.shapes[face].kind != FaceKind::Plane;
@@ -120,6 +128,7 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
       if (g >= 0 && is_round(faces.of_triangle(triangle_of(g)))) bent[f] = 1;
     }
   }
+  // open: faces that do not hold their own facets exactly, and are left to the cubics.
   std::vector<char> open(faces.shapes.size(), 0);
   std::vector<float> off(3 * out.size(), 0);  // of a cubic side from the face [m]
   for (std::size_t f = 0; f < out.size(); ++f) {
@@ -174,6 +183,7 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
   }
   // A side is what it is for the sake of faces that give closest points.
   const auto gives = [&](int face) { return face >= 0 && !open[face]; };
+  // Giving up one face changes the sides of its neighbors, until nothing changes.
   for (bool changed = true; changed;) {
     changed = false;
     for (std::size_t f = 0; f < out.size(); ++f)
@@ -190,6 +200,7 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
     FaceCell& cell = out[f];
     if (cell.face < 0) continue;
     const auto curved = [&](int face) { return is_round(face) && gives(face); };
+    // A face is asked for closest points where it, its elements or a neighbor is curved.
     const bool needed =
         is_round(cell.face) || !facets[f].flat || std::any_of(cell.beyond, cell.beyond + 3, curved);
     cell.exact = !needed || gives(cell.face);

@@ -18,6 +18,7 @@ constexpr double kMostGap = 4e-9;
 // Faces that meet at less than this angle (its sine) do not determine where.
 constexpr double kLeastAngle = 0.003;
 
+// What a facet is of the face it lies on.
 struct FaceCell {
   // What a side is: within one face; between two that meet at an angle, the curve on which both are
   // zero; between two that are tangent, where their normals are parallel; or the cubic curve that

@@ -25,6 +25,7 @@ constexpr int kMostRefits = 8, kMostSweeps = 40;
 constexpr int kFewOfBand = 3;
 constexpr std::size_t kVerticesOfPlane = 5;
 
+// Without interpolation.
 double quantile(std::vector<double> values, double share) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * double(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
@@ -49,6 +50,7 @@ std::array<Vec3, 3> normals_at(const Primitive& shape, const std::array<Vec3, 3>
 Vec3 Faces::normal(const Shell& shell, int t, int k) const {
   const Triangle& c = shell.triangles()[t];
   const std::vector<Vec3>& p = shell.vertices();
+  // On the side of the facet's own normal.
   const Vec3 n = normals_at(shapes[of[t]], {p[c[0]], p[c[1]], p[c[2]]})[k];
   return n.dot(shell.topology().face_normal[t]) < 0 ? Vec3(-n) : n;
 }
@@ -61,6 +63,7 @@ std::vector<int> Recognizer::patch(int seed, std::size_t vertices, bool along) {
   std::priority_queue<Entry> open;
   open.push({0, seed});
   mark({seed});
+  // A heap by priority: the next triangle is the largest.
   const auto add_vertices = [&](int t) {
     for (int v : corners(t))
       if (std::find(seen.begin(), seen.end(), v) == seen.end()) seen.push_back(v);
@@ -83,6 +86,7 @@ std::vector<int> Recognizer::patch(int seed, std::size_t vertices, bool along) {
   return out;
 }
 
+// The largest angle [rad] between a facet and the shape's normals at its corners.
 double Recognizer::lean(int t, const Primitive& shape) const {
   double least = 1;
   const Triangle& c = corners(t);
@@ -111,6 +115,8 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
   for (int k = 0; k < 3; ++k) {
     const int l = next_corner(k);
     const Vec3 d = point(c[l]) - point(c[k]), middle = (point(c[k]) + point(c[l])) / 2;
+    // What the cubic side through these normals would add to the middle of the chord: an eighth of
+    // the difference of the slopes.
     const Vec3 rise = (d.dot(normals[l]) * normals[l] - d.dot(normals[k]) * normals[k]) / 8;
     out.deviation = std::max(out.deviation, std::abs(shape.distance(middle)));
     curved = std::max(curved, std::abs(shape.distance(middle + rise)));
@@ -119,6 +125,7 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
   return out;
 }
 
+// Flood fill over the neighbors that the shape explains, all on one side of it.
 Growth Recognizer::grow(int seed, const Primitive& shape, double tolerance) {
   Growth out{shape, {}, 0, 0, tolerance};
   mark({seed});
@@ -143,6 +150,7 @@ Growth Recognizer::grow(int seed, const Primitive& shape, double tolerance) {
   return out;
 }
 
+// Evenly taken where there are too many.
 bool Recognizer::refit(Growth& growth) const {
   const std::vector<int> vertices = vertices_of(growth.triangles);
   std::vector<Vec3> points;
@@ -180,6 +188,7 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
     all.clear();
     return;
   }
+  // 0.009 rad is half a degree.
   const double most_lean = 2 * quantile(leans, 0.75) + 0.009, most_off = 5 * quantile(off, 0.75);
   std::vector<std::pair<int, int>> by_region;  // region, place in `all`
   for (std::size_t i = 0; i < all.size(); ++i)
@@ -211,6 +220,7 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
       }
       std::sort(where.begin(), where.end());
       int count = 1;
+      // The number of distinct rulings: neighbors differ by more than 1e-3 rad.
       for (std::size_t n = 1; n < where.size(); ++n) count += where[n] - where[n - 1] > 1e-3;
       // Rulings on both sides of the cut at pi.
       if (s.kind != FaceKind::Torus && where.size() > 1 &&

@@ -19,6 +19,7 @@ Mat3 eigenvectors(const Mat3& symmetric) {
   return Eigen::SelfAdjointEigenSolver<Mat3>(symmetric).eigenvectors();
 }
 
+// Rank-revealing: what the points do not determine stays as it is (a basic solution).
 template <class Matrix, class Vector>
 Eigen::VectorXd least_squares(const Matrix& a, const Vector& b) {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(a);
@@ -40,6 +41,8 @@ Primitive with_axis(FaceKind kind, const Vec3& point, const Vec3& axis,
   if (kind == FaceKind::Cone) {
     const Eigen::ArrayXd from_mean = along - along.mean();
     const double slope = (from_mean * off).sum() / std::max(from_mean.square().sum(), 1e-300);
+    // Linear regression of the distance from the axis over the place along it; radius at `point`,
+    // second: half-angle.
     out.radius -= slope * along.mean();
     out.second = std::atan(slope);
   } else if (kind == FaceKind::Torus) {
@@ -49,6 +52,7 @@ Primitive with_axis(FaceKind kind, const Vec3& point, const Vec3& axis,
     const Eigen::Vector3d x = least_squares(a, (off.square() + along.square()).matrix());
     out.point += x[1] * axis;
     out.radius = x[0];
+    // (off - R)^2 + (h - h0)^2 = r^2 is linear in R, h0 and r^2 - R^2 - h0^2.
     out.second = radius_or_zero(x[2] + x[0] * x[0] + x[1] * x[1]);
   }
   return out;
@@ -61,6 +65,8 @@ struct Frame {
   explicit Frame(const Vec3& axis) : u(axis.unitOrthogonal()), v(axis.cross(u)) {}
 };
 
+// The derivative of a distance by a motion of the surface is minus the normal's component of that
+// motion.
 template <class Row>
 double distance_and_row(const Primitive& p, const Frame& frame, const Vec3& x, Row&& row) {
   Vec3 n;
@@ -73,6 +79,7 @@ double distance_and_row(const Primitive& p, const Frame& frame, const Vec3& x, R
   const double h = y.dot(p.axis);
   const Vec3 across = y - h * p.axis;
   const double off = across.norm();
+  // Unit, away from the axis; a turn of the axis moves a point at height h by h.
   const Vec3 e = off > 0 ? Vec3(across / off) : Vec3::Zero();
   const double eu = e.dot(frame.u), ev = e.dot(frame.v);
   if (p.kind == FaceKind::Cylinder) {
@@ -89,6 +96,7 @@ double distance_and_row(const Primitive& p, const Frame& frame, const Vec3& x, R
   return distance;
 }
 
+// One step of Gauss-Newton; the axis is normalized after it.
 void move(Primitive& p, const Frame& frame, const Eigen::VectorXd& x) {
   if (p.kind == FaceKind::Sphere) {
     p.point += x.head<3>();
@@ -109,6 +117,7 @@ void move(Primitive& p, const Frame& frame, const Eigen::VectorXd& x) {
   if (p.kind == FaceKind::Cone) p.radius -= along * std::tan(p.second);
 }
 
+// Positive radii, finite numbers, and no cone so flat that it is a plane.
 bool is_sound(const Primitive& p) {
   // What is nearly a sphere may be any torus of a small radius until more of it is known.
   return std::isfinite(p.radius) && p.point.allFinite() &&
@@ -118,6 +127,8 @@ bool is_sound(const Primitive& p) {
 
 }  // namespace
 
+// In closed form, positive outside; the normal is its gradient. 1e-300: on the axis or at the
+// center there is no direction, and the result is finite.
 double Primitive::distance(const Vec3& x, Vec3& normal) const {
   const Vec3 y = x - point;
   if (kind == FaceKind::Plane) {
@@ -139,6 +150,7 @@ double Primitive::distance(const Vec3& x, Vec3& normal) const {
   }
   if (kind == FaceKind::Cone) {
     const double c = std::cos(second), s = std::sin(second);
+    // In the half-plane through x, perpendicular to the ruling.
     normal = c * e - s * axis;
     return (off - radius) * c - h * s;
   }
@@ -158,6 +170,8 @@ Mat3 Primitive::hessian(const Vec3& x) const {
   const Vec3 across = y - y.dot(axis) * axis;
   const double off = std::max(across.norm(), 1e-300);
   const Vec3 e = across / off, around = axis.cross(e);
+  // Around the axis the normal turns with the angle: curvature (n . e) / off. Cylinder and cone are
+  // straight along the meridian; a torus has 1 / q.
   Mat3 out = n.dot(e) / off * around * around.transpose();
   if (kind == FaceKind::Torus) {
     const Vec3 meridian = n.cross(around);
@@ -167,6 +181,7 @@ Mat3 Primitive::hessian(const Vec3& x) const {
   return out;
 }
 
+// Of the circle about the axis, at the height of x.
 double Primitive::radius_at(const Vec3& x) const {
   if (kind == FaceKind::Cone) return radius + (x - point).dot(axis) * std::tan(second);
   return kind == FaceKind::Plane ? 1 : radius;
@@ -182,6 +197,8 @@ bool Primitive::singular(const Vec3& x, double share) const {
          (kind == FaceKind::Torus && std::hypot(off - radius, h) < share * second);
 }
 
+// The intersection of two level sets: tangent n x m; curvature and offset v are in the plane of n
+// and m, from n . v and m . v by a 2 by 2 system.
 Intersection intersection_at(const Primitive& one, const Primitive& other, const Vec3& x) {
   Vec3 n, m;
   const double a = one.distance(x, n), b = other.distance(x, m), c = n.dot(m);
@@ -194,6 +211,7 @@ Intersection intersection_at(const Primitive& one, const Primitive& other, const
           solve(-a, -b), across.norm()};
 }
 
+// Plane, cylinder, cone, sphere, torus.
 int num_parameters(FaceKind kind) {
   static constexpr int kCount[] = {3, 5, 6, 4, 7};
   return kCount[static_cast<int>(kind)];
@@ -203,6 +221,7 @@ std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets
   std::vector<Primitive> out;
   const std::vector<Vec3>& points = facets.vertices;
   Vec3 middle = Vec3::Zero();
+  // Guesses are made about the middle and in units of the size, against cancellation.
   for (const Vec3& p : points) middle += p / double(points.size());
   double size = 0;
   for (const Vec3& p : points) size = std::max(size, (p - middle).cwiseAbs().maxCoeff());
@@ -240,6 +259,7 @@ std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets
     nm += weight * n * moment.transpose();
     mm += weight * moment * moment.transpose();
   }
+  // The direction in which the normals vary least.
   const Vec3 axis = eigenvectors(spread).col(0);
   // The point nearest to the normals' lines, seen along the axis.
   Mat3 square = 1e-9 * Mat3::Identity();
@@ -258,6 +278,8 @@ std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets
   };
   add(square.ldlt().solve(right), axis);
   if (kind != FaceKind::Torus) return out;
+  // Minimize sum (n . moment of axis + moment of n . a)^2 over unit a: an eigenvalue problem after
+  // eliminating the axis' place.
   const Mat3 solved = nn.ldlt().solve(nm);
   const Mat3 directions = eigenvectors(mm - nm.transpose() * solved);
   for (int k = 0; k < 2; ++k) {
@@ -304,6 +326,7 @@ bool fit_primitive(const std::vector<Vec3>& points, double tolerance, Primitive&
     if (step >= kFewSteps && worst > 0.6 * last && worst > enough) return false;
     last = worst;
     Eigen::VectorXd x = least_squares(jacobian, -off);
+    // No step is longer than the points' size.
     x *= std::min(1.0, 1 / std::max(x.cwiseAbs().maxCoeff(), 1e-300));
     move(p, frame, x);
     if (x.cwiseAbs().maxCoeff() < 1e-13) break;

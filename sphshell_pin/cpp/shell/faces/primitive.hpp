@@ -11,6 +11,7 @@ using Mat3 = Eigen::Matrix3d;
 
 enum class FaceKind : int { Plane = 0, Cylinder = 1, Cone = 2, Sphere = 3, Torus = 4 };
 
+// A surface with a closest point in closed form. Lengths in meters, angles in radians.
 struct Primitive {
   FaceKind kind = FaceKind::Plane;
   Vec3 point = Vec3::Zero();  // on the axis; the center of a sphere or torus; on a plane
@@ -48,6 +49,7 @@ struct Intersection {
   Vec3 offset;              // from the point onto both [m]
   double sine;              // of the angle between the shapes
 };
+// At a point that need not be on it yet.
 Intersection intersection_at(const Primitive& one, const Primitive& other, const Vec3& x);
 
 // How many numbers describe a primitive of a kind.

@@ -31,6 +31,7 @@ constexpr double kSimpler[] = {0, 1, 0.98, 0.97, 0.95};
 
 }  // namespace
 
+// The others keep their order.
 void Faces::give_up(const std::vector<char>& gone) {
   std::vector<int> number(shapes.size(), -1);
   std::vector<Primitive> kept;
@@ -74,6 +75,7 @@ double Recognizer::longest_side(int t) const {
   return longest;
 }
 
+// The angle [rad] between the normals of two facets.
 double Recognizer::turn(int t, int u) const {
   const Vec3 &a = facet_normal(t), &b = facet_normal(u);
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -88,6 +90,7 @@ std::vector<int> Recognizer::vertices_of(const std::vector<int>& triangles) cons
   return out;
 }
 
+// Vertices, and centroids, normals and areas of the triangles, as guess_primitives() takes them.
 FacetSample Recognizer::sample(const std::vector<int>& triangles) const {
   FacetSample out;
   for (const int v : vertices_of(triangles)) out.vertices.push_back(point(v));
@@ -99,11 +102,13 @@ FacetSample Recognizer::sample(const std::vector<int>& triangles) const {
   return out;
 }
 
+// Marks of earlier rounds count as none, so nothing needs to be cleared.
 void Recognizer::mark(const std::vector<int>& triangles) {
   ++round_;
   for (const int t : triangles) mark_[t] = round_;
 }
 
+// Over edges that may be inside a face: no creases, and turns below the limit.
 void Recognizer::list_neighbors() {
   const Topology& topology = shell_.topology();
   beside_.assign(topology.edge_of.size(), -1);
@@ -152,6 +157,7 @@ bool Recognizer::try_kinds(int seed, const std::vector<int>& patch, bool torus, 
         facets.vertices.size() < std::size_t(num_parameters(kind)) + 1)
       continue;
     for (Primitive guess : guess_primitives(kind, facets)) {
+      // A guess, its least-squares fit to the patch, then growth over all that it explains.
       if (!fit_primitive(facets.vertices, tolerance_, guess)) continue;
       any = true;
       Growth growth = grow_and_refit(seed, guess);
@@ -163,6 +169,7 @@ bool Recognizer::try_kinds(int seed, const std::vector<int>& patch, bool torus, 
         leave_own_faces_out(growth);
         if (!is_over_determined(growth)) continue;
       }
+      // The kind that explains most triangles wins.
       const double worth = double(growth.triangles.size()) * kSimpler[static_cast<int>(kind)];
       if (worth > score) score = worth, best = std::move(growth);
       break;
@@ -215,6 +222,7 @@ bool Recognizer::take(Growth growth) {
   std::vector<int> shared(faces_.size(), 0);
   for (const int t : all)
     if (of_[t] >= 0) ++shared[of_[t]];
+  // A face gives way where nearly all of it is shared, and the new one is clearly larger.
   const auto stays = [&](int f) {
     const double own = double(faces_[f].triangles.size());
     return shared[f] < 0.9 * own || double(all.size()) < 1.3 * own;
@@ -239,6 +247,7 @@ void Recognizer::drop_zones_of_free_shapes() {
               all.end());
     weak[f] = !all.empty() && is_weak(faces_[f]);
   }
+  // First all are judged, then dropped: the order does not matter.
   std::vector<int> dropped;
   for (std::size_t f = 0; f < faces_.size(); ++f) {
     if (!weak[f]) continue;
@@ -263,6 +272,8 @@ void Recognizer::drop_zones_of_free_shapes() {
       }
       shortest.push_back(least);
     }
+    // A zone is short against its triangles: less than six times their shortest sides along the
+    // axis.
     const auto middle = shortest.begin() + std::ptrdiff_t(shortest.size() / 2);
     std::nth_element(shortest.begin(), middle, shortest.end());
     if (smooth > 0 && 2 * vague >= smooth && high - low < 6 * *middle)
@@ -280,6 +291,7 @@ void Recognizer::add_planes(Faces& faces) const {
   std::vector<char> plane(count, 1);
   std::vector<int> number(count, -1), some(count, -1);
   for (std::size_t t = 0; t < of_.size(); ++t) {
+    // Each triangle may speak against its region.
     char& is_plane = plane[regions_.of(int(t))];
     some[regions_.of(int(t))] = static_cast<int>(t);
     if (of_[t] >= 0 || regions_.count(regions_.of(int(t))) < 2) is_plane = 0;
@@ -311,6 +323,7 @@ Faces Recognizer::run() {
   // Any order will do, as long as it is the same one and visits all places soon.
   std::uint64_t state = 1;
   for (std::size_t i = seeds.size(); i > 1; --i) {
+    // Knuth's linear congruence (MMIX), and the shuffle of Fisher and Yates.
     state = state * 6364136223846793005u + 1442695040888963407u;
     std::swap(seeds[i - 1], seeds[(state >> 33) % i]);
   }

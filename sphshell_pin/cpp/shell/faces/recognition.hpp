@@ -8,6 +8,7 @@
 
 namespace sphshell {
 
+// The faces of a shell, and which triangles lie on them.
 struct Faces {
   std::vector<Primitive> shapes;
   std::vector<int> of;  // per triangle, in `shapes`; -1: of no kind known; empty: none at all

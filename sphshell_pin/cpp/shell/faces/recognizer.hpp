@@ -16,10 +16,12 @@ struct Growth {
   double window = 0;     // the vertices are as close as that to the shape [m]
 };
 
+// Finds faces from seeds: a patch, a fit, growth over all that it explains, evidence.
 class Recognizer {
  public:
   Recognizer(const Shell& shell, const CoplanarRegions& regions, double tolerance);
 
+  // To be called once.
   Faces run();
 
  private:
@@ -33,12 +35,15 @@ class Recognizer {
   const Triangle& corners(int t) const { return shell_.triangles()[t]; }
   const Vec3& point(int vertex) const { return shell_.vertices()[vertex]; }
   const Vec3& facet_normal(int t) const { return shell_.topology().face_normal[t]; }
+  // Of a triangle [m, m^2, m].
   Vec3 centroid(int t) const;
   double area(int t) const;
   double longest_side(int t) const;
   double turn(int t, int u) const;  // [rad]
+  // Each once, ascending.
   std::vector<int> vertices_of(const std::vector<int>& triangles) const;
   FacetSample sample(const std::vector<int>& triangles) const;
+  // These alone are marked from now on.
   void mark(const std::vector<int>& triangles);
   bool is_marked(int t) const { return mark_[t] == round_; }
 
@@ -46,6 +51,7 @@ class Recognizer {
   std::vector<int> patch(int seed, std::size_t vertices, bool along);
   Explained explain(int t, const Primitive& shape, double tolerance, double most_lean) const;
   double lean(int t, const Primitive& shape) const;
+  // The connected triangles that a shape explains; the shape fitted to them; both in turn.
   Growth grow(int seed, const Primitive& shape, double tolerance);
   bool refit(Growth& growth) const;
   Growth grow_and_refit(int seed, const Primitive& shape);
@@ -54,15 +60,19 @@ class Recognizer {
 
   // evidence.cpp
   std::vector<int> inner_vertices(const Growth& growth);
+  // Whether its border leaves the shape slowly; whether its vertices determine the shape, with some
+  // to spare; whether it is a strip without vertices inside.
   bool drifts_away(const Growth& growth);
   bool is_over_determined(const Growth& growth);
   bool is_weak(const Growth& growth);
 
   // recognition.cpp
   void list_neighbors();
+  // Fills curved_: the triangles that a face other than a plane may have.
   void find_candidates();
   bool try_kinds(int seed, const std::vector<int>& patch, bool torus, bool others, Growth& best,
                  double& score);
+  // Whether a face was found from this triangle; whether it was taken.
   bool recognize_from(int seed);
   bool take(Growth growth);
   void drop_zones_of_free_shapes();

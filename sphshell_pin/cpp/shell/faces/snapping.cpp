@@ -17,6 +17,7 @@ bool onto_all(const std::vector<Primitive>& shapes, const std::vector<int>& face
               Vec3& x) {
   const Vec3 before = x;
   for (int i = 0; i < kMostSnaps; ++i) {
+    // Gram-Schmidt on the normals: at most three faces determine a point.
     Vec3 step = Vec3::Zero(), free[3];
     int count = 0;
     for (const int f : faces) {
@@ -40,6 +41,7 @@ bool onto_all(const std::vector<Primitive>& shapes, const std::vector<int>& face
 
 std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, double tolerance) {
   const auto flat = [](const Primitive& one) { return one.kind == FaceKind::Plane; };
+  // Flat elements are on planes as they are.
   if (std::all_of(faces.shapes.begin(), faces.shapes.end(), flat)) return {};
   const std::vector<Vec3>& before = shell.vertices();
   std::vector<std::vector<int>> around(before.size());
@@ -52,6 +54,7 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
   std::vector<Vec3> out = before;
   bool any = false;
   for (std::size_t v = 0; v < out.size(); ++v) {
+    // Planes first: they are exact, and the other faces give way.
     std::stable_partition(around[v].begin(), around[v].end(),
                           [&](int f) { return flat(faces.shapes[f]); });
     if (!onto_all(faces.shapes, around[v], tolerance, out[v])) out[v] = before[v];
@@ -66,6 +69,7 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
       };
       const bool moved =
           out[t[0]] != before[t[0]] || out[t[1]] != before[t[1]] || out[t[2]] != before[t[2]];
+      // Put back where a triangle would turn over; that may spoil a neighbor, so it is repeated.
       if (!moved || normal(out).dot(normal(before)) > kLeastAlike) continue;
       for (const int v : t) out[v] = before[v];
       changed = true;

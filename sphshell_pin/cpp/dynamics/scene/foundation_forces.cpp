@@ -1,5 +1,3 @@
-#include "dynamics/scene/foundation_pair.hpp"
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -16,6 +14,8 @@ struct Pressed {
   double gap_rate, share, drag;
   Vec3 slip;
 
+  // share is clamped at zero: a pressure does not pull. drag [s/m] is the friction coefficient over
+  // the slip speed.
   Pressed(const FoundationLaw& law, const CoulombFriction* friction, const Vec3& n, const Vec3& v)
       : gap_rate(n.dot(v)),
         share(std::max(0.0, 1 - law.dissipation * gap_rate)),
@@ -31,22 +31,20 @@ const CoulombFriction* sliding_friction(const Pair& pair) {
 
 // The derivative of the pressure at a point this far from the sphere's center by that center.
 Vec3 pressure_by_center(const Vec3& from, double radius) {
+  // p = (R^2 - rho^2) / (2 rho): dp/drho = -(R^2 / rho^2 + 1) / 2, and rho falls along `from`.
   const double rho = from.norm();
   return (radius * radius / (rho * rho) + 1) / (2 * rho) * from;
 }
 
 }  // namespace
 
-void FoundationPair::find(const Pair& pair, const Vec3& center, bool slopes,
-                          std::vector<Contact>& contacts) {
+void FoundationForces::find(const Pair& pair, const Vec3& center, bool slopes,
+                            std::vector<Contact>& contacts) {
   contacts.clear();
   center_ = center;
   const bool points =
       pair.law.needs_rate() || sliding_friction(pair) || (slopes && pair.friction.has_state());
-  if (pair.ball > 0)
-    foundation_.find_on_ball(pair.ball, center, pair.radius, points);
-  else
-    foundation_.find(*pair.shell, pair.method, center, pair.radius, slopes, points);
+  pair.ask([&](const auto& one) { one.overlap(foundation_, center, pair.radius, slopes, points); });
   for (const FoundationRow& row : foundation_.rows()) {
     const Vec3 n = row.normal();
     Contact& contact =
@@ -59,16 +57,18 @@ void FoundationPair::find(const Pair& pair, const Vec3& center, bool slopes,
   }
 }
 
-FoundationForce FoundationPair::force(const Pair& pair, std::size_t i, const Vec3& velocity,
-                                      const Vec3& spin) const {
+FoundationForce FoundationForces::force(const Pair& pair, std::size_t i, const Vec3& velocity,
+                                        const Vec3& spin) const {
   const FoundationLaw& law = *pair.law.foundation();
   const double kappa = law.modulus / law.thickness;
   FoundationForce out;
+  // The elastic force is the row's sum; damping and friction are sums over its points.
   out.elastic = out.normal = kappa * foundation_.rows()[i].sum.force;
   out.friction.setZero(), out.moment.setZero();
   const CoulombFriction* friction = sliding_friction(pair);
   for (const FoundationPoint& point : foundation_.points()) {
     if (point.row != static_cast<int>(i) || point.area == 0) continue;
+    // Rigid-body velocity of the sphere's point at the quadrature point, against the shell.
     const Vec3 arm = point.point - center_, v = velocity + spin.cross(arm);
     const Pressed pressed(law, friction, point.normal, v);
     const double push = kappa * point.pressure * point.area;
@@ -83,21 +83,16 @@ FoundationForce FoundationPair::force(const Pair& pair, std::size_t i, const Vec
   return out;
 }
 
-double FoundationPair::energy(const Pair& pair, std::size_t i) const {
-  const FoundationLaw& law = *pair.law.foundation();
-  return law.modulus / law.thickness * foundation_.rows()[i].sum.energy;
-}
-
 // An ellipse has half axes of 2 sqrt(moment / area).
-PatchRow FoundationPair::patch(const Pair& pair, std::size_t i, const Mat3& rotation,
-                               double force) const {
-  Foundation found;
-  if (pair.ball > 0)
-    found.find_on_ball(pair.ball, center_, pair.radius, true);
-  else
-    found.find(*pair.shell, pair.method, center_, pair.radius, false, true);
-  const int number = static_cast<int>(i);
-  const FoundationRow& row = found.rows()[i];
+PatchRow FoundationForces::patch(SceneData& scene, const ActiveContact& active,
+                                 const ContactRow& shown) const {
+  const Pair& pair = scene.pair_of(active);
+  // Force, damping included, and number of the row.
+  const double force = shown.normal_force;
+  const int number = active.index;
+  Foundation found;  // with its points, which a scene has only where it needs them
+  pair.ask([&](const auto& one) { one.overlap(found, center_, pair.radius, false, true); });
+  const FoundationRow& row = found.rows()[static_cast<std::size_t>(number)];
   double area = 0, peak = 0;
   Vec3 middle = Vec3::Zero(), push = Vec3::Zero();
   for (const FoundationPoint& one : found.points()) {
@@ -106,6 +101,7 @@ PatchRow FoundationPair::patch(const Pair& pair, std::size_t i, const Mat3& rota
     peak = std::max(peak, one.pressure);
   }
   if (!(area > 0)) return unknown_patch(row.depth);
+  // Centroid of the area, and the second moments about it in the tangent plane.
   middle /= area;
   const Vec3 normal = row.normal(), east = normal.unitOrthogonal(), north = normal.cross(east);
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
@@ -117,7 +113,8 @@ PatchRow FoundationPair::patch(const Pair& pair, std::size_t i, const Mat3& rota
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solved(moments / area);
   const Eigen::Vector2d half = 2 * solved.eigenvalues().cwiseMax(0).cwiseSqrt();
   const Eigen::Vector2d longer = solved.eigenvectors().col(1);
-  const Vec3 axis = rotation * (longer[0] * east + longer[1] * north);
+  const Vec3 axis =
+      scene.state_of(active).world_from_j.rotation() * (longer[0] * east + longer[1] * north);
   // Damping is shared out as the elastic pressure is.
   PatchRow out{{half[1], half[0]}, {}, peak * force / push.norm(), force / area, row.depth};
   std::copy_n(axis.data(), 3, out.axis);
@@ -126,14 +123,15 @@ PatchRow FoundationPair::patch(const Pair& pair, std::size_t i, const Mat3& rota
 
 // The quadrature points stay where they are on the shell: there the pressure follows the center,
 // and the border of the overlap adds nothing, as it bears no pressure.
-void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
-                            const ContactSite& site, double normal_force,
-                            ContactSlopes& out) const {
+void FoundationForces::slopes(const Pair& pair, std::size_t i, double relaxation,
+                              const ContactSite& site, double normal_force,
+                              ContactSlopes& out) const {
   const FoundationLaw& law = *pair.law.foundation();
   const double kappa = law.modulus / law.thickness;
   const FoundationRow& row = foundation_.rows()[i];
   const Vec3 force = kappa * row.sum.force;
   const Mat3 slope = kappa * row.sum.slope;
+  // The elastic force acts at the center; its moment about the shell's origin is c x f.
   out.wrench << force, center_.cross(force);
   out.by_place << slope, cross_matrix(center_) * slope - cross_matrix(force);
   out.by_twist.setZero();
@@ -146,6 +144,8 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
     const Vec3 v = site.twist.head<3>() + site.twist.tail<3>().cross(x);
     const Pressed pressed(law, friction, n, v);
     // Of a pressure of one: the force, and its derivative by the velocity.
+    // Damping and drag per unit of pressure, and their derivative by the velocity of the point: the
+    // normal part -b n n^T, and of the drag the product rule over share and coefficient.
     const double area = kappa * point.area;
     const Vec3 unit = area * ((pressed.share - 1) * n - pressed.drag * pressed.slip);
     Mat3 by_velocity = Mat3::Zero();
@@ -166,6 +166,7 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
     out.wrench.tail<3>() += point.pressure * x.cross(unit);
     out.by_place.topRows<3>() += by_place;
     out.by_place.bottomRows<3>() += arm * by_place;
+    // v = linear - [x] angular, moment = [x] force.
     out.by_twist.topLeftCorner<3, 3>() += by_velocity;
     out.by_twist.topRightCorner<3, 3>() -= by_velocity * arm;
     out.by_twist.bottomLeftCorner<3, 3>() += arm * by_velocity;
@@ -175,9 +176,10 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
 }
 
 // Of the center of pressure, by the sphere's center.
-Mat3 FoundationPair::center_slopes(std::size_t i, double radius) const {
+Mat3 FoundationForces::center_slopes(std::size_t i, double radius) const {
   double all = 0;
   Vec3 first = Vec3::Zero(), all_by = Vec3::Zero();
+  // Quotient rule for sum(p A x) / sum(p A); only p depends on the center.
   Mat3 first_by = Mat3::Zero();
   for (const FoundationPoint& point : foundation_.points()) {
     if (point.row != static_cast<int>(i)) continue;
@@ -186,6 +188,7 @@ Mat3 FoundationPair::center_slopes(std::size_t i, double radius) const {
     all += share, first += share * from;
     all_by += by, first_by += from * by.transpose();
   }
+  // Without pressure the center of pressure moves with the sphere.
   if (!(all > 0)) return Mat3::Identity();
   return (first_by - first / all * all_by.transpose()) / all;
 }
@@ -193,9 +196,9 @@ Mat3 FoundationPair::center_slopes(std::size_t i, double radius) const {
 // The bristle's part of the wrench, and its rates. It follows from a contact whose normal force
 // depends on nothing, less what that does without friction; the normal force's own derivatives,
 // which are those of the pressure, pass through that of the friction by it.
-void FoundationPair::add_bristle(const Pair& pair, std::size_t i, double relaxation,
-                                 const ContactSite& site, double normal_force,
-                                 ContactSlopes& out) const {
+void FoundationForces::add_bristle(const Pair& pair, std::size_t i, double relaxation,
+                                   const ContactSite& site, double normal_force,
+                                   ContactSlopes& out) const {
   const Vec3& n = site.contact.normal;
   const double size = std::max(normal_force, 1e-300), depth = site.contact.depth;
   // Of the pressure's force along the normal.
@@ -220,33 +223,29 @@ void FoundationPair::add_bristle(const Pair& pair, std::size_t i, double relaxat
   out.wrench += all.wrench - without.wrench;
   out.by_place += all.by_place - without.by_place + by_force * by_place;
   out.by_twist += all.by_twist - without.by_twist + by_force * by_twist;
-  out.by_stretch = all.by_stretch;
-  out.rate = all.rate;
-  const Vec3 rate_by_force = (more.rate_by_depth - all.rate_by_depth) * (depth / size);
-  out.rate_by_place = all.rate_by_place + rate_by_force * by_place;
-  out.rate_by_twist = all.rate_by_twist + rate_by_force * by_twist;
-  out.rate_by_stretch = all.rate_by_stretch;
-  for (int k = 0; k + 1 < pair.friction.rings(); ++k) {
-    ContactSlopes::Ring& ring = out.outer[k] = all.outer[k];
-    const Vec3 by = (more.outer[k].rate_by_depth - ring.rate_by_depth) * (depth / size);
+  for (int k = 0; k < pair.friction.rings(); ++k) {
+    ContactSlopes::Ring& ring = out.rings[k] = all.rings[k];
+    const Vec3 by = (more.rings[k].rate_by_depth - ring.rate_by_depth) * (depth / size);
     ring.rate_by_place += by * by_place;
     ring.rate_by_twist += by * by_twist;
   }
 }
 
 // The force of a row of a foundation, in place of that of its depth.
-void SceneData::add_foundation(ActiveContact& active, const ContactKinematics<double>& m) {
-  const Pair& pair = pairs_[active.pair];
-  const PairState& state = states_[active.pair];
+void FoundationForces::complete(const SceneData& scene, ActiveContact& active) const {
+  const Pair& pair = scene.pair_of(active);
+  const PairState& state = scene.state_of(active);
+  const ContactKinematics<double>& m = active.kinematics;
   const auto& turn = state.world_from_j.rotation();
   const Vec3 center = state.world_from_j.act(state.center);
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
   if (pair.needs_velocity()) {
-    velocity = turn.transpose() * relative_velocity(pair, center);
-    spin = turn.transpose() *
-           (body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+    velocity = turn.transpose() * scene.relative_velocity(pair, center);
+    spin = turn.transpose() * scene.relative_spin(pair);
   }
-  const FoundationForce found = foundations_[active.pair].force(pair, active.row, velocity, spin);
+  const std::size_t i = static_cast<std::size_t>(active.index);
+  const FoundationForce found = force(pair, i, velocity, spin);
+  const FoundationLaw& law = *pair.law.foundation();
   ContactForce<double>& f = active.force;
   f.elastic = found.elastic.norm();
   f.normal = std::max(0.0, active.contact.normal.dot(found.normal));
@@ -254,17 +253,45 @@ void SceneData::add_foundation(ActiveContact& active, const ContactKinematics<do
   f.friction = whole - f.normal * m.normal;
   active.moment = turn * found.moment + (center - active.point).cross(whole);
   active.damping = found.damping, active.sliding = found.sliding;
+  active.elastic = law.modulus / law.thickness * foundation_.rows()[i].sum.energy;
+  active.pieces = i == 0 ? 1 : 0;
   if (!pair.friction.has_state()) return;
   // One bristle at the center of pressure, on a disc as large as that of a plane.
   ContactForce<double> bristle;
   bristle.normal = f.normal, bristle.slip = f.slip;
   std::visit(
-      [&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), relaxation(pair)); },
+      [&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), scene.relaxation(pair)); },
       pair.friction.law);
   active.sliding = friction_power(bristle, m);
   bristle.elastic = f.elastic;
   bristle.friction += f.friction;
   f = bristle;
+}
+
+void FoundationForces::slopes(const SceneData& scene, const ActiveContact& active,
+                              const ContactSite& site, ContactSlopes& out) const {
+  const Pair& pair = scene.pair_of(active);
+  slopes(pair, static_cast<std::size_t>(active.index), scene.relaxation(pair), site,
+         active.force.normal, out);
+}
+
+bool FoundationForces::changed(SceneData& scene, const Pair& pair, const ActiveContact& active,
+                               const ContactSite& site, ContactSlopes& out) const {
+  // With scratch of its own, as this one holds the state of the scene.
+  FoundationForces foundation;
+  std::vector<Contact> contacts;
+  foundation.find(pair, site.place, true, contacts);
+  const std::size_t i = static_cast<std::size_t>(active.index);
+  if (i >= contacts.size()) return false;
+  ContactSite other = site;
+  other.contact = contacts[i];
+  other.radius = pair.radius;
+  other.disc_radius = pair.disc_radius();
+  const Vec3 spin = site.twist.tail<3>(), velocity = site.twist.head<3>() + spin.cross(site.place);
+  const Vec3 normal = foundation.force(pair, i, velocity, spin).normal;
+  foundation.slopes(pair, i, scene.relaxation(pair), other,
+                    std::max(0.0, other.contact.normal.dot(normal)), out);
+  return true;
 }
 
 }  // namespace sphshell

@@ -1,0 +1,78 @@
+// A step of an integrator under held torques, and its derivatives.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "dynamics/derivatives/step_derivatives.hpp"
+#include "dynamics/integrators/table.hpp"
+
+namespace sphshell {
+
+// From (q, v, z); the scene is left as it was.
+class HeldStep {
+ public:
+  HeldStep(SceneData& scene, const std::string& integrator, double dt, const VectorX& q,
+           const VectorX& v, VectorX z, const VectorX& tau)
+      : scene_(scene),
+        before_(scene.least_relaxation()),
+        dt_(dt),
+        torques_(tau),
+        stepper_(make_stepper(integrator, scene)),
+        chart_(scene, torques_),
+        start_{0, q, v, std::move(z), {}} {
+    // Explicit steps of this length hold bristles back.
+    scene.relax_in(stepper_->is_implicit() ? 0 : dt);
+    scene.restart();
+    chart_.begin(start_);
+    scene.evaluate(q, v, start_.z, true);
+  }
+  ~HeldStep() {
+    scene_.restart();
+    scene_.relax_in(before_);
+  }
+
+  // The end of the step, which starts from the same state however often it is taken.
+  const State& take() {
+    stepper_->begin(chart_);
+    stepper_->step(chart_, dt_, end_);
+    return end_;
+  }
+  // Of the end, after take(): by the parameters of `slopes`, q, v and the torques, in columns.
+  Tangent derivatives(StepSlopes& slopes) {
+    const Eigen::Index nv = start_.v.size(),
+                       first = Eigen::Index(slopes.linearization().parameters().size()),
+                       all = first + 3 * nv;
+    Tangent out{MatrixX::Zero(nv, all), MatrixX::Zero(nv, all),
+                MatrixX::Zero(start_.z.size(), all)};
+    MatrixX torque = MatrixX::Zero(nv, all);
+    out.q.middleCols(first, nv).setIdentity();
+    out.v.middleCols(first + nv, nv).setIdentity();
+    torque.rightCols(nv).setIdentity();
+    slopes.carry(chart_, *stepper_, dt_, torque, out);
+    return out;
+  }
+
+ private:
+  class Held : public Torques {
+   public:
+    explicit Held(const VectorX& tau) : tau_(tau) {}
+    const VectorX& torque(double, const VectorX&, const VectorX&) override { return tau_; }
+    bool follow_state() const override { return false; }
+    bool follow_time() const override { return false; }
+
+   private:
+    const VectorX& tau_;
+  };
+
+  SceneData& scene_;
+  const double before_, dt_;
+  Held torques_;
+  std::unique_ptr<Stepper> stepper_;
+  Chart chart_;
+  const State start_;
+  State end_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,43 @@
+#include "dynamics/scene/geometry.hpp"
+
+#include <cmath>
+
+#include "shell/curved/curved.hpp"
+
+namespace sphshell {
+namespace {
+
+bool is_closed(const Shell& shell) {
+  const std::vector<Edge>& edges = shell.topology().edges;
+  return std::none_of(edges.begin(), edges.end(), [](const Edge& edge) { return edge.count == 1; });
+}
+
+}  // namespace
+
+void ShellSurface::find_near(const Vec3& center, double radius, double margin, Query& query) const {
+  query.find(*shell, center, radius + margin, method);
+  for (Contact& contact : query.contacts) contact.depth -= margin;
+}
+
+// A curved element is off its flat one by the bulge at most.
+double ShellSurface::distance(const Vec3& center) const {
+  const double distance = std::abs(shell->closest_point(center).distance);
+  const bool is_curved = method == Method::Smooth && shell->curved() != nullptr;
+  return is_curved ? distance - shell->curved()->bulge() : distance;
+}
+
+// Of a shell with one side that encloses a volume: elsewhere there is no inside.
+double ShellSurface::depth_behind(const Vec3& center, double radius) const {
+  if (shell->side() == Side::Both) return 0;
+  const double distance = shell->closest_point(center).distance;
+  const double outside = shell->side() == Side::Outside ? distance : -distance;
+  return outside < 0 && is_closed(*shell) ? radius - outside : 0;
+}
+
+// At any distance, so that the depth can be followed through zero.
+void Ball::find_near(const Vec3& center, double other, double, Query& query) const {
+  const double depth = other + radius - center.norm();
+  query.contacts.assign(1, Contact{Vec3::Zero(), Vec3::Zero(), depth, 0, Feature::Face});
+}
+
+}  // namespace sphshell

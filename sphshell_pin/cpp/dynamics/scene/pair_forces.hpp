@@ -1,0 +1,90 @@
+// How the contacts of a pair become forces. Both kinds answer the same questions.
+#pragma once
+
+#include <variant>
+#include <vector>
+
+#include "contact/laws/foundation.hpp"
+#include "contact/laws/wrench_derivatives.hpp"
+#include "dynamics/scene/contact_row.hpp"
+#include "dynamics/scene/pair.hpp"
+
+namespace sphshell {
+
+class SceneData;
+struct ActiveContact;
+
+// Each kind has
+// - kDepthHeld: whether the forces of a changed pair are found where the contacts are, so that what
+//   follows from their depths is added; else they are found anew, with all that follows;
+// - find: the contacts of the pair at a center, with dn_dc where `slopes` and where it is known;
+// - complete: what the law at a point, which has been evaluated, leaves out; power and energy of
+//   the contact;
+// - patch: where the bodies touch, under the force of the row;
+// - slopes: the wrench and the rates of bristles by the motion;
+// - changed: the same of a pair with another parameter; false where it has no such contact.
+
+// Each contact is a point where the laws of the pair act on a depth.
+struct PointForces {
+  static constexpr bool kDepthHeld = true;
+
+  template <class Pose>
+  void find(const Pair& pair, const Pose& pose_i, const SE3& pose_j, const Vec3& center, bool,
+            Query& query) {
+    pair.ask([&](const auto& one) { one.find(pose_i, pose_j, center, pair.radius, query); });
+  }
+  void complete(const SceneData& scene, ActiveContact& active) const;
+  PatchRow patch(SceneData& scene, const ActiveContact& active, const ContactRow& row) const;
+  void slopes(const SceneData& scene, const ActiveContact& active, const ContactSite& site,
+              ContactSlopes& out) const;
+  bool changed(SceneData& scene, const Pair& pair, const ActiveContact& active,
+               const ContactSite& site, ContactSlopes& out) const;
+};
+
+// What acts on the sphere at one row, in the shell's frame.
+struct FoundationForce {
+  Vec3 elastic, normal;             // elastic: through the center; normal: with damping [N]
+  Vec3 friction;                    // of what friction every point has by itself [N]
+  Vec3 moment;                      // of the normal force and that friction, about the center [N m]
+  double damping = 0, sliding = 0;  // power lost [W]
+};
+
+// Each contact is a patch of the body that the sphere overlaps, a row: a FoundationLaw's pressure
+// acts on all of it. Its point is the center of pressure, its normal the direction of the force.
+class FoundationForces {
+ public:
+  static constexpr bool kDepthHeld = false;
+
+  template <class Pose>
+  void find(const Pair& pair, const Pose&, const SE3&, const Vec3& center, bool slopes,
+            Query& query) {
+    find(pair, center, slopes || pair.friction.has_state(), query.contacts);
+  }
+  void find(const Pair& pair, const Vec3& center, bool slopes, std::vector<Contact>& contacts);
+  void complete(const SceneData& scene, ActiveContact& active) const;
+  // The ellipse with the area's second moments, and the pressures.
+  PatchRow patch(SceneData& scene, const ActiveContact& active, const ContactRow& row) const;
+  void slopes(const SceneData& scene, const ActiveContact& active, const ContactSite& site,
+              ContactSlopes& out) const;
+  bool changed(SceneData& scene, const Pair& pair, const ActiveContact& active,
+               const ContactSite& site, ContactSlopes& out) const;
+
+ private:
+  // Of row i, where the sphere's body moves with `velocity` at the center and turns with `spin`
+  // against the shell.
+  FoundationForce force(const Pair& pair, std::size_t i, const Vec3& velocity,
+                        const Vec3& spin) const;
+  void slopes(const Pair& pair, std::size_t i, double relaxation, const ContactSite& site,
+              double normal_force, ContactSlopes& out) const;
+  // See the definitions: the derivative of the center of pressure, and what a bristle adds.
+  Mat3 center_slopes(std::size_t i, double radius) const;
+  void add_bristle(const Pair& pair, std::size_t i, double relaxation, const ContactSite& site,
+                   double normal_force, ContactSlopes& out) const;
+
+  Vec3 center_ = Vec3::Zero();
+  Foundation foundation_;
+};
+
+using PairForces = std::variant<PointForces, FoundationForces>;
+
+}  // namespace sphshell
