@@ -225,6 +225,22 @@ def test_a_sphere_on_an_axis_touches_a_ring(place, step):
     assert np.isclose(np.hypot(across[3], sine), 1, atol=1e-9)
 
 
+@pytest.mark.parametrize(("height", "distance"), [(10.0, 5.0), (32.0, 13.0)])
+def test_the_closest_point_of_a_ring_is_one_of_its_points(height, distance, step):
+    """In the middle of a bore, and over its rim: as a hair beside the axis."""
+    shell, move = sp.Shell.from_file(step), 1e-7
+    on, beside = (
+        np.array([15.0, 20.0, height]) * MM,
+        np.array([15.0 * MM + move, 20 * MM, height * MM]),
+    )
+    found = shell.closest_points([on, beside])
+    assert found.distances == pytest.approx([distance * MM] * 2, abs=2 * move)
+    assert np.linalg.norm(found.points - [on, beside], axis=1) == pytest.approx(found.distances)
+    assert np.linalg.norm(found.normals, axis=1) == pytest.approx([1.0, 1.0])
+    off = np.linalg.norm(found.points[:, :2] - on[:2], axis=1)
+    assert off == pytest.approx([5.0 * MM] * 2, abs=1e-9)
+
+
 def test_a_ring_that_a_border_cuts_is_none(tmp_path):
     """A groove along half of a cylinder: its axis is as far from all of it, and only from that."""
     solid = occ.cut(occ.box([0, 0, 0], [30, 40, 20]), occ.cylinder(5.0, 50.0, [15, 20, -1]))

@@ -3,6 +3,7 @@
 namespace nb = nanobind;
 
 void bind_mending(nb::module_& m);
+void bind_mujoco(nb::module_& m);
 void bind_shell(nb::module_& m);
 void bind_contact(nb::module_& m);
 void bind_dynamics(nb::module_& m);
@@ -23,4 +24,5 @@ NB_MODULE(_core, m) {
   bind_evaluator(m);
   bind_foundation(m);
   bind_rollout(m);
+  bind_mujoco(m);
 }

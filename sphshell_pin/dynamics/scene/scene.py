@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin import _core
 from sphshell_pin.checks import check_positive, check_type
 from sphshell_pin.contact import Friction, NormalLaw
+from sphshell_pin.dynamics.scene.constraints import ContactConstraints, constraints_of
 from sphshell_pin.dynamics.scene.derivatives import (
     ContactForceDerivatives,
     DynamicsDerivatives,
@@ -168,6 +169,17 @@ class Scene(SceneParts):
         `state` as in `external_forces`; contacts then have its ids.
         """
         return SceneContacts.from_rows(self._at(state).contacts(q, v))
+
+    def constraints(
+        self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
+    ) -> ContactConstraints:
+        """Return all contacts at q (nq,), v (nv,) for Pinocchio's own solvers of constraints.
+
+        Their laws are not in them but for the stiffness: ADMM and PGS compute forces that hold the
+        bodies apart, with Coulomb's cones. `state` as in `contacts`.
+        """
+        contacts = self.contacts(q, v, state)
+        return constraints_of(self.model, self.pairs, self.check_state(q, v)[0], contacts)
 
     def _at(self, state: SceneState | None) -> _core.Scene | _core.SceneState:
         if state is None:

@@ -143,7 +143,7 @@ Query::~Query() = default;
 void Query::want_dn_dc() { parts_->want_dn_dc = true; }
 
 const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, double radius,
-                                        Method method) {
+                                        Method method, bool rings) {
   contacts.clear();
   // Round-off grows with the coordinates, which are of the size of shell and sphere.
   const Sphere sphere{center, radius, kRoundOff * (shell.size() + radius)};
@@ -162,7 +162,7 @@ const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, 
   for (const Minimum& minimum : minima) {
     Contact& contact = contacts.emplace_back(minimum.contact);
     contact.rim = contact.feature != Feature::Face && feature_normal(shell, minimum).rim;
-    if (minimum.off_axis < 1) contact = ring_of(minimum, sphere);
+    if (rings && minimum.off_axis < 1) contact = ring_of(minimum, sphere);
     contact.facet = minimum.facet, contact.index = minimum.index;
   }
   // Deepest first, saddles last: the order must not depend on the numbering of the elements.
@@ -213,7 +213,7 @@ SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Q
   // The curved surface is no farther from the flat one than the bulge: a sphere of this radius
   // reaches it.
   const double reach = std::abs(at.distance) + 1.01 * shell.curved()->bulge();
-  const auto& found = query.find(shell, point, reach + 1e-9 * shell.size(), Method::Smooth);
+  const auto& found = query.find(shell, point, reach + 1e-9 * shell.size(), Method::Smooth, false);
   if (found.empty()) return at;
   const Vec3 from = point - found.front().point;
   const bool behind = found.front().normal.dot(at.normal) < 0;

@@ -20,9 +20,10 @@ class Query {
   ~Query();
 
   // The contacts of the sphere (center in the shell's frame [m]); valid until the next call.
-  // Minima come deepest first, then saddles.
+  // Minima come deepest first, then saddles. With `rings` a contact all around an axis is the mean of
+  // the circle, else one of its points.
   const std::vector<Contact>& find(const Shell& shell, const Vec3& center, double radius,
-                                   Method method);
+                                   Method method, bool rings = true);
 
   // Also find dn_dc; not for the method "elements".
   void want_dn_dc();

@@ -1,0 +1,308 @@
+"""Contacts in MuJoCo's steps: against the scene's own forces and motions, energy and momentum."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter, SetupWarning
+from sphshell_pin.scenario import build
+from tests import meshes
+from tests.shell.test_faces import torus
+
+mujoco = pytest.importorskip("mujoco")
+
+from sphshell_pin.adapters.mujoco import attach  # noqa: E402
+from sphshell_pin.benchmarks.in_mujoco import ball, generalized, mjcf_of, text  # noqa: E402
+
+LAW = sp.HuntCrossleyLaw(1e5, 1.5, 0.2)
+RNG = np.random.default_rng(0)
+
+
+def model_of(xml: str):
+    model = mujoco.MjModel.from_xml_string(xml)
+    return model, mujoco.MjData(model)
+
+
+def plate(size: float = 1.0) -> sp.Shell:
+    corners = size * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return sp.Shell(corners, [[0, 1, 2, 3]], name="plate")
+
+
+def test_a_panda_on_the_blade_feels_the_forces_of_its_scene():
+    built = build("fingertip_on_blade")
+    scene, pair = built.scene, built.scene.pairs[0]
+    model, data = model_of(mjcf_of(scene.model, pair.sphere))
+    placed = {"placement": pair.placement_j, "law": pair.law, "friction": pair.friction}
+    with pytest.warns(SetupWarning, match="timestep of 0.002 s is too long"):
+        contacts = attach(model, pair.shell, ["tip"], **placed)
+    touched = 0
+    with contacts:
+        for _ in range(300):
+            q = built.q0 + 0.02 * RNG.standard_normal(7)
+            v = 0.5 * RNG.standard_normal(7)
+            data.qpos, data.qvel = q, v
+            mujoco.mj_forward(model, data)
+            wanted = generalized(scene, q, v)
+            own = scene.contacts(q, v)
+            touched += bool(np.any(wanted))
+            # The placements of both engines differ by their rounding, 1e-16 m and more.
+            size = np.abs(wanted).max() + 1e-3 * 7.5e6 * own.depth.max(initial=0.0) ** 0.5
+            assert data.qfrc_passive == pytest.approx(wanted, rel=0, abs=1e-12 * size)
+            assert contacts.contacts(data).depth == pytest.approx(own.depth, abs=1e-14)
+    assert touched > 100
+    mujoco.mj_forward(model, data)
+    assert not np.any(data.qfrc_passive)
+
+
+def test_a_ball_in_a_torus_and_the_torus_push_each_other():
+    shell = torus()
+    other = """<body name="torus"><freejoint/>
+      <inertial pos="0.01 0.02 0.03" mass="2" fullinertia="0.1 0.12 0.2 0 0.01 0"/></body>"""
+    model, data = model_of(ball(0.095, 0.3, more=other))
+    friction = sp.CoulombFriction(0.4, 0.3)
+    touched = 0
+    with attach(
+        model, shell, ["ball"], body="torus", law=sp.HuntCrossleyLaw(1e4, 1.5), friction=friction
+    ):
+        for _ in range(100):
+            at = data.qpos
+            at[7:10], at[10:] = (
+                RNG.standard_normal(3),
+                pin.Quaternion(pin.exp3(RNG.standard_normal(3))).coeffs()[[3, 0, 1, 2]],
+            )
+            turn = pin.Quaternion(at[[11, 12, 13, 10]]).matrix()
+            angle = RNG.uniform(0, 6.28)
+            middle = 0.3 * np.array([np.cos(angle), np.sin(angle), 0.0])
+            at[:3] = at[7:10] + turn @ (middle + RNG.uniform(-6e-3, 6e-3, 3))
+            data.qvel[:] = RNG.standard_normal(12)
+            mujoco.mj_forward(model, data)
+            force, opposite = data.qfrc_passive[:3], data.qfrc_passive[6:9]
+            touched += bool(np.any(force))
+            scale = 1 + np.abs(data.qfrc_passive).max()
+            assert force + opposite == pytest.approx(np.zeros(3), abs=1e-12 * scale)
+            # The moments of both about the world's origin: a free joint's turns are the body's.
+            moment = np.zeros(3)
+            for k, body in enumerate(("ball", "torus")):
+                own = data.body(body).xmat.reshape(3, 3) @ data.qfrc_passive[6 * k + 3 : 6 * k + 6]
+                moment += own + np.cross(
+                    at[7 * k : 7 * k + 3], data.qfrc_passive[6 * k : 6 * k + 3]
+                )
+            assert moment == pytest.approx(np.zeros(3), abs=1e-11 * scale)
+    assert touched > 20
+
+
+@pytest.mark.parametrize(
+    "friction", [sp.CoulombFriction(0.5, 0.4), sp.MindlinFriction(0.5, 0.4, 1e7, 0.3)]
+)
+def test_steps_are_those_of_a_simulation(friction):
+    """A ball is thrown onto a plate: MuJoCo's Euler is SemiImplicitEuler, friction's memory too."""
+    dt, radius = 1e-5, 0.02
+    law = sp.HuntCrossleyLaw(1e6, 1.5, 0.1)
+    model, data = model_of(ball(radius, 0.1, options=f'timestep="{dt}"'))
+    free = pin.Model()
+    free.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    free.appendBodyToJoint(1, pin.Inertia.FromSphere(0.1, radius), pin.SE3.Identity())
+    free.addBodyFrame("ball", 1, pin.SE3.Identity(), 0)
+    scene = sp.Scene(free)
+    scene.add_contact(sp.Sphere(radius, "ball"), plate(), law=law, friction=friction)
+    q0 = np.array([0, 0, radius + 1e-5, 0, 0, 0, 1.0])
+    v0 = np.array([0.05, 0.02, -0.1, 0, 0, 0])
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(q0, v0, 0.03, record_dt=1e-3)
+    data.qpos[:3], data.qvel[:6] = q0[:3], v0
+    with attach(model, plate(), ["ball"], law=law, friction=friction, log=True) as contacts:
+        for _ in range(round(0.03 / dt)):
+            mujoco.mj_step(model, data)
+        # Of a turning body MuJoCo integrates the velocity in the world, Pinocchio in the body.
+        assert data.qpos[:3] == pytest.approx(result.q[-1, :3], abs=5e-8)
+        assert data.qvel[3:] == pytest.approx(result.v[-1, 3:], abs=1e-3)
+        log = contacts.log(data)
+        assert log.t[0] < 1e-3
+        assert np.all(np.diff(log.t) >= 0)
+        assert len(log.t) > 20
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
+def test_a_ball_sticks_on_a_slope_and_a_reset_forgets(integrator):
+    """Bristles hold the weight where the ball cannot roll: no creep, and none of before."""
+    slope = np.radians(10)
+    gravity = text(np.sin(slope) * 9.81, 0, -9.81 * np.cos(slope))
+    option = f'timestep="2e-5" integrator="{integrator}" gravity="{gravity}"'
+    xml = ball(0.02, 0.1, options=option).replace(
+        "<freejoint/>",
+        "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1")),
+    )
+    model, data = model_of(xml)
+    law, friction = sp.HuntCrossleyLaw(1e6, 1.5, 5.0), sp.BristleFriction(0.6, 0.5, 1e4, 60.0)
+    with attach(model, plate(), ["ball"], law=law, friction=friction) as contacts:
+        ends = []
+        for _ in range(2):
+            mujoco.mj_resetData(model, data)
+            data.qpos[2] = 0.02
+            for _ in range(20000):
+                mujoco.mj_step(model, data)
+            ends.append(data.qpos.copy())
+            mujoco.mj_forward(model, data)
+            found = contacts.contacts(data)
+            weight = 0.1 * 9.81
+            assert found.normal_force.sum() == pytest.approx(weight * np.cos(slope), rel=1e-3)
+            held = -found.friction_force_world.sum(axis=0)[0]
+            assert held == pytest.approx(weight * np.sin(slope), rel=5e-3)
+            assert abs(data.qvel[0]) < 2e-6
+        assert np.array_equal(*ends)
+
+
+def test_energy_of_a_ball_that_swings_in_a_bowl():
+    xml = ball(0.05, 0.2, options='timestep="1e-4" integrator="RK4"')
+    model, data = model_of(xml)
+    shell = sp.Shell(*meshes.bowl(24, 1.0, 2.0), name="bowl")
+    law = sp.HuntCrossleyLaw(1e6, 1.5)
+    data.qpos[:3] = 0.2, 0.1, 0.08
+    with attach(model, shell, ["ball"], law=law) as contacts:
+        # It is let fall from a hair above the bowl, and bounces.
+        energies = []
+        for _ in range(10000):
+            mujoco.mj_step(model, data)
+            if not len(contacts.contacts(data).depth):
+                energies.append(0.1 * data.qvel[:3] @ data.qvel[:3] + 0.2 * 9.81 * data.qpos[2])
+    assert len(energies) > 100
+    assert np.ptp(energies) < 1e-5 * abs(energies[0])
+
+
+def test_models_and_threads_do_not_disturb_each_other():
+    law = sp.HuntCrossleyLaw(1e5, 1.5, 0.5)
+    frictions = sp.CoulombFriction(0.5, 0.4), sp.MindlinFriction(0.5, 0.4, 1e7, 0.3)
+    made = [model_of(ball(0.02, 0.1, options='timestep="1e-4"'))[0] for _ in frictions]
+    held = [
+        attach(model, plate(), ["ball"], law=law, friction=friction)
+        for model, friction in zip(made, frictions, strict=True)
+    ]
+
+    def moved(model, speed: float) -> np.ndarray:
+        data = mujoco.MjData(model)
+        data.qpos[2], data.qvel[0] = 0.03, speed
+        for _ in range(3000):
+            mujoco.mj_step(model, data)
+        return data.qpos.copy()
+
+    jobs = [(model, speed) for model in made for speed in (0.1, 0.2, 0.3, 0.4)]
+    alone = [moved(*job) for job in jobs]
+    together: dict[int, np.ndarray] = {}
+    threads = [
+        threading.Thread(target=lambda k=k, job=job: together.update({k: moved(*job)}))
+        for k, job in enumerate(jobs)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(np.array_equal(together[k], one) for k, one in enumerate(alone))
+    assert len({one.tobytes() for one in alone}) == len(jobs)
+    for one in held:
+        one.detach()
+    assert moved(made[0], 0.1)[2] == pytest.approx(0.03 - 0.5 * 9.81 * 0.3**2, rel=1e-3)
+
+
+def test_mujocos_own_contact_is_off_between_them_and_nowhere_else():
+    xml = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1"/>
+      <body name="tray"><freejoint/><geom name="tray" type="box" size=".1 .1 .01"/></body>
+      <body name="a" pos="0 0 .12"><freejoint/><geom name="a" type="sphere" size=".02"/></body>
+      <body name="b" pos="0 .03 .12"><freejoint/><geom name="b" type="sphere" size=".02"/></body>
+      </worldbody></mujoco>"""
+    model, data = model_of(xml)
+
+    def touching() -> set[frozenset[str]]:
+        mujoco.mj_forward(model, data)
+        return {frozenset(model.geom(int(k)).name for k in pair) for pair in data.contact.geom}
+
+    data.qpos[2] = 0.009
+    data.qpos[9], data.qpos[16] = 0.0185, 0.0185
+    everything = {
+        frozenset(p)
+        for p in (
+            ("floor", "tray"),
+            ("floor", "a"),
+            ("floor", "b"),
+            ("tray", "a"),
+            ("tray", "b"),
+            ("a", "b"),
+        )
+    }
+    assert touching() == everything
+    with pytest.warns(SetupWarning):
+        contacts = attach(model, plate(0.1), ["a"], body="tray", law=LAW)
+    assert touching() == everything - {frozenset(("tray", "a"))}
+    contacts.detach()
+    assert touching() == everything
+
+
+def test_substeps_carry_a_stiff_law():
+    model, data = model_of(ball(0.02, 0.1, options='timestep="2e-3"'))
+    data.qpos[2] = 0.03
+    with pytest.warns(SetupWarning, match=r"set model.opt.timestep, or call contacts.step\(data\)"):
+        contacts = attach(model, plate(), ["ball"], law=sp.HuntCrossleyLaw(1e7, 1.5, 1.0))
+    with contacts:
+        heights = []
+        for _ in range(500):
+            contacts.step(data)
+            heights.append(data.qpos[2])
+        assert contacts.substeps > 10
+        assert data.time == pytest.approx(1.0)
+        assert model.opt.timestep == 2e-3
+        # It never comes as high as it began, and far above that without.
+        assert min(heights) > 0.0196
+        assert max(heights[100:]) < 0.0295
+        for _ in range(500):
+            mujoco.mj_step(model, data)
+            heights.append(data.qpos[2])
+    assert max(heights) > 0.04
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"spheres": ["nobody"]}, "must be the name of a geom or site"),
+        ({"spheres": []}, "must name at least one"),
+        ({"spheres": ["floor"]}, "must be a sphere: the geom has another type"),
+        ({"spheres": "ball"}, "must be a list of names"),
+        ({"body": "nobody"}, "must be the name of a body"),
+        ({"body": "ball"}, "another body than that of the spheres"),
+        ({"shell": 3}, "must be a Shell"),
+        ({"model": 3}, "must be a mujoco.MjModel"),
+        ({"placement": 3}, "must be a pinocchio.SE3"),
+        ({"law": 3}, "law"),
+    ],
+)
+def test_what_cannot_be_attached_is_refused_and_changes_nothing(changes, said):
+    floor = '<geom name="floor" type="plane" size="1 1 .1"/>'
+    model, data = model_of(ball(0.02, 0.1, more=floor))
+    given = {"model": model, "shell": plate(), "spheres": ["ball"], "law": LAW} | changes
+    with pytest.raises(InvalidParameter, match=said):
+        attach(**given)
+    data.qpos[2] = 0.019
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 1
+    assert not np.any(data.qfrc_passive)
+
+
+def test_a_callback_of_ones_own_may_apply_them():
+    model, data = model_of(ball(0.02, 0.1))
+    called = []
+    mujoco.set_mjcb_passive(lambda *_: called.append(1))
+    try:
+        with pytest.raises(InvalidParameter, match=r"contacts\.apply"):
+            attach(model, plate(), ["ball"], law=LAW)
+        mujoco.set_mjcb_passive(None)
+        with pytest.warns(SetupWarning):
+            contacts = attach(model, plate(), ["ball"], law=LAW)
+        mujoco.set_mjcb_passive(lambda _, data: contacts.apply(data))
+        data.qpos[2] = 0.0199
+        mujoco.mj_forward(model, data)
+        assert data.qfrc_passive[2] == pytest.approx(contacts.contacts(data).normal_force[0])
+        contacts.detach()
+    finally:
+        mujoco.set_mjcb_passive(None)
