@@ -188,16 +188,8 @@ class _Run:
         ]
         for topic, kind, message in (
             ("/tf_static", "tf2_msgs/TFMessage", {"transforms": static}),
-            (
-                "/shells",
-                "visualization_msgs/MarkerArray",
-                shell_markers(self.scene, self.frames, stamp),
-            ),
-            (
-                "/bodies",
-                "visualization_msgs/MarkerArray",
-                body_markers(self.scene, self.frames, stamp),
-            ),
+            ("/shells", _MARKERS, shell_markers(self.scene, self.frames, stamp)),
+            ("/bodies", _MARKERS, body_markers(self.scene, self.frames, stamp)),
         ):
             yield _Sent(t, t, topic, kind, message, latched=True)
 
@@ -236,19 +228,12 @@ class _Run:
             for j in several:
                 name, place = self.frames.on(j)
                 twist = place.actInv(data.v[j])
-                parts.append(
-                    (
-                        self.twists[name],
-                        "geometry_msgs/TwistStamped",
-                        {
-                            "header": _header(stamp, name),
-                            "twist": {"linear": twist.linear, "angular": twist.angular},
-                        },
-                    )
-                )
+                moving = {"linear": twist.linear, "angular": twist.angular}
+                stamped = {"header": _header(stamp, name), "twist": moving}
+                parts.append((self.twists[name], "geometry_msgs/TwistStamped", stamped))
             if len(contacts) or drawn:
                 marked = contact_markers(contacts, result.pairs, self.scale, size, stamp)
-                parts.append(("/contacts/markers", "visualization_msgs/MarkerArray", marked))
+                parts.append(("/contacts/markers", _MARKERS, marked))
                 drawn = bool(len(contacts))
             for name, values in energy.items():
                 parts.append((f"/energy/{name}", _FLOAT, {"data": values[row]}))
@@ -274,11 +259,8 @@ class _Run:
         topic = self.topics[pair.name]
         slip = np.linalg.norm(contacts.slip_velocity_world[own], axis=1)
         wrench = {"force": pair.force_world[row], "torque": torque}
-        yield (
-            f"{topic}/wrench",
-            "geometry_msgs/WrenchStamped",
-            {"header": _header(stamp, frame), "wrench": wrench},
-        )
+        message = {"header": _header(stamp, frame), "wrench": wrench}
+        yield f"{topic}/wrench", "geometry_msgs/WrenchStamped", message
         yield f"{topic}/normal_force", _FLOAT, {"data": pair.normal[row]}
         yield f"{topic}/depth", _FLOAT, {"data": pair.depth[row]}
         yield f"{topic}/slip", _FLOAT, {"data": slip.max(initial=0.0)}
@@ -313,7 +295,7 @@ class _Run:
                     yield _Sent(t, sampled, f"{topic}/{_token(column)}", _FLOAT, {"data": value})
 
 
-_FLOAT = "std_msgs/Float64"
+_FLOAT, _MARKERS = "std_msgs/Float64", "visualization_msgs/MarkerArray"
 
 
 def _nanoseconds(t: Array, start: int) -> NDArray[np.int64]:

@@ -278,7 +278,7 @@ def deposit(
         if total * work > 0.0:
             removed[near] += shape * (work / total)
         else:
-            close = _nearest(samples.points, 0.5 * (a + b))
+            close = int(np.argmin(((samples.points - 0.5 * (a + b)) ** 2).sum(axis=1)))
             removed[close] += work / samples.areas[close]
             lost += work
     return removed, lost
@@ -297,7 +297,3 @@ def _unit(vector: Array, other: Array) -> Array:
     """Return the direction of `vector`, or that of `other` where it has none."""
     chosen = vector if np.linalg.norm(vector) > 1e-9 else other
     return np.asarray(chosen / np.linalg.norm(chosen))
-
-
-def _nearest(points: Array, place: Array) -> int:
-    return int(np.argmin(((points - place) ** 2).sum(axis=1)))

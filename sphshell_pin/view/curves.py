@@ -81,7 +81,7 @@ def _curves(series: PairSeries, t: FloatArray, known: dict[str, float]) -> Curve
     # The last row of a run that diverged may hold forces that no chart can show.
     sound = (np.abs(np.stack(columns)) < LARGEST).all(axis=0)
     t, normal, friction, depth = (column[sound] for column in columns)
-    rows = _extremes(len(t), normal, friction, depth)
+    rows = extremes(BINS, normal, friction, depth)
     figures = _figures(t, normal, depth) | {
         key: known[key] for key in ("contact_time", "mean", "peak", "depth") if key in known
     }
@@ -102,14 +102,17 @@ def _figures(t: FloatArray, normal: FloatArray, depth: FloatArray) -> dict[str, 
     }
 
 
-def _extremes(count: int, *columns: FloatArray) -> NDArray[np.int64]:
-    """Return the rows of the extremes of each column within BINS equal parts of `count` rows."""
-    if count <= 4 * BINS:
+def extremes(bins: int, *columns: FloatArray) -> NDArray[np.int64]:
+    """Return the rows of the extremes of each column (n,) within `bins` equal parts of the rows.
+
+    All rows, where these are fewer than the extremes might be.
+    """
+    count = len(columns[0])
+    if count <= 2 * bins * len(columns):
         return np.arange(count, dtype=np.int64)
-    edges = np.linspace(0, count, BINS + 1).astype(int)
     kept = {0, count - 1}
-    for start, end in itertools.pairwise(edges.tolist()):
+    for start, end in itertools.pairwise(np.linspace(0, count, bins + 1).astype(int).tolist()):
         for column in columns:
-            kept.add(start + int(np.argmax(column[start:end])))
-        kept.add(start + int(np.argmin(columns[0][start:end])))
+            part = column[start:end]
+            kept |= {start + int(part.argmin()), start + int(part.argmax())}
     return np.array(sorted(kept), dtype=np.int64)

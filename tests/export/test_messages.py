@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from sphshell_pin.dynamics.scene.scene_contacts import ROW, SceneContacts
 from sphshell_pin.export.cdr import encode
+from sphshell_pin.export.markers import ARROW, contact_markers
 from sphshell_pin.export.messages import DEFINITIONS, full_name, schema_of
+from sphshell_pin.view.arrows import ArrowScale
 
 JAZZY = get_typestore(Stores.ROS2_JAZZY)
 POINTS = np.random.default_rng(3).normal(size=(5, 3))
@@ -75,3 +78,18 @@ def test_a_message_that_does_not_fit_its_type_is_refused():
         encode("geometry_msgs/WrenchStamped", {"header": (0, 0)})
     with pytest.raises(KeyError, match="rows of 3"):
         encode("visualization_msgs/Marker", {"points": np.zeros((4, 2))})
+
+
+def test_arrows_of_contacts_add_up_to_the_force_and_none_pulls():
+    rows = np.zeros(4, ROW)
+    rows["pair"], rows["normal_force"] = [1, 0, 0, 0], [7.0, 3.0, -2.5, 3.0]
+    rows["normal_world"] = [[0, 0, 1], [0.6, 0, 0.8], [0, 0, 1], [-0.6, 0, 0.8]]
+    rows["point_world"][:, 0] = [5.0, 0.0, 1.0, 2.0]
+    contacts = SceneContacts.from_rows(rows.tobytes())
+    drawn = contact_markers(contacts, ("a", "b"), ArrowScale(1.0, 1.0), 0.1, (0, 0))["markers"]
+    arrows = [one for one in drawn if one.get("type") == ARROW]
+    assert [one["ns"] for one in arrows] == ["normal/b", "normal/a", "normal/a"]
+    forces = np.array([np.diff(one["points"], axis=0)[0] for one in arrows])
+    assert (forces[:, 2] > 0.0).all()
+    total = rows["normal_force"] @ rows["normal_world"]
+    np.testing.assert_allclose(forces.sum(axis=0), total, atol=1e-12)

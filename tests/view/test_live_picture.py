@@ -302,3 +302,17 @@ def test_the_first_camera_of_a_finished_run_has_all_of_its_part():
     player.seek(0.7)
     Easel(player)
     assert player.time == 0.7
+
+
+def test_the_camera_of_a_run_that_diverged_is_finite():
+    class Diverged(FilmPlayer):
+        @property
+        def contacts(self):
+            rows = np.zeros(1, ROW)
+            rows["normal_world"], rows["normal_force"] = [0, 0, 1], 1.0
+            rows["point_world"] = np.nan if self.time > 1.0 else self.q
+            return SceneContacts.from_rows(rows.tobytes())
+
+    view = Easel(Diverged()).picture.view
+    assert np.isfinite([view.eye, view.target]).all()
+    assert view.distance < 10.0

@@ -28,6 +28,7 @@ from sphshell_pin.shell.cad.framing import check_frame
 from sphshell_pin.shell.cad.model import CadFace, CadModel, compound, subshapes
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.units import NO_UNIT, iges_unit, step_unit
+from sphshell_pin.shell.readers.text import read_bytes
 
 IGES_FACES = (143, 144, 510)
 """IGES entities that stand for a face: bounded surface, trimmed surface, face of a solid."""
@@ -52,10 +53,7 @@ def read_model(path: Path) -> CadModel:
     ShellFileError
         If the file cannot be read, is truncated or damaged, or holds no face.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
+    data = read_bytes(path)
     kind = check_frame(path)
     try:
         read = {"STEP": _read_step, "IGES": _read_iges, "BREP": _read_brep}[kind]

@@ -369,7 +369,8 @@ def _seen_in(player: Player) -> tuple[FloatArray, FloatArray, FloatArray]:
     if length is not None:
         player.seek(now)
     q, points, normals = (np.concatenate(column) for column in zip(*found, strict=True))
-    return q, points, normals
+    sound = np.isfinite(points).all(axis=1)  # at the end of a run that diverged it may not be
+    return q, points[sound], normals[sound]
 
 
 def _pool(scene: Scene) -> int:
