@@ -7,10 +7,13 @@ the smaller question of the one closest point. The sheet grows at equal size of 
 that the sphere always touches the same number of them. In the picture every contestant has a
 process of its own; memory is what it holds after its first query. The ratios among the findings are
 measured in turn in one process.
+
+python -m benchmarks.queries [--quick]    # prints the tables
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -32,9 +35,11 @@ from sphshell_pin.cases.contents import (
     Table,
     about,
     columns,
+    markdown,
     number,
     times_table,
 )
+from sphshell_pin.cases.machine import machine
 
 Times = dict[str, Array]
 KEY, TITLE = "queries", "Time and memory of a query"
@@ -215,3 +220,17 @@ def picture(rows: list[Row]) -> Picture:
         f"{', '.join(sorted({r.name for r in rows}, key=list(COLORS).index))}.",
         "Left: median time of a query, with quartiles. Right: memory held after the first query.",
     )
+
+
+def main() -> None:
+    """Measure and print the tables."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.queries")
+    parser.add_argument("--quick", action="store_true", help="up to 200 k triangles")
+    quick = parser.parse_args().quick
+    timing.one_core()
+    print(machine())
+    print(markdown(section(quick=quick, progress=timing.silent)))
+
+
+if __name__ == "__main__":
+    main()

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from sphshell_pin.benchmarks import analytic_cases, sizes, step, timing
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
+from sphshell_pin.cases.contents import Spread
 
 pytestmark = pytest.mark.slow
 
@@ -102,7 +103,7 @@ def test_one_core_for_a_while():
 
 
 def test_spread():
-    assert timing.Spread.of(np.array([3.0, 1.0, 2.0])) == timing.Spread(2.0, 1.5, 2.5)
+    assert Spread.of(np.array([3.0, 1.0, 2.0])) == Spread(2.0, 1.5, 2.5)
     heard = []
     timing.part(heard.append, 0.25, 0.5)(0.5)
     assert heard == [0.375]
