@@ -41,7 +41,7 @@ def compare(
     Example: sphshell-pin compare results/soft results/stiff
     """
     with faults(context):
-        from sphshell_pin.export.tables import write_folder
+        from sphshell_pin.atomic.files import write_folder
         from sphshell_pin.study.compare import compare as compare_runs
         from sphshell_pin.study.compare import measured, tables_of
         from sphshell_pin.tables import csv_text

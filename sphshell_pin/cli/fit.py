@@ -161,8 +161,8 @@ def _bar() -> Iterator[Callable[[int, float], object]]:
 def _write(
     found: Fit, path: Path, folder: Path, changes: dict[str, str], *, picture: bool
 ) -> list[Path]:
+    from sphshell_pin.atomic.files import write_folder
     from sphshell_pin.errors import MissingExtra, ScenarioError
-    from sphshell_pin.export.tables import write_folder
     from sphshell_pin.scenario.format.reading import read_scenario
     from sphshell_pin.scenario.format.sliders import check_knobs
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-from sphshell_pin.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.atomic.files import write_folder
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.scene import Scene
-from sphshell_pin.errors import ResultError, import_extra
+from sphshell_pin.errors import import_extra
 from sphshell_pin.tables import Table, csv_text
 
 Format = Literal["csv", "parquet"]
@@ -60,31 +59,6 @@ def write_tables(
         about = {"scenario": scenario, "command": command}
         data = {f"{name}.parquet": _parquet(table, about) for name, table in tables.items()}
     return write_folder(folder, data, [f"{name}.{format}" for name in KINDS])
-
-
-def write_folder(
-    folder: str | PathLike[str],
-    files: Mapping[str, bytes] | Iterable[tuple[str, bytes]],
-    every: Sequence[str],
-) -> list[Path]:
-    """Write `files`, names and contents, into `folder`, all or none; return their paths.
-
-    `every` are the names of all that an earlier call may have left there, which are replaced; the
-    first of them is written in any case. ResultError where the folder cannot be written.
-    """
-    folder = Path(folder)
-    try:
-        with AtomicFolder(folder, last=every[0]) as place:
-            staging, names = place.staging(), []
-            for name, content in files.items() if isinstance(files, Mapping) else files:
-                (staging / name).write_bytes(content)
-                names.append(name)
-            place.replace(staging, every)
-    except FolderInUse as busy:
-        raise ResultError(folder, f"{busy}: wait until it ends, or give another folder") from None
-    except OSError as error:
-        raise ResultError(folder, f"cannot be written: {error.strerror or error}") from error
-    return [folder / name for name in names]
 
 
 def _parquet(table: Table, about: dict[str, str]) -> bytes:

@@ -21,9 +21,9 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.atomic import write_whole
+from sphshell_pin.atomic.files import write_folder
 from sphshell_pin.checks import check_finite, check_vector
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
-from sphshell_pin.export.tables import write_folder
 from sphshell_pin.films import Pixels, check_film, write_film
 from sphshell_pin.view.recording import Shown, check_pace, render_recording, sound_rows
 

@@ -215,12 +215,15 @@ SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Q
   const double reach = std::abs(at.distance) + 1.01 * shell.curved()->bulge();
   const auto& found = query.find(shell, point, reach + 1e-9 * shell.size(), Method::Smooth, false);
   if (found.empty()) return at;
-  const Vec3 from = point - found.front().point;
-  const bool behind = found.front().normal.dot(at.normal) < 0;
-  at.normal = behind ? Vec3(-found.front().normal) : found.front().normal;
-  at.point = found.front().point;
+  const Contact& nearest = found.front();
+  // Around an axis it may be far from the flat surface's closest point, and face the other way.
+  if (nearest.feature == Feature::Face)
+    at.normal = shell.topology().face_normal[shell.triangle_of_facet(nearest.facet)];
+  const Vec3 from = point - nearest.point;
+  at.normal = nearest.normal.dot(at.normal) < 0 ? Vec3(-nearest.normal) : nearest.normal;
+  at.point = nearest.point;
   at.distance = from.dot(at.normal) < 0 ? -from.norm() : from.norm();
-  at.element = found.front().element;
+  at.element = nearest.element;
   return at;
 }
 
