@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
@@ -22,7 +24,7 @@ def test_same_set_as_the_definition(name: str, side: str) -> None:
     corners, owner = corners_of(vertices, elements)
     count = 0
     for radius in (0.1, 0.3):
-        for center in positions(vertices, elements, radius, 24, seed=2):
+        for center in islice(positions(vertices, elements, radius, 60, seed=2), 0, None, 5):
             if np.abs(center - shell.closest_points(center[None]).points[0]).max() < 1e-9:
                 continue  # on the surface the side is undecided
             expected = oracle.facets(center, radius, corners, owner, side)
@@ -38,7 +40,7 @@ def test_same_set_as_the_definition(name: str, side: str) -> None:
             assert not why, f"{name}, {side}, center {center.tolist()}: {why}"
             assert not len(found) or oracle.normal_error(found, expected) <= 1e-10
             count += len(found)
-    assert count > 20
+    assert count > 10
 
 
 def test_plate_pushes_up_from_below() -> None:
