@@ -118,15 +118,6 @@ def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch, tmp_path)
     assert file.stat().st_mode & 0o077 == 0
 
 
-def test_importing_the_page_loads_nothing_heavy():
-    code = (
-        "import sys, sphshell_pin.view.live\n"
-        "print([m for m in ('meshcat', 'tornado', 'pydantic', 'matplotlib') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
 def test_other_machines_are_let_in_with_a_warning_only(tmp_path, monkeypatch):
     monkeypatch.setattr(Live, "run", lambda live: live.stop())
     for host, warned in (("127.0.0.1", False), ("0.0.0.0", True), ("", True)):
