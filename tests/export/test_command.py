@@ -5,17 +5,12 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from typer.testing import CliRunner
 
 import sphshell_pin as sp
-from sphshell_pin.cli import app
 from sphshell_pin.cli.export import beside, nanoseconds
 from sphshell_pin.errors import InvalidParameter
+from tests.command import call
 from tests.scenario.files import without_pictures, write
-
-
-def call(*arguments):
-    return CliRunner().invoke(app, [str(one) for one in arguments])
 
 
 @pytest.fixture(scope="module")

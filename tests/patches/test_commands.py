@@ -2,17 +2,12 @@
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import sphshell_pin as sp
-from sphshell_pin.cli import app
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
+from tests.command import call
 from tests.scenario.files import DROP, write
-
-
-def call(*arguments):
-    return CliRunner().invoke(app, [str(one) for one in arguments])
 
 
 def test_a_scenario_writes_patches_wear_and_taxels(tmp_path):

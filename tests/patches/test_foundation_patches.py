@@ -5,7 +5,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.patches import ShellTaxels, TaxelGrid, wear_maps
-from tests.patches.scenes import RADIUS, plate, slider, total_force
+from tests.patches.scenes import RADIUS, plate, preston, slider, total_force
 
 KAPPA = 2e9  # modulus over thickness [Pa/m]
 LAW = sp.FoundationLaw(1e7, 5e-3)
@@ -59,15 +59,6 @@ def test_taxels_add_up(slid):
     )
 
 
-def preston(result):
-    """The volume that Preston's law removes in all, for a coefficient of 1e-12 / Pa [m^3]."""
-    half = 0.5 * np.diff(result.t)
-    share = np.append(half, 0.0) + np.append(0.0, half)
-    log = result.contacts
-    slip = np.linalg.norm(log.slip_velocity_world, axis=1)
-    return 1e-12 * (log.normal_force * slip * share[log.row]).sum()
-
-
 def test_a_long_pass_leaves_the_groove_of_the_pressure():
     result = run(duration=0.08, q0=(-0.008, 0.0, RADIUS - DEPTH))
     (worn,) = wear_maps(result, 1e-12)
@@ -79,7 +70,7 @@ def test_a_long_pass_leaves_the_groove_of_the_pressure():
     pressure = KAPPA * np.maximum(0.0, RADIUS**2 - rho**2) / (2 * rho)
     expected = 1e-12 * pressure.sum(axis=1) * (x[1] - x[0])
     assert np.abs(depth - expected).max() < 0.01 * expected.max()
-    assert worn.volume == pytest.approx(preston(result), rel=1e-9)
+    assert worn.volume == pytest.approx(preston(result, 1e-12), rel=1e-9)
 
 
 def test_at_a_crease_each_wall_takes_its_own():
@@ -94,4 +85,4 @@ def test_at_a_crease_each_wall_takes_its_own():
     left, right = elements.forces[0].reshape(2, 2).sum(axis=0)
     assert left == pytest.approx(right, rel=1e-6)
     (worn,) = wear_maps(result, 1e-12)
-    assert worn.volume == pytest.approx(preston(result), rel=1e-9)
+    assert worn.volume == pytest.approx(preston(result, 1e-12), rel=1e-9)

@@ -10,18 +10,9 @@ from sphshell_pin.patches import wear_maps
 from sphshell_pin.patches.placed import PlacedPatches
 from sphshell_pin.patches.sampling import divide
 from sphshell_pin.patches.wear import deposit, strokes_of
-from tests.patches.scenes import plate, slide
+from tests.patches.scenes import plate, preston, slide
 
 COEFFICIENT = 1e-12
-
-
-def preston(result):
-    """The volume that Preston's law removes in all [m^3]."""
-    half = 0.5 * np.diff(result.t)
-    share = np.append(half, 0.0) + np.append(0.0, half)
-    slip = np.linalg.norm(result.contacts.slip_velocity_world, axis=1)
-    log = result.contacts
-    return COEFFICIENT * (log.normal_force * slip * share[log.row]).sum()
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +48,7 @@ def test_strokes_are_smooth_however_far_apart_rows_are(record_dt):
 @pytest.mark.parametrize("resolution", [5e-5, 2e-4, 1e-3, 5e-3])
 def test_volumes_do_not_depend_on_the_resolution(slid, resolution):
     (worn,) = wear_maps(slid, COEFFICIENT, resolution=resolution)
-    assert worn.volume == pytest.approx(preston(slid), rel=1e-12)
+    assert worn.volume == pytest.approx(preston(slid, COEFFICIENT), rel=1e-12)
     assert (worn.unresolved > 0.0) == (resolution > 2e-3)
 
 

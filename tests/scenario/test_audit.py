@@ -6,15 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 pytest.importorskip("OCP")
 
-from sphshell_pin.cli import app
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.cad_audit import _counts, audit_cad
 from sphshell_pin.shell.cad import CadOptions, require_kernel
+from tests.command import call
 from tests.scenario.files import DROP, write
 from tests.shell import cad_shapes as shapes
 
@@ -141,9 +140,7 @@ def test_border_of_a_hole_is_a_curve(tmp_path):
 def test_files_and_table_have_the_audit(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     out = tmp_path / "out"
-    told = CliRunner().invoke(
-        app, ["run", str(path), "--out", str(out), "--no-recording", "--audit-cad"]
-    )
+    told = call("run", path, "--out", out, "--no-recording", "--audit-cad")
     assert told.exit_code == 0, told.output
     assert "exact CAD faces" in told.output
     figures = json.loads((out / "summary.json").read_text())["cad_audit"]["ball-plate"]
@@ -170,7 +167,7 @@ def test_without_the_option_nothing_is_audited(tmp_path):
 
 def test_a_scenario_without_cad_is_refused_before_it_runs(tmp_path):
     out = tmp_path / "out"
-    told = CliRunner().invoke(app, ["run", str(write(tmp_path)), "--out", str(out), "--audit-cad"])
+    told = call("run", str(write(tmp_path)), "--out", out, "--audit-cad")
     assert told.exit_code == 2
     (line,) = told.stderr.strip().splitlines()
     assert "no contact with a CAD surface" in line

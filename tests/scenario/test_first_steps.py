@@ -3,17 +3,16 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from typer.testing import CliRunner
 
-from sphshell_pin.cli import app
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.drafting.new import new_scenario
+from tests.command import call
 from tests.scenario.files import DROP, write
 from tests.scenario.test_new import arm_urdf
 
 
 def told(*arguments):
-    done = CliRunner().invoke(app, [str(one) for one in arguments])
+    done = call(*arguments)
     return done.exit_code, " ".join(done.output.split())
 
 
@@ -45,9 +44,9 @@ def test_a_new_scenario_takes_one_body_of_a_cad_file(tmp_path):
     builder.Add(pair, BRepPrimAPI_MakeBox(100.0, 100.0, 20.0).Shape())
     builder.Add(pair, BRepPrimAPI_MakeBox(gp_Pnt(300, 0, 0), 40.0, 40.0, 40.0).Shape())
     BRepTools.Write_s(pair, str(tmp_path / "two.brep"))
-    call = ["new", "--robot", "ball", "--surface", tmp_path / "two.brep", "--unit", "mm"]
-    call += ["--radius", "5mm", "--out", tmp_path / "a.toml"]
-    code, output = told(*call, "--face", "3")
+    command = ["new", "--robot", "ball", "--surface", tmp_path / "two.brep", "--unit", "mm"]
+    command += ["--radius", "5mm", "--out", tmp_path / "a.toml"]
+    code, output = told(*command, "--face", "3")
     assert code == 0, output
     assert build(tmp_path / "a.toml").scenario.shell[0].faces == [3]
     made = new_scenario(
@@ -90,8 +89,8 @@ def test_a_doubtful_unit_is_told_once_and_plainly(tmp_path):
         box + "\nf 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n",
         encoding="utf-8",
     )
-    call = ["--robot", "ball", "--surface", tmp_path / "b.obj", "--unit", "m", "--radius", "3mm"]
-    code, output = told("new", *call, "--out", tmp_path / "a.toml")
+    command = ["--robot", "ball", "--surface", tmp_path / "b.obj", "--unit", "m", "--radius", "3mm"]
+    code, output = told("new", *command, "--out", tmp_path / "a.toml")
     assert code == 0, output
     assert "UnitWarning" not in output
     assert ".py" not in output

@@ -8,11 +8,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from typer.testing import CliRunner
 
 import sphshell_pin as sp
 from sphshell_pin import robots
-from sphshell_pin.cli import app
 from sphshell_pin.errors import (
     FrameNotFound,
     InvalidParameter,
@@ -24,6 +22,7 @@ from sphshell_pin.errors import (
 from sphshell_pin.scenario import build, judge, live_parameters, rebuild, shipped_scenarios
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
+from tests.command import call
 from tests.shell.surfaces import surface_file
 from tests.studies import mostly_studies
 
@@ -323,8 +322,18 @@ def test_a_place_that_cannot_be_written(out, match, tmp_path):
 def test_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(BOWL, "bowl.shl")
-    call = ["new", "--robot", "ball", "--surface", "bowl.shl", "--unit", "mm", "--radius", "12mm"]
-    result = CliRunner().invoke(app, call)
+    command = [
+        "new",
+        "--robot",
+        "ball",
+        "--surface",
+        "bowl.shl",
+        "--unit",
+        "mm",
+        "--radius",
+        "12mm",
+    ]
+    result = call(*command)
     assert result.exit_code == 0, result.output
     assert "sphshell-pin run ball_on_bowl.toml" in result.output
     assert "verdict" in result.output
@@ -332,17 +341,17 @@ def test_the_command(tmp_path, monkeypatch):
     assert build("ball_on_bowl.toml").scene.pairs[0].sphere.radius == pytest.approx(
         0.012, rel=1e-12
     )
-    again = CliRunner().invoke(app, call)
+    again = call(*command)
     assert again.exit_code == 2
     assert "is there already" in again.output
     for radius, said in (("12xx", "must be one of"), ("abc", "must be a length")):
-        wrong = CliRunner().invoke(app, ["new", "--robot", "ball", "--radius", radius])
+        wrong = call("new", "--robot", "ball", "--radius", radius)
         assert wrong.exit_code == 2
         assert said in wrong.output
 
 
 def test_a_unit_is_asked_for_as_the_command_takes_it():
-    wrong = CliRunner().invoke(app, ["new", "--robot", "ball", "--surface", str(BLADE)])
+    wrong = call("new", "--robot", "ball", "--surface", BLADE)
     assert wrong.exit_code == 2
     assert "--unit mm if that is 0.1558 m" in wrong.output
 

@@ -6,14 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from typer.testing import CliRunner
 
 import sphshell_pin as sp
-from sphshell_pin.cli import app
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SetupWarning
 from sphshell_pin.scenario import build, explain_built
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
+from tests.command import call
 from tests.scenario.files import DROP, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -93,15 +92,12 @@ def test_a_press_on_nothing_and_a_target_out_of_reach(scenario):
 
 
 def test_the_commands_say_so(scenario, tmp_path):
-    off = [f"--set={key}={value}" for key, value in OFF.items()]
-    ran = CliRunner().invoke(
-        app,
-        ["run", str(scenario), "--no-recording", "--duration=0.01", *off, f"--out={tmp_path}/o"]
-        + [f"--set={key}={value}" for key, value in AWAY.items()],
-    )
+    off, away = ([f"--set={k}={one}" for k, one in them.items()] for them in (OFF, AWAY))
+    options = ["--no-recording", "--duration=0.01", f"--out={tmp_path}/o"]
+    ran = call("run", scenario, *options, *off, *away)
     assert "warning: the controller's path is off the shell" in ran.output
     assert "warning: nothing was touched" in ran.output
-    explained = CliRunner().invoke(app, ["explain", str(scenario), *off])
+    explained = call("explain", scenario, *off)
     assert "Warning: the controller's path is off the shell" in explained.output
 
 

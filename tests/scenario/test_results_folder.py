@@ -18,8 +18,8 @@ from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running import run
 from sphshell_pin.study.sweep.job import Outcome
 from sphshell_pin.study.sweep.journal import Journal
+from tests.command import call
 from tests.scenario.files import write
-from tests.test_cli import call
 
 LAST = "summary.json"
 

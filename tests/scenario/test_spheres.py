@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from sphshell_pin import robots
-from sphshell_pin.cli import app
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, run_scenario
+from tests.command import call
 from tests.scenario.files import write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -151,7 +150,7 @@ def test_the_table_of_many_contacts_lists_the_largest(tmp_path):
     start, end = TWO_BALLS.index("spheres = ["), TWO_BALLS.index('shell = "plate"')
     file = write(tmp_path, f"{TWO_BALLS[:start]}spheres = [{spheres}]\n{TWO_BALLS[end:]}")
     options = ["run", str(file), "--out", str(tmp_path / "out"), "--no-recording"]
-    told = CliRunner().invoke(app, options).output
+    told = call(*options).output
     assert "floor/lower/ball-0 " in told
     assert "floor/lower/ball-19" not in told
     assert "5 more contacts with smaller peak forces, of which" in told

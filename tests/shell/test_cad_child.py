@@ -15,13 +15,12 @@ import pytest
 
 pytest.importorskip("OCP")
 
-from typer.testing import CliRunner
 
 from sphshell_pin import Shell
-from sphshell_pin.cli import app
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad import process
 from sphshell_pin.shell.cad.messages import pack, unpack
+from tests.command import call
 from tests.fuzz.cad import KINDS, outcome
 from tests.shell import cad_shapes as shapes
 
@@ -180,10 +179,10 @@ def test_limits_are_checked_and_told_on_the_command_line(box, tmp_path):
         with pytest.raises(InvalidParameter, match=f"{name} = 0 must be positive"):
             Shell.from_file(box, "mm", **{name: 0})
     target = ["convert", str(box), str(tmp_path / "box.stl"), "--unit-in", "mm"]
-    told = CliRunner().invoke(app, [*target, "--memory-limit", "1"])
+    told = call(*target, "--memory-limit", "1")
     assert told.exit_code == 2
     assert "memory limit of 1e-09 GB" in told.stderr
-    told = CliRunner().invoke(app, ["check", str(box), "--unit", "mm", "--time-limit", "1e-3"])
+    told = call("check", box, "--unit", "mm", "--time-limit", "1e-3")
     assert told.exit_code == 2
     assert "time limit of 0.001 s" in told.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["box.brep"]

@@ -5,14 +5,13 @@ import pytest
 
 pytest.importorskip("OCP")
 
-from typer.testing import CliRunner
 
 from sphshell_pin import Shell
-from sphshell_pin.cli import app
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError
 from sphshell_pin.shell import converting
 from sphshell_pin.shell.converting import convert
 from tests import meshes
+from tests.command import call
 from tests.shell import cad_shapes as shapes
 
 pytestmark = pytest.mark.slow
@@ -154,14 +153,14 @@ def test_what_cannot_be_is_refused(plate, tmp_path):
 
 def test_the_command_prints_what_it_measured(plate, tmp_path):
     target = tmp_path / "out.stl"
-    told = CliRunner().invoke(app, ["convert", str(plate), str(target), "--chord-error", "1e-4"])
+    told = call("convert", plate, target, "--chord-error", "1e-4")
     assert told.exit_code == 0, told.output
     assert "7 CAD faces" in told.output
     assert "deviation measured at" in told.output
     assert target.is_file()
-    told = CliRunner().invoke(app, ["check", str(plate), "--face", "7", "--chord-error", "1e-5"])
+    told = call("check", plate, "--face", "7", "--chord-error", "1e-5")
     assert told.exit_code == 0
     assert "1 CAD face, tolerance" in told.output
-    told = CliRunner().invoke(app, ["convert", str(target), str(tmp_path / "out.obj")])
+    told = call("convert", target, tmp_path / "out.obj")
     assert told.exit_code == 2
     assert "--unit-in mm" in told.output

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import sphshell_pin as sp
-from sphshell_pin.cli import app
 from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.plot.compare import plot_compare
 from sphshell_pin.study.compare import Curve, Measured, compare, measured, tables_of
+from tests.command import call
 from tests.export.runs import finger_run, turntable_run
 from tests.scenario.files import DROP, write
 
@@ -157,10 +156,6 @@ def test_the_picture_has_every_run_and_its_difference(finger, table):
     assert "force [N]" in figure.axes[0].get_ylabel()
     still = run("still", [0, 1], [0, 0])
     plot_compare(compare([still, still]))
-
-
-def call(*arguments):
-    return CliRunner().invoke(app, [str(one) for one in arguments])
 
 
 def drop(folder, name, **changes):

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 pytest.importorskip("scipy")
 pytest.importorskip("matplotlib")
 
 import sphshell_pin as sp
 from sphshell_pin.atomic import folder
-from sphshell_pin.cli import app, fit
+from sphshell_pin.cli import fit
 from sphshell_pin.scenario import read_scenario
 from sphshell_pin.study.fit.parameters import parse_wanted
+from tests.command import call
 from tests.study.fitted_sets import SCENARIO
 from tests.study.test_fit import (
     DISSIPATION,
@@ -56,7 +56,7 @@ def test_the_command_writes_values_in_place(bounce, tmp_path, monkeypatch):
         f"{DISSIPATION}=0:1",
     ]
     command += ["--experiment", f"fast.csv {fast}", "--set", f"{STIFFNESS}=8e4"]
-    done = CliRunner().invoke(app, command)
+    done = call(*command)
     assert done.exit_code == 0, done.output
     assert "2 experiments" in done.output
     out = Path("results/bounce")
@@ -83,10 +83,10 @@ def test_the_command_ends_with_1_where_the_data_do_not_determine(bounce, tmp_pat
     monkeypatch.chdir(tmp_path)
     Path("fall.csv").write_text(f"t [ms],{HEIGHT} [mm]\n0,17\n1,16.5\n2,16.0\n5,14.4\n")
     command = ["fit", "fall.csv", str(bounce), "--param", STIFFNESS, "--no-picture"]
-    done = CliRunner().invoke(app, command)
+    done = call(*command)
     assert done.exit_code == 1, done.output
     assert f"the data do not determine {STIFFNESS}" in done.output
-    done = CliRunner().invoke(app, [*command, "--set", f"{STIFFNESS}=-1"])
+    done = call(*command, "--set", f"{STIFFNESS}=-1")
     assert done.exit_code == 2
     assert parse_wanted(["a=1:2", "b"]) == {"a": (1.0, 2.0), "b": None}
 
@@ -117,7 +117,7 @@ def test_the_command_writes_what_is_not_told_from_0(bounce, tmp_path, monkeypatc
     table = np.column_stack(list(data.values()))
     np.savetxt("slide.csv", table, header=",".join(data), delimiter=",", comments="")
     command = ["fit", "slide.csv", str(bounce), "--param", FRICTION, "--out", "out"]
-    done = CliRunner().invoke(app, command)
+    done = call(*command)
     assert done.exit_code == 1, done.output
     assert "they do not tell it from 0" in done.output
     names = ["bounce.fitted.toml", "fit.json", "fit.png"]
@@ -133,7 +133,7 @@ def test_a_file_that_cannot_be_made_leaves_none(bounce, tmp_path, monkeypatch, m
 
     monkeypatch.setattr(f"sphshell_pin.study.fit.report.Fit.{maker}", fail)
     Path("fall.csv").write_text(f"t [ms],{HEIGHT} [mm]\n0,17\n1,16.5\n2,16.0\n5,14.4\n")
-    done = CliRunner().invoke(app, ["fit", "fall.csv", str(bounce), "--param", "gravity.2"])
+    done = call("fit", "fall.csv", bounce, "--param", "gravity.2")
     assert done.exit_code == 2
     assert not Path("results").exists()
 

@@ -5,18 +5,17 @@ import math
 import numpy as np
 import pinocchio as pin
 import pytest
-from typer.testing import CliRunner
 
 pytest.importorskip("scipy")
 
 import sphshell_pin as sp
-from sphshell_pin.cli import app
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
 from sphshell_pin.study.fit.data import read_experiment
 from sphshell_pin.study.fit.quantities import quantities_of, unit_of
 from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.fit.writing import scenario_text
+from tests.command import call
 from tests.study.fitted_sets import SCENARIO
 
 HEIGHT = "q.root_joint.2"
@@ -186,7 +185,7 @@ def test_the_command_ends_with_2(built, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "wrong.csv").write_text(HEAD + "0,1\n0,1\n")
     command = ["fit", "wrong.csv", str(built.path), "--param", "gravity.2"]
-    done = CliRunner().invoke(app, command)
+    done = call(*command)
     assert done.exit_code == 2
     assert done.output.startswith("error: wrong.csv, line 3: time 0 s is the same")
     for option, value in {
@@ -194,7 +193,7 @@ def test_the_command_ends_with_2(built, tmp_path, monkeypatch):
         "--sigma": "height=high",
         "--set": "no",
     }.items():
-        done = CliRunner().invoke(app, [*command, option, value])
+        done = call(*command, option, value)
         assert done.exit_code == 2
         assert "must be " in done.output
     assert not (tmp_path / "results").exists()

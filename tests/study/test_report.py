@@ -13,7 +13,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks import analytic_cases, convergence, hard_cases, query, step
@@ -30,10 +29,10 @@ from sphshell_pin.benchmarks.sizes import Row as SizeRow
 from sphshell_pin.cases import machine
 from sphshell_pin.cases.contents import Column, Finding, Section, Spread, Table, Verdict
 from sphshell_pin.cases.drawing import spread_apart
-from sphshell_pin.cli import app
 from sphshell_pin.errors import Interrupted
 from sphshell_pin.study.report import PAGE, making
 from sphshell_pin.study.report.page import Heading
+from tests.command import call
 
 pytest.importorskip("matplotlib")
 KEYS = ["forces", "queries", "integrators", "steps", "hard_cases", "peers"]
@@ -292,7 +291,7 @@ def broken(*, quick, progress):
 
 def test_a_broken_section_does_not_lose_the_others(stubs, tmp_path):
     stubs(**dict.fromkeys(KEYS, stub) | {"queries": broken})
-    ran = CliRunner().invoke(app, ["report", "--out", str(tmp_path)])
+    ran = call("report", "--out", tmp_path)
     assert ran.exit_code == 1
     assert "not measured: Time and memory of a query: ValueError: a <b> broke" in ran.stderr
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
@@ -302,7 +301,7 @@ def test_a_broken_section_does_not_lose_the_others(stubs, tmp_path):
 
 
 def test_exit_code_and_table(stubs, tmp_path):
-    ran = CliRunner().invoke(app, ["report", "--quick", "--peers", "--out", str(tmp_path / "new")])
+    ran = call("report", "--quick", "--peers", "--out", tmp_path / "new")
     assert ran.exit_code == 0, ran.output
     assert "at most 2" in ran.stdout
     assert str(tmp_path / "new" / PAGE) in ran.stdout
@@ -319,7 +318,7 @@ def test_the_page_names_the_aims_that_are_not_met(stubs, tmp_path):
     same = replace(missed, what="the same with sand")
     nothing = Finding("b", "cost of a step", math.nan, aim=2.0)
     stubs(forces=some(missed, same, nothing), queries=some(unmeasured=["libigl: not installed"]))
-    ran = CliRunner().invoke(app, ["report", "--quick", "--out", str(tmp_path)])
+    ran = call("report", "--quick", "--out", tmp_path)
     assert "not measured: libigl: not installed" in ran.stderr
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     for line in (
@@ -336,7 +335,7 @@ def test_the_page_names_the_aims_that_are_not_met(stubs, tmp_path):
 @pytest.mark.parametrize("cores", [None, 0.0, machine.BUSY, 0.21, 1.5])
 def test_a_busy_machine_is_said_on_the_page(stubs, tmp_path, monkeypatch, cores):
     monkeypatch.setattr(machine.OtherWork, "cores", lambda self: cores)
-    ran = CliRunner().invoke(app, ["report", "--out", str(tmp_path)])
+    ran = call("report", "--out", tmp_path)
     busy = cores is not None and cores > machine.BUSY
     page = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert ("The machine was busy" in page) == busy
@@ -375,7 +374,7 @@ def test_an_interrupted_run_leaves_the_old_page(stubs, tmp_path, kind):
         raise kind
 
     stubs(**dict.fromkeys(KEYS, stub) | {"hard_cases": interrupted})
-    ran = CliRunner().invoke(app, ["report", "--out", str(tmp_path)])
+    ran = call("report", "--out", tmp_path)
     assert ran.exit_code == 130
     assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == before
 
@@ -396,7 +395,7 @@ def test_tables_of_an_old_report_go(stubs, tmp_path):
 
 def test_a_folder_that_cannot_be(stubs, tmp_path):
     (tmp_path / "file").write_text("mine")
-    ran = CliRunner().invoke(app, ["report", "--out", str(tmp_path / "file")])
+    ran = call("report", "--out", tmp_path / "file")
     assert ran.exit_code == 2
     assert "cannot hold a report" in ran.stderr
     assert (tmp_path / "file").read_text() == "mine"

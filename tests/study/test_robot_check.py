@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from typer.testing import CliRunner
 
 from sphshell_pin import Scene, robots
-from sphshell_pin.cli import app
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.study import robot_check
 from sphshell_pin.study.robot_check import (
@@ -32,6 +30,7 @@ from sphshell_pin.study.robot_check.postures import massless_joints, random_post
 from sphshell_pin.study.robot_check.probe_spheres import find_sphere
 from sphshell_pin.study.robot_check.setting import patch
 from sphshell_pin.testing.finding import Finding
+from tests.command import call
 from tests.studies import mostly_studies
 
 ROOT = Path(__file__).parents[2]
@@ -324,7 +323,7 @@ def test_the_figures_as_json() -> None:
 
 
 def run(*arguments: object):
-    return CliRunner().invoke(app, ["check-robot", *(str(one) for one in arguments)])
+    return call("check-robot", *arguments)
 
 
 def test_the_command(tmp_path: Path) -> None:
@@ -412,14 +411,14 @@ def test_the_command_takes_xacro_arguments_and_package_folders(
     inside = "finger_description/urdf"
     file.write_text(text.replace(inside, f"$(find {inside.partition('/')[0]})/urdf"))
     command = ["check-robot", str(file), "--quick", "--xacro-arg", "fingers=1"]
-    result = CliRunner().invoke(app, command)
+    result = call(*command)
     assert result.exit_code == 2
     assert "no package 'finger_description'" in result.stdout
-    result = CliRunner().invoke(app, [*command, "--package-dir", str(DATA / "xacro")])
+    result = call(*command, "--package-dir", DATA / "xacro")
     assert result.exit_code == 0, result.stdout
     assert "2/2" in result.stdout
-    result = CliRunner().invoke(app, ["check-robot", str(file), "--xacro-arg", "fingers"])
+    result = call("check-robot", file, "--xacro-arg", "fingers")
     assert result.exit_code == 2
     assert "--xacro-arg = 'fingers' must be NAME=VALUE" in result.stderr
-    result = CliRunner().invoke(app, ["run", "x.toml", "--package-dir", str(tmp_path / "nix")])
+    result = call("run", "x.toml", "--package-dir", tmp_path / "nix")
     assert result.exit_code == 2

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from sphshell_pin.study.sweep import sobol_indices
+from tests.command import call
 from tests.study.ishigami import DIST, ishigami_table
 from tests.study.ishigami import write as write_ishigami
 from tests.study.resting import check_once, entries, write
-from tests.study.test_sweep_stops import call, stopped_at
+from tests.study.test_sweep_stops import stopped_at
 
 pd = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")

@@ -8,9 +8,8 @@ import sys
 import time
 
 import pytest
-from typer.testing import CliRunner
 
-from sphshell_pin.cli import app
+from tests.command import call
 from tests.study.resting import check_once, entries, write
 
 pytestmark = pytest.mark.slow
@@ -27,10 +26,6 @@ ENTRY = [
 ]
 RUNS = 100  # many: a busy machine may end dozens of them before the signal comes
 VARY = ["--vary", "contact.law.stiffness=1e4:1e6:log:50", "--vary", "contact.law.exponent=1.5,2"]
-
-
-def call(*arguments):
-    return CliRunner().invoke(app, [str(one) for one in arguments])
 
 
 def wait_for(condition, seconds=60.0):

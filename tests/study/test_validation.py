@@ -5,13 +5,12 @@ import math
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from sphshell_pin.cases.contents import Finding, Picture
-from sphshell_pin.cli import app
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.study.report import PAGE
 from sphshell_pin.study.validation import Outcome, cases, collect, make_validation
+from tests.command import call
 from tests.studies import mostly_studies
 
 pytest.importorskip("matplotlib")
@@ -67,7 +66,7 @@ def test_command(tmp_path, monkeypatch):
         for key in ran
     ]
     monkeypatch.setattr(cases, "collect", lambda quick: made)
-    done = CliRunner().invoke(app, ["report", "--validation", "--out", str(tmp_path)])
+    done = call("report", "--validation", "--out", tmp_path)
     assert done.exit_code == 0, done.output
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "against published experiments" in text
@@ -77,7 +76,7 @@ def test_command(tmp_path, monkeypatch):
 
 
 def test_other_engines_are_not_asked():
-    done = CliRunner().invoke(app, ["report", "--validation", "--peers"])
+    done = call("report", "--validation", "--peers")
     assert done.exit_code == 2
     assert "leave out --peers" in done.output
 

@@ -7,11 +7,9 @@ import pinocchio as pin
 
 from sphshell_pin.dynamics.result.run_stats import RunStats
 from sphshell_pin.dynamics.scene.pairs import PlacedSphere
+from tests.shell.surfaces import CUBE, CUBE_QUADS
 
-CUBE_VERTICES = np.array(np.meshgrid(*3 * [(-0.5, 0.5)], indexing="ij")).reshape(3, -1).T
-CUBE_ELEMENTS = np.array(
-    [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-)
+CUBE_VERTICES, CUBE_ELEMENTS = CUBE - 0.5, np.array(CUBE_QUADS)
 
 
 def quad_shell(vertices, elements, name="shell", patches=None):

@@ -9,8 +9,8 @@ import pytest
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.view import film
 from sphshell_pin.view.film import render_film
+from tests.command import call
 from tests.scenario.files import write
-from tests.test_cli import call
 from tests.view.stand_ins import ball_on_plate
 
 Image = pytest.importorskip("PIL.Image")

@@ -8,29 +8,22 @@ from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.view.live import Live
 from tests.scenario.files import FINGER, write
+from tests.view.test_live_in_browser import Tab
 
 pytestmark = pytest.mark.browser
 
-LONG = 60_000  # [ms] on machines that draw without a graphics card
 KNOB = (
     '\n[[knob]]\nkey = "controller.kp"\n\n[[knob]]\nkey = "robot.three_link_finger.start.knuckle"\n'
 )
 
 
-class Tab:
+class ChartTab(Tab):
     """A page of `live`, which stands still: steps are made by its button."""
 
     def __init__(self, browser, live):
-        self.live = live
-        self.page = browser.new_page(viewport={"width": 1200, "height": 700})
-        self.complaints = []
-        self.page.on("pageerror", lambda fault: self.complaints.append(str(fault)))
-        self.page.goto(live.url)
-        self.wait("globalThis.state && chart.run.keys.length")
+        super().__init__(browser, live, viewport={"width": 1200, "height": 700})
+        self.wait("chart.run.keys.length")
         self.page.evaluate("document.getElementById('step-size').value = '0.1'")
-
-    def wait(self, expression):
-        self.page.wait_for_function(expression, timeout=LONG, polling=50)
 
     def choose(self, quantity):
         self.page.select_option("#quantity", quantity)
@@ -38,11 +31,11 @@ class Tab:
 
     def step(self):
         t = self.page.evaluate("state.t")
-        self.page.evaluate("document.getElementById('step').click()")
+        self.click("#step")
         self.wait(f"state.t > {t + 0.05}")
 
     def reset(self):
-        self.page.evaluate("document.getElementById('reset').click()")
+        self.click("#reset")
         self.wait("state.t === 0 && chart.ghost")
 
     def points(self, key, run="run"):
@@ -61,7 +54,7 @@ class Tab:
 def tab(browser, tmp_path_factory):
     path = write(tmp_path_factory.mktemp("finger"), FINGER + KNOB)
     with Live(LiveRun(build(path)), running=False) as live:
-        opened = Tab(browser, live)
+        opened = ChartTab(browser, live)
         yield opened
         opened.page.close()
         assert opened.complaints == []
@@ -157,15 +150,7 @@ def test_the_last_run_stays_as_a_ghost_and_a_kept_one_too(tab):
     # A parameter that restarts is the beginning of another run, too.
     tab.page.select_option("#compare", "last")
     tab.step()
-    key = "robot.three_link_finger.start.knuckle"
-    tab.page.evaluate(
-        """(key) => {
-            const slider = document.querySelector(`[data-parameter="${key}"]`);
-            slider.value = 600;
-            slider.dispatchEvent(new Event("input", {bubbles: true}));
-        }""",
-        key,
-    )
+    tab.slide('[data-parameter="robot.three_link_finger.start.knuckle"]', 0.6)
     tab.wait("state.t === 0 && chart.ghost?.rows.length > 3")
 
 
@@ -176,14 +161,10 @@ def test_a_finished_run_has_its_charts_and_nothing_to_compare_with(browser, tmp_
     )
     result = Replay(type(result)(**vars(result)))
     with Live(result, running=False, speed=1.0) as live:
-        tab = Tab(browser, live)
+        tab = ChartTab(browser, live)
         assert not tab.page.locator("#keep").is_visible()
         assert not tab.page.locator("#compare").is_visible()
-        tab.page.evaluate("""() => {
-            const slider = document.getElementById("scrubber");
-            slider.value = 10000;
-            slider.dispatchEvent(new Event("input", {bubbles: true}));
-        }""")
+        tab.slide("#scrubber", 1.0)
         tab.wait("state.t > 0.39")
         tab.choose("Controller torque [N m]")
         tab.wait("chart.run.rows.length > 10")

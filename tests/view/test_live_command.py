@@ -7,11 +7,10 @@ import time
 import webbrowser
 
 import pytest
-from typer.testing import CliRunner
 
-from sphshell_pin.cli import app
 from sphshell_pin.scenario import run_scenario
 from sphshell_pin.view.live import Live, opening
+from tests.command import call
 from tests.scenario.files import without_pictures, write
 from tests.view.live_client import get
 from tests.view.live_player import BallPlayer
@@ -25,8 +24,8 @@ ENTRY = (
 )
 
 
-def call(*arguments):
-    return CliRunner().invoke(app, ["view", *(str(one) for one in arguments)])
+def view(*arguments):
+    return call("view", *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +47,7 @@ def started(*arguments):
 
 
 def test_the_help_has_an_example():
-    told = call("--help")
+    told = view("--help")
     assert told.exit_code == 0
     assert "Example: sphshell-pin view" in told.output
 
@@ -81,7 +80,7 @@ def test_faults_are_one_sentence(tmp_path, finished):
             ([finished, "--set", "gravity.2=0"], "finished run"),
             ([finished, "--scenario", "gear_contact"], "nq"),
         ):
-            told = call(*arguments, "--no-open")
+            told = view(*arguments, "--no-open")
             assert told.exit_code == 2, arguments
             assert words in told.stderr
             assert told.stderr.count("\n") == 1
@@ -119,24 +118,15 @@ def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch, tmp_path)
     assert file.stat().st_mode & 0o077 == 0
 
 
-def test_importing_the_page_loads_nothing_heavy():
-    code = (
-        "import sys, sphshell_pin.view.live\n"
-        "print([m for m in ('meshcat', 'tornado', 'pydantic', 'matplotlib') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
 def test_other_machines_are_let_in_with_a_warning_only(tmp_path, monkeypatch):
     monkeypatch.setattr(Live, "run", lambda live: live.stop())
     for host, warned in (("127.0.0.1", False), ("0.0.0.0", True), ("", True)):
-        told = call(write(tmp_path), "--no-open", "--host", host)
+        told = view(write(tmp_path), "--no-open", "--host", host)
         assert told.exit_code == 0
         assert ("everybody" in told.stderr) is warned
 
 
 def test_a_folder_without_a_result_is_named(tmp_path):
-    told = call(tmp_path, "--no-open")
+    told = view(tmp_path, "--no-open")
     assert told.exit_code == 2
     assert "has no run.npz" in told.stderr

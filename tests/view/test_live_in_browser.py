@@ -10,7 +10,7 @@ from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.live import Live
 from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
-from tests.view.test_recording_in_browser import count, is_blue
+from tests.view.test_recording_in_browser import count, is_blue, pixels_of, watch
 
 pytestmark = pytest.mark.browser
 
@@ -21,17 +21,10 @@ LONG = 60_000  # [ms] on machines that draw without a graphics card
 class Tab:
     """A browser's tab with the page of `live`."""
 
-    def __init__(self, context, live):
-        self.page = context.new_page()
-        self.complaints = []
-        self.page.on("pageerror", lambda fault: self.complaints.append(str(fault)))
-        self.page.on(
-            "request",
-            lambda request: (
-                request.url.startswith((urljoin(live.url, "/"), "data:", "blob:"))
-                or self.complaints.append(request.url)
-            ),
-        )
+    def __init__(self, context, live, **options):
+        self.live = live
+        self.page = context.new_page(**options)
+        self.complaints = watch(self.page, urljoin(live.url, "/"))
         self.page.goto(live.url)
         self.wait("globalThis.state && document.body.classList.contains('ready')")
 
@@ -58,10 +51,6 @@ class Tab:
 
     def scene(self):
         """Return the picture (h, w, 3) without the panels that lie over it."""
-        import io
-
-        from PIL import Image
-
         # Standing still, it leaves the machine time for the screenshot.
         if self.state("running"):
             self.click("#run")
@@ -69,8 +58,7 @@ class Tab:
         self.page.add_style_tag(
             content="#status, #legend, #toasts, #notice { visibility: hidden !important; }"
         )
-        shot = self.page.locator("#stage").screenshot(timeout=LONG)
-        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
+        return pixels_of(self.page.locator("#stage").screenshot(timeout=LONG))
 
 
 @pytest.fixture

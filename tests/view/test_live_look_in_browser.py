@@ -11,11 +11,12 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.live import Live
 from tests.scenario.files import DROP, write
+from tests.view.test_live_in_browser import LONG, Tab
+from tests.view.test_recording_in_browser import pixels_of
 
 pytestmark = pytest.mark.browser
 
 DOCS = Path(__file__).parents[2] / "docs" / "view.md"
-LONG = 60_000  # [ms] on machines that draw without a graphics card
 NARROW = [(390, 844), (844, 390), (768, 1024), (320, 568)]
 WIDE = [(1440, 900), (1280, 720), (900, 500)]
 FRICTION = """damping = 20.0 }
@@ -64,26 +65,14 @@ VARIABLES = """(names) => {
 }"""
 
 
-class Look:
+class Look(Tab):
     """One page for all tests of this file; `show` makes it as if newly opened."""
 
-    def __init__(self, browser, folder):
-        self.live = Live(LiveRun(build(write(folder, SCENARIO))), running=False).start()
-        self.context = browser.new_context(viewport={"width": 1440, "height": 900})
-        self.page = self.context.new_page()
-        self.complaints = []
-        self.page.on("pageerror", lambda fault: self.complaints.append(str(fault)))
-        self.page.goto(self.live.url)
-        self.wait("globalThis.state && document.body.classList.contains('ready')")
+    def __init__(self, browser, live):
+        super().__init__(browser, live, viewport={"width": 1440, "height": 900})
         self.page.evaluate("document.getElementById('step-size').value = '0.1'")
         self.click("#step")
         self.wait("state.contacts.length === 1")
-
-    def wait(self, expression):
-        self.page.wait_for_function(expression, timeout=LONG, polling=50)
-
-    def click(self, selector):
-        self.page.evaluate("selector => document.querySelector(selector).click()", selector)
 
     def show(self, size=(1440, 900), scheme="light"):
         self.page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -94,10 +83,11 @@ class Look:
 
 @pytest.fixture(scope="module")
 def opened(browser, tmp_path_factory):
-    look = Look(browser, tmp_path_factory.mktemp("drop"))
-    yield look
-    look.context.close()
-    look.live.stop()
+    path = write(tmp_path_factory.mktemp("drop"), SCENARIO)
+    with Live(LiveRun(build(path)), running=False) as live:
+        look = Look(browser, live)
+        yield look
+        look.page.close()
     assert look.complaints == []
 
 
@@ -229,14 +219,10 @@ def test_curves_and_labels_of_charts_have_contrast(look, scheme):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_scene_and_the_chart_follow_the_preference(look, scheme):
-    import io
-
-    from PIL import Image
-
     look.show(scheme=scheme)
     look.page.wait_for_timeout(300)
     shot = look.page.locator("#stage").screenshot(timeout=LONG)
-    picture = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(float) / 255
+    picture = pixels_of(shot) / 255
     # Left and right of what stands in the middle there is nothing but the background.
     edges = luminance(picture[150:-50, [5, -5]])
     assert (edges > 0.6).all() if scheme == "light" else (edges < 0.1).all()

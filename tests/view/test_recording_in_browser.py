@@ -18,19 +18,27 @@ pytestmark = pytest.mark.browser
 SIZE = {"width": 800, "height": 500}
 
 
+def watch(page, address):
+    """Return a list that fills with the complaints of a page: faults, requests beyond `address`."""
+    complaints, own = [], (address, "data:", "blob:")
+    page.on("pageerror", lambda fault: complaints.append(str(fault)))
+    page.on("request", lambda one: one.url.startswith(own) or complaints.append(one.url))
+    return complaints
+
+
+def pixels_of(shot):
+    """Return the pixels (h, w, 3) of a screenshot."""
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
+
+
 @pytest.fixture
 def opened(browser):
     """Opens a file in a page without network; complaints of the page end the test."""
     context = browser.new_context(viewport=SIZE, offline=True)
     page = context.new_page()
-    complaints = []
-    page.on("pageerror", lambda fault: complaints.append(str(fault)))
-    page.on(
-        "request",
-        lambda request: (
-            request.url.startswith(("file:", "data:", "blob:")) or complaints.append(request.url)
-        ),
-    )
+    complaints = watch(page, "file:")
 
     def open_file(path):
         page.goto(path.resolve().as_uri())
@@ -49,12 +57,9 @@ def at_time(page, time):
 
 
 def picture(page):
-    from PIL import Image
-
     # The captions may lie over what is looked for.
     page.add_style_tag(content="#head, #key, #views { visibility: hidden !important; }")
-    image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-    return np.asarray(image).astype(int)
+    return pixels_of(page.screenshot())
 
 
 def count(pixels, color, tolerance=25):

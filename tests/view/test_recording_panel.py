@@ -6,6 +6,7 @@ import pytest
 from sphshell_pin.view import write_recording
 from sphshell_pin.view.curves import BINS, run_curves
 from tests.view.stand_ins import a_result, ball_configuration, ball_on_plate
+from tests.view.test_recording_in_browser import watch
 
 SIZES = {"wide": (1100, 640), "narrow": (390, 844)}
 STEP = 1.0 / 30.0
@@ -24,8 +25,7 @@ def ball(tmp_path_factory):
 @pytest.fixture(scope="module")
 def opened(browser, ball):
     """Opens the recording in a window; complaints and requests of it end the tests."""
-    complaints = []
-    contexts = {}
+    contexts, complaints = {}, []
 
     def page_of(size="wide", scheme="light", motion="reduce"):
         key = size, scheme, motion
@@ -38,13 +38,7 @@ def opened(browser, ball):
                 offline=True,
             )
             page = contexts[key] = context.new_page()
-            page.on("pageerror", lambda fault: complaints.append(str(fault)))
-            page.on(
-                "request",
-                lambda one: (
-                    one.url.startswith(("file:", "data:", "blob:")) or complaints.append(one.url)
-                ),
-            )
+            complaints.append(watch(page, "file:"))
             page.goto(ball[1].resolve().as_uri())
             page.wait_for_function("window.recording", timeout=60_000)
         return contexts[key]
@@ -52,7 +46,7 @@ def opened(browser, ball):
     yield page_of
     for page in contexts.values():
         page.context.close()
-    assert complaints == []
+    assert not any(complaints)
 
 
 @pytest.fixture
