@@ -13,7 +13,7 @@ from functools import partial
 import mujoco
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import sphshell_pin as sp
 from sphshell_pin.adapters.mujoco import attach
@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 STATES, ROUNDS, CALLS = 1000, 15, 2000
 
 
-def text(*numbers: object) -> str:
+def text(*numbers: ArrayLike) -> str:
     """Return numbers for an attribute of MJCF, exactly."""
-    return " ".join(repr(float(x)) for x in np.ravel(numbers))  # type: ignore[arg-type]
+    return " ".join(repr(float(x)) for one in numbers for x in np.ravel(one))
 
 
 def mjcf_of(model: pin.Model, sphere: sp.Sphere) -> str:
@@ -92,9 +92,9 @@ def panda(rng: np.random.Generator) -> None:
         law = sp.ImpactLaw(stiffness, 1.5, 300.0, 5e-5)
         scene = sp.Scene(built.scene.model)
         placed = {"placement": pair.placement_j, "law": law, "friction": pair.friction}
-        scene.add_contact(pair.sphere, pair.shell, **placed)  # type: ignore[arg-type]
+        scene.add_contact(pair.sphere, pair.shell, **placed)
         worst, touched = 0.0, 0
-        with attach(model, pair.shell, ["tip"], **placed) as contacts:  # type: ignore[arg-type]
+        with attach(model, pair.shell, ["tip"], **placed) as contacts:
             while touched < STATES:
                 q = built.q0 + 0.02 * rng.standard_normal(7)
                 v = 0.5 * rng.standard_normal(7)
