@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from sphshell_pin.scenario.drafting.placing import Bench, Place, Searched, neare
 from sphshell_pin.scenario.drafting.plan import (
     GRAVITY,
     TIP_GAP,
+    Hold,
     Plan,
     Press,
     Way,
@@ -336,13 +337,17 @@ def _first_working(
             request.tell(f"tried, run {tried.runs}: {fault.text}")
         if one.repair == "" and len(tried.stays) < _MOST_STILL:
             tried.stays += [(section, links, other) for other in _still(one, fault, request)]
-        kept = fault.kind in ("links", "run") or fault.excess
+        control = one.control
+        # Friction in the joints keeps the tip off the part, and against its motion.
+        slides = isinstance(control, Press) and len(control.path) > 1
+        kept = fault.kind in ("links", "run") or (fault.excess and not slides)
         left = [] if kept else _without(section, one).joints
         if "friction" in left:
             tried.leave_out("friction", fault)
             queue = [plan]
-        elif not queue and one.repair == "":
-            queue = _repairs(one, fault)
+        elif one.repair == "" and fault.kind == "force" and _pulled(control):
+            loose = replace(control, posture_stiffness=())
+            queue = [replace(one, control=loose, repair="loose")]
         elif not queue and "damping" in left:
             # The tip creeps to the surface, or drags behind.
             tried.leave_out("damping", fault)
@@ -356,16 +361,9 @@ def _without(section: RobotSection, plan: Plan) -> RobotSection:
     return section.model_copy(update={"joints": kinds})
 
 
-def _repairs(plan: Plan, fault: Fault) -> list[Plan]:
-    """Return what may repair the `fault` of a plan in the same place."""
-    control = plan.control
-    if not isinstance(control, Press):
-        return []
-    repairs = []
-    if fault.kind == "force" and any(control.posture_stiffness):
-        loose = replace(control, posture_stiffness=())
-        repairs.append(replace(plan, control=loose, repair="loose"))
-    return repairs
+def _pulled(control: Press | Hold | None) -> TypeGuard[Press]:
+    """Whether the posture pulls at the tip."""
+    return isinstance(control, Press) and any(control.posture_stiffness)
 
 
 def _still(plan: Plan, fault: Fault, request: Request) -> list[Plan]:
