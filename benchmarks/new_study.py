@@ -1,8 +1,9 @@
-"""What `new` writes for many robots, parts and places: each works, or is refused for a reason.
+"""What `new` writes for many robots and parts: each pair works at the first try, or is refused.
 
-Run it with `make new-study FOLDER=...`, or `python -m benchmarks.new_study FOLDER`. Every scenario
-that is written is read again, run, judged by its own expectations, and looked at by a way of its
-own: the corners of the links' meshes against the closed parts.
+Run it with `make new-study FOLDER=...`, or `python -m benchmarks.new_study FOLDER...`. Every
+scenario that is written is read again, run, judged by its own expectations, and looked at by a way
+of its own: the corners of the links' meshes against the closed parts, the side that is touched, the
+start's distance from singular postures and the part's height.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import coal
@@ -30,37 +31,32 @@ from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.trial import whole_posture
 from sphshell_pin.scenario.format.bodies import to_se3
 from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.running.run import simulate
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests" / "data" / "corpus"
-PROBE = ROOT / "tests" / "data" / "robots" / "arm_with_probe.urdf"
+FILES = ROOT / "tests" / "data"
 
+SHIPPED = ("panda", "ur3", "ur5", "ur10", "xarm7", "z1", "kinova", "so100", "so101", "talos_arm")
+SHIPPED += ("finger_edu", "three_link_finger", "allegro_right_hand", "asr_twodof")
+SHIPPED += ("ball", "a1", "go2", "solo12")
 ROBOTS: dict[str, tuple[str, dict[str, object]]] = {
-    "three_link_finger": ("three_link_finger", {}),
-    "arm_with_probe": (str(PROBE), {}),
-    "panda": ("panda", {}),
-    "ur5": ("ur5", {}),
-    "ur10": ("ur10", {}),
-    "xarm7": ("xarm7", {"frame": "link_eef", "radius": 0.012, "offset": (0.0, 0.0, 0.02)}),
-    "z1": ("z1", {"frame": "gripperMover", "radius": 0.012, "offset": (0.1, 0.0, 0.0)}),
-    "kinova": ("kinova", {"frame": "j2s6s200_end_effector", "radius": 0.02}),
-    "finger_edu": ("finger_edu", {}),
-    "allegro_right_hand": ("allegro_right_hand", {}),
-    "talos_arm": (
-        "talos_arm",
-        {"frame": "gripper_left_base_link", "radius": 0.015, "offset": (0.0, 0.0, -0.16)},
-    ),
-    "ball": ("ball", {}),
-    "a1": ("a1", {}),
-    "solo12": ("solo12", {"radius": 0.016}),
+    **{name: (name, {}) for name in SHIPPED},
+    "arm_with_probe": (str(FILES / "robots" / "arm_with_probe.urdf"), {}),
+    "arm_offset": (str(FILES / "robots" / "arm_offset.urdf"), {}),
+    "gantry": (str(FILES / "robots" / "gantry.urdf.xacro"), {}),
+    "hand_xacro": (str(FILES / "xacro" / "hand.urdf.xacro"), {}),
 }
 """What `new` is asked: the robot, and the options that it cannot do without."""
 
-PLACES = ("below", "above", "+x", "-x", "+y")
+PLACES = ("-", "below", "above", "+x", "-x", "+y")
+"""Values of --place; "-": none."""
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".stl", ".obj", ".shl", ".ply", ".off")
 UNITS = {".stl": "mm", ".obj": "mm", ".brep": "mm", ".ply": "mm", ".off": "mm"}
-MOST_FILES = 8
+MOST_FILES = 12
+# The least motion that the joints of an arm at the start give its tip, as a part of the largest.
+_SINGULAR = 0.02
 # Of a vertex of a link's mesh behind the surface [m], and of what belongs to the sphere [radii].
 _DEEP, _AT_TIP = 1e-5, 1.5
 
@@ -77,11 +73,24 @@ class Case:
     failed: str = ""
     """What a written scenario misses in its own run; "" where it works."""
     seconds: float = 0.0
+    slides: bool | None = None
+    """Whether the tip follows a path; None of what falls or stands."""
+    raised: float = 0.0
+    """The part's underside above the ground [m]."""
+
+    @property
+    def word(self) -> str:
+        """What came of it, in a word."""
+        if self.refused or self.failed:
+            return "refused" if self.refused else "fails"
+        return {True: "slides", False: "presses", None: "works"}[self.slides]
 
 
-def find_parts(folder: Path) -> list[Path]:
-    """Return the parts of `folder`: CAD files first, MOST_FILES at most."""
+def find_parts(folder: Path, names: Sequence[str] | None = None) -> list[Path]:
+    """Return the parts of `folder`, CAD first: those called `names`, or MOST_FILES at most."""
     files = [one for one in sorted(folder.iterdir()) if one.suffix.lower() in SUFFIXES]
+    if names:
+        return [one for one in files if one.stem in names]
     return sorted(files, key=lambda one: SUFFIXES.index(one.suffix.lower()) > 4)[:MOST_FILES]
 
 
@@ -97,6 +106,7 @@ def ask(robot: str, part: Path, place: str) -> Case:
     """Ask `new` for one scenario, and run what it writes."""
     name, options = ROBOTS[robot]
     began = time.perf_counter()
+    case = Case(robot, part.stem, place)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         path = Path(folder) / "made.toml"
@@ -105,11 +115,34 @@ def ask(robot: str, part: Path, place: str) -> Case:
             new_scenario(name, part, out=path, **asked)  # type: ignore[arg-type]
         except SphshellError as error:
             if path.exists():
-                return Case(robot, part.stem, place, failed=f"refused and written: {error}")
-            return Case(robot, part.stem, place, str(error), "", time.perf_counter() - began)
+                return replace(case, failed=f"refused and written: {error}")
+            return replace(case, refused=str(error), seconds=time.perf_counter() - began)
         seconds = time.perf_counter() - began
         built = build(path)
-        return Case(robot, part.stem, place, "", failure(built), seconds)
+        control = built.scenario.controller
+        slides = len(control.path) > 1 if isinstance(control, sp.CartesianImpedance) else None
+        (shell,), at = built.shells.values(), to_se3(built.scenario.shell[0].placement)
+        raised = float((shell.vertices @ at.rotation[2]).min() + at.translation[2])
+        failed = failure(built) or ("" if slides is None else wrong_start(built))
+        return replace(case, failed=failed, seconds=seconds, slides=slides, raised=raised)
+
+
+def wrong_start(built: Built) -> str:
+    """Return what is wrong with the posture and the side that is touched; "" if nothing."""
+    scene, (pair,) = built.scene, built.scene.pairs
+    reach = Reach(scene.model, pair.sphere.frame, pair.sphere.offset)
+    center = pair.placement.actInv(reach.center(built.q0))
+    jacobian = reach.jacobian(built.q0)
+    if scene.model.nv > 2:
+        values = np.linalg.svd(jacobian[:3], compute_uv=False)
+        rank = min(3, scene.model.nv, int(np.linalg.matrix_rank(jacobian[:3], tol=1e-9)))
+        if values[rank - 1] < _SINGULAR * values[0]:
+            return "the start is near a singular posture"
+    shell = pair.shell
+    if not shell.is_closed:
+        return ""
+    outside = float(shell.closest_points(center[None], method="facets").distances[0])
+    return "the tip starts inside the part" if outside < 0 and shell.side != "inside" else ""
 
 
 def _asked(question: tuple[str, Path, str]) -> Case:
@@ -166,64 +199,61 @@ def link_inside(built: Built, q: np.ndarray) -> str:
     return ""
 
 
-def cases_of(robots: Sequence[str], parts: Sequence[Path]) -> list[tuple[str, Path, str]]:
-    """Return all questions; a robot that floats has one place, which is none."""
-    floating = ("ball", "a1", "solo12", "iris")
-    return [
-        (robot, part, place)
-        for robot in robots
-        for part in parts
-        for place in (("-",) if robot in floating else PLACES)
-    ]
-
-
 def main() -> int:
     """Ask, run, print a table; with --write put it into the documentation."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, nargs="?", default=DATA)
+    parser.add_argument("folders", type=Path, nargs="*", default=[DATA])
     parser.add_argument("--robots", nargs="*", default=list(ROBOTS), choices=list(ROBOTS))
-    parser.add_argument("--files", nargs="*", help="names without a suffix; default: the first 8")
+    parser.add_argument("--files", nargs="*", help="names without a suffix; default: the first 12")
+    parser.add_argument("--places", nargs="*", default=["-"], choices=list(PLACES))
     parser.add_argument("--write", action="store_true", help="write docs/measured/new_study.json")
     parser.add_argument("--processes", type=int, default=2)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        parts = [read_once(one, Path(folder)) for one in find_parts(asked.folder)]
-        parts = [
-            one for one in parts if not asked.files or one.stem.rpartition("_")[0] in asked.files
-        ]
-        questions = cases_of(asked.robots, parts)
+        files = [one for some in asked.folders for one in find_parts(some, asked.files)]
+        parts = [read_once(one, Path(folder)) for one in files]
+        questions = [(r, p, place) for r in asked.robots for p in parts for place in asked.places]
         with multiprocessing.get_context("spawn").Pool(asked.processes) as pool:
             cases = []
             for case in pool.imap(_asked, questions):
                 cases.append(case)
-                said = f"refused: {case.refused}" if case.refused else case.failed or "works"
+                said = f"refused: {case.refused}" if case.refused else case.failed or case.word
                 where = f"{case.robot}  {case.part}  {case.place}  {case.seconds:.1f} s"
                 print(f"{where}  {said}", flush=True)
     found = sections(cases)
     print(found[0].text, *(" | ".join(row) for one in found for row in one.table), sep="\n")
     if asked.write:
-        print(f"wrote {write('new_study', 'python -m benchmarks.new_study FOLDER --write', found)}")
+        command = "python -m benchmarks.new_study FOLDER --write"
+        print(f"wrote {write('new_study', command, found)}")
     return 1 if any(case.failed for case in cases) else 0
 
 
 def sections(cases: Sequence[Case]) -> list[Measured]:
-    """Return what the site shows: the places that work by robot and part, and why others do not."""
+    """Return what the site shows: what came of each robot and part, and why some are refused."""
     robots = list(dict.fromkeys(case.robot for case in cases))
     parts = list(dict.fromkeys(case.part for case in cases))
-    written = [case for case in cases if not case.refused]
-    works = sum(not case.failed for case in written)
+    count = Counter(case.word for case in cases)
+    arms = [case for case in cases if case.word in ("slides", "presses")]
+    times = [case.seconds for case in cases]
+    floor = sum(abs(case.raised) < 1e-3 for case in arms)
     text = (
-        f"{len(cases)} cases: {len(written)} written, of which {works} work in their own run; "
-        f"{len(cases) - len(written)} refused."
+        f"{len(cases)} cases: {len(cases) - count['refused']} written, of which {count['fails']} "
+        f"fail; {count['refused']} refused. Of {len(arms)} that press, {count['slides']} slide and "
+        f"in {floor} the part is on the floor. Seconds for an answer: median "
+        f"{np.median(times):.1f}, most {max(times):.1f}."
     )
     rows = [["robot", *parts]]
     for robot in robots:
-        cells = []
-        for part in parts:
-            here = [case for case in cases if (case.robot, case.part) == (robot, part)]
-            works = sum(not case.refused and not case.failed for case in here)
-            cells.append(f"{works} of {len(here)}")
-        rows.append([robot, *cells])
+        words = [
+            Counter(case.word for case in cases if (case.robot, case.part) == (robot, part))
+            for part in parts
+        ]
+        rows.append(
+            [
+                robot,
+                *(", ".join(f"{w} {n}" if n > 1 else w for w, n in one.items()) for one in words),
+            ]
+        )
     reasons = Counter(reason(case.refused) for case in cases if case.refused)
     counts = [[text, str(count)] for text, count in reasons.most_common()]
     return [

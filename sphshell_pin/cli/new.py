@@ -69,8 +69,26 @@ def new(
         str | None,
         typer.Option(
             help="Where the surface is, seen from the tip: below, above, +x, -x, +y, -y; by "
-            "default below, or before a tip that does not point down."
+            "default below, if the joints allow it."
         ),
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z|FACE",
+            help="Where to touch: a point of the part \\[m], or a face as check lists them: plane, "
+            "'cylinder 5.5 mm'; the largest one.",
+        ),
+    ] = None,
+    path: Annotated[
+        str | None,
+        typer.Option(
+            metavar="POINTS|SHAPE",
+            help="Of the tip: points of the part \\[m], 'x,y,z; x,y,z', or line, circle, raster.",
+        ),
+    ] = None,
+    length: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Of a path: 0.06 \\[m] or 60mm.")
     ] = None,
     tips: Annotated[
         Literal["one", "all"],
@@ -117,16 +135,25 @@ def new(
                 against=against,
                 press=press,
                 place=place,
+                at=at,
+                path=path,
+                length=length_of("--length", length),
                 tips=tips,
                 base="floating" if free_flyer else base,
                 package_dirs=package_dir or (),
                 xacro_args=xacro_args_of(xacro_arg),
                 out=out,
                 force=force,
+                tell=_tell,
             )
         except UnitMissing as error:
             raise SphshellError(f"the unit {error.must('--unit {}')}") from error
         _show(made)
+
+
+def _tell(what: str) -> None:
+    """Show what was tried, on the error stream: the answer goes to the other."""
+    typer.echo(what, err=True)
 
 
 def _show(made: NewScenario) -> None:

@@ -28,7 +28,10 @@ def test_no_joint_stands_behind_the_surface(axes, tmp_path):
     plane = pair.placement
     tip = data.oMf[model.getFrameId(f"link_{len(axes) - 1}")].translation
     outward = plane.rotation[:, 2] * np.sign((tip - plane.translation) @ plane.rotation[:, 2])
-    assert ((origins - plane.translation) @ outward).min() > 0.009
+    heights = (origins - plane.translation) @ outward
+    # The arm stands on the plane, or beside it.
+    assert heights[0] >= -1e-9
+    assert heights[1:].min() > 0.009
 
 
 def test_a_new_scenario_takes_one_body_of_a_cad_file(tmp_path):

@@ -437,16 +437,16 @@ def test_a_sphere_has_room_in_a_groove():
 
 
 def test_a_way_across_stays_on_the_surface_and_ends_at_the_rim():
-    from sphshell_pin.scenario.drafting.touch_points import find_touch_point, path_on_surface
+    from sphshell_pin.scenario.drafting.touch_points import find_touch_point, paths_on_surface
 
     ball = shell_of(coal.Sphere(0.1))
     spot = find_touch_point(ball, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
-    way = path_on_surface(ball, spot, np.array([1.0, 0.0, 0.0]), 0.1, 0.005)
+    way = next(paths_on_surface(ball, spot, np.array([1.0, 0.0, 0.0]), 0.1, 0.005))
     assert len(way) == 21
     np.testing.assert_allclose(np.linalg.norm(way, axis=1), 0.1, atol=2e-4)
     assert way[-1, 0] > 0.05
     box = shell_of(coal.Box(0.2, 0.2, 0.04))
     spot = find_touch_point(box, 0.01, 1e-3)
-    way = path_on_surface(box, spot, np.array([1.0, 0.0, 0.0]), 1.0, 0.005)
+    way = next(paths_on_surface(box, spot, np.array([1.0, 0.0, 0.0]), 1.0, 0.005))
     assert np.abs(way[:, :2]).max() <= 0.1 + 1e-9
     np.testing.assert_allclose(way[:, 2], 0.02, atol=1e-9)

@@ -27,5 +27,5 @@ def test_new_scenarios_work_or_are_refused_for_a_reason(parts):
     assert set(refused) == {("three_link_finger", part.stem, "+y") for part in parts}
     assert all("cannot move along +y" in said for said in refused.values())
     works, because = sections(cases)
-    assert ["arm_with_probe", "2 of 2", "2 of 2"] in works.table
+    assert ["arm_with_probe", "slides 2", "presses 2"] in works.table
     assert ["the joints cannot move the tip that way", "2"] in because.table

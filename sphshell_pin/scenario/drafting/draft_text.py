@@ -123,7 +123,7 @@ shell = {shell.name}
 # Points in the shell's own coordinates [m], projected on it.
 path = {path}
 normal_force = {press.force} # [N]
-speed = {press.speed} # [m/s] along the path: three radii a second
+speed = {press.speed} # [m/s] along the path
 spline = {press.spline!o} # a smooth curve through the points
 acceleration = {press.acceleration!o} # [m/s2] it sets out and stops softly
 jerk = {press.jerk!o} # [m/s3]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -19,6 +19,7 @@ from sphshell_pin.contact.materials import find_material
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import is_path
+from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
 from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips, floats
 from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand
@@ -72,12 +73,16 @@ def new_scenario(
     against: str = "steel",
     press: float | None = None,
     place: str | None = None,
+    at: npt.ArrayLike | str | None = None,
+    path: npt.ArrayLike | str | None = None,
+    length: float | None = None,
     tips: Literal["one", "all"] = "one",
     base: Literal["fixed", "floating"] | None = None,
     package_dirs: Sequence[str | PathLike[str]] = (),
     xacro_args: Mapping[str, str] | None = None,
     out: str | PathLike[str] | None = None,
     force: bool = False,
+    tell: Callable[[str], None] | None = None,
 ) -> NewScenario:
     """Write a scenario in which `robot` touches `surface`, with values that work for its size.
 
@@ -105,13 +110,23 @@ def new_scenario(
     press
         Normal force [N] of a robot with a fixed base.
     place
-        Where the surface stands as seen from its tip, a key of PLACES.
+        Where the surface stands as seen from its tip, a key of PLACES; by default below, where the
+        joints allow it.
+    at
+        Where on the surface to touch: a point (3,) [m] in its own coordinates, or a kind of its
+        faces, with a radius where there are several ("cylinder 5.5 mm").
+    path, length
+        Of the tip: points (k, 3) [m] on the surface in its own coordinates, or "line", "circle" or
+        "raster" from the place that is touched, over `length` [m].
     tips
         "all": all fingertips of a hand hold the surface, which then is a free part, of `against`
         all through; its URDF is written beside the scenario, as NAME_part.urdf.
     out
         The file to write, by default ROBOT_on_SURFACE.toml here; an existing one is replaced with
         `force` only, and only when all went well.
+
+    tell
+        Called with a sentence for each draft that failed, while others are tried.
 
     Raises
     ------
@@ -129,22 +144,23 @@ def new_scenario(
         check_positive("press", press, "N")
     if place is not None and place not in PLACES:
         raise NameNotFound("place", place, "a surface", PLACES)
+    asked = Asked.checked(at, path, length)
     for one in (material, against):
         if one is not None:
             find_material(one)
-    path = _free_path(out, robot, surface, force=force)
+    file = _free_path(out, robot, surface, force=force)
     section = _robot_section(
         robot,
-        path,
+        file,
         base=base,
         package_dirs=package_dirs,
         xacro_args=xacro_args or {},
     )
-    bare = _build_bare(section, path)
+    bare = _build_bare(section, file)
     shaped = None if base is not None or section.path is None else _base(bare.assembly.model)
     if shaped is not None:
         section = section.model_copy(update={"base": shaped})
-        bare = _build_bare(section, path)
+        bare = _build_bare(section, file)
     loaded = bare.assembly.loaded[0]
     too_large = radius and radius_fault(bare.assembly.model, radius)
     if radius and too_large:
@@ -154,11 +170,11 @@ def new_scenario(
         found = every_tip(loaded, frame, radius, place)
     else:
         found = find_tips(loaded, shipped=section.name, frame=frame, radius=radius, offset=center)
-    shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, found)
+    shell_section, word = _shell_section(surface, unit, (bodies, faces), file, bare, found)
     if word is not None and tips == "all":
         held = word_primitive(word, max(one.radius for one in found))
         shell_section = shell_section.model_copy(update={"primitive": held})
-    with_shell = _build_bare(section, path, shell_section, reuse=bare)
+    with_shell = _build_bare(section, file, shell_section, reuse=bare)
     _check_size(with_shell.shells[shell_section.name], found)
     shell_section, with_shell = _sided(shell_section, with_shell, word)
     if tips == "all":
@@ -170,29 +186,29 @@ def new_scenario(
             found,
             pair,
             press,
-            path.stem,
-            lambda text, reuse: _build_text(text, path, reuse),
+            file.stem,
+            lambda text, reuse: _build_text(text, file, reuse),
         )
-        part = path.with_name(part_file(path.stem))
+        part = file.with_name(part_file(file.stem))
         if part.exists() and not force:
             raise ScenarioError(part, "", "is there already: give another --out, or --force")
         _write(part, grasp.urdf)
-        _write(path, grasp.text)
-        return NewScenario(path, grasp.text, grasp.built, explain_built(grasp.built), grasp.why)
-    request = Request(material, against, press, place, word)
+        _write(file, grasp.text)
+        return NewScenario(file, grasp.text, grasp.built, explain_built(grasp.built), grasp.why)
+    request = Request(material, against, press, place, word, asked, tell)
     title = f"{loaded.name} {{}} {shell_section.name}"
 
     def draft(section: RobotSection, plan: Plan) -> tuple[str, Built]:
         does = title.format(_DOES[type(plan.control)])
-        text = draft_text(path.stem, does, section, shell_section, plan, _run(plan))
-        return text, _build_text(text, path, with_shell)
+        text = draft_text(file.stem, does, section, shell_section, plan, _run(plan))
+        return text, _build_text(text, file, with_shell)
 
     # What is written is what was built, and tried.
     text, built, plan = find_working(section, with_shell, found, request, draft)
-    _write(path, text)
+    _write(file, text)
     of_base = () if shaped is None else (f"the base is {shaped}, by the robot's shape: or --base",)
     why = (*of_base, *plan.why, _materials_note(plan))
-    return NewScenario(path, text, built, explain_built(built), why)
+    return NewScenario(file, text, built, explain_built(built), why)
 
 
 def _sided(shell: ShellSection, built: Built, word: str | None) -> tuple[ShellSection, Built]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,15 +13,11 @@ import pinocchio as pin
 
 from sphshell_pin.contact.materials import Material, friction_between, restitution_between
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.placing import Place
 from sphshell_pin.scenario.drafting.poses import Stance
-from sphshell_pin.scenario.drafting.touch_points import (
-    come_down,
-    find_touch_point,
-    path_on_surface,
-    touch_points,
-    touches_once,
-)
+from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point, touches_once
 from sphshell_pin.shell import Shell
 
 Array = npt.NDArray[np.float64]
@@ -36,17 +33,13 @@ FALL_BESIDE = 0.1
 TIP_TURN = 0.02
 # Largest normal force by default [N], and in weights of the tip's effective mass.
 MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
-# The path across a surface: radii long at most, radii a second.
-PATH_RADII, PATH_RATE = 10.0, 3.0
+# The path across a surface: radii long at most, and this part of the reach; radii a second. It is
+# a path from this number of radii on, and no longer one is looked for from this part of it on.
+PATH_RADII, PATH_REACH, PATH_RATE = 10.0, 0.15, 3.0
+SHORTEST_PATH, ENOUGH = 1.0, 0.8
 LEAD_IN = 0.5
 # Of the target's speed and acceleration, each [s].
 RAMP = 0.25
-# Turns of the part about the approach, tried in this order [rad], and how many places are kept
-# where the sphere touches no single face.
-_YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
-_MOST_UNEVEN = 1
-# Places and turns at which links are held against the part.
-_MOST_TRIED = 250
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
 # radii.
 TIP_RATE, TIP_LAG = 20.0, 0.2
@@ -88,11 +81,13 @@ class Press:
     """Whether the sphere touches one face along the whole path: all of `force` acts there."""
     posture_stiffness: tuple[float, ...]
     joint_damping: tuple[float, ...]
+    smooth: bool = True
+    """Whether a path of more than two points bends, and has no corners."""
 
     @property
     def spline(self) -> bool:
-        """Whether the path bends."""
-        return len(self.path) > 2
+        """Whether the path is one smooth curve."""
+        return self.smooth and len(self.path) > 2
 
     @property
     def acceleration(self) -> float | None:
@@ -134,65 +129,96 @@ class Plan:
     """What was changed of a draft that failed; "" of the first draft."""
 
 
-def press_plans(
+@dataclass(frozen=True)
+class Way:
+    """A path of the tip on the surface; why it is none, where it is a single point."""
+
+    points: Array
+    """(k, 3) [m] in the shell's frame."""
+    smooth: bool = True
+    why: str = ""
+    even: bool = True
+    """Whether the sphere touches one face all along."""
+
+    @property
+    def length(self) -> float:
+        """Of the way [m]."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+def find_way(
     shell: Shell,
-    tip: Tip,
-    stance: Stance,
-    materials: tuple[Material, Material],
-    press: float | None,
-    blocked: Callable[[pin.SE3], bool],
-    *,
-    toward: Array | None = None,
-    inside: bool = False,
-) -> Iterator[Plan]:
-    """Yield plans in which a tip of a robot with a fixed base presses and slides.
+    place: Place,
+    radius: float,
+    gap: float,
+    asked: Asked,
+    free: Callable[[Array], bool],
+) -> Way:
+    """Return the longest path that surface and joints allow from a `place`, of those tried.
 
-    `press` [N] is the normal force asked for; `toward` (3,) the side of the surface to touch, with
-    `inside` from its middle; `blocked` says whether links of the robot are in the part at a
-    placement. One plan for each place on the part and turn of it where they are not; first those
-    where the sphere touches one face along the whole path, in each the nearest to the center first.
-
-    Raises
-    ------
-    SphshellError
-        The joints cannot push as hard as `press`.
+    The sphere of `radius` [m], whose `gap` [m] to the surface is that of the start, touches one
+    face along it, and the tip keeps its orientation unless that follows from its place. `free(q)`
+    says whether links are off the part.
     """
-    force = _force(stance, tip, materials, press)
-    gap = _gap(tip.radius, force, materials)
-    uneven: list[Plan] = []
-    tried = 0
-    for touch in touch_points(shell, tip.radius, gap, toward=toward, inside=inside):
-        on_face = touches_once(shell, touch, touch.point[None], tip.radius, 2 * gap)
-        if tried >= _MOST_TRIED:
-            break
-        if not on_face and len(uneven) >= _MOST_UNEVEN:
+    stance, touch = place.stance, place.touch
+    stays = touch.point[None]
+    if not place.on_face:
+        why = "the sphere touches edges or several sides at once, wherever it was tried"
+        return Way(stays, why=why, even=False)
+    if stance.slide is None:
+        return Way(stays, why="its joints cannot move it across the surface")
+    length = min(PATH_RADII * radius, PATH_REACH * stance.reach)
+    best, most_on_surface, reason = Way(stays), 0.0, ""
+    direction = place.placement.rotation.T @ stance.slide
+    for points, smooth in asked.paths(shell, touch, direction, radius, length):
+        fine = points if smooth else _fine(points, 0.5 * radius)
+        count = _even_part(shell, place, fine, radius, gap)
+        most_on_surface = max(most_on_surface, Way(fine[:count]).length)
+        normals = shell.closest_points(fine[:count]).normals
+        signs = np.sign(normals @ touch.normal)
+        centers = fine[:count] + (radius + gap) * normals * np.where(signs, signs, 1.0)[:, None]
+        world = np.array([place.placement.act(one) for one in centers])
+        count, why = stance.follows(world, free)
+        reason = why or reason
+        if asked.whole and count < len(fine):
             continue
-        facing = _turn(touch.normal, -stance.approach)
-        for angle in _YAWS:
-            turned = pin.AngleAxis(angle, stance.approach).toRotationMatrix() @ facing
-            placement = pin.SE3(turned, stance.center - turned @ touch.center)
-            tried += 1
-            if blocked(placement):
-                continue
-            path = touch.point[None]
-            if on_face and stance.slide is not None and stance.inertia:
-                length = min(PATH_RADII * tip.radius, 0.8 * stance.room)
-                path = path_on_surface(
-                    shell, touch, turned.T @ stance.slide, length, 0.5 * tip.radius
-                )
-            even = on_face and touches_once(shell, touch, path, tip.radius, 2 * gap)
-            if on_face and not even:
-                path, even = touch.point[None], True
-            plan = _press_plan(tip, stance, materials, press, force, gap, placement, path, even)
-            if even:
-                yield plan
-            else:
-                uneven.append(plan)
-            break
-    yield from uneven
+        way = Way(points if count == len(fine) else fine[:count], smooth)
+        if way.length > best.length:
+            best = way
+        if best.length >= ENOUGH * (asked.length or length):
+            return best
+    if asked.path is None and best.length >= SHORTEST_PATH * radius:
+        return best
+    needed = SHORTEST_PATH * radius if asked.path is None else ENOUGH * (asked.length or 0.0)
+    if most_on_surface <= needed:
+        why = f"the surface has no room: an edge or another side is within {_mm(most_on_surface)}"
+    else:
+        why = reason
+    return Way(stays, why=why)
 
 
-def _force(
+def _fine(points: Array, spacing: float) -> Array:
+    """Return `points` (k, 3) with more between them, at most `spacing` [m] apart."""
+    parts = [points[:1]]
+    for one, other in itertools.pairwise(points):
+        steps = max(1, math.ceil(float(np.linalg.norm(other - one)) / spacing))
+        parts.append(one + np.arange(1, steps + 1)[:, None] / steps * (other - one))
+    return np.concatenate(parts)
+
+
+def _even_part(shell: Shell, place: Place, points: Array, radius: float, gap: float) -> int:
+    """Return how many of `points` (k, 3) the sphere touches one after the other, each once."""
+    if touches_once(shell, place.touch, points, radius, 2 * gap):
+        return len(points)
+    low, high = 1, len(points)
+    while high - low > 1:
+        middle = (low + high) // 2
+        fits = touches_once(shell, place.touch, points[:middle], radius, 2 * gap)
+        low, high = (middle, high) if fits else (low, middle)
+    return low
+
+
+def press_force(
     stance: Stance, tip: Tip, materials: tuple[Material, Material], press: float | None
 ) -> float:
     """Return the normal force [N]; SphshellError where the joints cannot push as hard."""
@@ -218,7 +244,7 @@ def _force(
     return press
 
 
-def _gap(radius: float, force: float, materials: tuple[Material, Material]) -> float:
+def press_gap(radius: float, force: float, materials: tuple[Material, Material]) -> float:
     """Return the gap at the start [m] from which the first touch peaks at four times `force` [N].
 
     Fallen through g, Hertz's sphere stops at 4^(2/3) times the depth d under `force` at rest, where
@@ -228,34 +254,35 @@ def _gap(radius: float, force: float, materials: tuple[Material, Material]) -> f
     return min(TIP_GAP * radius, 1.5 * rest)
 
 
-def _press_plan(
+def press_plan(
     tip: Tip,
-    stance: Stance,
+    place: Place,
+    way: Way,
     materials: tuple[Material, Material],
-    press: float | None,
     force: float,
     gap: float,
-    placement: pin.SE3,
-    path: Array,
-    even: bool,
 ) -> Plan:
+    """Plan a scenario in which a tip of a robot with a fixed base presses with `force` [N].
+
+    The sphere begins with the `gap` [m] at the first point of the `way`.
+    """
+    stance, path = place.stance, way.points
     rate = _round(PATH_RATE * tip.radius)
     contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
     softest = contact.mu_static * force / (TIP_LAG * tip.radius)
     stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
     mass = math.sqrt(stance.mass * stance.slide_mass)
-    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     turning = 0.0
     if stance.inertia:
         moment = contact.mu_static * force * tip.radius
         turning = max(stance.inertia * TIP_RATE**2, moment / TIP_TURN)
-    spare = stance.model.nv > (6 if turning else 3)
+    spare = stance.joints > (6 if turning else 3)
     # The posture's pull may take a fiftieth of the normal force at the end of the path.
-    pull = min(0.02 * force / (stance.mass * max(length, tip.radius)), 100.0) if spare else 0.0
+    pull = min(0.02 * force / (stance.mass * max(way.length, tip.radius)), 100.0) if spare else 0.0
     control = Press(
         force=force,
         path=path,
-        even=even,
+        even=way.even,
         speed=rate,
         lead_in=LEAD_IN,
         stiffness=_round(stiffness),
@@ -264,31 +291,29 @@ def _press_plan(
         rotational_damping=_round(1.4 * math.sqrt(turning * stance.inertia)),
         posture_stiffness=tuple(_round(pull * one) for one in stance.joint_inertia),
         joint_damping=tuple(_round(0.7 * math.sqrt(pull) * one) for one in stance.joint_inertia),
+        smooth=way.smooth,
     )
     why = [f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"]
     why.append(
         f"the surface is {_mm(gap)} in front of the sphere, which presses along "
         f"{_axis(stance.approach)}"
     )
-    if stance.bent:
-        why.append("the joints were bent to a posture in which the tip can move and press")
+    why.append("the joints are bent to a posture in which the tip moves well and can press")
+    why.append(place.told)
     if stance.lock:
         why.append(f"{_count(len(stance.lock), 'joint')} that do not move the tip are locked")
-    if press is None:
-        why.append(
-            f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
-        )
-    if not even:
-        why.append(
-            "the sphere touches edges or several sides at once, wherever it was tried: the force "
-            "on the surface is the resultant of several"
-        )
+    why.append(
+        f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
+    )
+    if not way.even:
+        why.append("the force on the surface is the resultant of several")
     if len(path) < 2:
-        reason = "it has no room" if stance.inertia else "its joints cannot keep it from rolling"
-        why.append(f"the tip presses in one place and does not slide: {reason}")
-    ramps = 2 * RAMP if len(path) > 1 else 0.0
-    duration = math.ceil(10 * (LEAD_IN + length / rate + ramps + 0.5)) / 10
-    return Plan((tip,), contact, control, duration, gap, placement, None, tuple(why))
+        why.append(f"the tip presses in one place and does not slide: {way.why}")
+    else:
+        why.append(f"the tip slides over {_mm(way.length)}")
+    corners = 0 if len(path) < 2 else 1 if control.spline else len(path) - 1
+    duration = math.ceil(10 * (LEAD_IN + way.length / rate + 2 * RAMP * corners + 0.5)) / 10
+    return Plan((tip,), contact, control, duration, gap, place.placement, None, tuple(why))
 
 
 def plan_fall(
@@ -404,11 +429,6 @@ def _under(shell: Shell, centers: Array, radii: Array, gap: float) -> pin.SE3:
         if heights:
             return pin.SE3(np.eye(3), np.array([aside[0], aside[1], min(heights)]))
     raise SphshellError("no sphere lands on the surface: it is too small")
-
-
-def _turn(source: Array, target: Array) -> Array:
-    rotation: Array = pin.Quaternion.FromTwoVectors(source, target).toRotationMatrix()
-    return rotation
 
 
 def _round(x: float, digits: int = 2) -> float:

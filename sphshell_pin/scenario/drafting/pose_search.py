@@ -1,11 +1,11 @@
-"""The search for a draft that works: postures, and places and turns of the part."""
+"""The search for a draft that works: directions to press in, places of the part, and repairs."""
 
 from __future__ import annotations
 
-import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -13,25 +13,35 @@ import pinocchio as pin
 
 from sphshell_pin.contact.materials import Material, find_material
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
-from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
+from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
 from sphshell_pin.scenario.drafting.fingertips import Tip, floats
+from sphshell_pin.scenario.drafting.placing import Bench, Place, Searched, nearest_side
 from sphshell_pin.scenario.drafting.plan import (
     GRAVITY,
+    TIP_GAP,
+    Hold,
     Plan,
     Press,
+    Way,
     bearable,
+    find_way,
     plan_fall,
     plan_stand,
-    press_plans,
+    press_force,
+    press_gap,
+    press_plan,
 )
-from sphshell_pin.scenario.drafting.poses import Stance, stances
+from sphshell_pin.scenario.drafting.poses import Stance, home_approach
+from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
 from sphshell_pin.scenario.drafting.trial import Fault, try_out
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.schema import RobotSection
+from sphshell_pin.shell.shell import Shell
 
 Array = npt.NDArray[np.float64]
 
@@ -45,8 +55,14 @@ PLACES: dict[str, tuple[float, float, float]] = {
 }
 """Where the surface is placed, seen from the tip."""
 
-# Drafts that are run: of one posture, and in all.
-_MOST_OF_STANCE, _MOST_RUNS = 3, 9
+# Drafts that are run, in all, before a path is given up, and of a robot that floats.
+_MOST_RUNS, _MOST_SLIDES, _MOST_DROPS = 10, 6, 3
+# Places at which the tip cannot slide, before one of them is taken.
+_MOST_STILL = 12
+# Of the part above the floor, in turn, as parts of the robot's reach.
+_LIFTS = (0.0, 0.1, 0.25)
+# How far joints may be under the floor [m]: not at all, but for rounding.
+_AT_FLOOR = 1e-6
 # Between links and part at the start, along the approach, in radii of the sphere.
 _ROOM = 0.1
 # Of a draft that fails while the tip slides or after a hard touch: time to settle [s].
@@ -67,6 +83,9 @@ class Request:
     press: float | None
     place: str | None
     word: str | None
+    asked: Asked
+    tell: Callable[[str], None] | None = None
+    """Called with what failed, while the search goes on."""
 
     def materials(self, tips: Sequence[Tip], load: float) -> tuple[Material, Material]:
         """Return what sphere and surface are made of; `load` [kg] rests on each, 0: it falls."""
@@ -82,19 +101,20 @@ class Request:
 
 
 @dataclass
-class _Tried:
+class _Tried(Searched):
     """What a search came across, for the sentence that refuses."""
 
-    postures: int = 0
-    places: int = 0
     runs: int = 0
-    blocked: Counter[str] = field(default_factory=Counter)
     faults: list[Fault] = field(default_factory=list)
     without: tuple[str, ...] = ()
     """Kinds of what acts in the joints that are left out."""
     note: str = ""
     """Why they are."""
     errors: list[SphshellError] = field(default_factory=list)
+    stays: list[tuple[RobotSection, Links, Plan]] = field(default_factory=list)
+    """Plans that press in one place, where a path failed."""
+    ways: list[str] = field(default_factory=list)
+    """Why a path that was asked for could not be taken."""
 
     def leave_out(self, kind: str, fault: Fault) -> None:
         """Leave one more kind of what the file states of the joints out, for this `fault`."""
@@ -141,59 +161,152 @@ def _press(
             f"no joint moves frame '{tip.frame}': name another with --frame, or let the root "
             "float with --free-flyer"
         )
-    geometry = built.assembly.loaded[0].collision_model
-    q_work = _working_posture(section, model, q0)
-    approach = None if request.place is None else np.array(PLACES[request.place])
-    side = {"cylinder": (1.0, 0.0, 0.0), "bowl": (0.0, 0.0, 1.0)}.get(request.word or "")
-    toward = None if side is None else np.array(side)
     tried = _Tried()
-    touching = SelfContact(model, geometry, q_work).found
-    postures: list[Stance] = []
+    geometry = built.assembly.loaded[0].collision_model
+    still: list[Candidate] = []
 
-    def found_now() -> Iterator[Stance]:
-        for one in stances(model, q_work, tip, approach, touching):
-            postures.append(one)
-            tried.postures += 1
-            yield one
-
-    rooms = ((_ROOM * tip.radius, one) for one in found_now())
-    for room, stance in itertools.chain(rooms, ((0.0, one) for one in postures)):
-        links = Links(model, geometry, shell, [tip], stance.lock)
-
-        def blocked(
-            placement: pin.SE3, stance: Stance = stance, links: Links = links, room: float = room
-        ) -> bool:
-            tried.places += 1
-            # With a little room, as the tip yields when it is pressed on and slides.
-            nearer = pin.SE3(placement.rotation, placement.translation - room * stance.approach)
-            found = links.within(stance.q, nearer, whole=True)
-            if found is not None:
-                tried.blocked[found.link] += 1
-            return found is not None
-
-        pair = request.materials(tips, stance.mass)
-        inside = request.word == "bowl"
-        plans = press_plans(
-            shell, tip, stance, pair, request.press, blocked, toward=toward, inside=inside
-        )
-        start = _changed_joints(model, q0, stance.q)
+    def work(one: Candidate) -> tuple[str, Built, Plan] | None:
+        place, way, pair, force, gap, links = one
         stood = section.model_copy(
             update={
-                "lock": list(stance.lock),
-                "start": start,
-                "joints": stated_kinds(model, stance.lock),
+                "lock": list(place.stance.lock),
+                "start": _changed_joints(model, q0, place.stance.q),
+                "joints": stated_kinds(model, place.stance.lock),
             }
         )
+        plan = press_plan(tip, place, way, pair, force, gap)
+        return _first_working(stood, plan, links, draft, tried, request)
+
+    for found in _places(section, built, tip, shell, request, tried):
+        pair = request.materials(tips, found.stance.mass)
         try:
-            found = _first_working(stood, plans, links, draft, tried)
+            force = press_force(found.stance, tip, pair, request.press)
         except SphshellError as error:  # of this posture: another one may do
             tried.errors.append(error)
             continue
-        if found is not None:
-            return found
-        if tried.runs >= _MOST_RUNS:
+        gap = press_gap(tip.radius, force, pair)
+        place = found.with_gap(gap)
+        links = Links(model, geometry, shell, [tip], place.stance.lock)
+        nearer = place.placement.copy()
+        nearer.translation -= _ROOM * tip.radius * place.stance.approach
+
+        def free(q: Array, links: Links = links, nearer: pin.SE3 = nearer) -> bool:
+            return links.within(q, nearer) is None
+
+        way = find_way(shell, place, tip.radius, gap, request.asked, free)
+        one = Candidate(place, way, pair, force, gap, links)
+        if way.why:
+            # It presses there, if it slides nowhere.
+            still.append(one)
+            if len(still) >= _MOST_STILL:
+                break
+            continue
+        if (done := work(one)) is not None:
+            return done
+        if tried.runs >= _MOST_SLIDES:
             break
+    if request.asked.slides:
+        tried.ways += [one.way.why for one in still]
+        still = []
+    for stood, links, plan in tried.stays:
+        if (done := _first_working(stood, plan, links, draft, tried, request)) is not None:
+            return done
+    for one in still:
+        if (done := work(one)) is not None:
+            return done
     raise _refusal(tip, request, tried)
+
+
+class Candidate(NamedTuple):
+    """A place with what a plan needs to press there."""
+
+    place: Place
+    way: Way
+    materials: tuple[Material, Material]
+    force: float
+    gap: float
+    links: Links
+
+
+def _places(
+    section: RobotSection,
+    built: Built,
+    tip: Tip,
+    shell: Shell,
+    request: Request,
+    tried: _Tried,
+) -> Iterator[Place]:
+    """Yield places of the part before the tip, those on the floor of the robot's base first.
+
+    The tip presses down if nothing else is asked for, else as its limb points, else sideways.
+    """
+    model, geometry = built.assembly.model, built.assembly.loaded[0].collision_model
+    q_work = _working_posture(section, model, built.assembly.q0)
+    gap = TIP_GAP * tip.radius
+    touching = SelfContact(model, geometry, q_work)
+    data, at = model.createData(), pin.GeometryData(geometry)
+    lowest = _floor(geometry)
+
+    def usable(q: Array, floor: float | None) -> bool:
+        if touching.found(q):
+            return False
+        pin.updateGeometryPlacements(model, data, geometry, at, q)
+        heights = [
+            pose.act(one.geometry.aabb_center)[2]
+            for one, pose in zip(geometry.geometryObjects, at.oMg, strict=True)
+            if one.parentJoint
+        ]
+        heights += [data.oMi[j].translation[2] for j in range(1, model.njoints)]
+        return floor is None or min(heights) > floor - _AT_FLOOR
+
+    checks: dict[tuple[str, ...], Links] = {}
+
+    def blocked(stance: Stance, placement: pin.SE3) -> str | None:
+        if stance.lock not in checks:
+            checks[stance.lock] = Links(model, geometry, shell, [tip], stance.lock)
+        # With a little room, as the tip yields when it is pressed on and slides.
+        nearer = placement.copy()
+        nearer.translation -= room * stance.approach
+        found = checks[stance.lock].within(stance.q, nearer, whole=True)
+        return None if found is None else found.link
+
+    bench = Bench(model, q_work, tip, shell, lowest, 2 * gap, usable, blocked, tried)
+    approaches = [np.array(PLACES[request.place])] if request.place else None
+    if approaches is None:
+        down = np.array(PLACES["below"])
+        found = [down, home_approach(model, q_work, tip), *map(np.array, PLACES.values())]
+        approaches = list({tuple(one): one for one in found}.values())
+    lifts = [part * model_reach(model) for part in _LIFTS]
+    inside = request.word == "bowl"
+    known = {"cylinder": np.eye(3)[0], "bowl": np.eye(3)[2]}.get(request.word or "")
+    if request.asked.fixed:
+        spots = request.asked.touches(shell, tip.radius, gap)
+        choices = [(nearest_side(spots[0].normal), spots)]
+    else:
+        choices = [
+            (side, list(touch_points(shell, tip.radius, gap, toward=side, inside=inside)))
+            for side in ([known] if known is not None else sides(shell))
+        ]
+    for approach in approaches:
+        # Upright ones first, as they stand in their file.
+        ordered = sorted(choices, key=lambda one: abs(one[0][2] + approach[2]) > 1e-3)
+        for room in (_ROOM * tip.radius, 0.0):  # noqa: B007 (read by `blocked`)
+            for side, some in ordered:
+                for lift in (*lifts, None):
+                    yield from bench.places(side, some, approach, lift=lift)
+
+
+def _floor(geometry: pin.GeometryModel) -> float:
+    """Return the height [m] under what of the robot is fixed to the world, 0 at most."""
+    lowest = 0.0
+    for one in geometry.geometryObjects:
+        one.geometry.computeLocalAABB()
+        if not one.parentJoint:
+            box = one.geometry.aabb_local
+            corners = np.array(np.meshgrid(*zip(box.min_, box.max_, strict=True))).reshape(3, -1).T
+            heights = corners @ one.placement.rotation[2] + one.placement.translation[2]
+            lowest = min(lowest, float(heights.min()))
+    return lowest
 
 
 def stated_kinds(model: pin.Model, lock: Sequence[str]) -> list[str]:
@@ -202,35 +315,43 @@ def stated_kinds(model: pin.Model, lock: Sequence[str]) -> list[str]:
 
 
 def _first_working(
-    section: RobotSection, plans: Iterator[Plan], links: Links, draft: Draft, tried: _Tried
+    section: RobotSection,
+    plan: Plan,
+    links: Links,
+    draft: Draft,
+    tried: _Tried,
+    request: Request,
 ) -> tuple[str, Built, Plan] | None:
-    runs = 0
-    for plan in plans:
-        queue = [plan]
-        while queue:
-            one = queue.pop(0)
-            if tried.without and not one.left_out:
-                one = replace(one, left_out=tried.without, why=(*one.why, tried.note))
-            text, built = draft(_without(section, one), one)
-            fault = try_out(built, one, links)
-            tried.runs += 1
-            runs += 1
-            if fault is None:
-                return text, built, one
-            tried.faults.append(fault)
-            kept = fault.kind in ("links", "run") or fault.excess
-            left = [] if kept else _without(section, one).joints
-            if "friction" in left:
-                tried.leave_out("friction", fault)
-                queue = [plan]
-            elif not queue and one.repair == "":
-                queue = _repairs(one, fault)
-            elif not queue and "damping" in left:
-                # The tip creeps to the surface, or drags behind.
-                tried.leave_out("damping", fault)
-                queue = [plan]
-        if runs >= _MOST_OF_STANCE or tried.runs >= _MOST_RUNS:
-            return None
+    queue = [plan]
+    while queue and tried.runs < _MOST_RUNS:
+        one = queue.pop(0)
+        if tried.without and not one.left_out:
+            one = replace(one, left_out=tried.without, why=(*one.why, tried.note))
+        text, built = draft(_without(section, one), one)
+        fault = try_out(built, one, links)
+        tried.runs += 1
+        if fault is None:
+            return text, built, one
+        tried.faults.append(fault)
+        if request.tell is not None:
+            request.tell(f"tried, run {tried.runs}: {fault.text}")
+        if one.repair == "" and len(tried.stays) < _MOST_STILL:
+            tried.stays += [(section, links, other) for other in _still(one, fault, request)]
+        control = one.control
+        # Friction in the joints keeps the tip off the part, and against its motion.
+        slides = isinstance(control, Press) and len(control.path) > 1
+        kept = fault.kind in ("links", "run") or (fault.excess and not slides)
+        left = [] if kept else _without(section, one).joints
+        if "friction" in left:
+            tried.leave_out("friction", fault)
+            queue = [plan]
+        elif one.repair == "" and fault.kind == "force" and _pulled(control):
+            loose = replace(control, posture_stiffness=())
+            queue = [replace(one, control=loose, repair="loose")]
+        elif not queue and "damping" in left:
+            # The tip creeps to the surface, or drags behind.
+            tried.leave_out("damping", fault)
+            queue = [plan]
     return None
 
 
@@ -240,21 +361,26 @@ def _without(section: RobotSection, plan: Plan) -> RobotSection:
     return section.model_copy(update={"joints": kinds})
 
 
-def _repairs(plan: Plan, fault: Fault) -> list[Plan]:
-    """Return what may repair the `fault` of a plan in the same place."""
+def _pulled(control: Press | Hold | None) -> TypeGuard[Press]:
+    """Whether the posture pulls at the tip."""
+    return isinstance(control, Press) and any(control.posture_stiffness)
+
+
+def _still(plan: Plan, fault: Fault, request: Request) -> list[Plan]:
+    """Return the plan that presses in one place, which a path may have failed, unless one is asked.
+
+    It is tried if no path works anywhere.
+    """
     control = plan.control
-    if not isinstance(control, Press) or (fault.kind == "links" and fault.t < control.lead_in):
+    early = fault.kind == "links" and isinstance(control, Press) and fault.t < control.lead_in
+    if not isinstance(control, Press) or early or request.asked.slides:
         return []
-    repairs = []
-    if fault.kind == "force" and any(control.posture_stiffness):
-        loose = replace(control, posture_stiffness=())
-        repairs.append(replace(plan, control=loose, repair="loose"))
-    stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
-    duration = _CALM_LEAD_IN + 0.5
     why = plan.why
     if len(control.path) > 1:
+        why = tuple(one for one in why if not one.startswith("the tip slides"))
         why = (*why, f"the tip presses in one place and does not slide: with a path {fault.text}")
-    return [*repairs, replace(plan, control=stays, duration=duration, repair="stays", why=why)]
+    stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
+    return [replace(plan, control=stays, duration=_CALM_LEAD_IN + 0.5, repair="stays", why=why)]
 
 
 def _drop(
@@ -263,10 +389,10 @@ def _drop(
     model, q0 = built.assembly.model, built.assembly.q0
     (shell,) = built.shells.values()
     inside = request.word == "bowl"
-    if request.press is not None or request.place is not None:
+    if request.press is not None or request.place is not None or not request.asked.is_default:
         raise SphshellError(
-            "a robot that floats comes down on the surface by its weight: leave out --press "
-            "and --place"
+            "a robot that floats comes down on the surface by its weight: leave out --press, "
+            "--place, --at and --path"
         )
     centers = sphere_centers(built, tips)
     root = q0[:7]
@@ -296,7 +422,7 @@ def _drop(
         end = float(f"{_BEFORE * fault.t:.2g}")
         # What can stand has to stand.
         falls = fault.kind == "links" and (plan.control is None or len(plan.tips) < 3)
-        if not falls or end < _SHORTEST or tried.runs >= _MOST_OF_STANCE:
+        if not falls or end < _SHORTEST or tried.runs >= _MOST_DROPS:
             raise _refusal(tips[0], request, tried, floating=True)
         note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the surface"
         plan = replace(plan, duration=end, why=(*plan.why, note))
@@ -320,8 +446,8 @@ def _changed_joints(model: pin.Model, q0: Array, q: Array) -> dict[str, float | 
 
 def _refusal(tip: Tip, request: Request, tried: _Tried, *, floating: bool = False) -> SphshellError:
     """Return the error that says why no draft works, and what to change."""
-    way = f"along {request.place}" if request.place else "where its limb points"
     if not tried.postures:
+        way = f"along {request.place}" if request.place else "along any axis"
         return SphshellError(
             f"the tip on frame '{tip.frame}' cannot move {way} in any posture that was tried: its "
             "joints do not allow it; take another --place or --frame"
@@ -335,8 +461,13 @@ def _refusal(tip: Tip, request: Request, tried: _Tried, *, floating: bool = Fals
         )
     if tried.errors:
         return tried.errors[0]
+    if tried.ways:
+        return SphshellError(
+            f"the path cannot be taken: {tried.ways[0]}; take a shorter --length, another --at or "
+            "--place"
+        )
     if tried.blocked:
-        ((link, _),) = tried.blocked.most_common(1)
+        ((link, _),) = Counter(tried.blocked).most_common(1)
         advice = _ADVICE_BOWL if request.word == "bowl" else _ADVICE["links"]
         return SphshellError(
             f"link '{link}' would be in the part, or another one: in each of "
@@ -350,6 +481,7 @@ _ADVICE = {
     "run": "take a softer --law, or a larger --radius",
     "touch": "take another --place, or another --frame",
     "force": "take a smaller --radius, another --press or --place",
+    "path": "take a shorter --length, another --at or --place",
     "links": "take another --place, a smaller part, or a sphere farther out (--frame, --offset)",
     "figure": "take another --law or --radius",
 }

@@ -19,6 +19,8 @@ Array = npt.NDArray[np.float64]
 _SHARPEST = np.cos(np.deg2rad(35.0))
 # Of a contact's normal with the surface's, where a face is touched and not an edge.
 _ALIGNED = 0.98
+# A sheet's mean normal, as a part of that of a plane.
+_SHEET = 0.3
 # How far from the middle other places are looked for, as parts of half the box.
 _PARTS = (0.15, 0.35, 0.6)
 # Points at the end of a path that are left out, so that it ends before a rim and not on it.
@@ -50,45 +52,44 @@ def find_touch_point(
 ) -> TouchPoint:
     """Return a place in the middle of `shell` where a sphere of `radius` [m] has the `gap` [m].
 
-    `toward` (3,) is the side to touch from; by default the broad side, and for a closed surface its
-    upper one where sides are alike. A sheet is touched from its hollow side. With `inside` the
+    `toward` (3,) is the side to touch from, by default the first one of `sides`. With `inside` the
     surface is touched from its middle. `beside` (3,) [m] moves the place away from the middle.
     """
     middle = shell.box.mean(axis=0) + (0.0 if beside is None else beside)
-    if toward is None and _is_sheet(shell):
-        point, normal = _hollow_side(shell, middle)
-        start = point + max(float(np.linalg.norm(middle - point)), 2 * radius) * normal
-        axis = normal
-    else:
-        axis = _broad_axis(shell.box) if toward is None else np.asarray(toward, dtype=float)
-        start = middle if inside else _above(shell, axis, middle)
-    return come_down(shell, start, -axis, radius, gap)
+    axis = sides(shell)[0] if toward is None else np.asarray(toward, dtype=float)
+    return come_down(shell, middle if inside else _above(shell, axis, middle), -axis, radius, gap)
+
+
+def sides(shell: Shell) -> list[Array]:
+    """Return the sides (3,) to touch a part from, unit vectors of its frame, the best one first.
+
+    Of a body the top, as it stands in its file, unless another side is more than twice as broad;
+    of an open sheet the outside only, where it bulges: the axis nearest to it.
+    """
+    outward = _bulge(shell)
+    if outward is not None:
+        k = int(np.argmax(np.abs(outward)))
+        return [np.sign(outward[k]) * np.eye(3)[k]]
+    sizes = shell.box[1] - shell.box[0]
+    broad = [float(np.prod(np.delete(sizes, k))) for k in range(3)]
+    axes = [sign * np.eye(3)[k] for sign in (1.0, -1.0) for k in (2, 1, 0)]
+
+    def rank(axis: Array) -> tuple[bool, float]:
+        area = broad[int(np.argmax(np.abs(axis)))]
+        return axis[2] < 1.0 or area < 0.5 * max(broad), -round(area / max(broad), 3)
+
+    return sorted(axes, key=rank)
 
 
 def touch_points(
-    shell: Shell, radius: float, gap: float, *, toward: Array | None = None, inside: bool = False
+    shell: Shell, radius: float, gap: float, *, toward: Array, inside: bool = False
 ) -> Iterator[TouchPoint]:
-    """Yield touch points: that of `find_touch_point`, then others farther and farther from it.
-
-    Without `toward` those on the six sides of the surface's box follow.
-    """
+    """Yield touch points: that of `find_touch_point`, then others farther and farther from it."""
     yield find_touch_point(shell, radius, gap, toward=toward, inside=inside)
-    for part in _PARTS:
-        yield from _around(shell, radius, gap, part, toward, inside=inside)
-    if toward is None:
-        for side in (*np.eye(3)[::-1], *-np.eye(3)[::-1]):
-            yield find_touch_point(shell, radius, gap, toward=side)
-            yield from _around(shell, radius, gap, _PARTS[1], side, inside=False)
-
-
-def _around(
-    shell: Shell, radius: float, gap: float, part: float, toward: Array | None, *, inside: bool
-) -> Iterator[TouchPoint]:
-    """Yield touch points beside the middle, by `part` of half the box along its axes."""
     half = 0.5 * (shell.box[1] - shell.box[0])
-    for signs in itertools.product((0, 1, -1), repeat=3):
-        if any(signs):
-            aside = part * half * np.array(signs)
+    for part, signs in itertools.product(_PARTS, itertools.product((0, 1, -1), repeat=3)):
+        aside = part * half * np.array(signs)
+        if any(signs) and abs(toward @ aside) <= 1e-9 * shell.size:
             yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=aside)
 
 
@@ -100,7 +101,7 @@ def touches_once(
     In a groove it rests on several sides, each with a force of its own; on an edge the force turns
     with the smallest step aside. `points` lead away from `place`.
     """
-    first, second = _tangents(place.normal, np.zeros(3))
+    first, second = tangents(place.normal, np.zeros(3))
     for aside in (0.1 * radius, 0.5 * radius):
         near = shell.closest_points(
             place.point + aside * np.array([first, -first, second, -second])
@@ -121,29 +122,24 @@ def touches_once(
     return True
 
 
-def path_on_surface(
+def paths_on_surface(
     shell: Shell, place: TouchPoint, direction: Array, length: float, spacing: float
-) -> Array:
-    """Return points (k, 3) on the surface from `place` on, `spacing` apart, over `length` [m].
+) -> Iterator[Array]:
+    """Yield paths (k, 3) on the surface from `place` on, `spacing` apart, over `length` [m].
 
-    It goes along `direction` (3,) as the surface allows and ends before a rim or a sharp edge;
-    where it would be less than half of `length`, the longest of several directions is taken.
+    The first goes along `direction` (3,) as the surface allows, the others beside it; each ends
+    before a rim or a sharp edge.
     """
-    first, second = _tangents(place.normal, direction)
+    first, second = tangents(place.normal, direction)
     steps = max(1, round(length / spacing))
-    best = np.zeros((0, 3))
     for k in range(_DIRECTIONS):
-        # 0, +45, -45, +90, ... degrees: near the asked direction first.
-        angle = np.pi / 4 * ((k + 1) // 2) * (1 if k % 2 else -1)
+        # 0, 180, +45, -135, -45, ... degrees: near the asked direction first.
+        angle = np.pi / 4 * ((k // 2 + 1) // 2) * (1 if k // 2 % 2 else -1) + np.pi * (k % 2)
         ahead = np.cos(angle) * first + np.sin(angle) * second
-        path = _walk(shell, place, ahead, steps, spacing)
-        best = path if len(path) > len(best) else best
-        if len(best) - 1 >= 0.5 * length / spacing:
-            break
-    return best
+        yield _walk(shell, place, ahead, steps, spacing)
 
 
-def _tangents(normal: Array, direction: Array) -> tuple[Array, Array]:
+def tangents(normal: Array, direction: Array) -> tuple[Array, Array]:
     """Return unit vectors (3,) across `normal` and each other, the first along `direction`."""
     first = direction - normal * (normal @ direction)
     if np.linalg.norm(first) < 1e-6:
@@ -168,22 +164,24 @@ def _walk(shell: Shell, place: TouchPoint, direction: Array, steps: int, spacing
     return np.array(points[: max(1, len(points) - _SPARE)])
 
 
-def _is_sheet(shell: Shell) -> bool:
-    """Whether the surface is a sheet, and not a body, be it with holes: its normals agree."""
-    if shell.is_closed:
-        return False
+def _bulge(shell: Shell) -> Array | None:
+    """Return the mean normal (3,) of an open sheet on the side where it bulges, of a flat one up.
+
+    None of a body, be it with holes: its normals do not agree.
+    """
     corners = shell.vertices[shell.triangles]
     areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = float(np.linalg.norm(areas, axis=1).sum())
-    return float(np.linalg.norm(areas.sum(axis=0))) > 0.3 * total
-
-
-def _broad_axis(box: Array) -> Array:
-    """Return the axis along which the surface is thinnest; z before y before x where alike."""
-    sizes = box[1] - box[0]
-    k = max(i for i in range(3) if sizes[i] <= 1.01 * sizes.min() + 1e-12)
-    axis: Array = np.eye(3)[k]
-    return axis
+    mean, total = areas.sum(axis=0), float(np.linalg.norm(areas, axis=1).sum())
+    if shell.is_closed or float(np.linalg.norm(mean)) <= _SHEET * total:
+        return None
+    normal: Array = mean / np.linalg.norm(mean)
+    heights = shell.vertices @ normal
+    middle = shell.closest_points(shell.box.mean(axis=0)[None]).points[0] @ normal
+    # The box of a dome is around its hollow.
+    bulge = float(middle - 0.5 * (heights.max() + heights.min()))
+    if abs(bulge) < 1e-6 * shell.size:
+        bulge = float(normal @ np.array([1e-6, 1e-3, 1.0]))
+    return normal if bulge >= 0 else -normal
 
 
 def _above(shell: Shell, axis: Array, middle: Array) -> Array:
@@ -193,17 +191,6 @@ def _above(shell: Shell, axis: Array, middle: Array) -> Array:
         beside = shell.closest_points(far[None]).points[0]
         far = beside + axis * (axis @ (far - beside))
     return far
-
-
-def _hollow_side(shell: Shell, middle: Array) -> tuple[Array, Array]:
-    """Return the point of an open surface nearest to its `middle`, and the normal towards that."""
-    at = shell.closest_points(middle[None])
-    point, normal = at.points[0], at.normals[0]
-    inward = float((middle - point) @ normal)
-    if abs(inward) < 1e-6 * shell.size:
-        # A flat sheet has no hollow side: the upper one.
-        inward = float(normal @ np.array([1e-6, 1e-3, 1.0]))
-    return point, normal if inward >= 0 else -normal
 
 
 def come_down(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from sphshell_pin.scenario.drafting.draft_text import HELD
 from sphshell_pin.scenario.drafting.plan import GRAVITY, Hold, Plan, Press
 from sphshell_pin.scenario.format.bodies import joint_spans, to_se3
 from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.running.figures import judge
 from sphshell_pin.scenario.running.run import simulate
 
@@ -24,13 +26,15 @@ _MOST_ROWS = 300
 # Part of the lead-in after which the force is held, and of the rows that may be off it: a tip that
 # starts to slide shakes for a moment.
 _SETTLED, _SHAKEN = 0.6, 0.1
+# How far the tip may stay behind its path, in radii: its spring gives way by a fifth of one.
+_BEHIND = 0.6
 # Of the end of a run in which a robot stands still [s].
 _LAST = 0.3
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What fails in a draft: `kind` is "run", "touch", "force", "links" or "figure"."""
+    """What fails in a draft: `kind` is "run", "touch", "force", "links", "path" or "figure"."""
 
     kind: str
     text: str
@@ -51,6 +55,7 @@ def try_out(built: Built, plan: Plan, links: Links) -> Fault | None:
         _touch_fault(result)
         or _link_fault(built, result, links)
         or _force_fault(built, plan, result)
+        or _path_fault(built, plan, result)
         or _figure_fault(built, result)
     )
 
@@ -69,6 +74,20 @@ def _link_fault(built: Built, result: Result, links: Links) -> Fault | None:
         if found is not None:
             return Fault("links", f"link '{found.link}' is in the part", float(t), found.link)
     return None
+
+
+def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
+    """Say where the tip is behind the end of its path, if it is."""
+    control = plan.control
+    if not isinstance(control, Press) or len(control.path) < 2:
+        return None
+    (tip,), (pair,) = plan.tips, built.scene.pairs
+    reach = Reach(built.scene.model, tip.frame, tip.offset)
+    away = pair.placement.actInv(reach.center(result.q[-1])) - control.path[-1]
+    behind = math.sqrt(max(float(away @ away) - tip.radius**2, 0.0))
+    if behind < _BEHIND * tip.radius:
+        return None
+    return Fault("path", f"the tip stays {1e3 * behind:.2g} mm behind the end of its path")
 
 
 def whole_posture(built: Built, q: Array) -> Array:

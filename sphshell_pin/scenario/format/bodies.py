@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +22,20 @@ from sphshell_pin.dynamics.scene.models import (
 )
 from sphshell_pin.errors import MissingExtra, ScenarioError, SphshellError
 from sphshell_pin.robots import LoadedRobot, load, load_file
+from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.format.reading import item_key
-from sphshell_pin.scenario.format.schema import Placement, RobotSection, Scenario
+from sphshell_pin.scenario.format.schema import (
+    TIP_AT,
+    Placement,
+    RobotSection,
+    Scenario,
+    TipAt,
+)
 
 Array = npt.NDArray[np.float64]
+
+# Of a tip that is brought somewhere: starts of the search, and how near it comes [m], [rad].
+_SEEDS, _AT_TIP, _ALONG = 40, 1e-6, 1e-4
 
 
 @dataclass(frozen=True)
@@ -131,7 +142,82 @@ def assemble(
         q0[in_q], v0[in_v], armature[in_v] = q_joint, v_joint, inertia
     if armature.any():
         base.armature = armature  # which pinocchio.appendModel (4.1) drops
+    for i, section in enumerate(scenario.robot):
+        key = f"{item_key('robot', scenario.robot, i)}.start.{TIP_AT}"
+        if section.tip_start is not None:
+            with blamed_on(path, key):
+                q0 = _with_tip(base, q0, section.tip_start, prefixes[i], section.lock, scenario)
     return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken), tuple(prefixes))
+
+
+def _with_tip(
+    model: pin.Model,
+    q: Array,
+    tip: TipAt,
+    prefix: str,
+    lock: Sequence[str],
+    scenario: Scenario,
+) -> Array:
+    """Return q (nq,) with the tip of the robot whose names begin with `prefix` where it shall be.
+
+    From q on, then from seeds within the limits of its joints, always the same.
+    """
+    frame, offset = _tip_frame(model, tip, prefix, scenario)
+    names = list(model.names)[1:]
+    held = [
+        name for name in names if not name.startswith(prefix) or name.removeprefix(prefix) in lock
+    ]
+    # A root that floats stays, as it would carry the tip anywhere.
+    held += [name for name in names if find_joint(model, name).nv == 6 and len(names) > 1]
+    reach = Reach(model, frame, offset, held)
+    place, rng = np.array(tip.xyz), np.random.default_rng(0)
+    turn = None
+    if tip.along is not None:
+        along = np.array(tip.along)
+        if not along.any():
+            raise SphshellError("along must be a direction, not [0, 0, 0]")
+        turn = partial(reach.turn_of_axis, along / np.linalg.norm(along))
+    best, least = q, np.inf
+    for k in range(_SEEDS):
+        seed = reach.into_limits(q) if k == 0 else reach.seed(q, rng)
+        found, off = reach.solve(seed, place, turn=turn)
+        reach.center(found)
+        turned = 0.0 if turn is None else float(np.linalg.norm(turn()))
+        if off < _AT_TIP and turned < _ALONG:
+            return found
+        if off + turned < least:
+            best, least = found, off + turned
+    center = reach.center(best)
+    off = float(np.linalg.norm(center - place))
+    if off < _AT_TIP and turn is not None:
+        angle = np.rad2deg(np.linalg.norm(turn()))
+        raise SphshellError(
+            f"the joints bring frame '{frame}' there, but its z axis no nearer than {angle:.3g} "
+            "degrees to along: leave that out, or take another place"
+        )
+    raise SphshellError(
+        f"the tip on frame '{frame}' comes no nearer than {1e3 * off:.3g} mm, at "
+        f"[{', '.join(f'{one:.4g}' for one in center)}]: its joints reach no farther"
+        + ("" if turn is None else " with its z axis along")
+    )
+
+
+def _tip_frame(
+    model: pin.Model, tip: TipAt, prefix: str, scenario: Scenario
+) -> tuple[str, Sequence[float]]:
+    """Return the frame of the tip and its offset, by default those of a contact's sphere."""
+    if tip.frame is not None:
+        return prefix + tip.frame, tip.offset
+    for contact in scenario.contact:
+        sphere = contact.sphere
+        moves = (
+            sphere is not None
+            and sphere.frame.startswith(prefix)
+            and int(model.frames[find_frame(model, sphere.frame)].parentJoint) > 0
+        )
+        if sphere is not None and moves:
+            return sphere.frame, sphere.offset
+    raise SphshellError("no contact has a sphere on this robot: name the frame of the tip")
 
 
 def _prefix(section: RobotSection, robot: LoadedRobot) -> str:
@@ -207,12 +293,12 @@ def _start(
             with blamed_on(path, f"{key}.q"):
                 q = shortened(model, q, check=True)
     rules = mimics(model)
-    for name, value in section.start.items():
+    for name, value in section.joint_start.items():
         with blamed_on(path, f'{key}.start."{name}"'):
             set_joint(model, q, name, value)
-    for name in (one for one in section.start if one in rules):
+    for name in (one for one in section.joint_start if one in rules):
         # What it mimics may be stated too, or another joint that mimics the same.
-        rule, value = rules[name], section.start[name]
+        rule, value = rules[name], section.joint_start[name]
         joint = find_joint(model, rule.of)
         if joint.nq == 1:
             with blamed_on(path, f'{key}.start."{name}"'):

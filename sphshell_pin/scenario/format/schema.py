@@ -8,13 +8,15 @@ them when it stands alone, `robot/name` as soon as there are several robots.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, TypeAlias, cast
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
+    Tag,
     create_model,
     model_validator,
 )
@@ -32,6 +34,9 @@ from sphshell_pin.scenario.format.typed_tables import OneOf, Positive, Vector3, 
 
 LISTS = ("robot", "joint", "shell", "contact", "source", "sensor", "knob")
 """Tables of which there may be several."""
+
+TIP_AT = "tip_at"
+"""Key of a robot's start that states where its tip is, beside those of its joints."""
 
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=3)]
@@ -58,6 +63,25 @@ class Placement(Section):
     rpy_deg: Annotated[Vector3, Parameter("deg")] = [0.0, 0.0, 0.0]
 
 
+class TipAt(Section):
+    """Where a robot's tip is at the start: a point of a frame, found by inverse kinematics."""
+
+    xyz: Vector3
+    frame: str | None = None
+    offset: Vector3 = [0.0, 0.0, 0.0]
+    along: Vector3 | None = None
+
+
+def _start_kind(value: object) -> str:
+    return "tip" if isinstance(value, dict | TipAt) else "joint"
+
+
+StartValue: TypeAlias = Annotated[
+    Annotated[float | list[float], Tag("joint")] | Annotated[TipAt, Tag("tip")],
+    Discriminator(_start_kind),
+]
+
+
 class RobotSection(Section):
     """A robot or a single body: shipped (`name`) or your own (`file`; `urdf` is the same key)."""
 
@@ -77,7 +101,7 @@ class RobotSection(Section):
     lock: list[str] = []
     joints: list[Literal["limits", "damping", "friction", "armature", "effort", "speed"]] = []
     q: list[float] | None = None
-    start: dict[str, float | list[float]] = {}
+    start: dict[str, StartValue] = {}
     speed: dict[str, float | list[float]] = {}
 
     @model_validator(mode="after")
@@ -94,7 +118,31 @@ class RobotSection(Section):
             raise ValueError(f"{' and '.join(beside)} belong to a file; drop them beside name")
         if self.free_flyer and self.base is not None:
             raise ValueError('free_flyer = true is base = "floating": state base alone')
+        for name, value in self.start.items():
+            if isinstance(value, TipAt) and name != TIP_AT:
+                raise ValueError(
+                    f"start.{name} takes numbers; the table of a tip is start.{TIP_AT}"
+                )
+        at = self.start.get(TIP_AT)
+        listed = isinstance(at, list) and len(at) == 3
+        if at is not None and not isinstance(at, TipAt) and not listed:
+            raise ValueError(f"start.{TIP_AT} must be [x, y, z] or a table {{ xyz, frame, ... }}")
         return self
+
+    @property
+    def joint_start(self) -> dict[str, float | list[float]]:
+        """The stated start of joints."""
+        return {
+            name: value
+            for name, value in self.start.items()
+            if name != TIP_AT and not isinstance(value, TipAt)
+        }
+
+    @property
+    def tip_start(self) -> TipAt | None:
+        """The stated start of the tip."""
+        at = self.start.get(TIP_AT)
+        return TipAt(xyz=at) if isinstance(at, list) else at if isinstance(at, TipAt) else None
 
     @property
     def path(self) -> str | None:

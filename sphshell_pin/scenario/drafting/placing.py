@@ -1,0 +1,192 @@
+"""Where a part stands before the tip: as on a table, one side of it towards the tip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.poses import Stance, stances
+from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
+from sphshell_pin.shell.shell import Shell
+
+Array = npt.NDArray[np.float64]
+
+# Turns of the part about the approach, tried in this order [rad].
+_YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
+# Cosine between the normal that is touched and the side of the part, which is turned to the tip:
+# below it the part is turned to the normal itself, or another place is looked for.
+_STEEP = 0.8
+# Places and turns at which links are held against the part, and places of one posture that are
+# offered.
+_MOST_TRIED, _MOST_OF_STANCE = 160, 2
+
+
+@dataclass(frozen=True)
+class Place:
+    """A posture of the robot and a part before its tip."""
+
+    stance: Stance
+    touch: TouchPoint
+    placement: pin.SE3
+    """Of the part in the world."""
+    on_face: bool
+    """Whether the sphere touches one face there, and once."""
+    raised: float
+    """How far the part's underside is above the floor [m]."""
+    side: Array
+    """Of the part (3,), which is turned to the tip."""
+
+    def with_gap(self, gap: float) -> Place:
+        """Return the place with the sphere at the `gap` [m] to the part, which stays."""
+        touch, stance = self.touch, self.stance
+        away = (stance.radius + gap) * touch.normal - (touch.center - touch.point)
+        center = touch.center + away
+        moved = stance.at(self.placement.act(center))
+        if moved is None:
+            return self
+        return replace(self, stance=moved, touch=replace(touch, center=center))
+
+    @property
+    def told(self) -> str:
+        """A sentence that says how the part stands."""
+        up = self.placement.rotation[:, 2] @ np.eye(3)[2]
+        stands = "upright, as in its file" if up > 0.999 else f"with its {_side(self.side)} "
+        if up <= 0.999:
+            stands += "towards the tip"
+        if abs(self.raised) < 1e-4:
+            return f"the surface stands {stands}, on the floor of the robot's base"
+        how = "above" if self.raised > 0 else "below"
+        return (
+            f"the surface stands {stands}, {1e3 * abs(self.raised):.3g} mm {how} the floor of the "
+            "robot's base: there the tip would not come to it"
+        )
+
+
+@dataclass
+class Searched:
+    """What a search for places came across, for the sentence that refuses."""
+
+    postures: int = 0
+    places: int = 0
+    blocked: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A robot and a part that is put before its tip; `floor` [m] is the height under the base."""
+
+    model: pin.Model
+    q: Array
+    """The posture to start from (nq,)."""
+    tip: Tip
+    shell: Shell
+    floor: float
+    depth: float
+    """How deep the sphere may come into the part [m]."""
+    usable: Callable[[Array, float | None], bool]
+    """Whether links are free of each other and above a height, at a configuration."""
+    blocked: Callable[[Stance, pin.SE3], str | None]
+    """The link that is in the part at a placement."""
+    searched: Searched
+
+    def places(
+        self,
+        side: Array,
+        touches: Iterable[TouchPoint],
+        approach: Array,
+        *,
+        lift: float | None,
+    ) -> Iterator[Place]:
+        """Yield places where the part has `side` (3,) to a tip that presses along `approach` (3,).
+
+        It stands `lift` [m] above the floor, or wherever the posture has the tip. First those of
+        each posture where the sphere touches one face.
+        """
+        spots = list(touches)
+        facing = turned_to(side, -approach)
+        lowest = float((self.shell.vertices @ facing.T)[:, 2].min())
+        uneven: list[Place] = []
+        tried = 0
+
+        def height(spot: TouchPoint) -> float | None:
+            if lift is None:
+                return None
+            return self.floor + lift - lowest + float(facing[2] @ spot.center)
+
+        limit = self.floor if lift is not None else None
+        postures = stances(
+            self.model,
+            self.q,
+            self.tip,
+            approach,
+            height(spots[0]),
+            lambda q: self.usable(q, limit),
+        )
+        for posture in postures:
+            self.searched.postures += 1
+            offered = 0
+            for spot in spots:
+                on_face = bool(spot.normal @ side > _STEEP) and touches_once(
+                    self.shell, spot, spot.point[None], self.tip.radius, self.depth
+                )
+                z = height(spot)
+                at = posture.center if z is None else np.array([*posture.center[:2], z])
+                stance = posture.at(at)
+                if stance is None or (not on_face and uneven):
+                    continue
+                for angle in _YAWS:
+                    turned = pin.AngleAxis(angle, approach).toRotationMatrix() @ facing
+                    placement = pin.SE3(turned, stance.center - turned @ spot.center)
+                    tried += 1
+                    self.searched.places += 1
+                    link = self.blocked(stance, placement)
+                    if link is not None:
+                        self.searched.blocked.append(link)
+                        continue
+                    bottom = float((self.shell.vertices @ turned.T)[:, 2].min())
+                    raised = bottom + float(placement.translation[2]) - self.floor
+                    place = Place(stance, spot, placement, on_face, raised, side)
+                    if on_face:
+                        yield place
+                        offered += 1
+                    else:
+                        uneven.append(place)
+                    break
+                if offered >= _MOST_OF_STANCE or tried >= _MOST_TRIED:
+                    break
+            if tried >= _MOST_TRIED:
+                break
+        yield from uneven
+
+
+def nearest_side(normal: Array) -> Array:
+    """Return the axis (3,) nearest to `normal` (3,), or the normal itself if that is oblique."""
+    k = int(np.argmax(np.abs(normal)))
+    axis: Array = np.sign(normal[k]) * np.eye(3)[k]
+    return axis if abs(normal[k]) > _STEEP else normal
+
+
+def turned_to(side: Array, target: Array) -> Array:
+    """Return the rotation (3, 3) that turns `side` to `target` by the shortest way, upright ones.
+
+    Those that are opposite to each other are turned about a horizontal axis across them, or z.
+    """
+    if side @ target < -0.999:
+        about = np.array([0.0, 0.0, 1.0]) if abs(side[2]) < 0.5 else np.array([1.0, 0.0, 0.0])
+        rotation: Array = 2.0 * np.outer(about, about) - np.eye(3)
+        return rotation
+    rotation = pin.Quaternion.FromTwoVectors(side, target).toRotationMatrix()
+    rounded = np.round(rotation)
+    return rounded + 0.0 if np.abs(rotation - rounded).max() < 1e-9 else rotation
+
+
+def _side(side: Array) -> str:
+    k = int(np.argmax(np.abs(side)))
+    if abs(side[k]) > 0.999:
+        return f"{'-' if side[k] < 0 else '+'}{'xyz'[k]} side"
+    return "touched place"

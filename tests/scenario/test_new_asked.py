@@ -1,0 +1,234 @@
+"""The first picture of a new scenario, and what a user may ask of it: the place and the path."""
+
+from __future__ import annotations
+
+import re
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from typer.testing import CliRunner
+
+import sphshell_pin as sp
+from sphshell_pin.cli import app
+from sphshell_pin.errors import InvalidParameter, SphshellError
+from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.drafting.touch_points import sides
+from sphshell_pin.scenario.running.run import simulate
+from tests.scenario.test_new import arm_urdf
+
+PLATE = (0.3, 0.24, 0.04)
+
+
+@pytest.fixture
+def plate(tmp_path):
+    """Write a plate that lies above the origin of its file; return the file."""
+    path = tmp_path / "plate.shl"
+    box = sp.Shell.from_geometry(coal.Box(*PLATE))
+    box.transformed(pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.02]))).to_file(path)
+    return path
+
+
+@pytest.fixture
+def arm(tmp_path):
+    return arm_urdf(tmp_path)
+
+
+def placed(built):
+    """Return the vertices of the surface in the world, and its placement."""
+    (pair,) = built.scene.pairs
+    corners = pair.shell.vertices @ pair.placement.rotation.T + pair.placement.translation
+    return corners, pair.placement
+
+
+def way(built):
+    return np.array(built.scenario.controller.path)
+
+
+def test_a_part_lies_before_a_bent_arm_as_on_a_table(arm, plate, tmp_path):
+    """The arm stands straight up at zero: by default it does what `--place below` does."""
+    made = new_scenario(arm, plate, radius=0.01, out=tmp_path / "a.toml")
+    below = new_scenario(arm, plate, radius=0.01, place="below", out=tmp_path / "b.toml")
+    assert made.text.replace("a.toml", "b.toml") == below.text
+    corners, placement = placed(made.built)
+    assert corners[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+    np.testing.assert_allclose(placement.rotation, np.eye(3), atol=1e-9)
+    (contact,) = made.built.scene.explain(made.built.q0).pairs
+    assert contact.gap > 0
+    # All six directions of the tip are free, and no joint is at a limit.
+    model, q = made.built.scene.model, made.built.q0
+    jacobian = pin.computeFrameJacobian(
+        model, model.createData(), q, model.getFrameId("link_5"), pin.LOCAL_WORLD_ALIGNED
+    )
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    assert values[-1] > 0.02 * values[0]
+    assert np.abs(q).max() < 2.75
+    assert np.linalg.norm(way(made.built)[-1] - way(made.built)[0]) > 0.05
+
+
+def dome(tmp_path, *, up):
+    """Write an open hemisphere of radius 0.1 m, its rim at z = 0; return the file."""
+    ball = sp.Shell.from_geometry(coal.Sphere(0.1))
+    kept = ball.triangles[(ball.vertices[ball.triangles][:, :, 2] > -1e-9).all(axis=1)]
+    vertices = ball.vertices * [1.0, 1.0 if up else -1.0, 1.0 if up else -1.0]
+    path = tmp_path / "dome.shl"
+    sp.Shell(vertices, kept).to_file(path)
+    return path
+
+
+@pytest.mark.parametrize("up", [True, False])
+def test_an_open_scan_is_touched_from_outside(up, arm, tmp_path):
+    file = dome(tmp_path, up=up)
+    np.testing.assert_array_equal(sides(sp.Shell.from_file(file))[0], [0, 0, 1 if up else -1])
+    built = new_scenario(arm, file, radius=0.01, out=tmp_path / "a.toml").built
+    (pair,) = built.scene.pairs
+    data = built.scene.model.createData()
+    pin.framesForwardKinematics(built.scene.model, data, built.q0)
+    frame = built.scene.model.getFrameId(pair.sphere.frame)
+    center = pair.placement.actInv(data.oMf[frame].act(np.array(pair.sphere.offset)))
+    assert np.linalg.norm(center) > 0.1
+    # It lies on its rim.
+    assert placed(built)[0][:, 2].min() == pytest.approx(0.0, abs=1e-5)
+
+
+GANTRY = """<robot name="gantry"><link name="frame"/>{}</robot>"""
+CARRIAGE = """
+<link name="{name}"><inertial><mass value="{mass}"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="to_{name}" type="prismatic"><parent link="{parent}"/><child link="{name}"/>
+  <origin xyz="0 0 {up}"/><axis xyz="{axis}"/>
+  <limit lower="-0.3" upper="0.3" effort="300" velocity="1"/></joint>"""
+
+
+def test_a_gantry_slides(plate, tmp_path):
+    """Nothing can turn its tip, so that it needs no joints against rolling."""
+    stages = [("bridge", 6, "frame", 0.6, "1 0 0"), ("trolley", 2, "bridge", 0, "0 1 0")]
+    stages += [("quill", 1, "trolley", 0, "0 0 1"), ("probe", 0.1, "quill", -0.3, "0 0 1")]
+    keys = ("name", "mass", "parent", "up", "axis")
+    text = GANTRY.format(
+        "".join(CARRIAGE.format(**dict(zip(keys, one, strict=True))) for one in stages)
+    )
+    text = text.replace('"to_probe" type="prismatic"', '"to_probe" type="fixed"')
+    (tmp_path / "gantry.urdf").write_text(text, encoding="utf-8")
+    made = new_scenario(
+        tmp_path / "gantry.urdf", plate, frame="probe", radius=0.01, out=tmp_path / "a.toml"
+    )
+    control = made.built.scenario.controller
+    assert len(control.path) > 2
+    assert control.rotational_stiffness == 0.0
+    result, _ = simulate(made.built)
+    moved = np.linalg.norm(result.q[-1][:2] - result.q[0][:2])
+    assert moved == pytest.approx(
+        np.linalg.norm(way(made.built)[-1] - way(made.built)[0]), rel=0.05
+    )
+
+
+def test_a_point_of_the_part_is_touched(arm, plate, tmp_path):
+    at = (0.05, -0.06, 0.04)
+    for text in (at, "0.05, -0.06, 0.04"):
+        built = new_scenario(
+            arm, plate, radius=0.01, at=text, out=tmp_path / "a.toml", force=True
+        ).built
+        np.testing.assert_allclose(way(built)[0], at, atol=1e-5)
+    # A side is turned up, as the tip presses down.
+    built = new_scenario(arm, plate, radius=0.01, at=(0.15, 0, 0.02), out=tmp_path / "b.toml").built
+    np.testing.assert_allclose(placed(built)[1].rotation @ [1, 0, 0], [0, 0, 1], atol=1e-9)
+
+
+def test_a_face_is_touched_by_its_kind_and_size(arm, tmp_path):
+    """A cylinder of 40 mm on its end: its mantle, or the larger of its planes."""
+    sp.Shell.from_geometry(coal.Cylinder(0.04, 0.1)).to_file(tmp_path / "rod.shl")
+    options = {"radius": 0.01, "out": tmp_path / "a.toml", "force": True}
+    for text in ("cylinder", "cylinder 40 mm", "cylinders of radius 40 mm"):
+        built = new_scenario(arm, tmp_path / "rod.shl", at=text, **options).built
+        assert np.linalg.norm(way(built)[0][:2]) == pytest.approx(0.04, rel=2e-3)
+    built = new_scenario(arm, tmp_path / "rod.shl", at="plane", **options).built
+    assert abs(way(built)[0][2]) == pytest.approx(0.05, abs=1e-6)
+    with pytest.raises(SphshellError, match=r"has no face 'cylinder 30 mm'; .*radius 40 mm"):
+        new_scenario(arm, tmp_path / "rod.shl", at="cylinder 30 mm", **options)
+    with pytest.raises(SphshellError, match=r"no face 'lid': give x,y,z"):
+        new_scenario(arm, tmp_path / "rod.shl", at="lid", **options)
+
+
+def length_of(points):
+    return np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+
+
+def test_the_path_has_the_shape_and_length_asked_for(arm, plate, tmp_path):
+    options = {"radius": 0.01, "out": tmp_path / "a.toml", "force": True}
+    line = way(new_scenario(arm, plate, path="line", length=0.08, **options).built)
+    assert length_of(line) == pytest.approx(0.08, abs=0.005)
+    circle = way(new_scenario(arm, plate, path="circle", length=0.1, **options).built)
+    np.testing.assert_allclose(circle[0], circle[-1], atol=1e-5)
+    away = np.linalg.norm(circle[:-1] - circle[:-1].mean(axis=0), axis=1)
+    np.testing.assert_allclose(away, 0.1 / (2 * np.pi), rtol=1e-2)
+    made = new_scenario(arm, plate, path="raster", length=0.12, **options)
+    raster = way(made.built)
+    assert len(raster) == 10
+    assert length_of(raster) == pytest.approx(0.12, rel=1e-3)
+    assert not made.built.scenario.controller.spline
+    np.testing.assert_allclose(raster[:, 2], 0.04, atol=1e-6)
+
+
+def test_the_points_of_a_path_are_taken_over(arm, plate, tmp_path):
+    points = [[-0.02, 0, 0.04], [0.03, 0.0, 0.04], [0.03, 0.03, 0.04]]
+    text = "; ".join(",".join(map(str, one)) for one in points)
+    for path in (points, text):
+        built = new_scenario(
+            arm, plate, radius=0.01, path=path, out=tmp_path / "a.toml", force=True
+        ).built
+        np.testing.assert_allclose(way(built), points, atol=1e-5)
+    result, _ = simulate(built)
+    data = built.scene.model.createData()
+    pin.framesForwardKinematics(built.scene.model, data, result.q[-1])
+    (pair,) = built.scene.pairs
+    frame = built.scene.model.getFrameId(pair.sphere.frame)
+    center = pair.placement.actInv(data.oMf[frame].act(np.array(pair.sphere.offset)))
+    np.testing.assert_allclose(center[:2], points[-1][:2], atol=0.003)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "match"),
+    [
+        ({"at": (1.0, 0.0, 0.0)}, SphshellError, r"\[1, 0, 0\] is 850 mm off the surface"),
+        ({"at": (1.0, 0.0)}, InvalidParameter, r"must have shape \(3,\)"),
+        ({"path": "spiral"}, InvalidParameter, "must be line, circle, raster, or points"),
+        ({"path": "1,2; 3,4"}, InvalidParameter, "must be line, circle, raster, or points"),
+        ({"path": "line", "length": 1.0}, SphshellError, "cannot be taken: .*shorter --length"),
+        ({"length": 0.1}, InvalidParameter, "belongs to a path of line, circle, raster"),
+        ({"path": [[0, 0, 0.04]], "at": (0, 0, 0.04)}, InvalidParameter, "leave it out"),
+    ],
+)
+def test_what_cannot_be_asked(options, error, match, arm, plate, tmp_path):
+    with pytest.raises(error, match=match) as caught:
+        new_scenario(arm, plate, radius=0.01, out=tmp_path / "a.toml", **options)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "a.toml").exists()
+
+
+def test_a_body_that_falls_takes_no_place(tmp_path):
+    with pytest.raises(SphshellError, match="leave out --press, --place, --at and --path"):
+        new_scenario("ball", "plane", at=(0.0, 0.0, 0.0), out=tmp_path / "a.toml")
+
+
+def test_what_fails_is_told_while_others_are_tried(tmp_path):
+    """Dry friction keeps the force off: the first run says so."""
+    text = arm_urdf(tmp_path).read_text(encoding="utf-8")
+    stated = '<dynamics friction="2.0"/></joint>'
+    (tmp_path / "arm.urdf").write_text(text.replace("</joint>", stated), encoding="utf-8")
+    told: list[str] = []
+    new_scenario(
+        tmp_path / "arm.urdf", "plane", radius=0.01, out=tmp_path / "a.toml", tell=told.append
+    )
+    assert told
+    assert re.fullmatch(r"tried, run 1: the force of .* N is not held: .*", told[0])
+
+
+def test_the_command_takes_place_and_path(arm, plate, tmp_path):
+    call = ["new", "--robot", arm, "--surface", plate, "--radius", "10mm", "--at", "plane"]
+    call += ["--path", "circle", "--length", "60mm", "--out", tmp_path / "a.toml"]
+    done = CliRunner().invoke(app, [str(one) for one in call])
+    assert done.exit_code == 0, done.output
+    assert "the tip slides over 59" in done.output
+    assert "upright, as in its file, on the floor" in done.output

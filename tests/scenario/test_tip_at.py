@@ -1,0 +1,123 @@
+"""A start that states where the tip is: joints follow by inverse kinematics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.errors import ScenarioError
+from sphshell_pin.scenario import build
+from tests.scenario.test_new import arm_urdf
+
+SCENARIO = """
+title = "an arm over a plane"
+
+[[robot]]
+urdf = "arm.urdf"
+start = {start}
+{more}
+
+[[shell]]
+name = "plane"
+primitive = {{ type = "half-space", extent = 1.0 }}
+
+[[contact]]
+name = "tip"
+sphere = {{ frame = "{sphere}", radius = 0.01, offset = [0.0, 0.0, 0.2] }}
+shell = "plane"
+law = {{ type = "hunt-crossley", stiffness = 1e6, dissipation = 0.5 }}
+
+[run]
+duration = 0.1
+"""
+XYZ = [0.4, 0.1, 0.0105]
+
+
+def scenario(folder, start, more="", sphere="link_5"):
+    arm_urdf(folder)
+    path = folder / "a.toml"
+    path.write_text(SCENARIO.format(start=start, more=more, sphere=sphere), encoding="utf-8")
+    return path
+
+
+def pose_of(built, frame="link_5"):
+    model = built.scene.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, built.q0)
+    return data.oMf[model.getFrameId(frame)]
+
+
+@pytest.mark.parametrize(
+    "start", [f"{{ tip_at = {XYZ} }}", f"{{ tip_at = {{ xyz = {XYZ} }}, joint_0 = 0.3 }}"]
+)
+def test_the_sphere_of_the_contact_is_where_it_is_stated(start, tmp_path):
+    built = build(scenario(tmp_path, start))
+    np.testing.assert_allclose(pose_of(built).act(np.array([0, 0, 0.2])), XYZ, atol=1e-6)
+    model = built.scene.model
+    assert (built.q0 >= model.lowerPositionLimit).all()
+    assert (built.q0 <= model.upperPositionLimit).all()
+    # The same file, the same start.
+    np.testing.assert_array_equal(built.q0, build(built.path).q0)
+
+
+def test_the_axis_of_its_frame_points_as_stated(tmp_path):
+    start = f"{{ tip_at = {{ xyz = {XYZ}, along = [1, 0, -2], frame = 'link_5' }} }}"
+    pose = pose_of(build(scenario(tmp_path, start)))
+    np.testing.assert_allclose(pose.translation, XYZ, atol=1e-6)
+    np.testing.assert_allclose(pose.rotation[:, 2], np.array([1, 0, -2]) / np.sqrt(5), atol=1e-4)
+
+
+def test_stated_joints_are_where_the_search_begins_and_locked_ones_stay(tmp_path):
+    near = "{ tip_at = [0.4, 0.1, 0.3], joint_0 = 0.5, joint_1 = 0.9, joint_2 = 0.7 }"
+    path = scenario(tmp_path, near, 'lock = ["joint_0"]')
+    built = build(path)
+    np.testing.assert_allclose(
+        pose_of(built).act(np.array([0, 0, 0.2])), [0.4, 0.1, 0.3], atol=1e-6
+    )
+    assert built.assembly.q0[0] == 0.5
+
+
+def test_places_are_those_of_the_world(tmp_path):
+    """Of two arms, the second stands elsewhere and is turned."""
+    more = 'label = "one"\n[[robot]]\nurdf = "arm.urdf"\nlabel = "two"\n'
+    more += "placement = { xyz = [1.0, 0.0, 0.0], rpy_deg = [0.0, 0.0, 90.0] }\n"
+    more += "start = { tip_at = { xyz = [0.8, 0.2, 0.3], frame = 'link_5' } }\n"
+    built = build(scenario(tmp_path, f"{{ tip_at = {XYZ} }}", more, sphere="one/link_5"))
+    np.testing.assert_allclose(
+        pose_of(built, "one/link_5").act(np.array([0, 0, 0.2])), XYZ, atol=1e-6
+    )
+    np.testing.assert_allclose(pose_of(built, "two/link_5").translation, [0.8, 0.2, 0.3], atol=1e-6)
+
+
+def test_it_can_be_set(tmp_path):
+    path = scenario(tmp_path, f"{{ tip_at = {XYZ} }}")
+    built = build(path, {"robot.arm.urdf.start.tip_at": "[0.3, 0.0, 0.2]"})
+    np.testing.assert_allclose(pose_of(built).act(np.array([0, 0, 0.2])), [0.3, 0, 0.2], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("start", "match"),
+    [
+        (
+            "{ tip_at = [3, 0, 0] }",
+            r"tip_at: the tip on frame 'link_5' comes no nearer than [\d.e+]",
+        ),
+        ("{ tip_at = [3, 0] }", r"start.tip_at must be \[x, y, z\] or a table"),
+        ("{ tip_at = { xyz = [0.4, 0, 0.3], along = [0, 0, 0] } }", "along must be a direction"),
+        ("{ tip_at = { xyz = [0.4, 0, 0.3], frame = 'lnk_5' } }", "no frame 'lnk_5'"),
+        ("{ tip_at = { xy = [0.4, 0, 0.3] } }", "did you mean 'xyz'"),
+        ("{ joint_1 = { xyz = [0.4, 0, 0.3] } }", "the table of a tip is start.tip_at"),
+        ("{ tip_at = { xyz = [0.0, 0.0, 1.39], along = [0, 0, -1] } }", "with its z axis along"),
+    ],
+)
+def test_what_cannot_be_is_said_in_one_sentence(start, match, tmp_path):
+    with pytest.raises(ScenarioError, match=match) as caught:
+        build(scenario(tmp_path, start))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_tip_without_a_contact_needs_its_frame(tmp_path):
+    path = scenario(tmp_path, f"{{ tip_at = {XYZ} }}", sphere="universe")
+    with pytest.raises(ScenarioError, match="name the frame of the tip"):
+        build(path)
