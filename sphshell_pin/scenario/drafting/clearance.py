@@ -58,10 +58,6 @@ class Links:
             if not any(_is_sphere(one, model, frames[k], tips[k]) for k in at):
                 self._objects.append((i, tuple(at)))
 
-    def __len__(self) -> int:
-        """Return how many geometries are held against the part."""
-        return len(self._objects)
-
     def within(self, q: Array, placement: pin.SE3, *, whole: bool = False) -> Intrusion | None:
         """Return a link that is in the part at `placement` with the robot at q (nq,).
 

@@ -35,7 +35,7 @@ from sphshell_pin.scenario.drafting.plan import (
     press_gap,
     press_plan,
 )
-from sphshell_pin.scenario.drafting.poses import Stance, home_approach
+from sphshell_pin.scenario.drafting.poses import Stance, home_approach, joints_aside
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
 from sphshell_pin.scenario.drafting.trial import Fault, try_out
 from sphshell_pin.scenario.format.bodies import joint_spans
@@ -111,7 +111,7 @@ class _Tried(Searched):
     note: str = ""
     """Why they are."""
     errors: list[SphshellError] = field(default_factory=list)
-    stays: list[tuple[RobotSection, Links, Plan]] = field(default_factory=list)
+    stays: list[tuple[RobotSection, Plan]] = field(default_factory=list)
     """Plans that press in one place, where a path failed."""
     ways: list[str] = field(default_factory=list)
     """Why a path that was asked for could not be taken."""
@@ -163,10 +163,11 @@ def _press(
         )
     tried = _Tried()
     geometry = built.assembly.loaded[0].collision_model
+    links = Links(model, geometry, shell, [tip], joints_aside(model, tip))
     still: list[Candidate] = []
 
     def work(one: Candidate) -> tuple[str, Built, Plan] | None:
-        place, way, pair, force, gap, links = one
+        place, way, pair, force, gap = one
         stood = section.model_copy(
             update={
                 "lock": list(place.stance.lock),
@@ -177,7 +178,7 @@ def _press(
         plan = press_plan(tip, place, way, pair, force, gap)
         return _first_working(stood, plan, links, draft, tried, request)
 
-    for found in _places(section, built, tip, shell, request, tried):
+    for found in _places(section, built, tip, shell, links, request, tried):
         pair = request.materials(tips, found.stance.mass)
         try:
             force = press_force(found.stance, tip, pair, request.press)
@@ -186,15 +187,14 @@ def _press(
             continue
         gap = press_gap(tip.radius, force, pair)
         place = found.with_gap(gap)
-        links = Links(model, geometry, shell, [tip], place.stance.lock)
         nearer = place.placement.copy()
         nearer.translation -= _ROOM * tip.radius * place.stance.approach
 
-        def free(q: Array, links: Links = links, nearer: pin.SE3 = nearer) -> bool:
+        def free(q: Array, nearer: pin.SE3 = nearer) -> bool:
             return links.within(q, nearer) is None
 
         way = find_way(shell, place, tip.radius, gap, request.asked, free)
-        one = Candidate(place, way, pair, force, gap, links)
+        one = Candidate(place, way, pair, force, gap)
         if way.why:
             # It presses there, if it slides nowhere.
             still.append(one)
@@ -208,7 +208,7 @@ def _press(
     if request.asked.slides:
         tried.ways += [one.way.why for one in still]
         still = []
-    for stood, links, plan in tried.stays:
+    for stood, plan in tried.stays:
         if (done := _first_working(stood, plan, links, draft, tried, request)) is not None:
             return done
     for one in still:
@@ -225,7 +225,6 @@ class Candidate(NamedTuple):
     materials: tuple[Material, Material]
     force: float
     gap: float
-    links: Links
 
 
 def _places(
@@ -233,6 +232,7 @@ def _places(
     built: Built,
     tip: Tip,
     shell: Shell,
+    links: Links,
     request: Request,
     tried: _Tried,
 ) -> Iterator[Place]:
@@ -259,15 +259,11 @@ def _places(
         heights += [data.oMi[j].translation[2] for j in range(1, model.njoints)]
         return floor is None or min(heights) > floor - _AT_FLOOR
 
-    checks: dict[tuple[str, ...], Links] = {}
-
     def blocked(stance: Stance, placement: pin.SE3) -> str | None:
-        if stance.lock not in checks:
-            checks[stance.lock] = Links(model, geometry, shell, [tip], stance.lock)
         # With a little room, as the tip yields when it is pressed on and slides.
         nearer = placement.copy()
         nearer.translation -= room * stance.approach
-        found = checks[stance.lock].within(stance.q, nearer, whole=True)
+        found = links.within(stance.q, nearer, whole=True)
         return None if found is None else found.link
 
     bench = Bench(model, q_work, tip, shell, lowest, 2 * gap, usable, blocked, tried)
@@ -336,7 +332,7 @@ def _first_working(
         if request.tell is not None:
             request.tell(f"tried, run {tried.runs}: {fault.text}")
         if one.repair == "" and len(tried.stays) < _MOST_STILL:
-            tried.stays += [(section, links, other) for other in _still(one, fault, request)]
+            tried.stays += [(section, other) for other in _still(one, fault, request)]
         control = one.control
         # Friction in the joints keeps the tip off the part, and against its motion.
         slides = isinstance(control, Press) and len(control.path) > 1

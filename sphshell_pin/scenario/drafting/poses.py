@@ -137,7 +137,7 @@ def stances(
     says whether links of the robot are free. The best is the one near q if it moves easily, else
     the one whose tip moves best with its joints away from their limits.
     """
-    lock = _joints_aside(model, tip)
+    lock = joints_aside(model, tip)
     reach = Reach(model, tip.frame, tip.offset, lock)
     rng = np.random.default_rng(0)
     rows = np.eye(3)[2:] if height is not None else np.zeros((0, 3))
@@ -171,7 +171,7 @@ def _ease(reach: Reach, q: Array) -> float:
     return float(np.clip(room / _AT_EASE, 0.0, 1.0).min(initial=1.0))
 
 
-def _joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
+def joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
     """Return the joints that do not move the tip."""
     parent = int(model.frames[find_frame(model, tip.frame)].parentJoint)
     # A joint that is held holds those that mimic it, and what it mimics.
