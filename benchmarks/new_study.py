@@ -38,7 +38,7 @@ ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests" / "data" / "corpus"
 FILES = ROOT / "tests" / "data"
 
-SHIPPED = ("panda", "ur3", "ur5", "ur10", "xarm7", "z1", "kinova", "so100", "so101", "talos_arm")
+SHIPPED: tuple[str, ...] = ("panda", "ur3", "ur5", "ur10", "xarm7", "z1", "kinova", "so100", "so101", "talos_arm")
 SHIPPED += ("finger_edu", "three_link_finger", "allegro_right_hand", "asr_twodof")
 SHIPPED += ("ball", "a1", "go2", "solo12")
 ROBOTS: dict[str, tuple[str, dict[str, object]]] = {
@@ -130,6 +130,8 @@ def ask(robot: str, part: Path, place: str) -> Case:
 def wrong_start(built: Built) -> str:
     """Return what is wrong with the posture and the side that is touched; "" if nothing."""
     scene, (pair,) = built.scene, built.scene.pairs
+    assert pair.sphere is not None
+    assert pair.shell is not None
     reach = Reach(scene.model, pair.sphere.frame, pair.sphere.offset)
     center = pair.placement.actInv(reach.center(built.q0))
     jacobian = reach.jacobian(built.q0)

@@ -8,8 +8,8 @@ from functools import cache
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.work_precision import Judge, cost_at, measure
-from sphshell_pin.benchmarks.work_precision_cases import bowl, press, stick_slip
+from sphshell_pin.benchmarks.work_precision import cost_at, measure
+from sphshell_pin.benchmarks.work_precision_cases import References, bowl, press, stick_slip
 
 pytestmark = pytest.mark.slow
 
@@ -21,8 +21,8 @@ CASES = {
 
 
 @cache
-def judge_of(name: str) -> Judge:
-    return Judge(CASES[name]())
+def judge_of(name: str) -> References:
+    return References(CASES[name]())
 
 
 def test_references_of_different_kinds_agree():
