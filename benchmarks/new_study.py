@@ -38,7 +38,18 @@ ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests" / "data" / "corpus"
 FILES = ROOT / "tests" / "data"
 
-SHIPPED: tuple[str, ...] = ("panda", "ur3", "ur5", "ur10", "xarm7", "z1", "kinova", "so100", "so101", "talos_arm")
+SHIPPED: tuple[str, ...] = (
+    "panda",
+    "ur3",
+    "ur5",
+    "ur10",
+    "xarm7",
+    "z1",
+    "kinova",
+    "so100",
+    "so101",
+    "talos_arm",
+)
 SHIPPED += ("finger_edu", "three_link_finger", "allegro_right_hand", "asr_twodof")
 SHIPPED += ("ball", "a1", "go2", "solo12")
 ROBOTS: dict[str, tuple[str, dict[str, object]]] = {
