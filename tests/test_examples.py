@@ -26,6 +26,7 @@ FILES = {
     "06_fit_measured_rebounds": [
         "alumina.urdf", "rebound.toml", "rebound.fitted.toml", "fit.png",
     ],
+    "07_peg_in_mujoco": ["peg.png"],
 }  # fmt: skip
 # Objects that the last line of a cell shows as a table.
 TABLES = {
@@ -34,7 +35,7 @@ TABLES = {
     "04_taxels_on_a_crease": ["Result"],
     "06_fit_measured_rebounds": ["Fit of "],
 }
-NEEDS = {"05_circle_with_5_newtons": "crocoddyl"}
+NEEDS = {"05_circle_with_5_newtons": "crocoddyl", "07_peg_in_mujoco": "mujoco"}
 
 
 @pytest.fixture(scope="module")
@@ -161,3 +162,10 @@ def check_fit_measured_rebounds(names):
     assert friction.low < 0.092 < friction.high
     assert young.low < 70e9 < young.high
     assert len(found.series) == 20
+
+
+def check_peg_in_mujoco(names):
+    assert names["measured"] == pytest.approx(names["along"], rel=1e-3)
+    # The hull pushes the peg out of the bore; in the shell it slides through.
+    assert names["hull"][1][-1] > names["radius"] * 0.9
+    assert names["round_bore"][1].min() < -names["depth"]
