@@ -198,15 +198,19 @@ def bowl(seconds: float = 60.0, dt: float = 1e-4) -> None:
     along = np.array([np.sin(0.15), 0.0, -np.cos(0.15)])
     data.qpos[:3] = [0, 0, 2.0] + (2.0 - radius + depth * np.cos(0.15)) * along
 
-    energies = []
+    energies, sides = [], []
     with attach(model, shell, ["ball"], law=law) as contacts:
         for step in range(round(seconds / dt)):
             if step % 1000 == 0:
                 mujoco.mj_forward(model, data)
                 v = data.qvel[:3]
                 energy = 0.5 * mass * v @ v + mass * 9.81 * data.qpos[2]
-                energies.append(energy + sum(law.energy(d) for d in contacts.contacts(data).depth))
+                depths = contacts.contacts(data).depth
+                assert len(depths) == 1
+                energies.append(energy + law.energy(depths[0]))
+                sides.append(data.qpos[0])
             mujoco.mj_step(model, data)
+    assert min(sides) < -0.9 * max(sides) < 0.0
     swing = mass * 9.81 * (2.0 - radius) * (1 - np.cos(0.15))
     change = np.ptp(energies) / swing
     print(f"energy of {seconds:.0f} s in a bowl, RK4 at {dt:.0e} s: {change:.1e} of the swing's")
