@@ -25,6 +25,7 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.cases.measured import Measured, write
+from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, judge
 from sphshell_pin.scenario.drafting.new import new_scenario
@@ -191,7 +192,7 @@ def link_inside(built: Built, q: np.ndarray) -> str:
     spheres = []
     for contact in built.scenario.contact:
         if (sphere := contact.sphere) is not None:
-            pose = data.oMf[model.getFrameId(sphere.frame)]
+            pose = data.oMf[find_frame(model, sphere.frame)]
             spheres.append((pose.act(np.array(sphere.offset)), sphere.radius))
     part = to_se3(section.placement)
     for one, pose in zip(geometry.geometryObjects, at.oMg, strict=True):
