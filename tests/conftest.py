@@ -34,3 +34,14 @@ def no_pictures():
     """Runs draw nothing."""
     with without_pictures():
         yield
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Build the C++ library first and open browsers last: beside compilers pages stand still."""
+
+    def place(item: pytest.Item) -> int:
+        if item.path.name == "test_cpp.py":
+            return 0
+        return 2 if item.get_closest_marker("browser") else 1
+
+    items.sort(key=place)

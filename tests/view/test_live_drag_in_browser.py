@@ -55,6 +55,23 @@ def drag_right(tab, start, steps=8):
         tab.page.mouse.move(start[0] + 12 * step, start[1])
 
 
+def take_hold(live, tab):
+    """Press on the link and drag it; return where the camera was.
+
+    On a busy machine the page's picture may be behind: who misses the link presses again.
+    """
+    deadline = time.monotonic() + 120.0
+    while time.monotonic() < deadline:
+        start = tab.page.evaluate(ON_SCREEN, point_of(live).tolist())
+        eye = tab.page.evaluate(EYE)
+        drag_right(tab, start)
+        tab.page.wait_for_timeout(500)
+        if tab.state("drag"):
+            return eye
+        tab.page.mouse.up()
+    pytest.fail("nothing was taken hold of")
+
+
 def wait_until_still(live, tab):
     tab.wait("state.t > 0.05")
     deadline = live.player.time + 30.0
@@ -66,9 +83,8 @@ def test_a_link_is_dragged_with_the_mouse_and_comes_back(arm):
     live, tab = arm
     wait_until_still(live, tab)
     rest, before, right = live.player.q.copy(), point_of(live), rightwards(tab)
-    start, eye = tab.page.evaluate(ON_SCREEN, before.tolist()), tab.page.evaluate(EYE)
     tab.page.keyboard.down("Control")
-    drag_right(tab, start)
+    eye = take_hold(live, tab)
     tab.wait("state.drag && state.drag.newtons > 1")
     wait_until_still(live, tab)
     moved = point_of(live) - before
@@ -100,10 +116,7 @@ def test_without_key_and_button_the_mouse_moves_the_camera(arm):
     # With the button, bodies are taken hold of; beside them the camera still moves.
     tab.page.keyboard.press("d")
     assert tab.page.locator("#drag-mode").get_attribute("aria-pressed") == "true"
-    start = tab.page.evaluate(ON_SCREEN, point_of(live).tolist())
-    eye = tab.page.evaluate(EYE)
-    drag_right(tab, start)
-    tab.wait("state.drag")
+    eye = take_hold(live, tab)
     tab.page.mouse.up()
     tab.wait("!state.drag")
     assert tab.page.evaluate(EYE) == pytest.approx(eye)
