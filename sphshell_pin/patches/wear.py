@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 # Samples over the smaller half axis of a patch, unless a resolution is given.
 _PER_HALF_AXIS = 5.0
+_MOST_PLACES = 1e8  # along all strokes
 # A patch wears what faces it within 72 degrees and is no farther from its plane than this share of
 # its larger half axis.
 _FACING, _FAR = 0.3, 1.0
@@ -165,6 +166,8 @@ def _map(
         raise ResultError("the result", f"has no contact near shell '{shell.name}': is it another?")
     removed, lost = deposit(samples, patches, strokes, shell, overlap)
     volume = float(removed @ samples.areas)
+    if not np.isfinite(volume):
+        raise ResultError("the result", "has strokes or forces that overflow: is it damaged?")
     return WearMap(
         shell,
         read_only(samples.corners),
@@ -233,7 +236,12 @@ def strokes_of(t: Array, patches: PlacedPatches) -> Strokes:
 def _along(points: Array, strokes: Strokes, step: float) -> Array:
     """Return places along the strokes, no farther apart than `step` [m]."""
     begin, end = points[strokes.first], points[strokes.last]
-    pieces = np.ceil(np.linalg.norm(end - begin, axis=1) / step).astype(np.int64) + 1
+    counts = np.ceil(np.linalg.norm(end - begin, axis=1) / step) + 1
+    if not counts.sum() < _MOST_PLACES:
+        raise ResultError(
+            "the result", "has strokes that are far longer than its patches: is it damaged?"
+        )
+    pieces = counts.astype(np.int64)
     which = np.repeat(np.arange(len(pieces)), pieces)
     at = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     share = (at / np.maximum(pieces[which] - 1, 1))[:, None]

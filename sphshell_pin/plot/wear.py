@@ -37,7 +37,7 @@ def plot_wear(maps: Sequence[WearMap]) -> Figure:
     factor, unit = reading_unit(largest, "m")
     scale = color_scale(largest * factor, COLORS)
     for axis, one in zip(axes, shown, strict=True):
-        worn = one.depth > LEAST * largest
+        worn = one.depth > LEAST * one.depth.max()
         corners, depth = one.corners[worn], one.depth[worn]
         normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         middle = (depth[:, None] * normals).sum(axis=0)
