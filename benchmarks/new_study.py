@@ -237,7 +237,7 @@ def main() -> int:
     found = sections(cases)
     print(found[0].text, *(" | ".join(row) for one in found for row in one.table), sep="\n")
     if asked.write:
-        command = "python -m benchmarks.new_study FOLDER --write"
+        command = f"python -m benchmarks.new_study {' '.join(sys.argv[1:])}"
         print(f"wrote {write('new_study', command, found)}")
     return 1 if any(case.failed for case in cases) else 0
 
