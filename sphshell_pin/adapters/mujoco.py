@@ -190,13 +190,11 @@ def attach(
         raise InvalidParameter("spheres", spheres, "must name at least one sphere geom or site")
     ends = [_end(model, name) for name in names]
     home = 0 if body is None else _id(model, "body", body)
-    bodies = sorted({end.body for end in ends} | {home} - {0}, key=int)
-    bodies = [one for one in bodies if one]
+    bodies = sorted(({end.body for end in ends} | {home}) - {0})
     if not model.nv:
         raise InvalidParameter("model", model, "must have a joint: no force can move it")
     if any(end.body == home for end in ends):
         raise InvalidParameter("body", body, "must be another body than that of the spheres")
-    _claim_callback()
     scene = _scene(model, bodies, ends, home)
     frame = f"body {home}" if home else "universe"
     balls = [Sphere(end.radius, f"sphere {end.name}") for end in ends]
@@ -204,6 +202,7 @@ def attach(
     settings = {"law": law, "friction": friction, "method": method}
     for ball, end in zip(balls, ends, strict=True):
         scene.add_contact(ball, shell, frame, pose, name=end.name, **settings)  # type: ignore[arg-type]
+    _claim_callback()
     made = MujocoContacts(model, scene, bodies, ends, log)
     if made.substeps > 1:
         said = (

@@ -177,17 +177,17 @@ def test_the_command(request, tmp_path, no_pictures):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "said"),
     [
         (["nowhere", "--out", "a.png"], "nowhere is no finished run"),
         (["nowhere.npz", "--out", "a.png"], "nowhere.npz"),
         (["nowhere.npz", "--out", "a.png", "--size", "wide"], "must be WIDTHxHEIGHT"),
     ],
 )
-def test_the_command_refuses_in_one_sentence(arguments, told, tmp_path, monkeypatch):
+def test_the_command_refuses_in_one_sentence(arguments, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = call("render", *arguments)
     assert done.exit_code == 2
-    assert told in done.output
+    assert said in done.output
     assert "\n" not in done.output.strip()
     assert list(tmp_path.iterdir()) == []
