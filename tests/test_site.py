@@ -91,7 +91,7 @@ def test_data_and_parameters_are_shown_in_place_of_their_marks(built):
     for name, words in (
         ("hard_cases", ("2 I depth / v", "Tip of 3 or 100 facets")),
         ("speed", ("coal::collide", "Ball bounces five times")),
-        ("robots", ("three_link_finger", "4 of 5")),
+        ("robots", ("three_link_finger", "valve_body_step")),
         ("laws", ("parameter of <code>MindlinFriction</code>", "full_damping_depth")),
         ("scenarios", ("half-space", "cartesian-impedance", "release")),
         ("commands", ("--chord-error", "check-robot")),
