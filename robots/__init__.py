@@ -244,7 +244,10 @@ def exactly(
             "with mimic = false, which lets these joints move freely"
         )
     if loops:
-        loops = (f"joints move freely that the file couples: {'; '.join(loops)}",)
+        loops = (
+            f"joints move freely that the file couples: {'; '.join(loops)}; "
+            "docs/joints.md shows how Pinocchio closes loops in a loop of your own",
+        )
     for note in (*loops, *description.notes) if warn else ():
         warnings.warn(f"{file}: {note}", RobotWarning, stacklevel=3)
     robot = replace(robot, notes=(*loops, *description.notes))

@@ -27,6 +27,7 @@ FILES = {
         "alumina.urdf", "rebound.toml", "rebound.fitted.toml", "fit.png",
     ],
     "07_peg_in_mujoco": ["peg.png"],
+    "08_gripper_with_loops": ["gripper.png"],
 }  # fmt: skip
 # Objects that the last line of a cell shows as a table.
 TABLES = {
@@ -169,3 +170,10 @@ def check_peg_in_mujoco(names):
     # The hull pushes the peg out of the bore; in the shell it slides through.
     assert names["hull"][1][-1] > names["radius"] * 0.9
     assert names["round_bore"][1].min() < -names["depth"]
+
+
+def check_gripper_with_loops(names):
+    assert max(names["gaps"]) < 1e-8
+    assert names["forces"][-1] == pytest.approx(names["expected"], rel=1e-3)
+    # The part is held: it does not creep.
+    assert np.ptp(names["heights"][3900:]) < 1e-7
