@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Samples over the smaller half axis of a patch, unless a resolution is given.
 _PER_HALF_AXIS = 5.0
-_MOST_PLACES = 1e8  # along all strokes
+_MOST_PLACES = 3e6  # along all strokes
 # A patch wears what faces it within 72 degrees and is no farther from its plane than this share of
 # its larger half axis.
 _FACING, _FAR = 0.3, 1.0
