@@ -62,7 +62,7 @@ def divide(shell: Shell, places: Array, reach: float, resolution: float, curved:
     Raises InvalidParameter for a resolution that needs too many pieces.
     """
     surface = _Surface(shell, curved)
-    # Of strokes that leave the shell, only what is near it counts; the grid's cells reach 2 farther.
+    # Of strokes that leave the shell only what is near it counts, with the cells of the grid there.
     beyond = 3.0 * reach + surface.bulge
     places = places[((places >= shell.box[0] - beyond) & (places <= shell.box[1] + beyond)).all(1)]
     if not len(places):

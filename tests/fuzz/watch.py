@@ -75,7 +75,7 @@ def watch(
     first = task.first
     with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
         while first < task.last and time.time() < task.until:
-            place = context.Value("q", -1, lock=False)  # the file that is read, -1 before the first
+            place = context.Value("q", -1, lock=False)  # of the file that is read, or -1
             ours, theirs = context.Pipe(duplex=False)
             rest = replace(task, first=first)
             worker = context.Process(target=_work, args=(rest, theirs, place, folder), daemon=True)
@@ -172,10 +172,11 @@ def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
             continue
         if time.time() >= task.until:
             break
-        place.value = k
+        place.value = -1  # an input may take long to make
         one = make_input(task.seed, k)
         path = home / f"input{one.suffix}"
         path.write_bytes(one.data)
+        place.value = k
         start = time.monotonic()
         try:
             outcome = read(path)

@@ -129,9 +129,10 @@ acceleration = {press.acceleration!o} # [m/s2] it sets out and stops softly
 jerk = {press.jerk!o} # [m/s3]
 lead_in = {press.lead_in} # [s] stand still while the force comes on
 stiffness = {press.stiffness} # [N/m] friction holds the tip a fifth of a radius behind at most
-damping = {press.damping} # [N s/m] 0.7 of critical
+damping = {press.damping} # [N s/m] {press.damped} of critical
 rotational_stiffness = {press.rotational_stiffness!o} # [N m/rad] keeps the tip's orientation
 rotational_damping = {press.rotational_damping!o}
+decoupled = {press.decoupled!o} # the robot's inertia does not act on the surface
 # Null-space posture damping, in proportion to the joints' own inertia.
 posture_stiffness = {press.posture_stiffness!o}
 joint_damping = {press.joint_damping!o}

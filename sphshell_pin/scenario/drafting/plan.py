@@ -83,11 +83,27 @@ class Press:
     joint_damping: tuple[float, ...]
     smooth: bool = True
     """Whether a path of more than two points bends, and has no corners."""
+    damped: float = 0.7
+    """Damping as a part of the critical one."""
 
     @property
     def spline(self) -> bool:
         """Whether the path is one smooth curve."""
         return self.smooth and len(self.path) > 2
+
+    def calmed(self) -> Press:
+        """Return it with four times the damping: friction shakes the tip less."""
+        return replace(
+            self,
+            damping=_round(4.0 * self.damping),
+            rotational_damping=_round(4.0 * self.rotational_damping),
+            damped=4.0 * self.damped,
+        )
+
+    @property
+    def decoupled(self) -> bool:
+        """Whether the robot's inertia is to be kept from the surface, as it moves."""
+        return len(self.path) > 1
 
     @property
     def acceleration(self) -> float | None:

@@ -335,7 +335,7 @@ def _first_working(
             tried.stays += [(section, other) for other in _still(one, fault, request)]
         control = one.control
         # Friction in the joints keeps the tip off the part, and against its motion.
-        slides = isinstance(control, Press) and len(control.path) > 1
+        slides = control if isinstance(control, Press) and len(control.path) > 1 else None
         kept = fault.kind in ("links", "run") or (fault.excess and not slides)
         left = [] if kept else _without(section, one).joints
         if "friction" in left:
@@ -348,6 +348,8 @@ def _first_working(
             # The tip creeps to the surface, or drags behind.
             tried.leave_out("damping", fault)
             queue = [plan]
+        elif not queue and slides and fault.kind == "force" and one.repair != "calmed":
+            queue = [replace(one, control=slides.calmed(), repair="calmed")]
     return None
 
 
