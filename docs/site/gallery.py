@@ -26,7 +26,7 @@ from sphshell_pin.view.film import Camera, render_film
 
 PICTURES = Path(__file__).parents[1] / "pictures" / "gallery"
 SIZE = WIDTH, HEIGHT = 960, 600  # [pixels]
-LARGEST = 150_000  # [bytes]: a larger file is written with six bits a color
+LARGEST = 150_000  # [bytes]: a larger file is written with 256 colors
 WIDER = 1.9  # drawn so much wider, for title and legend beside the picture
 
 
@@ -72,7 +72,8 @@ class Shot:
         cut.save(stream, "png", optimize=True)
         if stream.tell() > LARGEST:
             stream = io.BytesIO()
-            ImageOps.posterize(cut, 6).save(stream, "png", optimize=True)
+            few = ImageOps.posterize(cut, 6).quantize(256, dither=Image.Dither.NONE)
+            few.save(stream, "png", optimize=True)
         return stream.getvalue()
 
     def card(self, run: RunReport) -> str:
@@ -136,14 +137,7 @@ SHOTS = (
     Shot(
         "oblique_impact", 0.00504, "figures.across", "speed across after the blow", "m/s", zoom=1.25
     ),
-    Shot(
-        "sphere_on_shell",
-        0.75,
-        "figures.swing_period",
-        "period of the rolling",
-        "s",
-        camera="follow",
-    ),
+    Shot("sphere_on_shell", 0.75, "figures.swing_period", "period of the rolling", "s", zoom=1.15),
     Shot("allegro_hand_object", 1.5, "figures.carried_weight", "weight carried", "N"),
     Shot("gear_contact", 0.3, "figures.tooth_force", "force between the teeth", "N"),
 )
