@@ -189,6 +189,8 @@ def test_no_page_is_an_orphan():
     measured = json.loads((ROOT / "docs/measured/validation.json").read_text(encoding="utf-8"))
     for section in measured["sections"]:
         linked |= {shown / file for file, _ in section.get("pictures", ())}
+    cards = (ROOT / "docs/measured/gallery.json").read_text(encoding="utf-8")
+    linked |= {ROOT / "docs" / link for link in LINK.findall(cards)}
     pictures = {path for path in shown.rglob("*") if path.is_file()}
     assert pictures <= linked
     assert all(picture.stat().st_size < 400_000 for picture in pictures)

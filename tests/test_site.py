@@ -95,6 +95,7 @@ def test_data_and_parameters_are_shown_in_place_of_their_marks(built):
         ("laws", ("parameter of <code>MindlinFriction</code>", "full_damping_depth")),
         ("scenarios", ("half-space", "cartesian-impedance", "release")),
         ("commands", ("--chord-error", "check-robot")),
+        ("gallery", ("mean force", "scenarios/peg_in_bore.toml")),
     ):
         for word in words:
             assert word in texts[f"{name}.html"], (name, word)
