@@ -9,7 +9,7 @@ import pytest
 from sphshell_pin.cases.contents import Finding, Picture
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.study.report import PAGE
-from sphshell_pin.study.validation import Outcome, cases, collect, make_validation
+from sphshell_pin.study.validation import Outcome, carried, cases, collect, make_validation
 from tests.command import call
 from tests.studies import mostly_studies
 
@@ -28,6 +28,13 @@ def test_case(one):
     # An explanation of a figure that is within its bound is out of date.
     out = {finding.key for finding in found.findings if finding.met is False}
     assert set(found.explained) <= out
+
+
+def test_pushed_box_and_its_balls():
+    """The short form of a slow case, in a direction of its own."""
+    t, speeds, across = carried.push_box(20.0, 0.5)
+    assert carried.accelerations(t, speeds) == pytest.approx(carried.EXACT, rel=1e-4)
+    assert across[-1] == pytest.approx(0.0, abs=1e-5 * speeds[-1].max())
 
 
 @pytest.mark.parametrize("one", collect(), ids=lambda one: one.key)

@@ -37,6 +37,10 @@ MODULES = (
     "finger_pad",
     "cam",
     "rolling",
+    "restitution",
+    "leaving",
+    "carried",
+    "tippe_top",
 )
 """In the order of the page."""
 HEADING = Heading(
