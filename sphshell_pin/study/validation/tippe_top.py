@@ -59,37 +59,18 @@ def tippe_top() -> Outcome:
     runs = {name: spin_top(friction) for name, friction in FRICTIONS.items()}
     changes = {name: jellett / jellett[0] - 1 for name, (_, _, jellett, _) in runs.items()}
     over = list(runs.values())[:2]  # those that slip
+    most = max(float(np.abs(change).max()) for change in changes.values())
+    tilted = 180 - min(math.degrees(tilt[-1]) for _, tilt, _, _ in over)
+    wrong = max(abs(spin * AXIAL * (RADIUS + OFF) / j[0] - 1) for _, _, j, spin in over)
     findings = [
-        Finding(
-            "jellett",
-            "Jellett's integral, three frictions, largest relative change",
-            max(float(np.abs(change).max()) for change in changes.values()),
-            aim=1e-4,
-        ),
-        Finding(
-            "turned",
-            "tilt at the end of two runs that slip, distance from 180 degrees",
-            180 - min(math.degrees(tilt[-1]) for _, tilt, _, _ in over),
-            "deg",
-            aim=3.0,
-        ),
-        Finding(
-            "spin",
-            "spin about the vertical turned over, error relative to J / (C (R + e))",
-            max(
-                abs(spin * AXIAL * (RADIUS + OFF) / jellett[0] - 1) for _, _, jellett, spin in over
-            ),
-            aim=1e-3,
-        ),
+        Finding("jellett", "J, three frictions, largest relative change", most, aim=1e-4),
+        Finding("turned", "tilt at the end where it slips, short of 180", tilted, "deg", aim=3.0),
+        Finding("spin", "spin turned over, relative to J / (C (R + e))", wrong, aim=1e-3),
     ]
+    drifts = [(name, runs[name][0], 1e5 * change) for name, change in changes.items()]
     panels = [
         Panel("time [s]", "tilt [deg]", (), [(n, r[0], np.degrees(r[1])) for n, r in runs.items()]),
-        Panel(
-            "time [s]",
-            "change of Jellett's integral, relative [1e-5]",
-            (),
-            [(name, runs[name][0], 1e5 * change) for name, change in changes.items()],
-        ),
+        Panel("time [s]", "change of J, relative [1e-5]", (), drifts),
     ]
     caption = "The top turns over where it slips, and not where it sticks; J stays."
     return Outcome(findings, [draw("tippe_top", panels, caption)])
