@@ -37,6 +37,7 @@ LOOKS = {
     "mujoco": ("MuJoCo", drawing.RED, "v"),
     "drake": ("Drake", drawing.GREEN, "s"),
     "pybullet": ("PyBullet", drawing.ORANGE, "^"),
+    "exudyn": ("EXUDYN", drawing.INK, "P"),
     "loop": ("Python loop", drawing.VIOLET, "D"),
 }
 SWING = "bowl"
@@ -57,7 +58,7 @@ def left_out() -> Section:
         TITLE,
         notes=[
             "Left out of this run: sphshell-pin report --peers measures the same scenes in MuJoCo, "
-            "Drake, PyBullet and a Python loop (pip install 'sphshell-pin[peers]')."
+            "Drake, PyBullet, EXUDYN and a Python loop (pip install 'sphshell-pin[peers]')."
         ],
         unmeasured=[f"{what} / ours (sphshell-pin report --peers)" for what in AIMED],
     )

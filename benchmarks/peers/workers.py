@@ -20,6 +20,7 @@ ENGINES = {
     "mujoco": "mujoco:MuJoCo",
     "drake": "drake:Drake",
     "pybullet": "pybullet:PyBullet",
+    "exudyn": "exudyn:Exudyn",
     "loop": "python_loop:PythonLoop",
 }
 STARTING = 120.0  # [s] for imports

@@ -44,7 +44,10 @@ def section(one: Case, found: Outcome) -> Measured:
     pictures = [(f"validation/{one.name}.png", one.caption) for one in found.pictures]
     texts = [f"**{heading}.** {text}" for heading, text in one.texts.items()]
     return Measured(
-        one.title, pictures=pictures, notes=[*texts, *found.notes, *explanations(found)]
+        one.title,
+        pictures=pictures,
+        table=Measured.of(found.tables[0]).table if found.tables else (),
+        notes=[*texts, *found.notes, *explanations(found)],
     )
 
 

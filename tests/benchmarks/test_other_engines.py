@@ -1,4 +1,4 @@
-"""The adapters of Drake and PyBullet against closed forms and Pinocchio."""
+"""The adapters of Drake, PyBullet and EXUDYN against closed forms and Pinocchio."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 
 from sphshell_pin.benchmarks import swing
 from sphshell_pin.benchmarks.peers import drake, scenes
+from sphshell_pin.benchmarks.peers.engine import CannotDo
 from sphshell_pin.benchmarks.peers.merged import merged_urdf
 from sphshell_pin.benchmarks.peers.workers import engine_called
 
@@ -197,3 +198,31 @@ def test_the_merged_arm_moves_as_the_whole_one(scale):
         merged.gravity.linear = scale * whole.gravity.linear
         scaled = pin.rnea(merged, merged.createData(), circle, v, a)
         np.testing.assert_allclose(scaled, scale**2 * torque, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["GeneralizedAlpha", "RK44"])
+def test_exudyn_carries_and_rolls(solver):
+    """The depth of the spring, the acceleration of a rolling ball, and the circle on a table."""
+    params = {"solver": solver, "dt": 2e-4, "exact edges": True}
+    engine = engine_of("exudyn")
+    plate = coarse(scenes.plate())
+    errors = plate.errors(engine.run(plate, params))
+    assert errors == pytest.approx({"depth": 0.0, "side force": 0.0}, abs=1e-9)
+    slope = coarse(scenes.slope())
+    assert slope.errors(engine.run(slope, params))["acceleration"] < 0.02
+    held = slope.variants()[1]
+    assert 0 < held.errors(engine.run(held, params))["creep [m/s]"] < 1e-3
+    table = replace(scenes.turntable(), surface=scenes.shapes.plate(0.2, 0.05))
+    assert table.errors(engine.run(table, params))["rate"] < 0.02
+
+
+def test_exudyn_has_settings_and_params_but_for_the_arm():
+    engine = engine_of("exudyn")
+    for build in scenes.SCENES.values():
+        scene = build()
+        if scene.name == "press":
+            with pytest.raises(CannotDo, match="URDF"):
+                engine.param_sets(scene)
+        else:
+            assert engine.settings(scene)["contact"]
+            assert {"solver", "dt", "exact edges"} == set(engine.param_sets(scene)[0])

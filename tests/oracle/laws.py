@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 
 def step(x: float, x0: float, h0: float, x1: float, h1: float) -> float:
     """ADAMS STEP: cubic from h0 at x0 to h1 at x1, constant outside."""
@@ -30,17 +28,3 @@ def hunt_crossley(depth: float, gap_rate: float, k: float, e: float, dissipation
 def coulomb(slip: float, mu_s: float, mu_d: float, v_s: float, v_d: float) -> float:
     """Two-velocity coefficient for slip >= 0, as one product of two STEPs."""
     return step(slip, -v_s, -1.0, v_s, 1.0) * step(slip, v_s, mu_s, v_d, mu_d)
-
-
-def hunt_crossley_restitution(speed: float, dissipation: float) -> float:
-    """Restitution of F = k x^e (1 + d v): d v - ln(1 + d v) is equal on both branches."""
-    a = dissipation * speed
-    lost = a - math.log1p(a)
-    low, high = 0.0, min(a, 1.0 - 1e-15)
-    for _ in range(200):
-        y = 0.5 * (low + high)
-        if -y - math.log1p(-y) < lost:
-            low = y
-        else:
-            high = y
-    return 0.5 * (low + high) / a if a > 0 else 1.0

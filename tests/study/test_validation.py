@@ -4,12 +4,21 @@ import json
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from sphshell_pin.benchmarks.rolling import turned
 from sphshell_pin.cases.contents import Finding, Picture
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.study.report import PAGE
-from sphshell_pin.study.validation import Outcome, cases, collect, make_validation
+from sphshell_pin.study.validation import (
+    Outcome,
+    carried,
+    cases,
+    collect,
+    make_validation,
+    tosses,
+)
 from tests.command import call
 from tests.studies import mostly_studies
 
@@ -28,6 +37,28 @@ def test_case(one):
     # An explanation of a figure that is within its bound is out of date.
     out = {finding.key for finding in found.findings if finding.met is False}
     assert set(found.explained) <= out
+
+
+def test_pushed_box_and_its_balls():
+    """The short form of a slow case, in a direction of its own."""
+    t, speeds, across = carried.push_box(20.0, 0.5)
+    assert carried.accelerations(t, speeds) == pytest.approx(carried.EXACT, rel=1e-4)
+    assert across[-1] == pytest.approx(0.0, abs=1e-5 * speeds[-1].max())
+
+
+def test_tosses_of_a_cube():
+    """The data, gravity in flight, the first velocity, and the errors of some tosses."""
+    poses, velocities = tosses.tosses()
+    assert len(poses) == len(velocities) == 550
+    t = tosses.INTERVAL * np.arange(5)
+    falls = [np.polyfit(t, one[:5, 2], 2) for one in poses]
+    assert np.median([2 * fall[0] for fall in falls]) == pytest.approx(-9.81, abs=0.5)
+    world = turned(np.array([one[0, 3:] for one in poses]), velocities[:, :3])
+    first = np.median([fall[1] for fall in falls] - world[:, 2])
+    assert first == pytest.approx(0.0, abs=0.01)
+    errors, computed = tosses.misses(tosses.cube(*tosses.NUMBERS), range(100, 108), dt=2e-4)
+    assert [len(one) for one in computed] == [len(one) for one in poses[100:108]]
+    assert (errors.mean(axis=0) < [0.2, 30.0]).all()
 
 
 @pytest.mark.parametrize("one", collect(), ids=lambda one: one.key)

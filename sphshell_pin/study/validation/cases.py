@@ -37,13 +37,19 @@ MODULES = (
     "finger_pad",
     "cam",
     "rolling",
+    "restitution",
+    "leaving",
+    "carried",
+    "tippe_top",
+    "tosses",
 )
 """In the order of the page."""
 HEADING = Heading(
     "sphshell_pin: against published experiments",
-    "Every case states its source, and takes its parameters from there: nothing is fitted. A "
-    "figure is our distance from what was published, its aim the scatter of those data. Where a "
-    "figure is out of its aim, the case says which physics the theory leaves out.",
+    "Every case states its source, and takes its parameters from there: nothing is fitted to what "
+    "it is judged by. A figure is our distance from what was published, its aim the scatter of "
+    "those data. Where a figure is out of its aim, the case says which physics the theory leaves "
+    "out.",
 )
 DATA = Path("tests", "data", "validation")
 STATED: dict[str, Any] = tomllib.loads(
