@@ -120,7 +120,10 @@ Shell.from_file({str(box)!r}, "mm")
 
 
 def running(pid):
-    shown = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, check=False)
+    # Without libraries that sanitizers load first: ps may not end with them.
+    bare = {"PATH": os.environ["PATH"]}
+    command = ["ps", "-o", "stat=", "-p", str(pid)]
+    shown = subprocess.run(command, capture_output=True, check=False, env=bare)
     return shown.stdout[:1] not in (b"Z", b"")
 
 
