@@ -57,6 +57,14 @@ def put(node, radius=1.0):
     set_object(node, sphere(radius), material("MeshPhong", 0))
 
 
+def test_any_number_of_nodes_may_be_placed(window, canvas):
+    for k in range(300):
+        canvas[f"n{k}"].set_transform(place(k))
+    window.commit()
+    told = Browser(window).look().matrices
+    assert [told[f"/meshcat/n{k}"][0, 3] for k in range(300)] == list(range(300))
+
+
 def test_only_what_moved_is_told(window, canvas):
     moves = [mover(canvas[f"n{k}"]) for k in range(200)]
     for k, move in enumerate(moves):

@@ -116,7 +116,9 @@ class LiveWindow:
     def _place(self, path: str, matrix: FloatArray) -> None:
         """Place the node at `path` at `matrix` (16,), column by column."""
         row = self._row_of.get(path)
-        self._drawn[self._add(path) if row is None else row] = matrix
+        if row is None:
+            row = self._add(path)  # before self._drawn is looked up, which it may replace
+        self._drawn[row] = matrix
 
     def _add(self, path: str) -> int:
         with self._lock:
