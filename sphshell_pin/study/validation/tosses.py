@@ -115,7 +115,11 @@ def cube_tosses() -> Outcome:
         findings,
         [draw("cube_tosses", panels, caption)],
         notes=[f"{doubt}."],
-        explained={f.key: f"{doubt}: the bound is within it." for f in findings if not f.met},
+        explained={
+            f.key: f"{doubt}: the bound is within it."
+            for f, aim, error in zip(findings[:2], (POSITION, ROTATION), spread, strict=True)
+            if not f.met and f.value - aim <= error
+        },
     )
 
 
