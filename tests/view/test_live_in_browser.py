@@ -207,6 +207,7 @@ def test_a_second_tab_follows(opened):
     tab.wait("!document.querySelector('[data-part=trails]').checked")
     second.click("#run")
     tab.wait("state.running && document.getElementById('run-word').innerText === 'Pause'")
+    second.wait("state.running")  # its click asks for the opposite of what it shows
     second.click("#run")
     tab.wait("!state.running")
     assert not live.running
