@@ -94,6 +94,25 @@ def icosphere(subdivisions: int = 1, radius: float = 1.0) -> Mesh:
     return np.array(ball.vertices), np.array(ball.faces, dtype=np.int32)
 
 
+def ellipsoid(
+    cells: int, axes: tuple[float, float, float]
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
+    """A cube of cells^2 cells a side, blown up to semi-axes `axes`: with the normals there."""
+    plate, elements = grid_plate(cells, cells, 2.0)
+    u, v = np.tan(np.pi / 4 * plate[:, :2]).T
+    sides = [
+        np.roll(np.stack([np.full_like(u, sign), sign * u, v], axis=1), axis, axis=1)
+        for axis in range(3)
+        for sign in (1.0, -1.0)
+    ]
+    every = np.concatenate([elements + k * len(plate) for k in range(6)])
+    ball = trimesh.Trimesh(np.concatenate(sides), every)  # sides share their vertices
+    directions = ball.vertices / np.linalg.norm(ball.vertices, axis=1)[:, None]
+    normals = directions / axes
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return directions * axes, np.array(ball.faces, dtype=np.int32), normals
+
+
 def needles(count: int = 24, aspect: float = 1e4, seed: int = 0) -> Mesh:
     """Strip of long thin triangles (length 1, width 1/aspect) folded at random small angles."""
     rng = np.random.default_rng(seed)

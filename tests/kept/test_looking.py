@@ -61,19 +61,15 @@ def seen(
     return noticed
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_nothing_else_is_read_and_nothing_executed(
-    seen: dict[str, dict[str, object]], way: str
+def test_looking_reads_nothing_else_and_executes_nothing(
+    seen: dict[str, dict[str, object]], home: Path
 ) -> None:
-    failed = str(seen["failed"].get(way, ""))
-    if "Chromium" in failed:
-        pytest.skip("no Chromium on this machine")
-    assert not failed
-    assert seen["found"][way] == []
-
-
-def test_what_is_done_with_trust_is_noticed(seen: dict[str, dict[str, object]], home: Path) -> None:
-    """The hook hears of a routine, of the process of a xacro file, and of what they read."""
+    failed, found = seen["failed"], seen["found"]
+    if "Chromium" in str(failed.get("render", "")):
+        del failed["render"]
+    assert {way: failed[way] for way in WAYS if way in failed} == {}
+    assert {way: found[way] for way in WAYS if found[way]} == {}
+    # The hook hears of a routine, of the process of a xacro file, and of what they read.
     if seen["place"]["is"] == "alone":
         assert "no such file" in str(seen["failed"][TRUSTED[1]])
         return

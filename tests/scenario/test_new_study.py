@@ -13,7 +13,7 @@ def parts(tmp_path_factory):
     return [read_once(DATA / name, folder) for name in ("bladex_upper.stl", "trimesh_wallhole.obj")]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_new_scenarios_work_or_are_refused_for_a_reason(parts):
     cases = [
         ask(robot, part, place)

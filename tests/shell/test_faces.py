@@ -9,6 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.shell.faces import described
+from tests.meshes import ellipsoid
 
 SEGMENTS = 48
 
@@ -97,6 +98,15 @@ def test_recognition_can_be_switched_off(tmp_path):
         shell = sp.Shell.from_file(tmp_path / "part.stl", "mm", faces=faces)
         assert len(shell.faces) == 3
     assert not mesh(coal.Cylinder(0.1, 0.3), crease_angle=0.0).faces
+
+
+@pytest.mark.parametrize("axes", [(0.2, 0.03, 0.02), (0.05, 0.05, 0.02)])
+@pytest.mark.parametrize("cells", [12, 35])
+def test_zones_of_an_ellipsoid_are_no_faces(cells, axes):
+    """Elements are long where it is flat: a row of them is nearly a cylinder."""
+    vertices, elements, normals = ellipsoid(cells, axes)
+    assert not sp.Shell(vertices, elements).faces
+    assert not sp.Shell(vertices, elements, normals=normals).faces
 
 
 SOLIDS = {

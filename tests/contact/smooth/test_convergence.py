@@ -12,6 +12,7 @@ from sphshell_pin import Shell
 from sphshell_pin.shell.contact_set import Feature
 from tests.contact.helpers import force_sum
 from tests.contact.smooth.surfaces import SIDES, SURFACES, can, shell_of, side_of
+from tests.meshes import ellipsoid
 from tests.studies import mostly_studies
 
 COUNT = 300
@@ -101,3 +102,23 @@ def test_curved_true_edge() -> None:
     # Twice as curved as the surfaces above.
     assert np.sqrt((fine**2).mean()) <= 3e-4
     assert np.sqrt((fine**2).mean()) <= np.sqrt((coarse**2).mean()) / 2**3.5
+
+
+def test_a_large_sphere_touches_an_ellipsoid_where_a_plane_would() -> None:
+    """Its rows of elements are nearly cylinders: none may replace the normals that were given."""
+    axes, radius, depth = np.array([0.2, 0.03, 0.02]), 1000.0, 1e-6
+    most = []
+    for cells in (35, 70):
+        vertices, elements, normals = ellipsoid(cells, (0.2, 0.03, 0.02))
+        shell = Shell(vertices, elements, normals=normals)
+        away = []
+        for tilt in np.linspace(-0.02, 0.02, 201):
+            down = np.array([np.sin(tilt), 0.3 * np.sin(3 * tilt), -1.0])
+            down /= np.linalg.norm(down)
+            lowest = axes**2 * down / np.linalg.norm(axes * down)
+            contacts = shell.contacts(lowest + (radius - depth) * down, radius)
+            assert len(contacts) == 1
+            away.append(np.linalg.norm(contacts.point[0] - lowest))
+        most.append(max(away))
+    assert most[0] < 2e-6
+    assert most[0] / most[1] > 2**2.5

@@ -26,8 +26,17 @@ constexpr double kFarther = 3, kFarLarger = 6;
 constexpr double kMostTurn = 0.95;
 // A turn [rad] that is none.
 constexpr double kNoTurn = 1e-5;
+// A zone of a free shape is less than so many shortest sides of its triangles long, or an arc over
+// its triangles rises by less than so many deviations of its flat sides.
+constexpr double kShort = 6, kMostRise = 4;
 // Simpler kinds win ties (cylinder, cone, sphere, torus).
 constexpr double kSimpler[] = {0, 1, 0.98, 0.97, 0.95};
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 }  // namespace
 
@@ -237,8 +246,10 @@ bool Recognizer::take(Growth growth) {
   return true;
 }
 
-// Short strips beside what is smooth and was not recognized, or beside each other, are zones of a
-// free shape: they look like cones.
+// Strips beside what is smooth and was not recognized, or beside each other, may be zones of a free
+// shape: they look like cones. A zone is short against its triangles, or its profile, bent as it
+// turns at both ends, would stand off its chord hardly more than its flat sides do: who divides a
+// free shape keeps that alike in both directions, and a shaft between fillets is far longer.
 void Recognizer::drop_zones_of_free_shapes() {
   std::vector<char> weak(faces_.size(), 0);
   for (std::size_t f = 0; f < faces_.size(); ++f) {
@@ -253,7 +264,7 @@ void Recognizer::drop_zones_of_free_shapes() {
     if (!weak[f]) continue;
     const Growth& face = faces_[f];
     int smooth = 0, vague = 0;
-    std::vector<double> shortest;
+    std::vector<double> shortest, rises;
     double low = 0, high = 0, mean = 0;
     for (const int t : face.triangles) mean += area(t) / double(face.triangles.size());
     for (const int t : face.triangles) {
@@ -267,16 +278,17 @@ void Recognizer::drop_zones_of_free_shapes() {
         const int u = beside_[3 * t + k];
         if (u < 0 || of_[u] == int(f)) continue;
         ++smooth;
-        vague += of_[u] >= 0 ? weak[of_[u]]
-                             : curved_[u] && regions_.area(regions_.of(u)) < 2 * kFarLarger * mean;
+        if (!(of_[u] >= 0 ? weak[of_[u]]
+                          : curved_[u] && regions_.area(regions_.of(u)) < 2 * kFarLarger * mean))
+          continue;
+        ++vague;
+        const Vec3 side = point(corners(t)[next_corner(k)]) - here;
+        rises.push_back(turn(t, u) * (2 * area(t) / side.norm()) / 8);
       }
       shortest.push_back(least);
     }
-    // A zone is short against its triangles: less than six times their shortest sides along the
-    // axis.
-    const auto middle = shortest.begin() + std::ptrdiff_t(shortest.size() / 2);
-    std::nth_element(shortest.begin(), middle, shortest.end());
-    if (smooth > 0 && 2 * vague >= smooth && high - low < 6 * *middle)
+    if (smooth == 0 || 2 * vague < smooth) continue;
+    if (high - low < kShort * median(shortest) || median(rises) < kMostRise * face.deviation)
       dropped.push_back(static_cast<int>(f));
   }
   for (const int f : dropped)
