@@ -62,6 +62,9 @@ test: $(VENV)/.test ## build into .venv and run the tests, on all cores
 quick: $(VENV)/.test ## the tests that are not slow and need no browser
 	$(PYTEST) -m "not (slow or study or browser)" --durations=10
 
+slow-tests: $(VENV)/.test ## measure which tests are slow, for tests/slow.txt
+	$(PYTEST) -p tests.slow
+
 studies: $(VENV)/.test ## the same laws over every robot, surface and start, which make test leaves out
 	$(PYTEST) -m study
 

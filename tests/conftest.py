@@ -5,6 +5,7 @@ import shutil
 import pytest
 
 from tests.scenario.files import without_pictures
+from tests.slow import LIST, function_of
 
 # Software rendering, on machines that have no graphics card.
 FLAGS = [
@@ -36,8 +37,13 @@ def no_pictures():
         yield
 
 
+@pytest.hookimpl(tryfirst=True)  # marks are looked at next
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Build the C++ library first and open browsers last: beside compilers pages stand still."""
+    """Mark what is slow; build the C++ library first and open browsers last.
+
+    Beside compilers pages stand still.
+    """
+    slow = set(LIST.read_text("utf-8").split())
 
     def place(item: pytest.Item) -> int:
         if item.path.name == "test_cpp.py":
@@ -45,3 +51,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return 2 if item.get_closest_marker("browser") else 1
 
     items.sort(key=place)
+    for item in items:
+        if function_of(item.nodeid) in slow:
+            item.add_marker(pytest.mark.slow)

@@ -73,7 +73,6 @@ def test_options_change_the_run(tmp_path):
     assert "KEY=VALUE" in told.output
 
 
-@pytest.mark.slow
 def test_a_missed_expectation_is_exit_code_1_unless_the_scenario_was_changed(tmp_path):
     path = write(tmp_path, DROP + '[expect]\n"stats.steps" = { max = 3 }\n')
     arguments = ["run", path, "--out", tmp_path / "out", "--no-recording"]
@@ -149,7 +148,6 @@ def test_a_fault_of_the_users_routine_says_whose_it_is(tmp_path):
     assert "(own.py:find, line 8)" in told.stderr
 
 
-@pytest.mark.slow
 def test_a_diverged_run_says_where_its_part_is_and_spares_the_complete_one(tmp_path):
     out = tmp_path / "out"
     arguments = ["run", write(tmp_path), "--out", out, "--no-recording"]
@@ -256,7 +254,6 @@ def test_list_names_scenarios_and_robots():
         assert word in told.output
 
 
-@pytest.mark.slow
 def test_ctrl_c_keeps_what_was_computed(tmp_path):
     path = write(tmp_path, DROP.replace("duration = 0.05", "duration = 600\nrecord_dt = 0.1"))
     out = tmp_path / "out"

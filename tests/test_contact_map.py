@@ -197,7 +197,6 @@ def test_what_passed_between_the_rows_is_reported(figures, said):
             assert said in title
 
 
-@pytest.mark.slow
 def test_a_notebook_gets_a_picture():
     scene, result = stand_ins.ball_on_plate()
     for kind in ("overview", "force", "energy", "path", "map"):

@@ -20,8 +20,6 @@ import pytest
 
 import sphshell_pin as sp
 
-pytestmark = pytest.mark.slow
-
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "docs" / "examples" / "cpp"
 PAGE = ROOT / "docs" / "cpp.md"

@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 from sphshell_pin.cli import app
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, read_scenario
+from tests.studies import mostly_studies
 
 ROOT = Path(__file__).parent.parent
 PAGES = [
@@ -36,6 +37,8 @@ HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 PRINT = re.compile(r"^\s*print\(.*\)  # (.+)$")
 PRINTED = re.compile(r"<!-- printed by: (.+) -->\s*```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PRINTING = [page for page in PAGES if PRINTED.search(page.read_text("utf-8"))]
+LONG = ("grasping", "export")  # commands that take over ten seconds
 # A line of a block, or code within a line; what follows may go on behind a backslash.
 COMMAND = re.compile(r"(?:^ *(?:\$ )?|`)(sphshell-pin (?:[^`\n\\]|\\\n)*)", re.MULTILINE)
 
@@ -65,7 +68,6 @@ def anchors(page: Path) -> set[str]:
     return {heading.replace(" ", "-") for heading in plain}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", with_blocks("python"), ids=name_of)
 def test_the_python_of_a_page_runs(page, tmp_path, monkeypatch):
     """It prints what the comments behind its prints say."""
@@ -107,9 +109,8 @@ def is_near(told: str, found: str) -> bool:
     return abs(number - Decimal(found)) <= max(unit, abs(number) / 500)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if PRINTED.search(page.read_text("utf-8"))], ids=name_of
+    "page", mostly_studies(PRINTING, lambda p: p.stem not in LONG), ids=name_of
 )
 def test_the_commands_of_a_page_print_what_it_shows(page, tmp_path, monkeypatch):
     """`<!-- printed by: COMMAND -->` stands above what the last of its commands prints, in part."""

@@ -14,6 +14,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.studies import mostly_studies
+
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "docs" / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
@@ -36,6 +38,7 @@ TABLES = {
     "04_taxels_on_a_crease": ["Result"],
     "06_fit_measured_rebounds": ["Fit of "],
 }
+LONG = ("05_circle_with_5_newtons", "06_fit_measured_rebounds")
 NEEDS = {"05_circle_with_5_newtons": "crocoddyl", "07_peg_in_mujoco": "mujoco"}
 
 
@@ -65,8 +68,7 @@ def test_a_notebook_has_the_cells_of_its_script(notebooks, name):
         assert bare in code or bare in words, line
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", mostly_studies(NAMES, lambda name: name not in LONG))
 def test_an_example_comes_to_what_it_should(notebooks, name, tmp_path):
     pytest.importorskip(NEEDS.get(name, "numpy"))
     notebook = notebooks.notebook_of(EXAMPLES / f"{name}.py")

@@ -7,8 +7,6 @@ import time
 
 import pytest
 
-pytestmark = pytest.mark.slow
-
 # Tests that run in the background pass on that Ctrl-C is to be ignored.
 HEARS = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
 WHEN = """

@@ -106,7 +106,6 @@ def test_the_policy_of_the_wheels_is_that_of_pinocchios():
     assert "--plat $AUDITWHEEL_PLAT --only-plat" in WHEELS["linux"]["repair-wheel-command"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("platform", "machine", "suffix"),
     [

@@ -89,7 +89,6 @@ def test_scenes_simulations_and_results(trip: Trip) -> None:
     assert run(sp.Simulation(result.scene, simulation.integrator)) == bits
 
 
-@pytest.mark.slow
 def test_a_process_of_its_own_computes_the_same_bits() -> None:
     simulation = sp.Simulation(bumpy_scene(), sp.Adaptive())
     bits = run(simulation)

@@ -102,7 +102,6 @@ def test_a_run_without_contact_is_told_in_words(tmp_path):
     assert len(plot.save_figures(result, tmp_path)) == 3
 
 
-@pytest.mark.slow
 def test_a_single_instant_of_contact_is_drawn(tmp_path):
     scene, _ = ball_on_plate()
     q = np.tile(ball_configuration([0, 0, 0.05]), (2, 1))
@@ -149,7 +148,6 @@ def test_every_shell_has_its_own_picture_and_every_pair_its_name():
     assert all(f"on plate {k}" in written for k in range(3))
 
 
-@pytest.mark.slow
 def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
     count = plot.MOST_PAIRS + 3
     rows = [{"row": 1, "pair": k, "normal_force": 1.0 + k} for k in range(count)]
@@ -207,7 +205,6 @@ def test_without_matplotlib_one_sentence_says_how_to_get_it(monkeypatch):
         plot.plot_result(without_contact())
 
 
-@pytest.mark.slow
 def test_no_global_figure_is_made(tmp_path):
     script = (
         "import sys; from sphshell_pin.plot import save_figures;"

@@ -18,8 +18,6 @@ import pytest
 import sphshell_pin
 from sphshell_pin import errors
 
-pytestmark = pytest.mark.slow
-
 for package in ("mkdocs", "material", "mkdocstrings"):
     pytest.importorskip(package, reason="needs the extra docs: mkdocs-material, mkdocstrings")
 

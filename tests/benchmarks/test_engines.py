@@ -73,7 +73,6 @@ def press_scene():
         pytest.skip(str(missing))
 
 
-@pytest.mark.slow
 @pytest.mark.robots
 def test_the_loop_and_ours_press_alike():
     scene = press_scene()

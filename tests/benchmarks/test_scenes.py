@@ -71,7 +71,6 @@ def rolling(scene, contact, normal, surface_velocity, gravity):
     return rate
 
 
-@pytest.mark.slow
 def test_the_cylinder_is_what_the_equations_of_rolling_give():
     scene = scenes.cylinder()
     lever = scene.radius - scene.depth

@@ -73,7 +73,6 @@ def deepest(shell: sp.Shell, centers, radius: float):
     return shell.contacts_batch(centers, np.full(len(centers), radius))[0]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["block", "valve_body"])
 def test_depth_is_that_of_the_trimmed_faces(name, step):
     path = step if name == "block" else VALVE_BODY

@@ -38,8 +38,7 @@ SURFACES = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [24, pytest.param(60, marks=pytest.mark.study)])
+@pytest.mark.parametrize("count", [12, pytest.param(60, marks=pytest.mark.study)])
 @pytest.mark.parametrize("method", ["facets", "elements"])
 @pytest.mark.parametrize("name", SURFACES)
 def test_same_set(name: str, method: str, count: int) -> None:

@@ -35,7 +35,6 @@ def errors(contacts, normal):
     return abs(along - 1.0), float(np.linalg.norm(force - along * normal))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("kind", ["slivers", "delaunay"])
 def test_one_exact_contact(kind: str, count: int) -> None:

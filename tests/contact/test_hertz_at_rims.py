@@ -85,7 +85,6 @@ def test_forces_and_derivatives_are_numbers(name):
     assert compared > 60
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SHELLS)
 def test_elastic_bounces_at_rims_keep_the_energy(name):
     shell, rng = SHELLS[name](), np.random.default_rng(3)

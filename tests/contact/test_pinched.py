@@ -85,7 +85,7 @@ def jumps_of(shell: Shell, radius: float, method: str, length: float):
 def test_potential_does_not_jump(name: str, method: str) -> None:
     shell, radius = SURFACES[name]()
     assert shell.health.pinched_vertices > 0
-    assert jumps_of(shell, radius, method, 100) == []
+    assert jumps_of(shell, radius, method, 50) == []
 
 
 @pytest.mark.parametrize("vertex", CLEAR)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -43,7 +42,6 @@ def test_a_contact_set_is_what_it_says(mesh, center, radius: float) -> None:
         assert abs(elements.depth.max() - contacts.depth.max()) < 1e-15
 
 
-@pytest.mark.slow
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.lists(st.tuples(place, place, place), min_size=1, max_size=8), place)
 def test_triangles_of_coarse_coordinates(triangles, center) -> None:

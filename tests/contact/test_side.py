@@ -15,7 +15,6 @@ from tests.oracle.geometry import corners_of
 CLOSED = {"cube": meshes.cube(), "icosphere": meshes.icosphere(1), "quads": meshes.cube(quads=True)}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("side", ["outside", "inside"])
 @pytest.mark.parametrize("name", CLOSED)
 def test_same_set_as_the_definition(name: str, side: str) -> None:

@@ -33,7 +33,6 @@ def by_source(model: pin.Model, find=plate_points, friction=FRICTION) -> Scene:
 START = free_q([0.1, -0.05, RADIUS + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20.0, 5.0])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("friction", [None, FRICTION])
 @pytest.mark.parametrize("integrator", [SemiImplicitEuler, RungeKutta4])
 def test_a_source_that_mimics_the_plate_gives_the_same_run(integrator, friction) -> None:

@@ -140,7 +140,6 @@ for integrator in (sp.Adaptive(), sp.Implicit()):
 """
 
 
-@pytest.mark.slow
 def test_round_off_of_time_does_not_hang_the_run() -> None:
     """0.09 + (0.42 - 0.09) < 0.42, and 1e6 + k 1e-3 is off by more than 1e-9 of the period."""
     program = [sys.executable, "-c", FAR.format(root=str(ROOT))]
@@ -313,7 +312,6 @@ def zoo_start(scene: sp.Scene) -> tuple[np.ndarray, np.ndarray]:
     return q, rng.uniform(-2.0, 2.0, scene.model.nv)
 
 
-@pytest.mark.slow
 def test_all_kinds_of_joints_agree() -> None:
     scene = zoo()
     q, v = zoo_start(scene)

@@ -70,7 +70,6 @@ def test_rings_against_the_theory(rings: int) -> None:
         assert np.diff(energy.friction_loss).min() > -1e-8 * energy.exchanged
 
 
-@pytest.mark.slow
 def test_rings_converge_to_micro_slip() -> None:
     """The rms of v_t' / v_t against Maw et al.'s theory."""
     psi = KAPPA * np.tan(np.radians([2.0, 5, 10, 15, 20, 25, 30, 40, 60, 80])) / MU

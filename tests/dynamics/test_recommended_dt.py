@@ -117,7 +117,6 @@ def test_bristles_ring_or_decay(friction: sp.BristleFriction, time: float) -> No
     assert shortest(block(law, friction), q, [0.0] * 3) == pytest.approx(time, rel=1e-6)
 
 
-@pytest.mark.slow
 @laws
 def test_the_recommended_step_resolves_an_impact(law: str) -> None:
     one = (ELASTIC | DAMPED)[law]

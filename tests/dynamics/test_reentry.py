@@ -141,7 +141,6 @@ def holder_of_a_controller() -> object:
     return Controlled()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "make", [holder_of_a_run, holder_of_a_scene, holder_of_a_pair, holder_of_a_controller]
 )
@@ -155,7 +154,6 @@ def test_cycles_through_a_routine_are_collected(make) -> None:
     assert kept.__dict__
 
 
-@pytest.mark.slow
 def test_what_others_hold_of_a_cycle_survives() -> None:
     kept = holder_of_a_run()
     run, watched = kept.run, weakref.ref(kept)

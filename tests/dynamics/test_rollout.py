@@ -403,7 +403,6 @@ def test_memory_is_that_of_what_is_kept() -> None:
     assert resident() - before < 5000 * 4096
 
 
-@pytest.mark.slow
 def test_a_table_of_the_runs() -> None:
     pandas = pytest.importorskip("pandas")
     q0s, v0s = starts(3)

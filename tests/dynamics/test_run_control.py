@@ -69,7 +69,6 @@ except Interrupted as stop:
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     ["{}", "{'controller': lambda t, q, v, c: 0 * v, 'control_dt': 1e-3}"],

@@ -11,8 +11,6 @@ import sphshell_pin as sp
 from sphshell_pin.benchmarks.work_precision import cost_at, measure
 from sphshell_pin.benchmarks.work_precision_cases import References, bowl, press, stick_slip
 
-pytestmark = pytest.mark.slow
-
 CASES = {
     "bowl": lambda: replace(bowl(), duration=0.2),
     "press": lambda: press(duration=0.13),

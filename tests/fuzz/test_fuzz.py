@@ -15,8 +15,6 @@ from tests.fuzz.inputs import KINDS, TURNS, make_input, read
 from tests.fuzz.tables import prepare
 from tests.fuzz.watch import Report, Task, watch
 
-pytestmark = pytest.mark.slow
-
 BROKE = sorted((Path(__file__).parents[1] / "data" / "fuzz").iterdir())
 
 

@@ -63,7 +63,7 @@ def of_energy(tried: str, figures: tuple[float, float], largest: float) -> Verdi
     yield at_most("largest change of energy", tried, "0", figures[1], largest)
 
 
-@case("100 swings in a bowl")
+@case("100 swings in a bowl", slow=True)
 def swings() -> Verdicts:
     """From element to element the normal turns by 1e-7 rad at h / r = 0.15, an eighth at 0.075.
 

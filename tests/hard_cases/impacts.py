@@ -236,7 +236,7 @@ def lines() -> Verdicts:
     yield at_most("lines", f"{count} lines", "none is overlooked", count - seen, 0)
 
 
-@case("fast spheres")
+@case("fast spheres", slow=True)
 def few() -> Verdicts:
     yield from _each(45, 9)
 

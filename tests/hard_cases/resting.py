@@ -159,7 +159,7 @@ def seated(
     return RADIUS - float(result.q[-1, -1]) * math.sin(a), right, up, aside
 
 
-@case("ball in a cone, touched along a ring")
+@case("ball in a cone, touched along a ring", slow=True)
 def coned() -> Verdicts:
     for integrator in (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3)):
         for columns, flat, bound in ((64, True, 1e-6), (64, False, 5e-3)):

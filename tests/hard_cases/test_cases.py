@@ -8,8 +8,6 @@ from tests.hard_cases.__main__ import collect, row
 from tests.hard_cases.verdict import CASES, Case
 from tests.studies import mostly_studies
 
-pytestmark = pytest.mark.slow
-
 ALL = collect()
 SOME = mostly_studies(ALL, lambda hard: not hard.slow)
 

@@ -13,8 +13,6 @@ import pytest
 from tests.kept.looking import looks
 from tests.kept.scenes import run
 
-pytestmark = pytest.mark.slow
-
 TRUSTED = ("trusted", "another scenario")
 WAYS = [name for name in looks("") if name not in TRUSTED]
 

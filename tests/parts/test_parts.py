@@ -33,7 +33,6 @@ def part() -> Part:
     return random_part(tuple(FAMILIES).index("thin_box"))
 
 
-@pytest.mark.slow
 def test_every_family_makes_a_closed_mesh_of_its_volume() -> None:
     for number, family in enumerate(FAMILIES):
         assert family_of(number) == family

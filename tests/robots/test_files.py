@@ -12,6 +12,7 @@ from sphshell_pin import robots
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning
 from sphshell_pin.robots import xacro_file
+from tests.studies import mostly_studies
 
 FOLDER = Path(__file__).parents[1] / "data" / "xacro"
 INERTIAL = (
@@ -370,9 +371,8 @@ MIMICKING = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.robots
-@pytest.mark.parametrize("name", MIMICKING)
+@pytest.mark.parametrize("name", mostly_studies(MIMICKING, ("panda", "pr2").__contains__))
 def test_mimic_joints_of_the_library_are_exact(name):
     pytest.importorskip("example_robot_data")
     whole, robot = robots.load(name), robots.load(name, mimic=True)

@@ -69,7 +69,6 @@ def test_of_many_known_names_the_nearest_are_told():
     assert len(caught.value.valid) == count
 
 
-@pytest.mark.slow
 @pytest.mark.robots
 @pytest.mark.parametrize(
     ("name", "count", "radius"),

@@ -62,7 +62,6 @@ def exact(name, log):
     return RADIUS - (length - reach), way / length[:, None]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", MADE)
 def test_audit_agrees_with_formulas(name, tmp_path):
     make, start, more = MADE[name]
@@ -85,7 +84,6 @@ def test_audit_agrees_with_formulas(name, tmp_path):
     assert pair.normal_largest < 1e-7
 
 
-@pytest.mark.slow
 def test_flat_elements_are_off_by_their_chord_error(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     path.write_text(
@@ -136,7 +134,6 @@ def test_border_of_a_hole_is_a_curve(tmp_path):
         assert found.normal is None
 
 
-@pytest.mark.slow
 def test_files_and_table_have_the_audit(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     out = tmp_path / "out"
@@ -156,7 +153,6 @@ def test_files_and_table_have_the_audit(tmp_path):
     assert figures["normal_error"]["rms"] == pytest.approx(np.sqrt(np.mean(normal**2)))
 
 
-@pytest.mark.slow
 def test_without_the_option_nothing_is_audited(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     report = run_built(build(path), tmp_path / "out", recording=False)

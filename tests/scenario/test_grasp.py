@@ -189,7 +189,6 @@ def test_what_is_out_of_reach_is_not_touched(tmp_path):
     assert hand.close_on(np.zeros(6), shell, far, GAP) is None
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "surface", mostly_studies(["box", "cylinder", "sphere"], lambda one: one != "cylinder")
 )
@@ -211,7 +210,6 @@ def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
     assert np.allclose(-forces[log.row == last].sum(axis=0), [0, 0, 9.81 * mass], atol=0.02)
 
 
-@pytest.mark.slow
 def test_fingers_that_mimic_others_hold_too(tmp_path):
     """Two fingers move as one; the file's dry friction would keep them from pressing."""
     file = gripper(tmp_path)
@@ -238,9 +236,7 @@ def test_fingers_that_mimic_others_hold_too(tmp_path):
         ({"radius": 0.01}, "--radius belongs to a single tip"),
         ({"robot": "three_link_finger"}, "needs two fingertips or more"),
         ({"robot": "turntable"}, "this robot has 0"),
-        pytest.param(
-            {"against": "steel", "press": 500.0}, "no grasp .* works", marks=pytest.mark.slow
-        ),
+        pytest.param({"against": "steel", "press": 500.0}, "no grasp .* works"),
         ({"unit": "m", "surface": "large"}, "cannot hold a part of 400 x 400 x 400 mm"),
     ],
 )
@@ -258,7 +254,6 @@ def test_what_cannot_be_held_is_refused(options, why, tmp_path):
     assert not (tmp_path / "made_part.urdf").exists()
 
 
-@pytest.mark.slow
 def test_a_part_that_is_there_is_not_replaced(tmp_path):
     (tmp_path / "made_part.urdf").write_text("mine", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"made_part\.urdf: .*is there already"):
@@ -267,7 +262,6 @@ def test_a_part_that_is_there_is_not_replaced(tmp_path):
     assert not out(tmp_path).exists()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("side", "surface"),
     mostly_studies(

@@ -95,7 +95,6 @@ def test_a_value_set_from_outside_widens_the_range(tmp_path):
     assert (found.low, found.value, found.high) == (9e5, 5e6, 5e6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     mostly_studies(shipped_scenarios(), {"fingertip_on_blade", "gear_contact"}.__contains__),

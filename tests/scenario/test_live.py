@@ -120,7 +120,6 @@ def test_a_fault_of_the_users_own_function_ends_the_run_until_it_is_reset(tmp_pa
     assert live.ended is None
 
 
-@pytest.mark.slow
 @pytest.mark.robots
 def test_another_path_speed_goes_on_from_where_the_tip_is() -> None:
     """The target neither jumps nor turns back: the tip slides on, at the new speed."""
@@ -189,7 +188,6 @@ def tip_of(live: LiveRun) -> np.ndarray:
     return data.oMf[model.getFrameId(controller.frame)].act(np.asarray(controller.offset))
 
 
-@pytest.mark.slow
 @pytest.mark.robots
 def test_another_gravity_leaves_the_target_where_it_is() -> None:
     pytest.importorskip("example_robot_data", reason="needs the example-robot-data loaders")
@@ -203,7 +201,6 @@ def test_another_gravity_leaves_the_target_where_it_is() -> None:
     assert np.linalg.norm(tip_of(live) - before) == pytest.approx(0.002, rel=0.1)
 
 
-@pytest.mark.slow
 @pytest.mark.robots
 def test_a_target_whose_wait_is_cut_short_sets_out_from_its_start() -> None:
     pytest.importorskip("example_robot_data", reason="needs the example-robot-data loaders")

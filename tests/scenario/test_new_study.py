@@ -13,6 +13,12 @@ def parts(tmp_path_factory):
     return [read_once(DATA / name, folder) for name in ("bladex_upper.stl", "trimesh_wallhole.obj")]
 
 
+def test_a_scenario_works_in_its_own_run(parts):
+    case = ask("ball", parts[0], "-")
+    assert not case.failed
+    assert not case.refused
+
+
 @pytest.mark.study
 def test_new_scenarios_work_or_are_refused_for_a_reason(parts):
     cases = [

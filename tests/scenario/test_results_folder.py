@@ -60,7 +60,6 @@ def test_a_second_run_is_told_who_writes_until_that_process_is_killed(
     assert sorted(os.listdir(tmp_path)) == ["drop.toml", "out"]
 
 
-@pytest.mark.slow
 def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
     arguments = ["run", write(tmp_path), "--out", tmp_path / "out", "--no-recording"]
     assert call(*arguments).exit_code == 0

@@ -27,8 +27,7 @@ from sphshell_pin.study.sweep.table import write_table
 from tests import meshes
 from tests.scenario.files import write
 from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
-
-pytestmark = pytest.mark.slow
+from tests.studies import mostly_studies
 
 MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
 OTHERS = {
@@ -174,7 +173,7 @@ def test_ctrl_c_at_any_operation_leaves_old_or_new_results(two_runs, results, pl
         assert os.listdir(place) == ["out"], n
 
 
-@pytest.mark.parametrize("act", [None, fill])
+@pytest.mark.parametrize("act", mostly_studies([None, fill], lambda act: act is fill))
 def test_where_names_cannot_be_exchanged_the_next_run_goes_on(
     act, two_runs, results, place, monkeypatch
 ):

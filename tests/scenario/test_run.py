@@ -25,7 +25,6 @@ def built(tmp_path, no_pictures):
     return build(write(tmp_path))
 
 
-@pytest.mark.slow
 def test_the_folder_holds_what_was_computed(tmp_path):
     built, seen = build(write(tmp_path)), []
     out = tmp_path / "a" / "b"

@@ -38,7 +38,6 @@ def tau(t, q, v, contacts, sensors):
 """
 
 
-@pytest.mark.slow
 def test_a_scenario_states_its_sensors(tmp_path):
     (tmp_path / "own.py").write_text(READING, encoding="utf-8")
     controller = '\n[controller]\ntype = "python"\nfunction = "own.py:tau"\n'

@@ -8,7 +8,6 @@ from sphshell_pin.scenario.running.figures import check_expectations
 from sphshell_pin.scenario.running.run import simulate
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_a_shipped_scenario_comes_out_as_expected(name):
     try:

@@ -32,7 +32,6 @@ def digest() -> str:
     return found.hexdigest()
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(
     not hasattr(os, "sched_setaffinity") or len(os.sched_getaffinity(0)) < 2,
     reason="needs two cores, and a system that lends one of them alone",

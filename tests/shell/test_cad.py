@@ -146,7 +146,6 @@ def test_brep_files_need_a_unit(tmp_path):
         Shell.from_file(path)
 
 
-@pytest.mark.slow
 def test_a_wire_holds_no_surface(tmp_path):
     edge = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(1, 0, 0)).Edge()
     files = [
@@ -212,7 +211,6 @@ def put_before_the_library(folder, monkeypatch, text):
     monkeypatch.setattr(sys, "path", [str(folder / "first"), *sys.path])
 
 
-@pytest.mark.slow
 def test_without_the_library_the_extra_is_named(tmp_path, monkeypatch):
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     put_before_the_library(tmp_path, monkeypatch, "")
@@ -238,7 +236,6 @@ def test_a_library_of_the_system_that_is_absent_is_named(reason, told, tmp_path,
     assert caught.value.reason == reason
 
 
-@pytest.mark.slow
 def test_the_library_is_never_imported(tmp_path):
     """So does reading a CAD file: another process imports it."""
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())

@@ -23,8 +23,6 @@ from tests.shell.cad_cases import (
 )
 from tests.shell.surfaces import surface_file
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.mark.parametrize("make", ["ball", "cone", "ring", "rounded_box", "drilled_plate", "roof"])
 def test_elements_are_as_near_as_stated(make, tmp_path):

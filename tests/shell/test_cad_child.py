@@ -68,7 +68,6 @@ def load_with(job, box, monkeypatch, **limits):
         Shell.from_file(box, "mm", **limits)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("job", "told"),
     [
@@ -91,14 +90,12 @@ def test_what_becomes_of_the_child_is_told_in_a_sentence(job, told, box, monkeyp
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.slow
 def test_files_on_which_opencascade_crashed_or_hung():
     with ThreadPoolExecutor(2) as pool:
         found = pool.map(lambda path: outcome(path, time_limit=1.5), DAMAGED)
         assert set(found) <= set(KINDS.values())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_the_child_ends_with_its_parent(number, box, tmp_path):
     """A script without a guard, while the child holds the interpreter's lock for ever."""
@@ -140,7 +137,6 @@ def wait_for(answer):
     raise AssertionError("in vain")
 
 
-@pytest.mark.slow
 def test_a_child_is_used_again_and_by_one_at_a_time(box):
     def load():
         return Shell.from_file(box, "mm").vertices

@@ -12,8 +12,6 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, U
 from sphshell_pin.shell.converting import convert
 from tests.shell import cad_shapes as shapes
 
-pytestmark = pytest.mark.slow
-
 SIDES = np.array([20.0, 30.0, 10.0])
 """Of the box in the files, as their numbers have it."""
 

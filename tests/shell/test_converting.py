@@ -14,8 +14,6 @@ from tests import meshes
 from tests.command import call
 from tests.shell import cad_shapes as shapes
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def plate(tmp_path):

@@ -14,8 +14,6 @@ from sphshell_pin.shell import clean
 
 from ..oracle.ear_clipping import clip_ears
 
-pytestmark = pytest.mark.slow
-
 
 def on_circle(radius, angle):
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])

@@ -149,7 +149,6 @@ def test_words():
     assert text.endswith(", and 3 more; 12.5 % of the elements on none")
 
 
-@pytest.mark.slow
 def test_the_caps_of_a_fine_sphere_do_not_cost_its_square():
     """At its poles, where triangles are coplanar to rounding, growths over the ball are in vain."""
 

@@ -166,7 +166,6 @@ def drop(folder, name, **changes):
     return out
 
 
-@pytest.mark.slow
 def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     soft = drop(tmp_path, "soft")

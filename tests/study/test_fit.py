@@ -19,7 +19,6 @@ from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.fit.quantities import quantities_of, row_step
 from sphshell_pin.study.fit.runs import Runs, Trial
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
-from tests.studies import mostly_studies
 from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
@@ -89,8 +88,8 @@ def test_exact_data_give_back_the_values(bounce):
     assert not found.remarks
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sets", mostly_studies([16, 40], lambda sets: sets == 16))
+@pytest.mark.study
+@pytest.mark.parametrize("sets", [16, 40])
 def test_intervals_hold_the_truth_as_often_as_they_say(sets):
     """The study of docs/fitting.md with few sets: bounds of the binomial at 1 in 1000."""
     values, low, high, _ = zip(*many_sets(sets, first=5000), strict=True)
@@ -101,7 +100,6 @@ def test_intervals_hold_the_truth_as_often_as_they_say(sets):
     assert (inside >= least).all(), inside
 
 
-@pytest.mark.slow
 def test_touches_out_of_step_do_not_mislead(bounce):
     """From far off, pulses of force do not overlap; the times are then fitted one after another."""
     t = np.linspace(0.0, 0.24, 1201)

@@ -29,7 +29,6 @@ from tests.study.test_fit import (
 )
 
 
-@pytest.mark.slow
 def test_the_command_writes_values_in_place(bounce, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     t = np.linspace(0.0, 0.1, 201)

@@ -10,8 +10,6 @@ from sphshell_pin.benchmarks import analytic_cases, sizes, step, timing
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
 from sphshell_pin.cases.contents import Spread
 
-pytestmark = pytest.mark.slow
-
 
 def integrated(slope, start, t, method="DOP853"):
     """Return rows of a solution by SciPy."""

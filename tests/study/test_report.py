@@ -183,7 +183,6 @@ def table_of(path):
         return list(csv.DictReader(file))
 
 
-@pytest.mark.slow
 def test_whole_report(small, tmp_path):
     heard = []
     report = making.make_report(
@@ -253,7 +252,6 @@ def test_the_page_in_a_browser(small, tmp_path, browser):
     assert looks[0] != looks[1]
 
 
-@pytest.mark.slow
 def test_small_forces_have_the_error_of_their_method():
     found = forces(quick=True, progress=lambda share: None)
     by_key = {f.key: f for f in found.findings}
@@ -408,7 +406,6 @@ def test_away_from_the_checkout_there_are_no_hard_cases(monkeypatch, tmp_path):
     assert "part of the checkout" in section.notes[0]
 
 
-@pytest.mark.slow
 def test_hard_cases_run_in_a_process_of_their_own():
     shares = []
     found = hard_cases.measure(

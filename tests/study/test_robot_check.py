@@ -72,7 +72,6 @@ def passes(report: RobotReport) -> bool:
     return True
 
 
-@pytest.mark.slow
 @pytest.mark.robots
 @pytest.mark.parametrize("part", mostly_studies(range(8), lambda part: part == 0))
 def test_every_robot_passes(part: int) -> None:
@@ -401,7 +400,6 @@ def test_the_page_of_the_docs_is_of_these_robots() -> None:
         assert list(verdicts) == robots.names()
 
 
-@pytest.mark.slow
 def test_the_command_takes_xacro_arguments_and_package_folders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

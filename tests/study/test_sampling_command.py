@@ -26,7 +26,6 @@ def scenario(tmp_path_factory):
     return write(tmp_path_factory.mktemp("sampling"))
 
 
-@pytest.mark.slow
 def test_a_sample_is_told_and_drawn(scenario):
     out = scenario.parent / "told.parquet"
     options = ["--sample", "sobol", "--n", 8, "--indices", "--tornado", "--bands", DEPTH]
@@ -95,7 +94,6 @@ def test_faults_are_one_sentence(scenario, options, words):
     assert not list(scenario.parent.glob("fault*"))
 
 
-@pytest.mark.slow
 def test_a_killed_sample_resumes_to_the_same_bytes(scenario):
     options = [STIFFNESS, DAMPING, "--sample", "sobol", "--n", 16, "--indices", "--bands", DEPTH]
     whole, killed = (scenario.parent / f"{name}.parquet" for name in ("whole", "killed"))
@@ -111,7 +109,6 @@ def test_a_killed_sample_resumes_to_the_same_bytes(scenario):
         assert killed.with_suffix(end).read_bytes() == whole.with_suffix(end).read_bytes()
 
 
-@pytest.mark.slow
 def test_ishigamis_indices_by_the_command(tmp_path):
     """The same as of the function alone."""
     scenario, out = write_ishigami(tmp_path), tmp_path / "ishigami.parquet"

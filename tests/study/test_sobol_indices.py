@@ -6,7 +6,6 @@ import pytest
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.study.sweep import quantiles, sobol_indices, tornado
 from sphshell_pin.study.sweep.sampling import design_of
-from tests.studies import mostly_studies
 from tests.study.ishigami import DIST, FIRST, KEYS, TOTAL, ishigami, ishigami_table, table_of
 
 pytest.importorskip("pandas")
@@ -18,7 +17,6 @@ def covers(found, kind, exact):
     return (found[f"{kind}_low"] <= exact) & (exact <= found[f"{kind}_high"])
 
 
-@pytest.mark.slow
 def test_the_indices_of_ishigamis_function():
     found = sobol_indices(ishigami_table(N), "f")
     assert found.index.tolist() == KEYS
@@ -54,8 +52,8 @@ def test_the_order_of_the_rows_does_not_matter_and_the_intervals_are_repeatable(
     assert (narrow["total_high"] < found["total_high"]).all()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("tables", mostly_studies([150, 300], lambda tables: tables == 150))
+@pytest.mark.study
+@pytest.mark.parametrize("tables", [150, 300])
 def test_intervals_cover_95_percent_where_the_points_are_random(tables):
     """The bootstrap takes the points for independent: with such points it must be right."""
     rng = np.random.default_rng(5)

@@ -64,7 +64,6 @@ def test_the_depth_of_rest_follows_its_closed_form(serial):
     assert not [name for name in table.columns if "wall" in name or "real_time" in name]
 
 
-@pytest.mark.slow
 def test_two_workers_leave_the_same_bytes(folder, serial):
     table = folder / "two.parquet"
     sweep(folder / "resting.toml", VARY, workers=2, out=table)
@@ -73,7 +72,6 @@ def test_two_workers_leave_the_same_bytes(folder, serial):
     assert table.read_bytes() == serial.read_bytes()
 
 
-@pytest.mark.slow
 def test_a_killed_worker_costs_nothing(folder, serial):
     table = folder / "killed.parquet"
 
@@ -87,7 +85,6 @@ def test_a_killed_worker_costs_nothing(folder, serial):
     assert table.read_bytes() == serial.read_bytes()
 
 
-@pytest.mark.slow
 def test_values_are_read_back_exactly_from_either_kind_of_file(folder, serial):
     h5py = pytest.importorskip("h5py")
     table = folder / "same.h5"
@@ -115,7 +112,6 @@ def test_a_failed_run_is_a_row_that_says_why(folder):
     assert table["figures.depth"].isna().tolist() == [False, True, False]
 
 
-@pytest.mark.slow
 def test_units_stay_with_the_table(folder, tmp_path):
     stiffness, exponent = "contact.law.stiffness", "contact.law.exponent"
     changes = {"run.duration": "0.1"}
@@ -151,7 +147,6 @@ def test_a_figure_that_breaks_leaves_the_others(tmp_path):
     assert table["figures.depth"].notna().all()
 
 
-@pytest.mark.slow
 def test_a_run_that_kills_its_workers_is_given_up_and_the_others_go_on(tmp_path):
     path = write(tmp_path, "deadly")
     out = tmp_path / "table.parquet"

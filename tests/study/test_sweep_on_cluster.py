@@ -13,8 +13,6 @@ from sphshell_pin.study.sweep import plan_sweep, run_plan, sweep
 from tests.study.cluster import Cluster
 from tests.study.resting import check_once, entries, write
 
-pytestmark = pytest.mark.slow
-
 pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
 
@@ -44,6 +42,7 @@ def test_a_killed_worker_of_a_cluster_costs_nothing(tmp_path, request):
     assert table.read_bytes() == serial.read_bytes()
 
 
+@pytest.mark.study
 def test_a_sample_is_the_same_on_a_cluster(tmp_path, request):
     cluster = Cluster(tmp_path)
     request.addfinalizer(cluster.close)
@@ -65,6 +64,7 @@ def test_a_sample_is_the_same_on_a_cluster(tmp_path, request):
         assert table.with_suffix(end).read_bytes() == serial.with_suffix(end).read_bytes()
 
 
+@pytest.mark.study
 def test_a_run_that_kills_the_workers_of_a_cluster_is_given_up(tmp_path, request):
     # Runs that were with a dying worker are given up at once, and tried again alone.
     cluster = Cluster(tmp_path, allowed_failures=0)

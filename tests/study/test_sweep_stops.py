@@ -12,8 +12,6 @@ import pytest
 from tests.command import call
 from tests.study.resting import check_once, entries, write
 
-pytestmark = pytest.mark.slow
-
 pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
 
@@ -84,6 +82,7 @@ def stopped(runs, scenario, options, out, workers, number):
     return done.returncode, done.stderr
 
 
+@pytest.mark.study
 def test_a_killed_sweep_leaves_no_worker_and_goes_on(scenario, reference):
     out = scenario.parent / "killed.parquet"
     code, _ = stopped(5, scenario, VARY, out, 2, signal.SIGKILL)

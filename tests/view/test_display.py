@@ -173,7 +173,6 @@ def test_a_stock_meshcat_page_takes_the_scene():
         page.window.server_proc.wait()
 
 
-@pytest.mark.slow
 def test_importing_the_folders_loads_no_picture_library():
     script = (
         "import sys, sphshell_pin.view, sphshell_pin.view.live, sphshell_pin.plot;"

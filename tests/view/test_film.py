@@ -11,6 +11,7 @@ from sphshell_pin.view import film
 from sphshell_pin.view.film import render_film
 from tests.command import call
 from tests.scenario.files import write
+from tests.studies import mostly_studies
 from tests.view.stand_ins import ball_on_plate
 
 Image = pytest.importorskip("PIL.Image")
@@ -101,7 +102,7 @@ def test_a_film_shows_the_pictures_in_their_order(rendered):
 @pytest.mark.browser
 @pytest.mark.parametrize(
     "name",
-    ["run.mp4", *(pytest.param(one, marks=pytest.mark.slow) for one in ("run.gif", "frames"))],
+    mostly_studies(["run.mp4", "run.gif", "frames"], lambda name: name == "run.mp4"),
 )
 def test_ctrl_c_leaves_nothing(rendered, tmp_path, name):
     # Tests that run in the background inherit that Ctrl-C is to be ignored.

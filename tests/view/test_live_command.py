@@ -15,8 +15,6 @@ from tests.scenario.files import without_pictures, write
 from tests.view.live_client import get
 from tests.view.live_player import BallPlayer
 
-pytestmark = pytest.mark.slow
-
 # Tests that run in the background pass on that Ctrl-C is to be ignored.
 ENTRY = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "

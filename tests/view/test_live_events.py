@@ -52,7 +52,6 @@ values = st.recursive(
 )
 
 
-@pytest.mark.slow
 @given(st.sampled_from([*FIELDS, "other"]), st.data())
 def test_no_message_is_more_than_an_event_or_a_sentence(kind, data):
     names = [*FIELDS.get(kind, {}), "extra"]

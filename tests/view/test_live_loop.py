@@ -244,7 +244,6 @@ def test_the_thread_runs_until_it_is_stopped():
     assert live.player.time == stopped
 
 
-@pytest.mark.slow
 def test_a_script_may_end_without_stopping_it():
     code = (
         "from sphshell_pin.scenario import build\n"

@@ -96,7 +96,6 @@ def test_a_message_beyond_all_measure_only_ends_its_own_connection(live):
     assert goes_on(live)
 
 
-@pytest.mark.slow
 def test_a_flood_is_answered_and_survived(live):
     async def visit():
         async with Client(live.url) as client:
@@ -145,7 +144,6 @@ def raw_socket(live):
     return connection
 
 
-@pytest.mark.slow
 def test_a_browser_that_never_reads_holds_up_nobody(live):
     deaf = raw_socket(live)
 
@@ -160,7 +158,6 @@ def test_a_browser_that_never_reads_holds_up_nobody(live):
     deaf.close()
 
 
-@pytest.mark.slow
 def test_a_browser_that_answers_late_skips_frames_and_gets_the_newest(live):
     async def visit():
         async with Client(live.url, answers=False) as slow, Client(live.url) as fast:

@@ -13,8 +13,6 @@ from sphshell_pin.scenario import build, run_built
 from tests.scenario.files import DROP, without_pictures, write
 from tests.view.test_page import unpacked
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):

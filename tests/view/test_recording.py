@@ -146,7 +146,6 @@ def test_without_meshcat_one_sentence_says_how_to_get_it(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
 def test_a_chattering_contact_does_not_swell_the_page(tmp_path):
     model = ball_model()
     scene = a_scene(model, contact_pair(model, "ball", 0.05, plate()))

@@ -44,7 +44,6 @@ def order(name: str, depth: float, exact: bool) -> float:
     return float(np.polyfit(np.log(sides[used]), np.log(rms[used]), 1)[0])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "depth"), mostly_studies(product(SURFACES, DEPTHS), lambda one: one[1] == DEPTHS[0])
 )

@@ -25,7 +25,6 @@ from tests.contact.smooth.surfaces import SURFACES, mean_edge, shell_of
 COUNT = 50  # of each family
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("make", [random_turned, random_extruded])
 def test_random_parts(make) -> None:
     """Kinks of 3 to 29 degrees between stretches of 0.2 to 20 radii. A few polygons may turn as
@@ -131,7 +130,6 @@ def test_propeller(radii: tuple[float, float]) -> None:
     assert (depth > 0).all()
 
 
-@pytest.mark.slow
 def test_turned_parts_with_averaged_normals() -> None:
     """The normals of a file bear witness no more than the elements do."""
     parts = [make(seed) for seed in range(COUNT) for make in (random_turned, random_extruded)]

@@ -54,7 +54,6 @@ def test_smooth_joints(name: str, depth: float) -> None:
         assert_no_jump(shell_of(name, h), rolled(name, depth, 3, 0.7 * h, 4), depth)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "exact"), EDGED)
 def test_edges(kind: str, exact: bool) -> None:
     for depth in DEPTHS:

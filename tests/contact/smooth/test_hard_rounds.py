@@ -92,7 +92,6 @@ def test_force_on_a_ring() -> None:
         assert np.linalg.norm(force[:2]) <= 1.01 * FLANK / NEAREST
 
 
-@pytest.mark.slow
 def test_centre_near_the_centre_of_curvature() -> None:
     """Centre near that of the curvature of a bowl, all about equally near; the nearest is found."""
     for cells in (4, 8):
@@ -161,7 +160,6 @@ def tube() -> Shell:
     return Shell(vertices / 3, elements, normals=normals)
 
 
-@pytest.mark.slow
 def test_tube_of_the_radius_of_the_sphere() -> None:
     """Tube of radius r, sphere off its axis; one contact, exact to 1 %."""
     for depth in (0.2, 0.05, 0.01):
@@ -192,7 +190,6 @@ def seat(columns: int, rows: int) -> Shell:
     return Shell(vertices, meshes._split(elements, np.zeros(len(elements), bool)), normals=normals)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("columns", "error"), [(32, 0.15), (64, 0.02), (128, 0.003)])
 def test_ball_in_a_countersink(columns: int, error: float) -> None:
     """Ball in a conical seat of 32, 64, 128 columns, touched round; of one to 15, 2, 0.3 %."""

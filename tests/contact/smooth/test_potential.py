@@ -116,7 +116,6 @@ def work(shell, path) -> tuple[float, float]:
     return float(parts.sum()), float(np.abs(parts).sum())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CURVED)
 def test_no_work_round_closed_paths(name: str) -> None:
     """Fifteen paths on each of five surfaces; the quadrature's error falls with its step."""
@@ -159,7 +158,6 @@ def jumps(name: str, h: float):
     return np.array(changes)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CURVED)
 def test_jump_across_smooth_edges(name: str) -> None:
     coarse, fine = jumps(name, 0.6), jumps(name, 0.3)
@@ -202,7 +200,6 @@ KINDS = [f"ridge {angle}" for angle in (40, 70, 100, 130, 170)] + [
 ]  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_continuous_across_true_edges(kind: str) -> None:
     """Round convex edges, borders and vertices the force goes over from face to edge to face

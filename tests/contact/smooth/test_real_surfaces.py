@@ -26,8 +26,6 @@ from tests.contact.smooth.surfaces import mean_edge
 from tests.shell.surfaces import DATA
 from tests.shell.test_corpus import FILES, load
 
-pytestmark = pytest.mark.slow
-
 Array = NDArray[np.float64]
 
 COUNT = int(os.environ.get("SPHSHELL_SPHERES", "1500"))

@@ -15,8 +15,6 @@ from tests.contact.smooth.test_potential import query
 from tests.contact.smooth.test_true_edges import cone
 from tests.studies import mostly_studies
 
-pytestmark = pytest.mark.slow
-
 
 def lens(half: float, rows: int, columns: int):
     """Two caps of a sphere of radius four that meet in a circle of radius `half`, and their normals

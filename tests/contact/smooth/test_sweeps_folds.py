@@ -12,8 +12,6 @@ from tests import meshes
 from tests.contact.smooth.sweeps import DEPTHS, assert_as_defined, assert_continuous
 from tests.studies import mostly_studies
 
-pytestmark = pytest.mark.slow
-
 ANGLES = (1, 2, 5, 10, 16, 20, 30, 45, 60, 90, 120, 150, 170)
 SIZE = 4.0
 

@@ -14,8 +14,6 @@ from tests.contact.smooth.sweeps import DEPTHS, UP, about, assert_continuous, bo
 from tests.contact.smooth.test_potential import query
 from tests.studies import mostly_studies
 
-pytestmark = pytest.mark.slow
-
 
 def rolled(name: str, depth: float, count: int, length: float, nodes: int, seed: int = 0):
     """Paths over a smooth surface: of constant depth, but on the wavy sheet of constant height."""

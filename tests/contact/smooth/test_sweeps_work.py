@@ -13,8 +13,6 @@ from tests.contact.smooth.test_sweeps_folds import KINDS, fold, fold_paths
 from tests.contact.smooth.test_sweeps_smooth import SMOOTH, rolled
 from tests.studies import mostly_studies
 
-pytestmark = pytest.mark.slow
-
 
 def work_case(name: str):
     """A shell, and paths of a depth of 0.04 to 0.06 over its joints."""

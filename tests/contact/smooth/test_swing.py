@@ -9,8 +9,6 @@ import pytest
 
 from sphshell_pin.benchmarks import swing
 
-pytestmark = pytest.mark.slow
-
 PERIODS = 2
 # The elements are far better than the bars that were asked for; keep them so.
 BETTER = 50

@@ -10,6 +10,7 @@ from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
 from tests.contact.helpers import energy, force_sum, positions, shell_of
 from tests.oracle.pieces import potential_and_force
+from tests.studies import mostly_studies
 
 RADIUS, DEPTH = 0.1, 0.004
 
@@ -146,7 +147,6 @@ def cone(facets: int, slope: float, rings: int = 1):
     return np.concatenate(vertices), np.array(triangles, dtype=np.int32)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rings", [1, 4])
 @pytest.mark.parametrize("slope", [0.4, 0.6, 1.0])
 def test_cone_tip(slope: float, rings: int) -> None:
@@ -192,8 +192,7 @@ POLYHEDRA = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("radius", [0.1, 0.4])
+@pytest.mark.parametrize("radius", mostly_studies([0.1, 0.4], lambda radius: radius == 0.4))
 @pytest.mark.parametrize("name", POLYHEDRA)
 def test_pieces_of_polyhedra(name: str, radius: float) -> None:
     """With every edge a crease (or a crease angle of zero) potential and force are those of the

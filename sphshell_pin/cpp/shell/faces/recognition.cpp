@@ -26,7 +26,7 @@ constexpr double kFarther = 3, kFarLarger = 6;
 constexpr double kMostTurn = 0.95;
 // A turn [rad] that is none.
 constexpr double kNoTurn = 1e-5;
-// A zone of a free shape is less than so many shortest sides of its triangles long, or an arc over
+// A zone of a free shape is less than so many shortest sides of its triangles long; or an arc over
 // its triangles rises by less than so many deviations of its flat sides.
 constexpr double kShort = 6, kMostRise = 4;
 // Simpler kinds win ties (cylinder, cone, sphere, torus).
@@ -247,9 +247,9 @@ bool Recognizer::take(Growth growth) {
 }
 
 // Strips beside what is smooth and was not recognized, or beside each other, may be zones of a free
-// shape: they look like cones. A zone is short against its triangles, or its profile, bent as it
-// turns at both ends, would stand off its chord hardly more than its flat sides do: who divides a
-// free shape keeps that alike in both directions, and a shaft between fillets is far longer.
+// shape: they look like cones. A zone is short against its triangles; or hardly wider than what
+// goes on beyond its border, and an arc that turns as it does there would rise over it hardly more
+// than the face itself does: who divides a free shape keeps that alike in both directions.
 void Recognizer::drop_zones_of_free_shapes() {
   std::vector<char> weak(faces_.size(), 0);
   for (std::size_t f = 0; f < faces_.size(); ++f) {
@@ -264,7 +264,7 @@ void Recognizer::drop_zones_of_free_shapes() {
     if (!weak[f]) continue;
     const Growth& face = faces_[f];
     int smooth = 0, vague = 0;
-    std::vector<double> shortest, rises;
+    std::vector<double> shortest, rises, wider;
     double low = 0, high = 0, mean = 0;
     for (const int t : face.triangles) mean += area(t) / double(face.triangles.size());
     for (const int t : face.triangles) {
@@ -282,13 +282,15 @@ void Recognizer::drop_zones_of_free_shapes() {
                           : curved_[u] && regions_.area(regions_.of(u)) < 2 * kFarLarger * mean))
           continue;
         ++vague;
-        const Vec3 side = point(corners(t)[next_corner(k)]) - here;
-        rises.push_back(turn(t, u) * (2 * area(t) / side.norm()) / 8);
+        const double side = (point(corners(t)[next_corner(k)]) - here).norm();
+        rises.push_back(turn(t, u) * (2 * area(t) / side) / 8);
+        wider.push_back(area(t) / area(u));  // on one base
       }
       shortest.push_back(least);
     }
     if (smooth == 0 || 2 * vague < smooth) continue;
-    if (high - low < kShort * median(shortest) || median(rises) < kMostRise * face.deviation)
+    if (high - low < kShort * median(shortest) ||
+        (median(wider) < kFarther && median(rises) < kMostRise * face.deviation))
       dropped.push_back(static_cast<int>(f));
   }
   for (const int f : dropped)
