@@ -20,6 +20,7 @@ sys.meta_path.append(FormerModules())
 
 if TYPE_CHECKING:
     from sphshell_pin.contact import *  # noqa: F403
+    from sphshell_pin.contact.laws import *  # noqa: F403
     from sphshell_pin.dynamics import *  # noqa: F403
     from sphshell_pin.errors import InvalidParameter as InvalidParameter
     from sphshell_pin.errors import SphshellError as SphshellError
@@ -47,9 +48,10 @@ _PARTS = (
 # What a type checker sees above; tests compare the two.
 _NAMES = {
     "contact": "BristleFriction BristleState ContactSet CoulombFriction Feature FoundationLaw "
-    "Friction FunctionLaw HertzLaw HuntCrossleyLaw ImpactLaw MATERIALS Material Method "
+    "Friction FunctionLaw HertzLaw MATERIALS Material Method "
     "MindlinFriction NormalLaw Sphere TableLaw contact_wrench find_material foundation_pressure "
     "friction_between restitution_between",
+    "contact.laws": "HuntCrossleyLaw ImpactLaw",
     "dynamics": "Adaptive CartesianImpedance ContactForceDerivatives ContactLog ContactPair "
     "ContactSwitch DynamicsDerivatives EnergyAudit Event ForceTorqueSensor GravityCompensation "
     "Implicit JointComponents JointFigures JointFriction JointLimits JointPD JointTorqueSensor "

@@ -19,6 +19,8 @@ from sphshell_pin.units import (
 if TYPE_CHECKING:
     from sphshell_pin.contact.hertz_law import Hertz
 
+__all__ = ["HuntCrossleyLaw", "ImpactLaw"]
+
 
 @dataclass(frozen=True)
 class _PowerLaw(NormalLaw):
