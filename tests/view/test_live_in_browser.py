@@ -15,7 +15,7 @@ from tests.view.test_recording_in_browser import count, is_blue, pixels_of, watc
 pytestmark = pytest.mark.browser
 
 SIZE = {"width": 900, "height": 500}
-LONG = 60_000  # [ms] on machines that draw without a graphics card
+LONG = 150_000  # [ms] on machines that draw without a graphics card
 
 
 class Tab:
