@@ -66,6 +66,8 @@ PLACES = ("-", "below", "above", "+x", "-x", "+y")
 """Values of --place; "-": none."""
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".stl", ".obj", ".shl", ".ply", ".off")
 UNITS = {".stl": "mm", ".obj": "mm", ".brep": "mm", ".ply": "mm", ".off": "mm"}
+# Of files that their authors made in another one.
+UNITS |= {"trimesh_featuretype.STL": "in", "bottle.obj": "m", "seat.obj": "m"}
 MOST_FILES = 12
 # The least motion that the joints of an arm at the start give its tip, as a part of the largest.
 _SINGULAR = 0.02
@@ -108,7 +110,7 @@ def find_parts(folder: Path, names: Sequence[str] | None = None) -> list[Path]:
 
 def read_once(file: Path, folder: Path) -> Path:
     """Write the surface of a file as .shl, so that CAD files are not read in each case again."""
-    shell = sp.Shell.from_file(file, unit=UNITS.get(file.suffix.lower()))
+    shell = sp.Shell.from_file(file, unit=UNITS.get(file.name, UNITS.get(file.suffix.lower())))
     path = folder / f"{file.stem}_{file.suffix[1:].lower()}.shl"
     shell.to_file(path)
     return path
