@@ -49,8 +49,8 @@ _PARTS = (
 _NAMES = {
     "contact": "BristleFriction BristleState ContactSet CoulombFriction Feature FoundationLaw "
     "Friction FunctionLaw HertzLaw MATERIALS Material Method "
-    "MindlinFriction NormalLaw Sphere TableLaw contact_wrench find_material foundation_pressure "
-    "friction_between restitution_between",
+    "MindlinFriction NormalLaw Plane Sphere TableLaw contact_wrench find_material "
+    "foundation_pressure friction_between restitution_between",
     "contact.laws": "HuntCrossleyLaw ImpactLaw",
     "dynamics": "Adaptive CartesianImpedance ContactForceDerivatives ContactLog ContactPair "
     "ContactSwitch DynamicsDerivatives EnergyAudit Event ForceTorqueSensor GravityCompensation "

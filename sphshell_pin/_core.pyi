@@ -161,6 +161,7 @@ class Pair:
         method: int,
         law: NormalLaw,
         friction: FrictionLaw | None,
+        plane: bool,
     ) -> None: ...
 
 class JointEffects:

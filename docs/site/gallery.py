@@ -137,6 +137,7 @@ SHOTS = (
     Shot(
         "oblique_impact", 0.00504, "figures.across", "speed across after the blow", "m/s", zoom=1.25
     ),
+    Shot("rattleback", 2.855, "figures.turned", "turns round at", "s", zoom=1.3),
     Shot("sphere_on_shell", 0.75, "figures.swing_period", "period of the rolling", "s", zoom=1.15),
     Shot("allegro_hand_object", 1.5, "figures.carried_weight", "weight carried", "N"),
     Shot("gear_contact", 0.3, "figures.tooth_force", "force between the teeth", "N"),

@@ -14,6 +14,7 @@ from sphshell_pin.contact.materials import (
     restitution_between,
 )
 from sphshell_pin.contact.normal_law import NormalLaw
+from sphshell_pin.contact.plane import Plane
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.contact.table_law import TableLaw
 from sphshell_pin.contact.wrench import BristleState, contact_wrench
@@ -36,6 +37,7 @@ __all__ = [
     "Method",
     "MindlinFriction",
     "NormalLaw",
+    "Plane",
     "Sphere",
     "TableLaw",
     "contact_wrench",

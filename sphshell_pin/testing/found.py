@@ -115,7 +115,7 @@ def passage(result: Result) -> Finding:
         f"'{e.pair}' by its event at t = {e.t:.6g} s" for e in result.events if e.kind == "through"
     ]
     for pair in scene.pairs:
-        if pair.shell is None:
+        if pair.shell is None or pair.sphere is None:
             continue
         corners, places = pair.shell.vertices[pair.shell.triangles], _places(model, pair)
         before: Array | None = None

@@ -1,4 +1,4 @@
-"""The spheres of a contact: one, those of a list, those of the collision geometry; on spheres."""
+"""The ends of a contact: one sphere, those of a list or of the geometry; on spheres; planes."""
 
 import json
 
@@ -110,6 +110,51 @@ def test_collision_spheres_of_frames_and_others(tmp_path):
         (names[1], 0.012),
         (frame, 0.03),
     ]
+
+
+EGG = f"""
+title = "An egg on a table"
+[robot]
+name = "ball"
+[robot.start]
+root_joint = [0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 1.0]
+[[shell]]
+name = "egg"
+primitive = {{ type = "ellipsoid", radii = [0.012, 0.012, 0.018] }}
+frame = "ball"
+[[contact]]
+name = "table"
+plane = {{ frame = "universe", offset = [0.0, 0.0, 0.001], normal = [0.0, 0.0, 2.0] }}
+shell = "egg"
+{LAW}
+[run]
+duration = 0.03
+"""
+
+
+def test_an_egg_falls_on_a_plane(tmp_path):
+    report = run_scenario(write(tmp_path, EGG), tmp_path / "out", recording=False)
+    pair = report.built.scene.pair("table")
+    assert (pair.kind, pair.frame_i, pair.frame_j) == ("plane-shell", "universe", "ball")
+    assert pair.plane.offset == (0.0, 0.0, 0.001)
+    touch = next(event for event in report.result.events if event.kind == "touch")
+    assert touch.t == pytest.approx(np.sqrt(2 * 0.001 / 9.81), rel=1e-3)
+    rows = report.result.contacts
+    assert rows.normal_world == pytest.approx(np.tile([0, 0, -1.0], (len(rows.depth), 1)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ("plane =", 'sphere = {frame = "ball", radius = 0.01}\nplane =', "contact.table: give"),
+        ('shell = "egg"', 'other_sphere = {frame = "ball", radius = 0.01}', "touches a shell"),
+        ('shell = "egg"', 'shell = "egg"\nmethod = "facets"', "must be 'smooth'"),
+        ("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]", "must not be zero"),
+    ],
+)
+def test_what_is_wrong_with_a_plane(old, new, what, tmp_path):
+    with pytest.raises(ScenarioError, match=what):
+        build(write(tmp_path, EGG.replace(old, new, 1)))
 
 
 SPHERE = 'sphere = { frame = "upper/ball", radius = 0.012 }'

@@ -17,6 +17,7 @@ from sphshell_pin.study.validation import (
     cases,
     collect,
     make_validation,
+    rattleback,
     tosses,
 )
 from tests.command import call
@@ -44,6 +45,17 @@ def test_pushed_box_and_its_balls():
     t, speeds, across = carried.push_box(20.0, 0.5)
     assert carried.accelerations(t, speeds) == pytest.approx(carried.EXACT, rel=1e-4)
     assert across[-1] == pytest.approx(0.0, abs=1e-5 * speeds[-1].max())
+
+
+def test_rattleback_as_rigid_rolling():
+    """The first half second, in which the rattling begins."""
+    (t, ours, lost), (_, rigid, zeros) = (
+        one(-5.0, 0.5) for one in (rattleback.spin_on_plane, rattleback.roll)
+    )
+    assert ours[: len(rigid)] == pytest.approx(rigid, abs=0.02)
+    assert np.ptp(rigid) > 0.5
+    assert (t[-1], len(zeros)) == (pytest.approx(0.5), 0)
+    assert abs(lost) < 1e-4
 
 
 def test_tosses_of_a_cube():

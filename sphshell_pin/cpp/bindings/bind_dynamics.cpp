@@ -33,7 +33,8 @@ SE3 to_se3(const Eigen::Matrix4d& m) {
 std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matrix4d& placement_i,
                                 int joint_j, const Eigen::Matrix4d& placement_j, double radius,
                                 double ball, std::shared_ptr<Shell> shell, nb::object source,
-                                int method, const NormalLaw& law, const FrictionLaw* friction) {
+                                int method, const NormalLaw& law, const FrictionLaw* friction,
+                                bool plane) {
   auto pair = std::make_unique<Pair>();
   pair->name = std::move(name);
   pair->joint_i = joint_i;
@@ -45,6 +46,8 @@ std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matr
     pair->geometry = SourcePoints{{}, PythonSource(std::move(source))};
   else if (ball > 0)
     pair->geometry = Ball{{}, ball};
+  else if (plane)
+    pair->geometry = PlaneBelow{{}, std::move(shell)};
   else
     pair->geometry = ShellSurface{{}, std::move(shell), static_cast<Method>(method)};
   pair->law = law;
@@ -179,7 +182,7 @@ void bind_dynamics(nanobind::module_& m) {
       .def_rw("group", &Pair::group)
       .def(nb::new_(&make_pair), "name"_a, "joint_i"_a, "placement_i"_a, "joint_j"_a,
            "placement_j"_a, "radius"_a, "ball"_a, "shell"_a.none(), "source"_a.none(), "method"_a,
-           "law"_a, "friction"_a.none());
+           "law"_a, "friction"_a.none(), "plane"_a);
 
   // NumPy's structured types of the rows that come as plain memory.
   m.def("contact_row_type", [] { return row_type<ContactRow>(kContactRowFields); });

@@ -41,36 +41,25 @@ class Bvh {
     const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
     const float reach = float(radius) * 1.000001f;
     const float limit = reach * reach;
-    if (!(distance2(root_, 0, c) <= limit)) return;
-    const auto take = [&](int leaf) {
-      const int first = first_of(leaf), end = first + count_of(leaf);
-      touch(first);
-      for (int i = first; i < end; ++i) out.push_back(i);
+    walk([&](const Node& n, int side) { return distance2(n, side, c) <= limit; }, out, touch);
+  }
+
+  // The same of all leaves whose box comes below a plane, at `offset` along its unit normal.
+  template <class Touch>
+  void find_below(const Vec3& normal, double offset, std::vector<int>& out, Touch&& touch) const {
+    const float n[3] = {float(normal.x()), float(normal.y()), float(normal.z())};
+    const double local = offset - normal.dot(origin_);
+    float size = 0;
+    for (int k = 0; k < 3; ++k) size += root_.high[0][k] - root_.low[0][k];
+    // A sum in single precision is off by less than this share of the numbers in it.
+    const float limit = float(local + 1e-6 * (size + std::abs(local)));
+    const auto comes_below = [&](const Node& node, int side) {
+      float lowest = 0;
+      for (int k = 0; k < 3; ++k)
+        lowest += std::min(n[k] * node.low[side][k], n[k] * node.high[side][k]);
+      return lowest <= limit;
     };
-    if (nodes_.empty()) return take(root_.child[0]);
-    int stack[kMaxDepth], top = 0, node = 0;
-    for (;;) {
-      const Node& n = nodes_[node];
-      int next = -1;
-      for (int side = 0; side < 2; ++side) {
-        if (!(distance2(n, side, c) <= limit)) continue;
-        const int child = n.child[side];
-        if (child < 0) {
-          take(child);
-        } else if (next < 0) {
-          next = child;
-        } else {
-          prefetch(&nodes_[child]);
-          stack[top++] = child;
-        }
-      }
-      if (next >= 0)
-        node = next;
-      else if (top > 0)
-        node = stack[--top];
-      else
-        return;
-    }
+    walk(comes_below, out, touch);
   }
 
   // Calls visit(position) -> squared distance, nearest boxes first; returns when no box can hold
@@ -140,6 +129,40 @@ class Bvh {
     float low[2][3], high[2][3];
     int child[2];  // >= 0 a node, < 0 a leaf
   };
+
+  template <class Meets, class Touch>
+  void walk(Meets&& meets, std::vector<int>& out, Touch&& touch) const {
+    if (!meets(root_, 0)) return;
+    const auto take = [&](int leaf) {
+      const int first = first_of(leaf), end = first + count_of(leaf);
+      touch(first);
+      for (int i = first; i < end; ++i) out.push_back(i);
+    };
+    if (nodes_.empty()) return take(root_.child[0]);
+    int stack[kMaxDepth], top = 0, node = 0;
+    for (;;) {
+      const Node& n = nodes_[node];
+      int next = -1;
+      for (int side = 0; side < 2; ++side) {
+        if (!meets(n, side)) continue;
+        const int child = n.child[side];
+        if (child < 0) {
+          take(child);
+        } else if (next < 0) {
+          next = child;
+        } else {
+          prefetch(&nodes_[child]);
+          stack[top++] = child;
+        }
+      }
+      if (next >= 0)
+        node = next;
+      else if (top > 0)
+        node = stack[--top];
+      else
+        return;
+    }
+  }
 
   // The square of the distance from c to a child's box, 0 inside.
   static float distance2(const Node& n, int side, const float c[3]) {

@@ -287,6 +287,12 @@ def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
         normal = away / length if length > 0 else np.array([0.0, 0.0, 1.0])
         point = pose_j.translation + pair.other_sphere.radius * normal
         return _Touch(length - pair.other_sphere.radius - pair.sphere.radius, point, normal)
+    if pair.plane is not None and pair.shell is not None:
+        over = pose_i.actInv(pose_j)  # the shell from the plane
+        heights = pair.shell.vertices @ over.rotation[2] + over.translation[2]
+        lowest = int(np.argmin(heights))
+        point = pose_j.act(pair.shell.vertices[lowest])
+        return _Touch(float(heights[lowest]), point, -pose_i.rotation[:, 2])
     if pair.sphere is None or pair.shell is None:
         return None
     at = pair.shell.closest_points(pose_j.actInv(center)[None], method=pair.method)
@@ -365,12 +371,14 @@ def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> A
 
 def _components(pair: ContactPair) -> tuple[str, ...]:
     lines = []
-    if pair.sphere is not None and pair.shell is not None:
+    if pair.shell is not None:
         shell = pair.shell
-        lines.append(
-            f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
-            f"shell '{shell.name}' on frame '{pair.frame_j}'"
+        one = (
+            f"plane on frame '{pair.frame_i}'"
+            if pair.sphere is None
+            else f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}'"
         )
+        lines.append(f"{one} against shell '{shell.name}' on frame '{pair.frame_j}'")
         moving = "moves with its frame" if pair.joint_j else "does not move: no wrench on its side"
         lines.append(
             f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
@@ -398,9 +406,11 @@ def _components(pair: ContactPair) -> tuple[str, ...]:
 def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:
     out: list[str] = []
     where = f"contact '{pair.name}'"
+    radius, shell = pair.least_radius, pair.shell
+    if pair.plane is not None and shell is not None:
+        out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
     if not pair.spheres:
         return out
-    radius, shell = pair.least_radius, pair.shell
     if shell is not None:
         sentence = unit_warning(scene.model, radius, shell.size)
         if sentence:

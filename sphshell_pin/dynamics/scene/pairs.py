@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.contact import Friction, Method, MindlinFriction, NormalLaw, Sphere
+from sphshell_pin.contact import Friction, Method, MindlinFriction, NormalLaw, Plane, Sphere
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.scene.sources import Find, checked_source
@@ -34,8 +34,9 @@ class ContactPair(Summarized):
 
     `frame_i`, `frame_j` name their frames, `joint_i`, `joint_j` the joints, `pose_i`, `pose_j` the
     frames' placements in the joints. The shell is at `placement` in frame_j; a pair of two spheres
-    has `other_sphere`, on body j, instead of it, and a pair of a contact source has `find` instead
-    of `sphere` and `shell`. `group` names the entry of which there are several pairs.
+    has `other_sphere`, on body j, instead of it, a pair of a plane and a shell has `plane`, on body
+    i, instead of `sphere`, and a pair of a contact source has `find` instead of `sphere` and
+    `shell`. `group` names the entry of which there are several pairs.
     """
 
     name: str
@@ -54,6 +55,7 @@ class ContactPair(Summarized):
     find: Find | None = None
     other_sphere: Sphere | None = None
     group: str = ""
+    plane: Plane | None = None
 
     frame = renamed("frame", "frame_j")
     sphere_placement = renamed("sphere_placement", "placement_i")
@@ -61,6 +63,8 @@ class ContactPair(Summarized):
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for what needs a sphere or a shell where there is none."""
+        if self.plane is not None:
+            self._check_plane()
         if self.find is None:
             return
         check_law(self.law, "at the points of a contact source")
@@ -88,9 +92,11 @@ class ContactPair(Summarized):
 
     @property
     def kind(self) -> str:
-        """Return "sphere-shell", "sphere-sphere" or "source"."""
+        """Return "sphere-shell", "sphere-sphere", "plane-shell" or "source"."""
         if self.find is not None:
             return "source"
+        if self.plane is not None:
+            return "plane-shell"
         return "sphere-shell" if self.other_sphere is None else "sphere-sphere"
 
     @property
@@ -110,7 +116,9 @@ class ContactPair(Summarized):
 
     @cached_property
     def placement_i(self) -> pin.SE3:
-        """The sphere's center in joint_i; of a source, frame_i."""
+        """The sphere's center, or the plane, in joint_i; of a source, frame_i."""
+        if self.plane is not None:
+            return self.pose_i * self.plane.placement
         return self.pose_i if self.sphere is None else _center(self.pose_i, self.sphere)
 
     @cached_property
@@ -120,6 +128,29 @@ class ContactPair(Summarized):
             return _center(self.pose_j, self.other_sphere)
         return self.pose_j * self.placement
 
+    def _check_plane(self) -> None:
+        """Refuse what follows from the radius of a sphere, and flat elements."""
+        why = "beside a Plane: it follows from the radius of a Sphere"
+        if self.law.needs_shape:
+            raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}")
+        friction = self.friction
+        if friction is not None and (
+            isinstance(friction, MindlinFriction) or friction._binding.torsional
+        ):
+            raise InvalidParameter("friction", friction, f"must have no disc of contact {why}")
+        if self.method != "smooth":
+            must = "must be 'smooth' beside a Plane; flat elements: a Shell with crease_angle 0"
+            raise InvalidParameter("method", self.method, must)
+
+    @property
+    def core_sides(self) -> tuple[str, str]:
+        """Which of "frame_i", "frame_j" names the frame of the core's body i, and j.
+
+        Against a plane the core's body i is the one with the shell: in the frame of the plane, its
+        body j, the normal is constant.
+        """
+        return ("frame_i", "frame_j") if self.plane is None else ("frame_j", "frame_i")
+
     @property
     def shown(self) -> tuple[str, str, str, str, str]:
         """Name, sphere, what it touches, law and friction, each in a few words."""
@@ -128,7 +159,10 @@ class ContactPair(Summarized):
             for one in (self.sphere, self.other_sphere)
             if one is not None
         ]
-        first = spheres[0] if self.sphere is not None else f"contact source at '{self.frame_i}'"
+        if self.plane is not None:
+            first = f"plane at '{self.frame_i}'"
+        else:
+            first = spheres[0] if self.sphere is not None else f"contact source at '{self.frame_i}'"
         if self.shell is not None:
             other = f"'{self.shell.name}' at '{self.frame_j}', {self.method}"
         else:
@@ -147,12 +181,15 @@ class ContactPair(Summarized):
         if self.find is not None:
             has_state = self.friction is not None and self.friction.has_state
             source = checked_source(self.find, self.name, has_state)
+        ends = [(self.joint_i, self.placement_i), (self.joint_j, self.placement_j)]
+        if self.plane is not None:
+            ends.reverse()  # see core_sides
         core = _core.Pair(
             name=self.name,
-            joint_i=self.joint_i,
-            placement_i=self.placement_i.homogeneous,
-            joint_j=self.joint_j,
-            placement_j=self.placement_j.homogeneous,
+            joint_i=ends[0][0],
+            placement_i=ends[0][1].homogeneous,
+            joint_j=ends[1][0],
+            placement_j=ends[1][1].homogeneous,
             radius=0.0 if self.sphere is None else self.sphere.radius,
             ball=0.0 if self.other_sphere is None else self.other_sphere.radius,
             shell=None if self.shell is None else self.shell.core_for(self.method),
@@ -160,6 +197,7 @@ class ContactPair(Summarized):
             method=int(Method.from_name(self.method)),
             law=self.law._binding,
             friction=None if self.friction is None else self.friction._binding,
+            plane=self.plane is not None,
         )
         core.group = self.group
         return core

@@ -20,7 +20,7 @@ from sphshell_pin.checks import (
     check_names,
     check_vector,
 )
-from sphshell_pin.contact import Friction, ImpactLaw, Method, NormalLaw, Sphere
+from sphshell_pin.contact import Friction, ImpactLaw, Method, NormalLaw, Plane, Sphere
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
@@ -149,7 +149,7 @@ class SceneParts(Summarized):
 
     def add_contact(
         self,
-        sphere: Sphere,
+        sphere: Sphere | Plane,
         shell: Shell | Sphere,
         frame: str = "universe",
         placement: pin.SE3 | None = None,
@@ -163,6 +163,10 @@ class SceneParts(Summarized):
         In place of the shell there may be another Sphere, which is a solid ball in a frame of its
         own: `frame`, `placement` and `method` are then not to be given. Contact is symmetric, but
         that forces act at the point of this other sphere that is closest to the first one's center.
+
+        In place of `sphere` there may be a Plane, a half-space that the shell touches where it is
+        lowest over it: the limit of a sphere whose radius grows. Its normals, too, lead from the
+        shell into the other body, against the normal of the plane.
 
         Without `friction` the contact has none; `method` is "smooth" (default), "facets" or
         "elements". Returns the pair. Warns with UnitWarning of a shell a thousand times larger than

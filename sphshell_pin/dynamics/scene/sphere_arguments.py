@@ -1,4 +1,4 @@
-"""Arguments of Scene.add_contact and add_contacts: spheres, and what they touch."""
+"""Arguments of Scene.add_contact and add_contacts: spheres or a plane, and what they touch."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TypedDict
 import pinocchio as pin
 
 from sphshell_pin.checks import check_name, check_placement, check_type
-from sphshell_pin.contact import Method, Sphere
+from sphshell_pin.contact import Method, Plane, Sphere
 from sphshell_pin.dynamics.scene.models import unit_warning
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.sources import Find
@@ -28,14 +28,23 @@ class Parts(TypedDict, total=False):
     find: Find
     other_sphere: Sphere
     group: str
+    plane: Plane
 
 
 def parts_of(
-    sphere: Sphere, shell: Shell | Sphere, frame: str, placement: pin.SE3 | None, method: str | None
+    sphere: Sphere | Plane,
+    shell: Shell | Sphere,
+    frame: str,
+    placement: pin.SE3 | None,
+    method: str | None,
 ) -> tuple[str, Parts]:
     """Check the arguments of Scene.add_contact; return frame_j and the fields of the pair."""
-    check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame)")
+    if isinstance(sphere, Plane):
+        check_type("shell", shell, Shell, "must be a Shell beside a Plane (of a ball: a sphere)")
+    else:
+        check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame) or a Plane(frame)")
     if isinstance(shell, Sphere):
+        assert isinstance(sphere, Sphere)  # a plane has been refused
         why = "must not be given where shell is a Sphere"
         if frame != "universe":
             raise InvalidParameter("frame", frame, f"{why}: that names its own frame")
@@ -52,7 +61,10 @@ def parts_of(
     method = "smooth" if method is None else method
     Method.from_name(method)
     placement = check_placement("placement", placement)
-    return frame, {"placement": placement, "method": method, "sphere": sphere, "shell": shell}
+    parts: Parts = {"placement": placement, "method": method, "shell": shell}
+    if isinstance(sphere, Plane):
+        return frame, {**parts, "plane": sphere}
+    return frame, {**parts, "sphere": sphere}
 
 
 def default_group(shell: Shell | Sphere) -> str:

@@ -131,9 +131,9 @@ class ForceTorqueSensor(_Analog, kind="force-torque"):
             [
                 k
                 for k, pair in enumerate(scene.pairs)
-                if find_frame(scene.model, getattr(pair, side)) in part.frames
+                if find_frame(scene.model, getattr(pair, pair.core_sides[side])) in part.frames
             ]
-            for side in ("frame_i", "frame_j")
+            for side in (0, 1)
         )
         if not (part.inertia.mass > 0 or part.children or pairs_i or pairs_j):
             raise InvalidParameter(

@@ -54,7 +54,7 @@ from sphshell_pin.scenario.format.reading import (
     read_scenario,
 )
 from sphshell_pin.scenario.format.sliders import check_knobs
-from sphshell_pin.scenario.format.sphere_tables import spheres_of, to_sphere
+from sphshell_pin.scenario.format.sphere_tables import spheres_of, to_end, to_sphere
 from sphshell_pin.summary import Fact, Summarized
 
 Array = npt.NDArray[np.float64]
@@ -333,10 +333,10 @@ def _add_contact(
     with blamed_on(path, key), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
         friction = contact.friction._build(path.parent)
-        if contact.sphere is not None:
-            sphere = to_sphere(contact.sphere)
+        one = contact.sphere or contact.plane
+        if one is not None:
             scene.add_contact(
-                sphere, shell, frame, placement, law, friction, contact.method, contact.name
+                to_end(one), shell, frame, placement, law, friction, contact.method, contact.name
             )
         else:
             scene.add_contacts(

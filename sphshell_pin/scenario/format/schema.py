@@ -229,15 +229,24 @@ class SphereSection(Section):
     offset: Annotated[Vector3, Parameter("m", "sphere offset")] = [0.0, 0.0, 0.0]
 
 
+class PlaneSection(Section):
+    """The plane of a contact, through `offset` [m] in `frame`; `normal` leads out of the solid."""
+
+    frame: str
+    offset: Vector3 = [0.0, 0.0, 0.0]
+    normal: Vector3 = [0.0, 0.0, 1.0]
+
+
 Spheres = Annotated[list[SphereSection | str], Field(min_length=1)]
 
 
 class ContactSection(Section):
-    """A sphere, or several, that may touch a shell or another sphere."""
+    """A sphere, or several, that may touch a shell or another sphere; or a plane and a shell."""
 
     name: str
     sphere: SphereSection | None = None
     spheres: Literal["collision"] | Spheres | None = None
+    plane: PlaneSection | None = None
     shell: str | None = None
     other_sphere: SphereSection | None = None
     method: Annotated[Literal["facets", "smooth", "elements"] | None, Parameter(label="method")] = (
@@ -249,10 +258,13 @@ class ContactSection(Section):
     @model_validator(mode="after")
     def check_ends(self) -> ContactSection:
         """Refuse a contact that lacks one of its two bodies, or has too many."""
-        if (self.sphere is None) == (self.spheres is None):
-            raise ValueError("give either sphere (one) or spheres (several), not both")
+        given = [one for one in (self.sphere, self.spheres, self.plane) if one is not None]
+        if len(given) != 1:
+            raise ValueError("give either sphere (one), spheres (several) or plane, one of them")
         if (self.shell is None) == (self.other_sphere is None):
             raise ValueError("give either shell (its name) or other_sphere, not both")
+        if self.plane is not None and self.other_sphere is not None:
+            raise ValueError("a plane touches a shell: give shell (its name), not other_sphere")
         if self.other_sphere is not None and self.method is not None:
             raise ValueError("method belongs to a shell; drop it beside other_sphere")
         return self

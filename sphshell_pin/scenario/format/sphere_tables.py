@@ -1,19 +1,27 @@
-"""The spheres of a contact, as a scenario states them."""
+"""The spheres, or the plane, of a contact, as a scenario states them."""
 
 from __future__ import annotations
 
-from sphshell_pin.contact import Sphere
+from sphshell_pin.contact import Plane, Sphere
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import collision_spheres
 from sphshell_pin.scenario.format.bodies import Assembly
-from sphshell_pin.scenario.format.schema import ContactSection, SphereSection
+from sphshell_pin.scenario.format.schema import ContactSection, PlaneSection, SphereSection
 
 
 def to_sphere(section: SphereSection) -> Sphere:
     """Return the Sphere of a table."""
     x, y, z = section.offset
     return Sphere(section.radius, frame=section.frame, offset=(x, y, z))
+
+
+def to_end(section: SphereSection | PlaneSection) -> Sphere | Plane:
+    """Return the Sphere or the Plane of a table."""
+    if isinstance(section, SphereSection):
+        return to_sphere(section)
+    (x, y, z), (a, b, c) = section.offset, section.normal
+    return Plane(section.frame, (x, y, z), (a, b, c))
 
 
 def spheres_of(contact: ContactSection, assembly: Assembly, carrier: str) -> list[Sphere]:

@@ -141,7 +141,7 @@ def _cad_pairs(built: Built) -> Iterator[tuple[int, ShellSection]]:
     """Walk the pairs whose shell is of a CAD file."""
     sections = {section.name: section for section in built.scenario.shell}
     for index, pair in enumerate(built.scene.pairs):
-        if pair.shell is None or pair.shell.name not in sections:
+        if pair.shell is None or pair.sphere is None or pair.shell.name not in sections:
             continue
         section = sections[pair.shell.name]
         if section.file is not None and Path(section.file).suffix.lower() in CAD_SUFFIXES:
@@ -177,7 +177,7 @@ def _audit_shell(
     shown = -1
     for place, i in enumerate(own.tolist()):
         pair = built.scene.pairs[log.pair[i]]
-        assert pair.sphere is not None  # pairs of shells have one
+        assert pair.sphere is not None  # _cad_pairs() leaves planes out
         if log.row[i] != shown:
             shown = int(log.row[i])
             pin.forwardKinematics(model, data, np.asarray(result.q[shown], dtype=float))

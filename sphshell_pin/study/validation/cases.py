@@ -41,6 +41,7 @@ MODULES = (
     "leaving",
     "carried",
     "tippe_top",
+    "rattleback",
     "tosses",
 )
 """In the order of the page."""

@@ -162,7 +162,7 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
   } else if (place.feature == Feature::Face) {
     const double u = place.at[0], v = place.at[1];
     if (moves) {
-      const Mat3 dx_dc = dx_dc_of(patch, u, v, center);
+      const Mat3 dx_dc = dx_dc_of(patch, u, v, Sphere{center, 0, 0});
       motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
       motion.parameters = parameters_by(patch, u, v) * dx_dc;
     }
@@ -179,7 +179,7 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
         const CubicCurve side =
             shell.curved()->facets()[place.facet].side(shell.facets()[place.facet], place.index);
         const Vec3 along = side.tangent(place.at[0]);
-        dx_dc = dx_dc_of(side, place.at[0], center);
+        dx_dc = dx_dc_of(side, place.at[0], Sphere{center, 0, 0});
         motion.parameters.row(0) = along.transpose() * dx_dc / along.squaredNorm();
       }
       motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;

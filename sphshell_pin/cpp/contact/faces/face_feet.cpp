@@ -68,6 +68,44 @@ void FaceFeet::add(const Shell& shell, int f, const Sphere& sphere, bool want_dn
   minima.push_back({contact, f, 0, foot.distance * cell.sign < 0});
 }
 
+void FaceFeet::add(const Shell& shell, int f, const Plane& plane, bool want_dx_dn,
+                   std::vector<Minimum>& minima) {
+  const CurvedShell& surface = *shell.curved();
+  const FaceCell& cell = surface.face_cells()[f];
+  const Primitive& shape = surface.faces().shapes[cell.face];
+  const Vec3 &n = plane.normal, &axis = shape.axis;
+  const bool torus = shape.kind == FaceKind::Torus;
+  if (!torus && shape.kind != FaceKind::Sphere) return;
+  Foot& foot = feet_[cell.face];
+  if (foot.round != round_) foot.round = round_, foot.claimed = false;
+  if (foot.claimed) return;
+  const NormalCone& cone = surface.cones()[f];
+  const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
+  Vec3 down = axis.dot(n) * axis - n;  // of a torus: from the axis to where it is lowest
+  const double slant = down.norm();
+  // A level torus is as low all around: below every facet, which are then one.
+  const bool anywhere = torus && slant < kOnAxis;
+  if (anywhere) down = middle - shape.point - axis.dot(middle - shape.point) * axis;
+  const Vec3 out = down.normalized();
+  const Vec3 point = torus ? Vec3(shape.point + shape.radius * out - shape.second * n)
+                           : Vec3(shape.point - shape.radius * n);
+  const double reach = cone.reach + 1e-6 * shell.size();
+  if (!plane.reaches(point) || (point - middle).squaredNorm() > reach * reach) return;
+  const Vec3 outward = cell.sign < 0 ? n : Vec3(-n);
+  if (!holds(shell, f, point, outward, plane.tolerance + surface.gap())) return;
+  foot.claimed = !anywhere;
+  const int element = shell.facets()[f].element;
+  Contact contact = contact_at(point, outward, plane, element, Feature::Face);
+  if (want_dx_dn) {
+    const Mat3 across = Mat3::Identity() - n * n.transpose();
+    contact.dn_dc = -(torus ? shape.second : shape.radius) * across;
+    if (torus && !anywhere)
+      contact.dn_dc -= shape.radius / slant * (Mat3::Identity() - out * out.transpose()) *
+                       (Mat3::Identity() - axis * axis.transpose()) * across;
+  }
+  minima.push_back({contact, f, 0, cell.sign < 0});
+}
+
 // Side by side of the facet: the point must be on the inner side of what bounds it there. Inner: a
 // plane between facets of one face. Shared: the other face cuts. Tangent: both faces touch along
 // the side, and the sign of their distance says nothing. Cubic: the curve itself.
@@ -112,11 +150,12 @@ bool holds(const Shell& shell, int f, const Vec3& point, const Vec3& outward, do
   return true;
 }
 
-SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
+template <class Probe>
+SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   const CurvedShell& surface = *shell.curved();
   const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
   SideFoot out;
-  out.t = nearest_on_side(side, center);
+  out.t = nearest_on_side(side, probe);
   out.point = side.point(out.t);
   out.tangent = side.tangent(out.t);
   if (surface.face_cells().empty() || surface.face_cells()[f].face < 0) return out;
@@ -139,11 +178,11 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
   Vec3 x = out.point;
   for (int i = 0; i < kMostRepeats; ++i) {
     const Intersection here = intersection_at(shape, other, x);
-    const Vec3 from = x - center;
+    const Vec3 from = -probe.pull(x);
     // Newton's method on the curve that is the intersection of two faces: a step along the tangent
     // by the second-order expansion of the distance, and back onto both faces by `offset`. Where
     // the distance is not convex the step is that of steepest descent.
-    const double bend = 1 + from.dot(here.curvature);
+    const double bend = Probe::kMetric + from.dot(here.curvature);
     const double step =
         std::clamp(-from.dot(here.tangent) / (bend > 0.05 ? bend : 1.0), -most, most);
     const Vec3 moved = here.offset + step * (here.tangent + step / 2 * here.curvature);
@@ -153,9 +192,9 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
   // Beyond an end that end is the nearest.
   // Regions of features overlap by this: no center is between two of them.
   const double gap = surface.gap();
-  if ((center - p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm()) {
+  if (probe.pull(p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm()) {
     out.t = 0, out.point = p;
-  } else if ((center - q).dot(tangent_at(q)) >= gap || (q - x).dot(chord) <= -gap * chord.norm()) {
+  } else if (probe.pull(q).dot(tangent_at(q)) >= gap || (q - x).dot(chord) <= -gap * chord.norm()) {
     out.t = 1, out.point = q;
   } else {
     if (out.t <= 0 || out.t >= 1) out.t = 0.5;
@@ -167,18 +206,25 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
 
 // On the curve of two faces as on any curve: tangent tangent^T over the second derivative of half
 // the square of the distance.
-Mat3 dx_dc_of(const Shell& shell, int f, int k, const SideFoot& foot, const Vec3& center) {
+template <class Probe>
+Mat3 dx_dc_of(const Shell& shell, int f, int k, const SideFoot& foot, const Probe& probe) {
   const CurvedShell& surface = *shell.curved();
   if (!surface.face_cells().empty() && surface.face_cells()[f].side[k] != FaceCell::Side::Cubic &&
       surface.face_cells()[f].across[k] >= 0) {
     const FaceCell& cell = surface.face_cells()[f];
     const std::vector<Primitive>& shapes = surface.faces().shapes;
     const Intersection at = intersection_at(shapes[cell.face], shapes[cell.across[k]], foot.point);
-    const double bend = 1 + (foot.point - center).dot(at.curvature);
-    return bend == 0 ? Mat3(Mat3::Zero()) : Mat3(at.tangent * at.tangent.transpose() / bend);
+    const double bend = Probe::kMetric - probe.pull(foot.point).dot(at.curvature);
+    return bend == 0 ? Mat3(Mat3::Zero())
+                     : Mat3(probe.follow() * at.tangent * at.tangent.transpose() / bend);
   }
-  return dx_dc_of(surface.facets()[f].side(shell.facets()[f], k), foot.t, center);
+  return dx_dc_of(surface.facets()[f].side(shell.facets()[f], k), foot.t, probe);
 }
+
+template SideFoot nearest_on_side(const Shell&, int, int, const Sphere&);
+template SideFoot nearest_on_side(const Shell&, int, int, const Plane&);
+template Mat3 dx_dc_of(const Shell&, int, int, const SideFoot&, const Sphere&);
+template Mat3 dx_dc_of(const Shell&, int, int, const SideFoot&, const Plane&);
 
 // Of a face of known shape from its normal, else from the cubic patch; made perpendicular to the
 // side.

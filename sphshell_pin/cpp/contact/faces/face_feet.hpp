@@ -19,6 +19,9 @@ class FaceFeet {
   // claimed it.
   void add(const Shell& shell, int facet, const Sphere& sphere, bool want_dn_dc,
            std::vector<Minimum>& minima);
+  // The same of the lowest point of a face; of planes, cylinders and cones it is on a border.
+  void add(const Shell& shell, int facet, const Plane& plane, bool want_dx_dn,
+           std::vector<Minimum>& minima);
 
  private:
   struct Foot {
@@ -36,16 +39,19 @@ class FaceFeet {
 // Whether a point of a face, with its unit normal on the facet's side, is in a facet.
 bool holds(const Shell& shell, int facet, const Vec3& point, const Vec3& outward, double tolerance);
 
-// The point of a side nearest to a center: of the curve that it is between two faces, or within
-// one, or of its cubic.
+// The point of a side nearest to a center, or lowest: of the curve that it is between two faces, or
+// within one, or of its cubic.
 struct SideFoot {
   double t;  // of the cubic
   Vec3 point, tangent;
 };
-// On the exact intersection curve by Newton's method, from the cubic's closest point.
-SideFoot nearest_on_side(const Shell& shell, int facet, int side, const Vec3& center);
-// How it follows the center (3, 3).
-Mat3 dx_dc_of(const Shell& shell, int facet, int side, const SideFoot& foot, const Vec3& center);
+// On the exact intersection curve by Newton's method, from the cubic's closest point. The probe is
+// a Sphere, or a Plane, over which the point is lowest.
+template <class Probe>
+SideFoot nearest_on_side(const Shell& shell, int facet, int side, const Probe& probe);
+// How it follows the center (3, 3), or the plane's normal.
+template <class Probe>
+Mat3 dx_dc_of(const Shell& shell, int facet, int side, const SideFoot& foot, const Probe& probe);
 
 // The unit direction that leaves a half-edge's side at a point of it into the facet, across the
 // unit tangent; t along the side.

@@ -88,7 +88,8 @@ bool CellQuadrature::add_loop(const Part& w, bool& found) {
   found = false;
   const Vec2 start = (w.corner[0] + w.corner[1] + w.corner[2]) / 3;
   CellPoint lowest;
-  if (!find_minimum(patch_, Vec3::Zero(), {start.x(), start.y()}, lowest)) return true;
+  if (!find_minimum(patch_, Sphere{Vec3::Zero(), 0, 0}, {start.x(), start.y()}, lowest))
+    return true;
   if (!(lowest.point.squaredNorm() < radius2_)) return true;
   // A closed curve round the point nearest to the ball's center, if that is in the part: four
   // points of it, and the arcs between them.

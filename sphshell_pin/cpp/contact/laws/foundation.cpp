@@ -210,7 +210,7 @@ void Foundation::find_depths(const Shell& shell, const Vec3& center, double radi
     const CurvedFacet& bent = curved.facets()[at.facet];
     Nearest found{Feature::Face, 0, 0.0, {}};
     const auto start = closest_on_facet(facet, center);
-    if (!find_minimum(bent.patch(facet), center, start, found.at) &&
+    if (!find_minimum(bent.patch(facet), Sphere{center, 0, 0}, start, found.at) &&
         !find_nearest(facet, bent, curved.cells()[at.facet], center, radius - row.depth, found))
       return;
     const double depth = radius - (found.at.point - center).norm();

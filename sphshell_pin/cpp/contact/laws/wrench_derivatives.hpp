@@ -34,6 +34,9 @@ struct ContactSite {
   const ContactShape* shape = nullptr;  // of Hertz's law
   // By its place, of a contact point that is no point of the sphere's normal.
   const Mat3* point_by = nullptr;
+  // How the place moves on the body as that turns: zero but of a shell on a plane, whose lowest
+  // point it is.
+  Mat3 place_by_turn = Mat3::Zero();
 };
 
 // Derivatives at a ContactSite. `place`: a displacement of what the contact follows, `twist`: the

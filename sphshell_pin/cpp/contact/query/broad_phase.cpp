@@ -37,6 +37,43 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
   keep_in_cone(shell, cones, bulge, sphere, margin, cells);
 }
 
+// At a minimum the plane's normal is among those of the features that the facet owns.
+void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
+                      const Plane& plane, const CellBounds* cells) {
+  followed_ = nullptr;
+  overlapping.clear(), candidates.clear();
+  const NormalCone* all = cones.data();
+  shell.bvh().find_below(plane.normal, plane.offset + bulge, overlapping, [all](int first) {
+    prefetch(all + first);
+    prefetch(all + first + 3);
+  });
+  const float n[3] = {float(plane.normal.x()), float(plane.normal.y()), float(plane.normal.z())};
+  const double local = plane.offset - plane.normal.dot(shell.origin());
+  const float limit = float(local + 1e-6 * (shell.size() + std::abs(local)));
+  for (int f : overlapping) {
+    const NormalCone& cone = all[f];
+    const float along = n[0] * cone.axis[0] + n[1] * cone.axis[1] + n[2] * cone.axis[2];
+    // The tangent of the angle between them, squared, without a division; 1e-5 for the rounding.
+    const float most = cone.tan_opening * std::abs(along) + 1e-5f;
+    if (cone.tan_opening < kAnyOpening && 1 - along * along > most * most + 1e-6f) continue;
+    // The ball of a cone holds all of a bent element.
+    if (n[0] * cone.middle[0] + n[1] * cone.middle[1] + n[2] * cone.middle[2] - cone.reach > limit)
+      continue;
+    for (int line = 0; line < int(sizeof(Facet)); line += 64)
+      prefetch(reinterpret_cast<const char*>(&shell.facets()[f]) + line);
+    if (cells != nullptr) prefetch(&cells[f]);
+    candidates.push_back(f);
+  }
+  // A face of known shape may bulge a little more than its cubic.
+  const auto is_above = [&](int f) {
+    const Vec3* at = shell.facets()[f].corner;
+    const double deepest = std::max({plane.depth(at[0]), plane.depth(at[1]), plane.depth(at[2])});
+    return deepest + 1.25 * (cells ? cells[f].bulge : bulge) <= 0;
+  };
+  candidates.erase(std::remove_if(candidates.begin(), candidates.end(), is_above),
+                   candidates.end());
+}
+
 // The center may be inside the cone of normals of the features that a facet owns
 // (Johnson and Cohen, I3D 2001), wherever it is within the margin and however far within it the
 // element bulges from its triangle.

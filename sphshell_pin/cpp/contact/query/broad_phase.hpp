@@ -21,6 +21,11 @@ class BroadPhase {
   void find(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
             const Sphere& sphere, const CellBounds* cells = nullptr);
 
+  // Facets whose box comes below the plane, widened by `bulge`, and those of them that may hold a
+  // minimum of the height over it.
+  void find(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
+            const Plane& plane, const CellBounds* cells = nullptr);
+
   std::vector<int> overlapping, candidates;
 
  private:

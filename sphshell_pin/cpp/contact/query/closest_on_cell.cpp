@@ -13,7 +13,7 @@ namespace {
 using Vec2 = Eigen::Vector2d;
 
 // |x(u, v) - c|^2 / 2 at a point of a patch: half the square of the distance, with its first
-// derivatives and the second ones, those of a plane first.
+// derivatives and the second ones, those of a plane first. Of a Plane, the height, scaled.
 // With f = |x(u, v) - c|^2 / 2: f_u = (x - c) . x_u and f_uv = x_u . x_v + (x - c) . x_uv. The fuu,
 // fuv, fvv are the first term alone, the metric of the surface; huu, huv, hvv are the Hessian.
 struct Expansion {
@@ -21,14 +21,15 @@ struct Expansion {
   double gu, gv, fuu, fuv, fvv;
   double huu, huv, hvv;
 
-  Expansion(const CubicPatch& patch, double u, double v, const Vec3& c)
-      : from(patch.point(u, v) - c) {
+  template <class Probe>
+  Expansion(const CubicPatch& patch, double u, double v, const Probe& probe)
+      : from(-probe.pull(patch.point(u, v))) {
     const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v);
     gu = from.dot(xu), gv = from.dot(xv);
     fuu = xu.dot(xu), fuv = xu.dot(xv), fvv = xv.dot(xv);
-    huu = fuu + from.dot(patch.along_uu(u, v));
-    huv = fuv + from.dot(patch.along_uv(u, v));
-    hvv = fvv + from.dot(patch.along_vv(u, v));
+    huu = Probe::kMetric * fuu + from.dot(patch.along_uu(u, v));
+    huv = Probe::kMetric * fuv + from.dot(patch.along_uv(u, v));
+    hvv = Probe::kMetric * fvv + from.dot(patch.along_vv(u, v));
   }
 
   // Positive definite, with a margin against round-off relative to the area element.
@@ -44,6 +45,8 @@ struct Expansion {
     return {-(c * gu - b * gv) / determinant, -(a * gv - b * gu) / determinant};
   }
 };
+
+const Sphere kOrigin{Vec3::Zero(), 0, 0};
 
 // How far a parameter point is outside the triangle u, v >= 0, u + v <= 1; negative within.
 double outside(double u, double v) { return std::max({-u, -v, u + v - 1}); }
@@ -145,7 +148,7 @@ class CellSearch {
   // where the bounds hold.
   void look_into(const Vec2 (&corner)[3], int halvings) {
     const Vec2 middle = (corner[0] + corner[1] + corner[2]) / 3;
-    Expansion here(patch_, middle.x(), middle.y(), Vec3::Zero());
+    Expansion here(patch_, middle.x(), middle.y(), kOrigin);
     axes_.first(here.gu, here.gv);
     axes_.second(here.huu, here.huv, here.hvv);
     double reach = 0;
@@ -192,7 +195,7 @@ class CellSearch {
   void descend(const Vec2& start) {
     double u = start.x(), v = start.y(), now = patch_.point(u, v).squaredNorm();
     for (int i = 0; i < 3 * kMostIterations; ++i) {
-      const Vec2 step = Expansion(patch_, u, v, Vec3::Zero()).step();
+      const Vec2 step = Expansion(patch_, u, v, kOrigin).step();
       double share = 1;
       for (; share > 1e-6; share /= 2) {
         const double a = u + share * step.x(), b = v + share * step.y();
@@ -206,7 +209,7 @@ class CellSearch {
     }
     // The last steps change the distance by less than round-off.
     CellPoint found{u, v, patch_.point(u, v)}, exact;
-    if (find_minimum(patch_, Vec3::Zero(), {u, v}, exact) &&
+    if (find_minimum(patch_, kOrigin, {u, v}, exact) &&
         exact.point.squaredNorm() < now * (1 + 1e-12))
       found = exact;
     const double distance2 = found.point.squaredNorm();
@@ -245,11 +248,12 @@ std::pair<double, double> closest_on_facet(const Facet& facet, const Vec3& x) {
 
 // Steps are limited to half the parameter range; an iterate that is far outside (by more than the
 // cell itself) has left the patch's reach and ends the search.
-bool find_minimum(const CubicPatch& patch, const Vec3& x, std::pair<double, double> start,
+template <class Probe>
+bool find_minimum(const CubicPatch& patch, const Probe& probe, std::pair<double, double> start,
                   CellPoint& out) {
   auto [u, v] = start;
   for (int i = 0; i < kMostIterations; ++i) {
-    const Expansion here(patch, u, v, x);
+    const Expansion here(patch, u, v, probe);
     Vec2 step = here.step();
     const double length = step.cwiseAbs().maxCoeff();
     if (length > 0.5) step *= 0.5 / length;
@@ -272,22 +276,33 @@ bool find_nearest(const Facet& facet, const CurvedFacet& curved, const CellBound
 
 // By the implicit function theorem: the closest point solves f_u = f_v = 0, so d(u, v)/dc = H^-1
 // [x_u x_v]^T, and dx/dc = [x_u x_v] H^-1 [x_u x_v]^T, with H the Hessian of half the square.
-Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Vec3& x) {
-  const Expansion here(patch, u, v, x);
+template <class Probe>
+Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Probe& probe) {
+  const Expansion here(patch, u, v, probe);
   Eigen::Matrix<double, 3, 2> along;
   along << patch.along_u(u, v), patch.along_v(u, v);
   Eigen::Matrix2d second;
   second << here.huu, here.huv, here.huv, here.hvv;
   if (second.determinant() == 0) return Mat3::Zero();
-  return along * second.inverse() * along.transpose();
+  return probe.follow() * (along * second.inverse() * along.transpose());
 }
 
 // The same in one dimension: x' x'^T / (|x'|^2 + (x - c) . x'').
-Mat3 dx_dc_of(const CubicCurve& side, double t, const Vec3& x) {
+template <class Probe>
+Mat3 dx_dc_of(const CubicCurve& side, double t, const Probe& probe) {
   const Vec3 along = side.tangent(t);
-  const double second = along.squaredNorm() + (side.point(t) - x).dot(side.second(t));
+  const double second =
+      Probe::kMetric * along.squaredNorm() - probe.pull(side.point(t)).dot(side.second(t));
   if (second == 0) return Mat3::Zero();
-  return along * along.transpose() / second;
+  return probe.follow() * (along * along.transpose() / second);
 }
+
+using Start = std::pair<double, double>;
+template bool find_minimum(const CubicPatch&, const Sphere&, Start, CellPoint&);
+template bool find_minimum(const CubicPatch&, const Plane&, Start, CellPoint&);
+template Mat3 dx_dc_of(const CubicPatch&, double, double, const Sphere&);
+template Mat3 dx_dc_of(const CubicPatch&, double, double, const Plane&);
+template Mat3 dx_dc_of(const CubicCurve&, double, const Sphere&);
+template Mat3 dx_dc_of(const CubicCurve&, double, const Plane&);
 
 }  // namespace sphshell

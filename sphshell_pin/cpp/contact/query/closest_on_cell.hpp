@@ -28,9 +28,10 @@ std::pair<double, double> on_side(int k, double t);
 // The closest point on the flat facet, moved into it, as parameters.
 std::pair<double, double> closest_on_facet(const Facet& facet, const Vec3& x);
 
-// The minimum of the distance from x that Newton's method finds from `start`. False where it lies
-// outside the cell, or where there is none.
-bool find_minimum(const CubicPatch& patch, const Vec3& x, std::pair<double, double> start,
+// The minimum of the distance from a Sphere's center, or of the height over a Plane, that Newton's
+// method finds from `start`. False where it lies outside the cell, or where there is none.
+template <class Probe>
+bool find_minimum(const CubicPatch& patch, const Probe& probe, std::pair<double, double> start,
                   CellPoint& out);
 
 // The closest point of a cell whatever its shape: least on its sides, for certain, and within it,
@@ -39,10 +40,11 @@ bool find_minimum(const CubicPatch& patch, const Vec3& x, std::pair<double, doub
 bool find_nearest(const Facet& facet, const CurvedFacet& curved, const CellBounds& bounds,
                   const Vec3& x, double radius, Nearest& out);
 
-// How the closest point follows x (3, 3): the second derivatives of the distance decide. Zero
-// where they do not.
-// u, v and t are those of the closest point to x.
-Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Vec3& x);
-Mat3 dx_dc_of(const CubicCurve& side, double t, const Vec3& x);
+// How the closest point follows the center (3, 3), or the lowest one the plane's normal: the second
+// derivatives of the distance decide. Zero where they do not. u, v and t are those of that point.
+template <class Probe>
+Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Probe& probe);
+template <class Probe>
+Mat3 dx_dc_of(const CubicCurve& side, double t, const Probe& probe);
 
 }  // namespace sphshell

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "contact/query/contact.hpp"
 #include "contact/query/tolerances.hpp"
 #include "shell/curved/curved.hpp"
 
@@ -137,6 +138,22 @@ inline double nearest_on_side(const CubicCurve& side, const Vec3& x) {
     parts[count++] = {first, part.from, part.width / 2};
   }
   return best;
+}
+
+inline double nearest_on_side(const CubicCurve& side, const Sphere& sphere) {
+  return nearest_on_side(side, sphere.center);
+}
+
+// Where it is lowest over a plane: h' rises through zero in one place, if at all.
+inline double nearest_on_side(const CubicCurve& side, const Plane& plane) {
+  const Vec3& n = plane.normal;
+  const double h1 = n.dot(side.c1), h2 = n.dot(side.c2), h3 = n.dot(side.c3);
+  const auto height = [&](double t) { return t * (h1 + t * (h2 + t * h3)); };
+  const double best = height(1) < 0 ? 1 : 0, quarter = h2 * h2 - 3 * h1 * h3;
+  if (!(quarter > 0)) return best;
+  // Of the two forms of the root of h1 + 2 h2 t + 3 h3 t^2 that which does not cancel.
+  const double root = std::sqrt(quarter), t = h2 > 0 ? -h1 / (h2 + root) : (root - h2) / (3 * h3);
+  return t > 0 && t < 1 && height(t) < height(best) ? t : best;
 }
 
 }  // namespace sphshell

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <type_traits>
 
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/query/closest_on_side.hpp"
@@ -13,19 +14,25 @@ namespace {
 
 // The contact at t on side k of facet f, as a saddle has it. Its ends are corners, which do not
 // move with the center.
-Minimum on_side(const Shell& shell, int f, int k, double t, const Sphere& sphere, bool want_dn_dc) {
+template <class Probe>
+Minimum on_side(const Shell& shell, int f, int k, double t, const Probe& probe, bool want_dn_dc) {
   const Facet& facet = shell.facets()[f];
   const bool vertex = t == 0 || t == 1;
   const int corner = t == 1 ? next_corner(k) : k;
   SideFoot foot{t, facet.corner[corner], Vec3::Zero()};
-  if (!vertex) foot = nearest_on_side(shell, f, k, sphere.center);
-  Contact contact = contact_at(foot.point, facet.normal, sphere, facet.element,
+  if (!vertex) foot = nearest_on_side(shell, f, k, probe);
+  Contact contact = contact_at(foot.point, facet.normal, probe, facet.element,
                                vertex ? Feature::Vertex : Feature::Edge);
   if (want_dn_dc)
     contact.dn_dc =
-        dn_dc_of(contact, sphere.radius,
-                 vertex ? Mat3(Mat3::Zero()) : dx_dc_of(shell, f, k, foot, sphere.center));
+        slopes_of(contact, probe, vertex ? Mat3(Mat3::Zero()) : dx_dc_of(shell, f, k, foot, probe));
   return {contact, f, vertex ? corner : k, false};
+}
+
+// Rows: two directions in the plane, and its normal.
+Mat3 axes_of(const Plane& plane) {
+  const Vec3 &n = plane.normal, east = n.unitOrthogonal();
+  return (Mat3() << east, n.cross(east), n).finished().transpose();
 }
 
 }  // namespace
@@ -69,7 +76,8 @@ int FacetTable::find(int facet) {
 // spanning forest of these sides, of which those between two minima are saddles; what is left. Ties
 // are broken by feature, element and facet, so that the result does not depend on the order in
 // which the tree of boxes was walked.
-void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+template <class Probe>
+void Components::merge(const Shell& shell, const Probe& probe, bool want_dn_dc,
                        std::vector<Minimum>& minima) {
   std::sort(minima.begin(), minima.end(), [](const Minimum& x, const Minimum& y) {
     const Contact &a = x.contact, &b = y.contact;
@@ -80,24 +88,31 @@ void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc
   });
   // Of what was found on one cell the deepest is its closest point.
   cells_.clear();
+  level_.clear();
   std::size_t kept = 0;
   for (std::size_t i = 0; i < minima.size(); ++i) {
     bool added = false;
-    cells_.number(minima[i].facet, added);
+    const int cell = cells_.number(minima[i].facet, added);
     if (added) minima[kept++] = minima[i];
+    if constexpr (std::is_same_v<Probe, Plane>) {
+      const Contact& contact = minima[i].contact;
+      if (added) level_.emplace_back();
+      if (minima[cell].contact.depth - contact.depth <= kLevelFace * probe.scale())
+        level_[cell].extend(Vec3(axes_of(probe) * contact.point));
+    }
   }
   minima.erase(minima.begin() + kept, minima.end());
-  if (minima.size() < 2) return;
+  if (minima.size() < 2) return move_to_middles(probe, minima);
   tree_.clear();
   reset_components(minima.size());
   if (components_.size() < minima.size()) components_.resize(minima.size());
   for (std::size_t i = 0; i < minima.size(); ++i)
     components_[i].cells = 1, components_[i].open.clear();
-  connect_equal_points(sphere, minima);
+  connect_equal_points(probe, minima);
   for (int i = 0; i < static_cast<int>(minima.size()); ++i)
-    add_candidates(shell, sphere, minima[i].facet, i, i);
-  grow_components(shell, sphere, minima.size());
-  find_saddles(shell, sphere, want_dn_dc, minima);
+    add_candidates(shell, probe, minima[i].facet, i, i);
+  grow_components(shell, probe, minima.size());
+  find_saddles(shell, probe, want_dn_dc, minima);
 }
 
 // Union-find with path halving.
@@ -121,8 +136,9 @@ void Components::reset_components(std::size_t minima) {
 }
 
 // Sheets that lie on each other are one where they have one closest point.
-void Components::connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima) {
-  const double same = kSamePlace * sphere.radius;
+template <class Probe>
+void Components::connect_equal_points(const Probe& probe, const std::vector<Minimum>& minima) {
+  const double same = kSamePlace * probe.scale();
   const auto point = [&](int i) -> const Vec3& { return minima[i].contact.point; };
   // Sorted along x only neighbors are compared: sheets seldom have many minima.
   by_x_.resize(minima.size());
@@ -148,19 +164,18 @@ bool Components::lower(const SaddleCandidate& a, const SaddleCandidate& b) {
 }
 
 // Pushes the ways out of a cell: to the other fans of a vertex where sheets meet in that point
-// only, and over the sides. `reach` is larger than the radius by the bulge, the most that a curved
-// side is off its chord: the depth from the chord is an upper bound, cheap, and made exact in
-// expand() if it comes up at all.
-void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f, int cell,
+// only, and over the sides. With the bulge, the most that a curved side is off its chord, the depth
+// of the chord is an upper bound, cheap, and made exact in expand() if it comes up at all.
+template <class Probe>
+void Components::add_candidates(const Shell& shell, const Probe& probe, int f, int cell,
                                 int component) {
   const Facet& facet = shell.facets()[f];
   const CellBounds& bounds = shell.curved()->cells()[f];
-  const double reach = sphere.radius + bounds.bulge;
   std::vector<SaddleCandidate>& open = components_[component].open;
   const Topology& topology = shell.topology();
   for (int k = 0; k < 3 && !topology.pinches.empty(); ++k) {
     const Pinch* pinch = topology.pinch_at(shell.triangles()[shell.triangle_of_facet(f)][k]);
-    const double depth = sphere.radius - (facet.corner[k] - sphere.center).norm();
+    const double depth = probe.depth(facet.corner[k]);
     if (pinch == nullptr || depth <= 0) continue;
     const int name = shell.facet_half_edge(pinch->fans[0][0]);
     for (const std::vector<int>& fan : pinch->fans) {
@@ -178,14 +193,12 @@ void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f,
     if (beyond == kBoundary || (beyond >= 0 && belongs_to(triangle_of(beyond), component)))
       continue;
     const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
-    const double t =
-        std::clamp((sphere.center - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
-    const double distance = (facet.corner[k] + t * d - sphere.center).norm();
-    if (distance >= reach) continue;
+    const double bound = probe.bound_along(facet.corner[k], d, bounds.bulge);
+    if (bound <= 0) continue;
     // A side is seen from the first of its triangles, so that a point has one name.
     const auto add_candidate = [&](int h, int name) {
-      open.push_back({reach - distance, SaddleCandidate::Kind::Bound, cell, triangle_of(h),
-                      triangle_of(name), side_of(name), 0, 0});
+      open.push_back({bound, SaddleCandidate::Kind::Bound, cell, triangle_of(h), triangle_of(name),
+                      side_of(name), 0, 0});
       std::push_heap(open.begin(), open.end(), lower);
     };
     const int here = 3 * f + k;
@@ -206,7 +219,8 @@ void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f,
 // The highest candidate that leads out of a component belongs to some largest spanning forest
 // (Prim). The smaller components go first, and all in turn: what remains when one component is
 // left, or those that are left lead nowhere inside the sphere, is not looked at.
-void Components::grow_components(const Shell& shell, const Sphere& sphere, std::size_t minima) {
+template <class Probe>
+void Components::grow_components(const Shell& shell, const Probe& probe, std::size_t minima) {
   active_.resize(minima);
   std::iota(active_.begin(), active_.end(), 0);
   for (int size = 16; active_.size() > 1; size *= 2) {
@@ -214,7 +228,7 @@ void Components::grow_components(const Shell& shell, const Sphere& sphere, std::
       int component = active_[i];
       if (root(component) != component) continue;
       while (component >= 0 && components_[component].cells < size)
-        component = expand(shell, sphere, component);
+        component = expand(shell, probe, component);
     }
     active_.erase(
         std::remove_if(active_.begin(), active_.end(),
@@ -226,7 +240,8 @@ void Components::grow_components(const Shell& shell, const Sphere& sphere, std::
 // Takes one more candidate into account; returns the component then, -1 once it leads nowhere.
 // Bounds are made exact where they come up first.
 // `open` is sorted by depth: where its highest candidate is outside the sphere, all are.
-int Components::expand(const Shell& shell, const Sphere& sphere, int component) {
+template <class Probe>
+int Components::expand(const Shell& shell, const Probe& probe, int component) {
   std::vector<SaddleCandidate>& open = components_[component].open;
   if (open.empty()) return -1;
   std::pop_heap(open.begin(), open.end(), lower);
@@ -240,9 +255,9 @@ int Components::expand(const Shell& shell, const Sphere& sphere, int component) 
   if (belongs_to(candidate.to, component)) return component;
   // Put back with its exact depth: it may not be the highest any more.
   if (candidate.kind == SaddleCandidate::Kind::Bound) {
-    const SideFoot foot = nearest_on_side(shell, candidate.facet, candidate.side, sphere.center);
+    const SideFoot foot = nearest_on_side(shell, candidate.facet, candidate.side, probe);
     candidate.t = foot.t;
-    candidate.depth = sphere.radius - (foot.point - sphere.center).norm();
+    candidate.depth = probe.depth(foot.point);
     candidate.kind = SaddleCandidate::Kind::Side;
     open.push_back(candidate);
     std::push_heap(open.begin(), open.end(), lower);
@@ -255,7 +270,7 @@ int Components::expand(const Shell& shell, const Sphere& sphere, int component) 
     parent_.push_back(component);
     ++components_[component].cells;
     tree_.push_back(candidate);
-    add_candidates(shell, sphere, facet, candidate.to, component);
+    add_candidates(shell, probe, facet, candidate.to, component);
     return component;
   }
   const int other = root(candidate.to);
@@ -280,7 +295,8 @@ int Components::expand(const Shell& shell, const Sphere& sphere, int component) 
 // minimum each are joined, the side's closest point is a saddle between these minima. Where it is
 // hardly shallower than the shallower minimum, both are left out: the energy changes by the
 // difference of their U alone.
-void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+template <class Probe>
+void Components::find_saddles(const Shell& shell, const Probe& probe, bool want_dn_dc,
                               std::vector<Minimum>& minima) {
   std::sort(tree_.begin(), tree_.end(),
             [](const SaddleCandidate& a, const SaddleCandidate& b) { return lower(b, a); });
@@ -297,14 +313,18 @@ void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool wan
     const int deeper = std::min(i, j), shallower = std::max(i, j);
     // Between two parts of a ring there is none: its corners are on the circle to that gap.
     const bool one_ring = minima[deeper].off_axis < 1 && minima[shallower].off_axis < 1;
-    const double least = one_ring ? shell.curved()->gap() : kNoSaddle * sphere.radius;
+    const double least = one_ring ? shell.curved()->gap()
+                                  : (level_.empty() ? kNoSaddle : kLevelFace) * probe.scale();
     if (candidate.depth >= minima[shallower].contact.depth - least) {
       absorbed_[shallower] = 1;
+      if (!level_.empty() && minima[deeper].contact.depth - minima[shallower].contact.depth <=
+                                 kLevelFace * probe.scale())
+        level_[deeper].extend(level_[shallower]);
       continue;
     }
     Minimum saddle =
         candidate.kind == SaddleCandidate::Kind::Side
-            ? on_side(shell, candidate.facet, candidate.side, candidate.t, sphere, want_dn_dc)
+            ? on_side(shell, candidate.facet, candidate.side, candidate.t, probe, want_dn_dc)
             : minima[candidate.minimum];
     // Force and energy of a saddle are subtracted; so is the derivative of its normal, which dn_dc
     // holds with the weight.
@@ -316,6 +336,7 @@ void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool wan
     minima.push_back(saddle);
     absorbed_.push_back(0);
   }
+  move_to_middles(probe, minima);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < minima.size(); ++i) {
     if (absorbed_[i]) continue;
@@ -324,6 +345,16 @@ void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool wan
     minima[kept++] = minima[i];
   }
   minima.erase(minima.begin() + kept, minima.end());
+}
+
+// On a plane one contact is in the middle of what lies level: of the box, which does not depend on
+// how a face is divided, and is within its hull.
+template <class Probe>
+void Components::move_to_middles(const Probe& probe, std::vector<Minimum>& minima) const {
+  if constexpr (std::is_same_v<Probe, Plane>)
+    for (std::size_t i = 0; i < level_.size(); ++i)
+      if (level_[i].diagonal().head<2>().norm() > kLevelFace * probe.scale())
+        minima[i].contact.point = axes_of(probe).transpose() * level_[i].center();
 }
 
 // Minima of nearly one depth and normal, the saddle between them as well, are shown as one contact.
@@ -346,5 +377,8 @@ int Components::leader_of(int minimum) {
   while (leader_[minimum] != minimum) minimum = leader_[minimum] = leader_[leader_[minimum]];
   return minimum;
 }
+
+template void Components::merge(const Shell&, const Sphere&, bool, std::vector<Minimum>&);
+template void Components::merge(const Shell&, const Plane&, bool, std::vector<Minimum>&);
 
 }  // namespace sphshell

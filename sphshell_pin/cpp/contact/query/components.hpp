@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "contact/query/minimum.hpp"
@@ -42,9 +43,10 @@ class FacetTable {
 // the others are minima, and the sides where their components merge are saddles.
 class Components {
  public:
-  // Leaves one minimum a cell, deepest first, and adds the saddles, of weight -1.
-  void merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
-             std::vector<Minimum>& minima);
+  // Leaves one minimum a cell, deepest first, and adds the saddles, of weight -1. The probe is a
+  // Sphere or a Plane.
+  template <class Probe>
+  void merge(const Shell& shell, const Probe& probe, bool want_dn_dc, std::vector<Minimum>& minima);
 
  private:
   // Where two cells meet: over a side, at its closest point, first only bounded from above; or at
@@ -74,15 +76,22 @@ class Components {
   bool belongs_to(int facet, int component);
   void reset_components(std::size_t minima);
   // The ways out of a cell, onto the heap of its component.
-  void add_candidates(const Shell& shell, const Sphere& sphere, int facet, int cell, int component);
-  void connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima);
+  template <class Probe>
+  void add_candidates(const Shell& shell, const Probe& probe, int facet, int cell, int component);
+  template <class Probe>
+  void connect_equal_points(const Probe& probe, const std::vector<Minimum>& minima);
   // Finds cells and the sides between them, as far as they decide on saddles.
-  void grow_components(const Shell& shell, const Sphere& sphere, std::size_t minima);
-  int expand(const Shell& shell, const Sphere& sphere, int component);
-  void find_saddles(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+  template <class Probe>
+  void grow_components(const Shell& shell, const Probe& probe, std::size_t minima);
+  template <class Probe>
+  int expand(const Shell& shell, const Probe& probe, int component);
+  template <class Probe>
+  void find_saddles(const Shell& shell, const Probe& probe, bool want_dn_dc,
                     std::vector<Minimum>& minima);
   void group_if_nearly_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
                            Contact& saddle);
+  template <class Probe>
+  void move_to_middles(const Probe& probe, std::vector<Minimum>& minima) const;
   // The minimum that a group is shown in place of.
   int leader_of(int minimum);
 
@@ -91,6 +100,8 @@ class Components {
   std::vector<Component> components_;  // beside the minima, and as many more as were ever needed
   std::vector<int> by_x_, active_;
   std::vector<SaddleCandidate> tree_;
+  // Beside the minima over a plane: the box, in its axes, of what is as deep as each.
+  std::vector<Eigen::AlignedBox3d> level_;
   std::vector<char> absorbed_;  // beside the minima and saddles
   std::vector<int> leader_;     // beside the minima: towards the one that it is grouped with
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/query/closest_on_side.hpp"
@@ -10,40 +11,52 @@
 
 namespace sphshell {
 
-void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
+template <class Probe>
+void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad, bool want_dn_dc,
                        std::vector<Minimum>& minima) {
+  constexpr bool sphere = std::is_same_v<Probe, Sphere>;
   const CurvedShell& surface = *shell.curved();
   // Where nothing is bent there is no need to look.
   const CellBounds* cells = surface.bulge() > 0 ? surface.cells().data() : nullptr;
   // All zero: a facet whose element is its flat triangle.
   const CellBounds flat{};
-  broad.find(shell, surface.cones(), surface.bulge(), sphere, cells);
+  broad.find(shell, surface.cones(), surface.bulge(), probe, cells);
   outlooks_.clear(), borders_.clear();
   const LargeArray<FaceCell>& faces = surface.face_cells();
   if (!faces.empty()) feet_.clear(surface);
+  const auto prefetch_cell = [&](int f) {
+    for (int line = 0; line < int(sizeof(CurvedFacet)); line += 64)
+      prefetch(reinterpret_cast<const char*>(&surface.facets()[f]) + line);
+  };
+  if (!sphere) std::for_each(broad.candidates.begin(), broad.candidates.end(), prefetch_cell);
   for (int f : broad.candidates) {
     if (!faces.empty() && faces[f].closed) {
-      feet_.add(shell, f, sphere, want_dn_dc, minima);
+      feet_.add(shell, f, probe, want_dn_dc, minima);
       borders_.push_back(f);
       continue;
     }
-    const Outlook outlook(f, shell.facets()[f], surface.cones()[f], cells ? cells[f] : flat,
-                          sphere);
+    const Facet& facet = shell.facets()[f];
+    const CellBounds& bounds = cells ? cells[f] : flat;
+    const Outlook outlook = [&]() -> Outlook {
+      if constexpr (sphere)
+        return {f, facet, surface.cones()[f], bounds, probe};
+      else
+        return {f, surface.facets()[f].patch(facet), probe, probe.tolerance + surface.gap()};
+    }();
     if (outlook.empty()) continue;
     // Control points are read in the next loop; until then they come into the cache.
-    for (int line = 0; line < int(sizeof(CurvedFacet)); line += 64)
-      prefetch(reinterpret_cast<const char*>(&surface.facets()[f]) + line);
+    if (sphere) prefetch_cell(f);
     outlooks_.push_back(outlook);
   }
   // The order of minima is made unique later, by Components::merge().
-  const Task task{shell, sphere, want_dn_dc, minima};
+  const Task<Probe> task{shell, probe, want_dn_dc, minima};
   for (const Outlook& outlook : outlooks_) {
     const Owned& owned = surface.facets()[outlook.facet].owned;
     if (outlook.within) {
-      if (surface.facets()[outlook.facet].flat)
-        add_flat(task, outlook);
-      else
+      if (!surface.facets()[outlook.facet].flat)
         add_bent(task, outlook);
+      else if constexpr (sphere)
+        add_flat(task, outlook);
     }
     for (int k = 0; k < 3; ++k) {
       if (outlook.side[k] && owned.twin[k] != kNotOwned) add_edge(task, outlook.facet, k);
@@ -51,9 +64,15 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
     }
   }
   for (const int f : borders_) add_border(task, f);
-  if (!faces.empty() && !minima.empty()) find_rings(shell, sphere, broad.candidates, minima);
-  if (minima.size() > 1) components_.merge(shell, sphere, want_dn_dc, minima);
+  if constexpr (sphere)
+    if (!faces.empty() && !minima.empty()) find_rings(shell, probe, broad.candidates, minima);
+  if (minima.size() > 1) components_.merge(shell, probe, want_dn_dc, minima);
 }
+
+template void CurvedQuery::find(const Shell&, const Sphere&, BroadPhase&, bool,
+                                std::vector<Minimum>&);
+template void CurvedQuery::find(const Shell&, const Plane&, BroadPhase&, bool,
+                                std::vector<Minimum>&);
 
 // Decides from bounds alone which features of a cell may hold a minimum: what is left out here is
 // certain to hold none. Two tests: by the cone of normals the projection of the center must be near
@@ -116,41 +135,83 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
         near_side[k] && near_side[previous_corner(k)] && forward[k] && backward[previous_corner(k)];
 }
 
+// The same over a plane, where the height is a cubic: Bernstein's coefficients of its slopes bound
+// them, and its second derivatives, which are linear, are positive all over where they are at the
+// corners. By `slack`, a slope, regions of features overlap.
+CurvedQuery::Outlook::Outlook(int f, const CubicPatch& p, const Plane& plane, double slack)
+    : facet(f), height(0), convex(true) {
+  const Vec3& n = plane.normal;
+  const double a = n.dot(p.c10), b = n.dot(p.c01), aa = n.dot(p.c20), ab = n.dot(p.c11) / 2;
+  const double bb = n.dot(p.c02), aaa = n.dot(p.c30), aab = n.dot(p.c21), abb = n.dot(p.c12);
+  const double bbb = n.dot(p.c03);
+  // By u and by v: at the corners, and between corner k and the next.
+  const double u[3] = {a, a + 2 * aa + 3 * aaa, a + 2 * ab + abb};
+  const double v[3] = {b, b + 2 * ab + aab, b + 2 * bb + 3 * bbb};
+  const double mid_u[3] = {a + aa, a + aa + ab + aab, a + ab};
+  const double mid_v[3] = {b + ab, b + bb + ab + abb, b + bb};
+  const double uu[3] = {aa, aa + 3 * aaa, aa + aab}, vv[3] = {bb, bb + abb, bb + 3 * bbb};
+  const double uv[3] = {ab, ab + aab, ab + abb};
+  static constexpr double kAlong[3][2] = {{1, 0}, {-1, 1}, {0, -1}};
+  double down_u = 0, down_v = 0, least = 1, first[3], last[3];
+  for (int k = 0; k < 3; ++k) down_u += u[k] + 2 * mid_u[k], down_v += v[k] + 2 * mid_v[k];
+  for (int k = 0; k < 3; ++k) {
+    const auto [x, y] = kAlong[k];
+    const int next = next_corner(k);
+    const double between = x * mid_u[k] + y * mid_v[k];
+    first[k] = x * u[k] + y * v[k], last[k] = x * u[next] + y * v[next];
+    side[k] = std::min(first[k], between) < slack && std::max(between, last[k]) > -slack;
+    convex = convex && uu[k] > 0 && uu[k] * vv[k] > uv[k] * uv[k];
+    least = std::min({least, down_u * u[k] + down_v * v[k], down_u * mid_u[k] + down_v * mid_v[k]});
+  }
+  within = !(least > 0);
+  for (int k = 0; k < 3; ++k) corner[k] = first[k] > -slack && last[previous_corner(k)] < slack;
+}
+
 // Where the distance is convex all over the cell, Newton's method finds what is within it, and the
 // facets that own its sides and corners what is there. Else its closest point is found for
 // certain, and counts on a side too: what others find beside it is no deeper, and what it would
 // count too much is absorbed by the link over that side, which is as deep.
-void CurvedQuery::add_bent(const Task& task, const Outlook& outlook) {
-  const auto& [shell, sphere, want_dn_dc, minima] = task;
+template <class Probe>
+void CurvedQuery::add_bent(const Task<Probe>& task, const Outlook& outlook) {
+  const auto& [shell, probe, want_dn_dc, minima] = task;
   const int f = outlook.facet;
   const Facet& facet = shell.facets()[f];
   const CurvedFacet& curved = shell.curved()->facets()[f];
   const CubicPatch patch = curved.patch(facet);
   Nearest found{Feature::Face, 0, 0.0, {}};
-  if (outlook.convex) {
-    if (!find_minimum(patch, sphere.center, closest_on_facet(facet, sphere.center), found.at))
-      return;
-  } else if (!find_nearest(facet, curved, shell.curved()->cells()[f], sphere.center, sphere.radius,
-                           found)) {
+  constexpr bool plane = std::is_same_v<Probe, Plane>;
+  const Sphere& sphere = probe.near_to(facet.corner[0]);
+  const bool certain = !outlook.convex;
+  if (certain &&
+      !find_nearest(facet, curved, shell.curved()->cells()[f], sphere.center, sphere.radius, found))
     return;
+  // Over a plane what is closest to a far center is a start.
+  if (plane && found.feature == Feature::Edge) {
+    const CubicCurve side = curved.side(facet, found.index);
+    found.at.point = side.point(found.t = nearest_on_side(side, probe));
+  } else if (!certain || (plane && found.feature == Feature::Face)) {
+    const auto start = certain ? std::pair(found.at.u, found.at.v)
+                       : plane ? std::pair(1 / 3., 1 / 3.)
+                               : closest_on_facet(facet, sphere.center);
+    if (!find_minimum(patch, probe, start, found.at)) return;
   }
   const auto& [u, v, point] = found.at;
-  if (!sphere.reaches(point)) return;
+  if (!probe.reaches(point)) return;
   // Needed where the center is on the surface, and to know on which side it is.
   const Vec3 outward = patch.along_u(u, v).cross(patch.along_v(u, v)).normalized();
-  Contact contact = contact_at(point, outward, sphere, facet.element, found.feature);
+  Contact contact = contact_at(point, outward, probe, facet.element, found.feature);
   if (want_dn_dc) {
     Mat3 dx_dc = Mat3::Zero();
-    if (found.feature == Feature::Face) dx_dc = dx_dc_of(patch, u, v, sphere.center);
+    if (found.feature == Feature::Face) dx_dc = dx_dc_of(patch, u, v, probe);
     if (found.feature == Feature::Edge)
-      dx_dc = dx_dc_of(curved.side(facet, found.index), found.t, sphere.center);
-    contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc);
+      dx_dc = dx_dc_of(curved.side(facet, found.index), found.t, probe);
+    contact.dn_dc = slopes_of(contact, probe, dx_dc);
   }
-  minima.push_back({contact, f, found.index, (sphere.center - point).dot(outward) < 0});
+  minima.push_back({contact, f, found.index, probe.pull(point).dot(outward) < 0});
 }
 
 // Of an element without a bulge: the plane's closed form, inside all three sides.
-void CurvedQuery::add_flat(const Task& task, const Outlook& outlook) {
+void CurvedQuery::add_flat(const Task<Sphere>& task, const Outlook& outlook) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const Facet& facet = shell.facets()[outlook.facet];
   const double height = outlook.height;
@@ -167,38 +228,37 @@ void CurvedQuery::add_flat(const Task& task, const Outlook& outlook) {
 
 // Within a face there is nothing to look for but its own closest point: beside it the sides and
 // corners of its border.
-void CurvedQuery::add_border(const Task& task, int f) {
-  const auto& [shell, sphere, want_dn_dc, minima] = task;
+template <class Probe>
+void CurvedQuery::add_border(const Task<Probe>& task, int f) {
+  const auto& [shell, probe, want_dn_dc, minima] = task;
   const Facet& facet = shell.facets()[f];
   const Owned& owned = shell.curved()->facets()[f].owned;
   const FaceCell& cell = shell.curved()->face_cells()[f];
   for (int k = 0; k < 3; ++k) {
     if (owned.vertex[k] >= 0) add_vertex(task, f, k);
     if (owned.twin[k] == kNotOwned) continue;
-    const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k],
-               c = sphere.center - facet.corner[k];
-    const double t = std::clamp(c.dot(d) / d.squaredNorm(), 0.0, 1.0);
-    const double reach = sphere.radius + double(cell.bulge[k]);
-    if ((c - t * d).squaredNorm() < reach * reach) add_edge(task, f, k);
+    const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
+    if (probe.bound_along(facet.corner[k], d, double(cell.bulge[k])) > 0) add_edge(task, f, k);
   }
 }
 
 // The closest point of a side between its ends, if the distance falls into none of the elements
 // that meet there.
-void CurvedQuery::add_edge(const Task& task, int f, int k) {
-  const auto& [shell, sphere, want_dn_dc, minima] = task;
+template <class Probe>
+void CurvedQuery::add_edge(const Task<Probe>& task, int f, int k) {
+  const auto& [shell, probe, want_dn_dc, minima] = task;
   const Facet& facet = shell.facets()[f];
-  const SideFoot foot = nearest_on_side(shell, f, k, sphere.center);
+  const SideFoot foot = nearest_on_side(shell, f, k, probe);
   if (foot.t <= 0 || foot.t >= 1) return;
   const Vec3 &point = foot.point, along = foot.tangent.normalized();
-  if (!sphere.reaches(point)) return;
+  if (!probe.reaches(point)) return;
   // `in` points from the side into an element, tangential to it: the distance falls that way where
   // the center is ahead. By gap() the regions of features overlap, so that none is lost between
   // two.
-  const auto rises = [&, &shell = shell, &sphere = sphere](int h) {
+  const auto rises = [&, &shell = shell, &probe = probe](int h) {
     const bool same = shell.facets()[triangle_of(h)].corner[side_of(h)] == facet.corner[k];
     const Vec3 in = inward(shell, h, same ? foot.t : 1 - foot.t, point, along);
-    return (sphere.center - point).dot(in) <= sphere.tolerance + shell.curved()->gap();
+    return probe.pull(point).dot(in) <= probe.tolerance + shell.curved()->gap();
   };
   const int code = shell.curved()->facets()[f].owned.twin[k];
   if (!rises(3 * f + k) || (code >= 0 && !rises(code))) return;
@@ -206,28 +266,28 @@ void CurvedQuery::add_edge(const Task& task, int f, int k) {
     const std::vector<int>& all = shell.half_edges_of(kManifold - code);
     if (!std::all_of(all.begin(), all.end(), rises)) return;
   }
-  Contact contact = contact_at(point, facet.normal, sphere, facet.element, Feature::Edge);
-  if (want_dn_dc)
-    contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc_of(shell, f, k, foot, sphere.center));
+  Contact contact = contact_at(point, facet.normal, probe, facet.element, Feature::Edge);
+  if (want_dn_dc) contact.dn_dc = slopes_of(contact, probe, dx_dc_of(shell, f, k, foot, probe));
   minima.push_back({contact, f, k, false});
 }
 
 // A corner, if the distance falls along none of its edges: then it falls in no direction between
 // two of them either, as their angle is below 180 degrees.
-void CurvedQuery::add_vertex(const Task& task, int f, int k) {
-  const auto& [shell, sphere, want_dn_dc, minima] = task;
+template <class Probe>
+void CurvedQuery::add_vertex(const Task<Probe>& task, int f, int k) {
+  const auto& [shell, probe, want_dn_dc, minima] = task;
   const Facet& facet = shell.facets()[f];
-  if (!sphere.reaches(facet.corner[k])) return;
+  if (!probe.reaches(facet.corner[k])) return;
   const Topology& topology = shell.topology();
   const Tangents& tangents = shell.curved()->tangents();
   const int vertex = shell.curved()->facets()[f].owned.vertex[k];
-  const Vec3 from = sphere.center - facet.corner[k];
-  const double tolerance = sphere.tolerance + shell.curved()->gap();
+  const Vec3 from = probe.pull(facet.corner[k]);
+  const double tolerance = probe.tolerance + shell.curved()->gap();
   for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i)
     if (from.dot(tangents[i]) > tolerance * tangents[i].norm()) return;
   Contact contact =
-      contact_at(facet.corner[k], facet.normal, sphere, facet.element, Feature::Vertex);
-  if (want_dn_dc) contact.dn_dc = dn_dc_of(contact, sphere.radius, Mat3::Zero());
+      contact_at(facet.corner[k], facet.normal, probe, facet.element, Feature::Vertex);
+  if (want_dn_dc) contact.dn_dc = slopes_of(contact, probe, Mat3::Zero());
   minima.push_back({contact, f, k, false});
 }
 

@@ -11,10 +11,12 @@
 
 namespace sphshell {
 
-// Minima of the distance on curved elements, with their saddles. Keeps its memory.
+// Minima of the distance on curved elements, with their saddles; of a Plane as the probe, in place
+// of a Sphere, those of the height over it. Keeps its memory.
 class CurvedQuery {
  public:
-  void find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
+  template <class Probe>
+  void find(const Shell& shell, const Probe& probe, BroadPhase& broad, bool want_dn_dc,
             std::vector<Minimum>& minima);
 
  private:
@@ -30,24 +32,30 @@ class CurvedQuery {
 
     Outlook(int f, const Facet& facet, const NormalCone& cone, const CellBounds& bounds,
             const Sphere& sphere);
+    Outlook(int f, const CubicPatch& patch, const Plane& plane, double slack);
     bool empty() const {
       return !(within || side[0] || side[1] || side[2] || corner[0] || corner[1] || corner[2]);
     }
   };
+  template <class Probe>
   struct Task {
     const Shell& shell;
-    const Sphere& sphere;
+    const Probe& probe;
     bool want_dn_dc;
     std::vector<Minimum>& minima;
   };
 
   // Each adds the minimum of one feature, if there is one: within a flat or a bent cell, on the
   // border of a face, on a side, at a corner.
-  void add_flat(const Task& task, const Outlook& outlook);
-  void add_bent(const Task& task, const Outlook& outlook);
-  void add_border(const Task& task, int facet);
-  void add_edge(const Task& task, int facet, int side);
-  void add_vertex(const Task& task, int facet, int corner);
+  void add_flat(const Task<Sphere>& task, const Outlook& outlook);
+  template <class Probe>
+  void add_bent(const Task<Probe>& task, const Outlook& outlook);
+  template <class Probe>
+  void add_border(const Task<Probe>& task, int facet);
+  template <class Probe>
+  void add_edge(const Task<Probe>& task, int facet, int side);
+  template <class Probe>
+  void add_vertex(const Task<Probe>& task, int facet, int corner);
 
   std::vector<Outlook> outlooks_;
   std::vector<int> borders_;  // facets that lie on faces

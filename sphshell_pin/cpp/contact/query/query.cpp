@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "contact/query/curved_query.hpp"
 #include "contact/faces/rings.hpp"
@@ -34,17 +35,28 @@ FeatureNormal feature_normal(const Shell& shell, const Minimum& at) {
   return {at.behind ? Vec3(-at.contact.normal) : at.contact.normal, false};
 }
 
+// Whether a feature faces what touches it. On a border there is no inside: such features face all.
+template <class Probe>
+bool faces(const Shell& shell, const Probe& probe, const Minimum& at) {
+  const double sign = shell.side() == Side::Outside ? 1.0 : -1.0;
+  if (at.contact.feature == Feature::Face) return at.behind == (sign < 0);
+  const FeatureNormal n = feature_normal(shell, at);
+  return n.rim || sign * n.outward.dot(probe.pull(at.contact.point)) >= 0;
+}
+
+// Of a plane the features that face it count.
+void keep_one_side(const Shell& shell, const Plane& plane, std::vector<Minimum>& minima) {
+  minima.erase(std::remove_if(minima.begin(), minima.end(),
+                              [&](const Minimum& at) { return !faces(shell, plane, at); }),
+               minima.end());
+}
+
 // side = outside | inside: the nearest contact tells on which side the center is. On the right side
 // count the contacts whose feature faces the center; on the wrong side the sphere is pushed back
 // out through the nearest point.
 void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum>& minima) {
   const double sign = shell.side() == Side::Outside ? 1.0 : -1.0;
-  // On a border there is no inside: such features face every center.
-  const auto faces_center = [&](const Minimum& at) {
-    if (at.contact.feature == Feature::Face) return at.behind == (sign < 0);
-    const FeatureNormal n = feature_normal(shell, at);
-    return n.rim || sign * n.outward.dot(sphere.center - at.contact.point) >= 0;
-  };
+  const auto faces_center = [&](const Minimum& at) { return faces(shell, sphere, at); };
   const auto nearest = std::max_element(
       minima.begin(), minima.end(),
       [](const Minimum& a, const Minimum& b) { return a.contact.depth < b.contact.depth; });
@@ -157,12 +169,29 @@ const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, 
     parts_->curved.find(shell, sphere, parts_->broad, parts_->want_dn_dc, minima);
   else
     parts_->flat.find(shell, sphere, parts_->broad, parts_->want_dn_dc, minima);
+  return list(shell, sphere, rings);
+}
+
+const std::vector<Contact>& Query::find_below(const Shell& shell, const Vec3& normal,
+                                              double offset) {
+  contacts.clear();
+  parts_->minima.clear();
+  const Plane plane{normal, offset, shell.size(), kRoundOff * shell.size()};
+  parts_->curved.find(shell, plane, parts_->broad, parts_->want_dn_dc, parts_->minima);
+  return list(shell, plane, false);
+}
+
+// The contacts of the minima that were found.
+template <class Probe>
+const std::vector<Contact>& Query::list(const Shell& shell, const Probe& probe, bool rings) {
+  std::vector<Minimum>& minima = parts_->minima;
   if (minima.empty()) return contacts;
-  if (shell.side() != Side::Both) keep_one_side(shell, sphere, minima);
+  if (shell.side() != Side::Both) keep_one_side(shell, probe, minima);
   for (const Minimum& minimum : minima) {
     Contact& contact = contacts.emplace_back(minimum.contact);
     contact.rim = contact.feature != Feature::Face && feature_normal(shell, minimum).rim;
-    if (rings && minimum.off_axis < 1) contact = ring_of(minimum, sphere);
+    if constexpr (std::is_same_v<Probe, Sphere>)
+      if (rings && minimum.off_axis < 1) contact = ring_of(minimum, probe);
     contact.facet = minimum.facet, contact.index = minimum.index;
   }
   // Deepest first, saddles last: the order must not depend on the numbering of the elements.
@@ -186,19 +215,20 @@ Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3
                  double radius) {
   Contact whole = contacts[i];
   if (whole.group < 0) return whole;
-  whole.normal.setZero(), whole.dn_dc.setZero();
+  whole.normal.setZero(), whole.dn_dc.setZero(), whole.point.setZero();
   whole.depth = 0;
   for (const Contact& c : contacts) {
     if (c.group != whole.group) continue;
     whole.depth += c.weight * c.depth;
     whole.normal += c.weight * c.normal;
     whole.dn_dc += c.dn_dc;
+    whole.point += c.weight * c.point;
   }
   whole.normal.normalize();
   // As one contact its weight is 1, wherever the sphere is.
   whole.dn_dc -= (whole.normal * (whole.normal.transpose() * whole.dn_dc)).eval();
   // On the sphere's normal at the common depth, which need not be a point of the shell.
-  whole.point = center - (radius - whole.depth) * whole.normal;
+  if (radius > 0) whole.point = center - (radius - whole.depth) * whole.normal;
   return whole;
 }
 

@@ -20,10 +20,14 @@ class Query {
   ~Query();
 
   // The contacts of the sphere (center in the shell's frame [m]); valid until the next call.
-  // Minima come deepest first, then saddles. With `rings` a contact all around an axis is the mean of
-  // the circle, else one of its points.
+  // Minima come deepest first, then saddles. With `rings` a contact all around an axis is the mean
+  // of the circle, else one of its points.
   const std::vector<Contact>& find(const Shell& shell, const Vec3& center, double radius,
                                    Method method, bool rings = true);
+
+  // Those of a half-space below a plane, at `offset` along its unit normal, in the shell's frame:
+  // the minima of the height over it that are below, on curved elements, with their saddles.
+  const std::vector<Contact>& find_below(const Shell& shell, const Vec3& normal, double offset);
 
   // Also find dn_dc; not for the method "elements".
   void want_dn_dc();
@@ -32,6 +36,8 @@ class Query {
 
  private:
   struct Parts;
+  template <class Probe>
+  const std::vector<Contact>& list(const Shell& shell, const Probe& probe, bool rings);
   std::unique_ptr<Parts> parts_;
 };
 

@@ -49,6 +49,11 @@ constexpr double kQuinticRoundOff = 4e-16;
 // A saddle no shallower than the shallower minimum, to this share of the radius, separates nothing.
 constexpr double kNoSaddle = 1e-13;
 
+// What is no more than this share of the shell's size above the lowest point of a face on a plane
+// is level with it, and a saddle no more below it is none: far more than round-off, so that a box
+// stays on its face and a roller on its line.
+constexpr double kLevelFace = 1e-9;
+
 // Shown as one contact, not summed as one: two minima where the saddle between them is no more
 // than this share of its depth below both (between flat elements, whose angles are meant, the
 // smaller share), and whose normals differ from its by no more than kAlike [rad].

@@ -5,10 +5,10 @@
 namespace sphshell {
 namespace {
 
-// The displacement of a place that goes with a displacement of its body.
-Matrix36 displacement_at(const Vec3& place) {
+// The displacement of a contact's place that goes with a displacement of its body.
+Matrix36 displacement_of(const ContactSite& site) {
   Matrix36 out;
-  out << Mat3::Identity(), -pinocchio::skew(place);
+  out << Mat3::Identity(), site.place_by_turn - pinocchio::skew(site.place);
   return out;
 }
 
@@ -111,7 +111,7 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
       find_slopes(active[next], site);
       sum.wrench += slopes_.wrench;
       // The sum over the contacts of a pair first: the chain's products are then made once a pair.
-      sum.by_displacement += slopes_.by_place * displacement_at(site.place);
+      sum.by_displacement += slopes_.by_place * displacement_of(site);
       sum.by_twist += slopes_.by_twist;
       if (jacobian && active[next].slot >= 0) add_bristle(active[next], site, chain, *jacobian);
       if (jacobian) add_parameters(active[next], site, chain);
@@ -146,7 +146,7 @@ void Linearization::add_bristle(const ActiveContact& active, const ContactSite& 
   for (int r = 0; r < rings; ++r) {
     const ContactSlopes::Ring& ring = slopes_.rings[r];
     const Eigen::Index z = 3 * (active.slot + r);
-    const Matrix36 by_displacement = ring.rate_by_place * displacement_at(site.place);
+    const Matrix36 by_displacement = ring.rate_by_place * displacement_of(site);
     auto rate = jacobian.middleRows<3>(nv + z);
     for (int m = 0; m < chain.size(); ++m) {
       const int k = chain.velocity(m);
@@ -173,6 +173,14 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
       active.contact, state.center, pair.has_sphere(),   pair.radius, scene_.disc_radius(active),
       twist,          {},           scene_.shape(active)};
   if (!site.follows) site.place = site.contact.point;
+  if (pair.on_plane()) {
+    // A point that the body carries along, but for where it is lowest as it turns.
+    static const Mat3 kCarried = Mat3::Identity();
+    site.follows = true, site.point_by = &kCarried;
+    site.place_by_turn =
+        site.contact.dn_dc * cross_matrix(site.contact.normal) / site.contact.weight;
+    site.contact.dn_dc.setZero();
+  }
   // z is in the shell's frame; that of the first ring was taken to the world for the forces.
   site.stretch[0].setZero();
   if (active.slot >= 0) site.stretch[0] = turn.transpose() * active.kinematics.bristle;

@@ -6,9 +6,10 @@
 namespace sphshell {
 namespace {
 
-// The motion that a twist gives to a place.
-Vec3 motion_of(const Vector6& twist, const Vec3& place) {
-  return twist.head<3>() + twist.tail<3>().cross(place);
+// The motion that a twist gives to the place of a contact.
+Vec3 motion_of(const Vector6& twist, const ContactSite& site) {
+  const Vec3 turned = twist.tail<3>();
+  return twist.head<3>() + turned.cross(site.place) + site.place_by_turn * turned;
 }
 
 }  // namespace
@@ -33,12 +34,17 @@ Linearization::Answer Linearization::answer_of(const Parameter& parameter,
     const SE3& world_from_j = scene_.states()[active.pair].world_from_j;
     Vec3 moved;  // the place, against the shell
     Vector6 twist = Vector6::Zero();
-    if (parameter.kind == Kind::Offset) {
+    if (pair.on_plane()) {
+      // The shell, along an axis of its own frame.
+      const SE3 shell =
+          world_from_j.actInv(scene_.body().world_from(pair.joint_i, pair.placement_i));
+      moved = motion_of(shell.toActionMatrix().col(parameter.axis), site);
+    } else if (parameter.kind == Kind::Offset) {
       const auto from_i = scene_.body().world_from(pair.joint_i, pair.placement_i).rotation();
       moved = world_from_j.rotation().transpose() * from_i.col(parameter.axis);
     } else {
       out.moved[parameter.axis] = 1;
-      moved = -motion_of(out.moved, site.place);
+      moved = -motion_of(out.moved, site);
       twist = -pinocchio::Motion(out.moved).cross(pinocchio::Motion(site.twist)).toVector();
     }
     out.wrench = slopes_.by_place * moved + slopes_.by_twist * twist;
@@ -125,6 +131,7 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     find_slopes(active, site);
     const Vec3 normal = site.contact.normal, force = slopes_.wrench.head<3>();
     const double weight = site.contact.weight;
+    const double side = pair.on_plane() ? -1 : 1;  // as in SceneData::log
     auto world = out.force_world.middleRows<3>(3 * row_of[i]);
     auto along = out.normal_force.row(row_of[i]);
     auto depth = out.depth.row(row_of[i]), plain = out.plain_depth.row(row_of[i]);
@@ -132,14 +139,14 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     // Product rule for force . normal.
     const auto add = [&](Eigen::Index column, const Vec3& force_by, const Vec3& normal_by,
                          double depth_by, double plain_by) {
-      world.col(column) += turn * force_by;
+      world.col(column) += side * (turn * force_by);
       along[column] += force_by.dot(normal) + force.dot(normal_by);
       depth[column] += weight * depth_by;
       plain[column] += weight * plain_by;
     };
     for (int m = 0; m < chain.size(); ++m) {
       const Vector6 axis = chain.axes().col(m), rate = chain.twist_by_q().col(m);
-      const Vec3 moved = motion_of(axis, site.place);
+      const Vec3 moved = motion_of(axis, site);
       const Vec3 by_q =
           slopes_.by_place.topRows<3>() * moved + slopes_.by_twist.topRows<3>() * rate;
       add(chain.velocity(m), by_q, slopes_.normal_by_place * moved, slopes_.depth_by_place * moved,
@@ -147,7 +154,7 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
       add(nv + chain.velocity(m), slopes_.by_twist.topRows<3>() * axis, Vec3::Zero(), 0, 0);
     }
     // The shell's frame turns with its body.
-    const Vec3 force_world = turn * force;
+    const Vec3 force_world = side * (turn * force);
     // In the world the force also turns with every joint that carries the shell.
     for (std::size_t j : body.model().supports[pair.joint_j]) {
       for (int k = 0; j > 0 && k < body.model().nvExtendeds[j]; ++k) {
@@ -165,7 +172,7 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
       const Answer answer = answer_of(parameters_[c], active, site);
       const Eigen::Index column = first + static_cast<Eigen::Index>(c);
       add(column, answer.wrench.head<3>(), answer.normal, answer.depth, answer.plain_depth);
-      world.col(column) += turn * answer.moved.tail<3>().cross(force);
+      world.col(column) += side * (turn * answer.moved.tail<3>().cross(force));
     }
   }
 }

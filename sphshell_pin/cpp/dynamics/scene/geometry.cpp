@@ -34,6 +34,16 @@ double ShellSurface::depth_behind(const Vec3& center, double radius) const {
   return outside < 0 && is_closed(*shell) ? radius - outside : 0;
 }
 
+void PlaneBelow::find(const SE3& plane_from_shell, Query& query) const {
+  const Mat3& turn = plane_from_shell.rotation();
+  query.find_below(*shell, turn.row(2).transpose(), -plane_from_shell.translation().z());
+  for (Contact& contact : query.contacts) {
+    contact.point = plane_from_shell.act(contact.point);
+    contact.normal = Vec3::UnitZ();
+    contact.dn_dc = (turn * contact.dn_dc * turn.transpose()).eval();
+  }
+}
+
 // At any distance, so that the depth can be followed through zero.
 void Ball::find_near(const Vec3& center, double other, double, Query& query) const {
   const double depth = other + radius - center.norm();

@@ -1,5 +1,6 @@
-// What the sphere of a pair may touch on body j. Each kind of geometry answers the same questions,
-// in the frame of body j: the rest of the scene does not ask which kind it is.
+// What the sphere of a pair, or the shell of a plane, may touch on body j. Each kind of geometry
+// answers the same questions, in the frame of body j: the rest of the scene does not ask which kind
+// it is.
 #pragma once
 
 #include <algorithm>
@@ -89,6 +90,23 @@ struct Ball : AnyGeometry {
   void follow_size(Contact& contact) const { contact.point = radius * contact.normal; }
 };
 
+// A plane with a solid below, z = 0 of its frame, that the shell of body i may touch: as points
+// that keep their normal, and go to where the shell is lowest.
+struct PlaneBelow : AnyGeometry {
+  static constexpr bool kHasSphere = false;
+  std::shared_ptr<const Shell> shell;
+
+  bool has_dn_dc() const { return false; }
+  template <class Pose>
+  void find(const Pose& pose_i, const SE3& pose_j, const Vec3&, double, Query& query) const {
+    find(pose_j.actInv(pose_i()), query);
+  }
+  void find(const SE3& plane_from_shell, Query& query) const;
+  void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }
+  void overlap(Foundation&, const Vec3&, double, bool, bool) const {}
+  double distance(const Vec3&) const { return 0; }
+};
+
 // Points that a user's function finds, of whose geometry nothing else is known.
 struct SourcePoints : AnyGeometry {
   static constexpr bool kHasSphere = false;
@@ -109,6 +127,6 @@ struct SourcePoints : AnyGeometry {
   double distance(const Vec3&) const { return 0; }
 };
 
-using Geometry = std::variant<ShellSurface, Ball, SourcePoints>;
+using Geometry = std::variant<ShellSurface, Ball, PlaneBelow, SourcePoints>;
 
 }  // namespace sphshell

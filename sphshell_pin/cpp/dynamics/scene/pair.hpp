@@ -11,12 +11,13 @@
 namespace sphshell {
 
 // Body i carries the sphere, body j what it may touch. `placement_i` holds the sphere's center,
-// `placement_j` the geometry's frame; of a source both placements are those of its frames.
+// `placement_j` the geometry's frame; of a source both placements are those of its frames. Of a
+// plane, body i carries the shell.
 struct Pair {
   std::string name, group;  // group: of the pairs that were stated together, or empty
   int joint_i = 0, joint_j = 0;
   SE3 placement_i = SE3::Identity(), placement_j = SE3::Identity();
-  double radius = 0;  // of the sphere; 0: of a source, which has none [m]
+  double radius = 0;  // of the sphere; 0: of a source or a plane, which have none [m]
   Geometry geometry;
   NormalLaw law;
   FrictionLaw friction;
@@ -27,10 +28,11 @@ struct Pair {
   auto ask(Question&& question) const {
     return std::visit(std::forward<Question>(question), geometry);
   }
-  // Whether contacts follow the center of a sphere: all but those of a source.
+  // Whether contacts follow the center of a sphere: not those of a plane or a source.
   bool has_sphere() const {
     return ask([](const auto& one) { return std::decay_t<decltype(one)>::kHasSphere; });
   }
+  bool on_plane() const { return std::holds_alternative<PlaneBelow>(geometry); }
   // Of the smaller of two spheres, else of the sphere [m].
   double least_radius() const {
     return ask([&](const auto& one) { return one.least_radius(radius); });

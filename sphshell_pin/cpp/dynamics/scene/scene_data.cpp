@@ -62,7 +62,7 @@ void SceneData::restart() {
 void SceneData::want_dn_dc() {
   wants_second_ = true;
   for (std::size_t k = 0; k < pairs_.size(); ++k)
-    if (pairs_[k].has_dn_dc()) queries_[k].want_dn_dc();
+    if (pairs_[k].has_dn_dc() || pairs_[k].on_plane()) queries_[k].want_dn_dc();
 }
 
 void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify) {

@@ -21,6 +21,8 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     const Contact whole = whole_of(contacts, i - begin, state.center, pair.radius);
     const Vec3 point = state.world_from_j.act(whole.point);
     const Vec3 normal = state.world_from_j.rotation() * whole.normal;
+    // Those of a plane are of its own body, as a sphere's are.
+    const double side = pair.on_plane() ? -1 : 1;
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
     double depth = 0;  // corrected, where the shape counts
     // One without a place stands alone.
@@ -36,12 +38,12 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     const Vec3 relative = relative_velocity(pair, point);
     ContactRow& row = rows.emplace_back();
     write(row.point, point);
-    write(row.normal, normal);
+    write(row.normal, side * normal);
     row.depth = active.shape < 0 ? whole.depth : whole.group < 0 ? active.kinematics.depth : depth;
     // Around a ring the normals cancel in part.
     row.normal_force = whole.feature == Feature::Ring ? active.force.normal : push.dot(normal);
-    write(row.friction_force, friction);
-    write(row.slip_velocity, relative - relative.dot(normal) * normal);
+    write(row.friction_force, side * friction);
+    write(row.slip_velocity, side * (relative - relative.dot(normal) * normal));
     row.pair = active.pair;
     row.element = whole.element;
     row.contact_id = active.contact_id;

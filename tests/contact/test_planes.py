@@ -1,0 +1,194 @@
+"""A plane under a shell: lowest points against brute force, closed forms and what lies level."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter
+from tests.meshes import crumpled, cube, ellipsoid, icosphere, soup
+from tests.models import add_body, empty, free_q, linear_law
+
+AXES = np.array([0.2, 0.03, 0.02])
+
+
+def scene_of(shell: sp.Shell, law=None, friction=None, method=None, **plane) -> sp.Scene:
+    """`shell` on a free body, over a plane of the world."""
+    model = empty()
+    add_body(model, "body", pin.JointModelFreeFlyer())
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Plane("universe", **plane), shell, "body", None, law or linear_law(1e4), friction, method
+    )
+    return scene
+
+
+def pose(rotation: np.ndarray, height: float) -> np.ndarray:
+    turned = pin.Quaternion(rotation).coeffs()
+    return np.concatenate(([0.3, -0.2, height], turned))
+
+
+def rotations(count: int, seed: int = 0) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return [pin.Quaternion(*(q / np.linalg.norm(q))).matrix() for q in rng.normal(size=(count, 4))]
+
+
+def egg(cells: int = 12, axes: np.ndarray = AXES) -> sp.Shell:
+    """An ellipsoid with its own normals."""
+    vertices, elements, normals = ellipsoid(cells, tuple(axes))
+    return sp.Shell(vertices, elements, normals=normals, side="outside")
+
+
+def lowest_vertices(shell: sp.Shell, heights: np.ndarray) -> list[int]:
+    """Vertices below 0 that no neighbor is below."""
+    triangles = np.asarray(shell.triangles)
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    sides = np.concatenate([sides, sides[:, ::-1]])
+    lower = np.full(len(heights), np.inf)
+    np.minimum.at(lower, sides[:, 0], heights[sides[:, 1]])
+    used = np.unique(triangles)
+    return [k for k in used if heights[k] < 0 and heights[k] < lower[k]]
+
+
+@pytest.mark.parametrize("mesh", [icosphere(2), crumpled(6, 1), soup(40, 2), cube(quads=True)])
+def test_flat_elements_touch_at_every_lowest_vertex(mesh) -> None:
+    """All local minima below the plane, at many orientations, by brute force."""
+    shell = sp.Shell(*mesh, crease_angle=0.0)
+    scene = scene_of(shell)
+    rng = np.random.default_rng(3)
+    several = 0
+    for rotation in rotations(150):
+        q = pose(rotation, 0.0)
+        world = np.asarray(shell.vertices) @ rotation.T + q[:3]
+        q[2] = -rng.uniform(-0.05, 1.0) * np.ptp(world[:, 2]) - world[:, 2].min()
+        world = np.asarray(shell.vertices) @ rotation.T + q[:3]
+        expected = lowest_vertices(shell, world[:, 2])
+        found = scene.contacts(q)
+        minima = found.normal_force > 0  # not of saddles
+        depth = found.depth[minima]
+        assert len(depth) == len(expected)
+        several += len(expected) > 1
+        assert np.sort(depth) == pytest.approx(np.sort(-world[expected, 2]), abs=1e-14)
+        order = np.argsort(depth), np.argsort(-world[expected, 2])
+        points = world[expected][order[1]]
+        assert found.point_world[minima][order[0]] == pytest.approx(points, abs=1e-13)
+        assert found.normal_world == pytest.approx(np.tile([0, 0, -1.0], (len(found.depth), 1)))
+    assert (several > 20) == (len(shell.elements) not in (6, 320))  # two of them are convex
+
+
+def support(axes: np.ndarray, rotation: np.ndarray) -> float:
+    """How far an ellipsoid reaches below its center."""
+    return float(np.linalg.norm(axes * rotation[2]))
+
+
+def test_ellipsoid_by_its_support_function_and_by_its_own_surface() -> None:
+    """The depth of a curved shell is that of its own surface, which is off by order four.
+
+    The surface's lowest point from the definition: the closest point of ever farther points below
+    moves to it.
+    """
+    errors, axes = [], np.array([0.06, 0.04, 0.03])
+    shells = [egg(cells, axes) for cells in (8, 16)]
+    for shell in shells:
+        scene, worst = scene_of(shell), 0.0
+        for rotation in rotations(20, 1):
+            reach = support(axes, rotation)
+            found = scene.contacts(pose(rotation, reach - 1e-4))
+            assert len(found.depth) == 1
+            worst = max(worst, abs(found.depth[0] - 1e-4))
+            down, point = -rotation[2], -(axes**2) * rotation[2] / reach
+            for _ in range(40):
+                far = point + 5.0 * down
+                point = shell.closest_points(far[None], method="smooth").points[0]
+            assert found.depth[0] == pytest.approx(1e-4 - reach + down @ point, abs=2e-13)
+        errors.append(worst)
+    assert errors[1] < 0.12 * errors[0]
+
+
+def test_spheres_and_tori_are_exact() -> None:
+    coal = pytest.importorskip("coal")
+    shell = sp.Shell.from_geometry(coal.Sphere(0.04), segments=24)
+    scene = scene_of(shell)
+    for rotation in rotations(30, 2):
+        found = scene.contacts(pose(rotation, 0.039))
+        assert found.depth == pytest.approx([0.001], abs=1e-14)
+        assert found.point_world[0] == pytest.approx([0.3, -0.2, -0.001], abs=1e-9)
+
+
+def test_limit_of_large_spheres() -> None:
+    """Forces, points and normals are those of a sphere of 1 km, to what its radius leaves."""
+    axes = np.array([0.06, 0.04, 0.03])
+    shell = egg(16, axes)
+    scene = scene_of(shell)
+    large = sp.Scene(scene.model)
+    ball = sp.Sphere(1e4, "universe", (0.3, -0.2, -1e4))
+    large.add_contact(ball, shell, "body", law=linear_law(1e4))
+    for rotation in rotations(10, 4):
+        q = pose(rotation, support(axes, rotation) - 1e-4)
+        ours, theirs = scene.contacts(q), large.contacts(q)
+        assert ours.depth == pytest.approx(theirs.depth, abs=1e-7)
+        assert ours.normal_world == pytest.approx(theirs.normal_world, abs=1e-3)
+        assert ours.point_world == pytest.approx(theirs.point_world, abs=1e-3)
+        assert ours.normal_force == pytest.approx(theirs.normal_force, rel=1e-3)
+
+
+def test_flat_on_flat_is_one_contact_in_the_middle() -> None:
+    """A level face, and an edge that lies level, however they are divided."""
+    shell = sp.Shell(*cube(0.2))
+    scene = scene_of(shell)
+    low = -np.asarray(shell.vertices)[:, 2].min()
+    flat = scene.contacts(pose(np.eye(3), low - 1e-3))
+    center = np.asarray(shell.vertices)[:, :2].mean(axis=0) + [0.3, -0.2]
+    assert flat.depth == pytest.approx([1e-3], abs=1e-15)
+    assert flat.point_world[0, :2] == pytest.approx(center, abs=1e-12)
+    edge = pin.utils.rotate("x", np.pi / 4)
+    heights = np.asarray(shell.vertices) @ edge[2]
+    rests = scene.contacts(pose(edge, -heights.min() - 1e-3))
+    assert rests.depth == pytest.approx([1e-3], abs=1e-14)
+    assert rests.point_world[0, 0] == pytest.approx(center[0], abs=1e-12)
+
+
+def test_two_feet_have_a_saddle_between_them() -> None:
+    """A wavy sheet on a plane: minima in its valleys, saddles once the ridges are below, too."""
+    x = np.linspace(-0.05, 0.05, 41)
+    u, v = np.meshgrid(x, x, indexing="ij")
+    z = 0.002 * np.cos(2 * np.pi * u / 0.05) + 0.5 * v**2
+    number = np.arange(41 * 41).reshape(41, 41)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    quads = np.stack([a, b, c, d], -1).reshape(-1, 4)
+    scene = scene_of(sp.Shell(np.stack([u, v, z], -1).reshape(-1, 3), quads))
+    above = scene.contacts(pose(np.eye(3), 0.0015))
+    assert len(above.depth) == 2
+    assert (above.normal_force > 0).all()
+    below = scene.contacts(pose(np.eye(3), -0.0025))
+    assert np.sort(np.sign(below.normal_force)).tolist() == [-1, 1, 1]
+
+
+def test_normal_and_offset_place_the_plane() -> None:
+    shell = egg()
+    up = np.array([0.3, -0.2, 0.9])
+    scene = scene_of(shell, offset=(0.1, 0.2, 0.05), normal=tuple(up))
+    up /= np.linalg.norm(up)
+    reach = float(np.linalg.norm(AXES * up))
+    q = free_q(np.array([0.1, 0.2, 0.05]) + (reach - 1e-4) * up)
+    found = scene.contacts(q)
+    assert found.depth == pytest.approx([1e-4], abs=1e-5)
+    assert found.normal_world[0] == pytest.approx(-up)
+
+
+def test_what_a_plane_cannot_do_is_refused() -> None:
+    shell = sp.Shell(*cube())
+    for method in ("facets", "elements"):
+        with pytest.raises(InvalidParameter, match="must be 'smooth'"):
+            scene_of(shell, method=method)
+    with pytest.raises(InvalidParameter, match="must be a Shell"):
+        scene_of(sp.Sphere(0.1, "body"))  # type: ignore[arg-type]
+    for law in (sp.FoundationLaw(1e6, 0.01), sp.HertzLaw(1e9, 0.3)):
+        with pytest.raises(InvalidParameter, match="follows from the radius"):
+            scene_of(shell, law)
+    with pytest.raises(InvalidParameter, match="follows from the radius"):
+        scene_of(shell, friction=sp.BristleFriction(0.4, 0.3, 1e4, 5.0, torsional=True))
+    with pytest.raises(InvalidParameter, match="must not be zero"):
+        sp.Plane("universe", normal=(0.0, 0.0, 0.0))

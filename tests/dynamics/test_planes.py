@@ -1,0 +1,197 @@
+"""A shell on a plane in scenes: derivatives, energy, momentum, rows and events."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from tests.contact.test_planes import egg as egg_shell
+from tests.contact.test_planes import rotations, support
+from tests.differences import acceleration
+from tests.meshes import cube
+from tests.models import add_body, empty
+
+EGG = np.array([0.03, 0.02, 0.025])
+INERTIA = pin.Inertia(0.5, np.array([0.002, -0.001, -0.003]), np.diag([1.5e-4, 2e-4, 1.8e-4]))
+
+
+def egg(law, friction=None, *, ground: bool = True, cells: int = 10) -> sp.Scene:
+    """An egg over a plane of the world, or of a body that moves as well."""
+    model = empty()
+    frame = "universe"
+    if not ground:
+        frame = "table"
+        add_body(model, frame, pin.JointModelFreeFlyer())
+    body = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "egg")
+    model.appendBodyToJoint(body, INERTIA, pin.SE3.Identity())
+    model.addFrame(pin.Frame("shell", body, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    tilt = (0.1, -0.05, 1.0)
+    scene.add_contact(
+        sp.Plane(frame, (0.0, 0.0, 0.01), tilt), egg_shell(cells, EGG), "shell", None, law, friction
+    )
+    return scene
+
+
+def touching(scene: sp.Scene, depth: float = 2e-4, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A state of `egg` with the egg `depth` deep in the plane."""
+    rng = np.random.default_rng(seed)
+    q = pin.neutral(scene.model)
+    plane = scene.pairs[0].plane.placement
+    if scene.model.nq > 7:
+        q = pin.integrate(scene.model, q, 0.3 * rng.normal(size=scene.model.nv))
+        data = scene.model.createData()
+        pin.forwardKinematics(scene.model, data, q)
+        plane = data.oMi[1] * plane
+    turn = rotations(1, seed)[0]
+    reach = support(EGG, (plane.rotation.T @ turn))
+    q[-7:-4] = plane.act(np.array([0.01, 0.02, reach - depth]))
+    q[-4:] = pin.Quaternion(turn).coeffs()
+    return q, rng.normal(size=scene.model.nv) * 0.3
+
+
+LAW = sp.ImpactLaw(2e7, 1.5, 20.0, 1e-4)
+FRICTIONS = [
+    None,
+    sp.CoulombFriction(0.3, 0.2, 0.05, 0.5),
+    sp.BristleFriction(0.4, 0.3, 2e4, 5.0),
+]
+
+
+@pytest.mark.parametrize("ground", [True, False])
+@pytest.mark.parametrize("friction", FRICTIONS)
+def test_derivatives_are_those_of_finite_differences(friction, ground: bool) -> None:
+    """By q and v, of accelerations, with a plane that stands and one that moves."""
+    scene = egg(LAW, friction, ground=ground)
+    model = scene.model
+    q, v = touching(scene)
+    tau = np.zeros(model.nv)
+    found = scene.dynamics_derivatives(q, v, tau)
+    step = 1e-6
+    for name, by in (("q", found.by_q), ("v", found.by_v)):
+        for k in range(model.nv):
+            ends = []
+            for sign in (1, -1):
+                move = sign * step * np.eye(model.nv)[k]
+                at = (pin.integrate(model, q, move), v) if name == "q" else (q, v + move)
+                ends.append(acceleration(scene, *at, tau))
+            expected = (ends[0] - ends[1]) / (2 * step)
+            scale = max(1.0, np.abs(by).max())
+            assert by[:, k] == pytest.approx(expected, abs=2e-5 * scale), (name, k)
+
+
+def test_rolling_loses_no_energy() -> None:
+    """Free of friction and damping."""
+    scene = egg(sp.ImpactLaw(2e7, 1.5, 0.0, 1e-4))
+    q, v = touching(scene, 1e-4)
+    result = sp.Simulation(scene, sp.Adaptive(rtol=1e-9, atol=1e-12)).run(q, v, 0.05)
+    kept = result.energy.kinetic + result.energy.potential + result.energy.elastic
+    assert np.ptp(kept) < 3e-6 * np.ptp(result.energy.kinetic)
+
+
+@pytest.mark.parametrize("face", [0.0, np.pi / 2])
+def test_a_box_stays_on_its_face(face: float) -> None:
+    """Put down level it neither falls over nor jitters, whatever its direction."""
+    model = empty()
+    add_body(model, "box", pin.JointModelFreeFlyer())
+    scene = sp.Scene(model)
+    shell = sp.Shell(*cube(0.2))
+    friction = sp.BristleFriction(0.4, 0.3, 1e5, 50.0)
+    law = sp.ImpactLaw(1e6, 1.0, 500.0, 1e-4)
+    scene.add_contact(sp.Plane("universe"), shell, "box", law=law, friction=friction)
+    turn = pin.utils.rotate("z", 0.3) @ pin.utils.rotate("x", face)
+    low = float((np.asarray(shell.vertices) @ turn[2]).min())
+    q = np.concatenate(([0.1, 0.2, -low], pin.Quaternion(turn).coeffs()))
+    result = sp.Simulation(scene, sp.RungeKutta4(1e-4)).run(q, np.zeros(6), 1.0)
+    assert np.abs(result.v[:, 3:]).max() < 1e-9
+    assert np.abs(result.q[:, 3:] - q[3:]).max() < 1e-9
+    assert np.abs(result.q[:, :2] - q[:2]).max() < 1e-9
+    assert result.q[-1, 2] == pytest.approx(-low - 9.81 / 1e6, abs=1e-6)
+
+
+def test_action_and_reaction() -> None:
+    """With a plane that moves: the wrenches on both bodies are opposite, about one point."""
+    scene = egg(LAW, FRICTIONS[1], ground=False)
+    model = scene.model
+    q, v = touching(scene)
+    forces = scene.external_forces(q, v)
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    total = sum((data.oMi[j].act(forces[j]) for j in (1, 2)), pin.Force.Zero())
+    assert np.abs(forces[2].linear).max() > 1
+    assert np.abs(total.vector).max() < 1e-12 * np.abs(forces[2].vector).max()
+
+
+def test_a_sensor_and_rows_show_the_force_on_the_body_of_the_plane() -> None:
+    scene = egg(LAW, FRICTIONS[1], ground=False)
+    q, v = touching(scene)
+    rows = scene.contacts(q, v)
+    data = scene.model.createData()
+    pin.forwardKinematics(scene.model, data, q)
+    on_table = data.oMi[1].act(scene.external_forces(q, v)[1]).linear
+    assert rows.normal_force * rows.normal_world[0] + rows.friction_force_world[0] == pytest.approx(
+        on_table, rel=1e-12
+    )
+
+
+def test_an_egg_falls_and_is_an_event_of_touch() -> None:
+    scene = egg(LAW, FRICTIONS[2])
+    q, v = touching(scene, -0.01)
+    result = sp.Simulation(scene, sp.Adaptive(rtol=1e-8)).run(q, 0 * v, 0.1)
+    first = next(event for event in result.events if event.kind == "touch")
+    plane = scene.pairs[0].plane.placement
+    fall = 0.01 / plane.rotation[2, 2]
+    assert first.t == pytest.approx(np.sqrt(2 * fall / 9.81), rel=1e-5)
+
+
+def test_bits_repeat() -> None:
+    scene = egg(LAW, FRICTIONS[2])
+    q, v = touching(scene, 1e-4)
+    runs = [sp.Simulation(scene, sp.Adaptive(rtol=1e-7)).run(q, v, 0.02) for _ in range(2)]
+    assert np.array_equal(runs[0].q, runs[1].q)
+
+
+def test_explanation_of_a_plane() -> None:
+    """The gap of the vertices, and the mass with which the egg resists along the normal."""
+    scene = egg(LAW)
+    q, v = touching(scene, -0.01)
+    figures = scene.explain(q, v).pairs[0]
+    assert "plane on frame 'universe' against shell 'shell' on frame 'shell'" in figures.modelled
+    assert figures.gap == pytest.approx(0.01, abs=2e-4)
+    assert 0 < figures.effective_mass < INERTIA.mass
+
+
+def test_derivatives_by_the_placement_of_the_shell() -> None:
+    scene = egg(LAW, FRICTIONS[1], ground=False)
+    pair = scene.pairs[0]
+    q, v = touching(scene)
+    tau = np.zeros(scene.model.nv)
+    names = [f"{pair.name}.placement.{axis}" for axis in ("vx", "vy", "vz", "wx", "wy", "wz")]
+    found = scene.dynamics_derivatives(q, v, tau, parameters=names).by_parameters
+    for k in range(6):
+        ends = []
+        for sign in (1, -1):
+            moved = sp.Scene(scene.model)
+            place = pair.placement * pin.exp6(pin.Motion(sign * 1e-6 * np.eye(6)[k]))
+            moved.add_contact(pair.plane, pair.shell, pair.frame_j, place, pair.law, pair.friction)
+            ends.append(acceleration(moved, q, v, tau))
+        expected = (ends[0] - ends[1]) / 2e-6
+        assert found[:, k] == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+
+
+def test_derivatives_of_the_force_on_the_body_of_the_plane() -> None:
+    """Of rows, whose sides are those of the plane's own body."""
+    scene = egg(LAW, FRICTIONS[1], ground=False)
+    q, v = touching(scene)
+    found = scene.contact_force_derivatives(q, v)
+    for k in range(scene.model.nv):
+        ends = []
+        for sign in (1, -1):
+            at = pin.integrate(scene.model, q, sign * 1e-7 * np.eye(scene.model.nv)[k])
+            rows = scene.contacts(at, v)
+            ends.append(rows.normal_force[0] * rows.normal_world[0] + rows.friction_force_world[0])
+        expected = (ends[0] - ends[1]) / 2e-7
+        scale = np.abs(found.by_q).max()
+        assert found.by_q[0, :, k] == pytest.approx(expected, abs=1e-5 * scale)
