@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 PARTS = Path(__file__).with_name("recording_page")
 STYLES = ("../live/page/palette.css", "style.css")
-SCRIPTS = ("../live/page/axes.js", "replay.js", "cameras.js", "chart.js", "panel.js")
+SHARED = ("../live/page/axes.js", "../live/page/materials.js")
+SCRIPTS = (*SHARED, "replay.js", "cameras.js", "chart.js", "panel.js")
 # A mesh file this long may well be used by several links: it is stored once.
 SHARED_TEXT = 20_000
 

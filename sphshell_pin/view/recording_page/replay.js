@@ -20,6 +20,7 @@ async function start_viewer() {
   const pane = element("pane");
   const viewer = new MeshCat.Viewer(pane);
   viewer.gui.domElement.style.display = "none";
+  flatten_materials(viewer);
   // The viewer takes the whole window for its own.
   const resize = viewer.set_3d_pane_size.bind(viewer);
   viewer.set_3d_pane_size = () => {

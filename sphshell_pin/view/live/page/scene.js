@@ -3,6 +3,7 @@
 
 import { emit, on } from "./connection.js";
 import { element } from "./controls.js";
+import { flatten_materials } from "./materials.js";
 import { notice } from "./notices.js";
 import { parts } from "./theme.js";
 
@@ -16,6 +17,7 @@ export class Picture {
     const viewer = this.viewer;
     globalThis.viewer = viewer;
     viewer.gui.domElement.style.display = "none";
+    flatten_materials(viewer);
     // The viewer takes the whole window for its own.
     const resize = viewer.set_3d_pane_size.bind(viewer);
     viewer.set_3d_pane_size = () => {
