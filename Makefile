@@ -56,7 +56,13 @@ demo: $(VENV)/.demo ## build into .venv and run fingertip_on_blade
 # A process that has finished takes over tests of another one. ARGS="-k blade": more arguments.
 PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal $(ARGS)
 
-test: $(VENV)/.test ## build into .venv and run the tests, on all cores
+# The C++ library, for its tests.
+$(VENV)/.cpp: $(VENV)/.test
+	@echo "Building the C++ library into build/cpp: about three minutes"
+	$(BIN)/python -m tests.test_cpp
+	@touch $@
+
+test: $(VENV)/.cpp ## build into .venv and run the tests, on all cores
 	$(PYTEST)
 
 quick: $(VENV)/.test ## the tests that are not slow and need no browser

@@ -45,12 +45,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     slow = set(LIST.read_text("utf-8").split())
 
+    def is_of_the_library(item: pytest.Item) -> bool:
+        return item.path.name == "test_cpp.py"
+
     def place(item: pytest.Item) -> int:
-        if item.path.name == "test_cpp.py":
-            return 0
-        return 2 if item.get_closest_marker("browser") else 1
+        return 0 if is_of_the_library(item) else 2 if item.get_closest_marker("browser") else 1
 
     items.sort(key=place)
     for item in items:
-        if function_of(item.nodeid) in slow:
+        if function_of(item.nodeid) in slow or is_of_the_library(item):
             item.add_marker(pytest.mark.slow)

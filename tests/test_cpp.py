@@ -53,7 +53,14 @@ def call(*command: object, cwd: Path = ROOT) -> str:
 
 @pytest.fixture(scope="module")
 def built() -> Path:
-    """The folder of the library, cpp and cpp-installed, and its users, cpp-finger and cpp-tests."""
+    return build_all()
+
+
+def build_all() -> Path:
+    """Build the library, cpp and cpp-installed, and its users, cpp-finger and cpp-tests.
+
+    Return their folder. `make test` does it before the tests, on all cores.
+    """
     BUILD.mkdir(parents=True, exist_ok=True)
     with (BUILD / "cpp.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process of the tests builds, the others wait
@@ -185,3 +192,7 @@ def test_the_page_has_the_example():
     assert found["cmake"] == (EXAMPLE / "CMakeLists.txt").read_text()
     programs = [text for kind, text in FENCE.findall(PAGE.read_text()) if "int main" in text]
     assert programs == [(EXAMPLE / "main.cpp").read_text()]
+
+
+if __name__ == "__main__":
+    build_all()

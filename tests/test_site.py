@@ -22,7 +22,7 @@ for package in ("mkdocs", "material", "mkdocstrings"):
     pytest.importorskip(package, reason="needs the extra docs: mkdocs-material, mkdocstrings")
 
 ROOT = Path(__file__).parent.parent
-WIDE = ["index.html", "commands.html", "gallery.html", "hard_cases.html", "scenarios.html"]
+WIDE = ["index.html", "commands.html", "hard_cases.html"]
 # What a browser loads by itself, other than what a reader clicks on.
 LOADED = {("script", "src"), ("img", "src"), ("iframe", "src"), ("link", "href"), ("source", "src")}
 

@@ -71,7 +71,9 @@ def test_an_oblique_bounce_by_everything(integrator: str) -> None:
 
 
 # Of a stretch that begins at the touch.
-@every_integrator
+@pytest.mark.parametrize(
+    "integrator", mostly_studies(INTEGRATORS, lambda one: one in ("adaptive", "implicit"))
+)
 def test_an_oblique_bounce_with_bristles(integrator: str) -> None:
     case = thrown(IMPACT, BRISTLE, INTEGRATORS[integrator])
     names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.stiffness", "v0"]

@@ -44,25 +44,27 @@ void bind_mujoco(nb::module_& m) {
           },
           nb::arg("state"), nb::arg("layout"), nb::arg("ids"), nb::arg("roots"), nb::arg("dofs"),
           nb::arg("logs"))
-      .def("attach", [](const OwnMujoco& self, std::uintptr_t model) {
-        register_passive(pointer(model), self.contacts);
-      })
-      .def("detach", [](const OwnMujoco& self, std::uintptr_t model) {
-        unregister_passive(pointer(model), self.contacts.get());
-      })
-      .def("apply", [](const OwnMujoco& self, std::uintptr_t model, std::uintptr_t data) {
-        self.contacts->apply(pointer(model), const_cast<void*>(pointer(data)));
-      })
-      .def("contacts", [](const OwnMujoco& self, std::uintptr_t data) {
-        return to_bytes(self.contacts->contacts(const_cast<void*>(pointer(data))));
-      })
-      .def("log", [](const OwnMujoco& self, std::uintptr_t data) {
-        auto [times, rows] = self.contacts->log(pointer(data));
-        const VectorX t = Eigen::Map<const VectorX>(times.data(), Eigen::Index(times.size()));
-        return std::pair(to_array(t), to_bytes(std::move(rows)));
-      })
-      .def("forget", [](const OwnMujoco& self, std::uintptr_t data) {
-        self.contacts->forget(pointer(data));
-      })
+      .def("attach", [](const OwnMujoco& self,
+                        std::uintptr_t model) { register_passive(pointer(model), self.contacts); })
+      .def("detach",
+           [](const OwnMujoco& self, std::uintptr_t model) {
+             unregister_passive(pointer(model), self.contacts.get());
+           })
+      .def("apply",
+           [](const OwnMujoco& self, std::uintptr_t model, std::uintptr_t data) {
+             self.contacts->apply(pointer(model), const_cast<void*>(pointer(data)));
+           })
+      .def("contacts",
+           [](const OwnMujoco& self, std::uintptr_t data) {
+             return to_bytes(self.contacts->contacts(const_cast<void*>(pointer(data))));
+           })
+      .def("log",
+           [](const OwnMujoco& self, std::uintptr_t data) {
+             auto [times, rows] = self.contacts->log(pointer(data));
+             const VectorX t = Eigen::Map<const VectorX>(times.data(), Eigen::Index(times.size()));
+             return std::pair(to_array(t), to_bytes(std::move(rows)));
+           })
+      .def("forget",
+           [](const OwnMujoco& self, std::uintptr_t data) { self.contacts->forget(pointer(data)); })
       .def("take_fault", [](const OwnMujoco& self) { return self.contacts->take_fault(); });
 }
