@@ -38,7 +38,7 @@ TABLES = {
     "04_taxels_on_a_crease": ["Result"],
     "06_fit_measured_rebounds": ["Fit of "],
 }
-LONG = ("05_circle_with_5_newtons", "06_fit_measured_rebounds")
+LONG = ("03_parameter_study", "05_circle_with_5_newtons", "06_fit_measured_rebounds")
 NEEDS = {"05_circle_with_5_newtons": "crocoddyl", "07_peg_in_mujoco": "mujoco"}
 
 

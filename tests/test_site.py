@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import subprocess
@@ -54,18 +55,25 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    site = tmp_path_factory.mktemp("site")
-    done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(site)],
-        cwd=ROOT,
-        # Examples without outputs, whatever notebooks there are.
-        env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "NOTEBOOKS": str(site / "none")},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return site, done
+def built(tmp_path_factory, worker_id):
+    """The folder of the site, which one process builds for all, and what mkdocs said."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base if worker_id == "master" else base.parent
+    site, said = shared / "site", shared / "site.log"
+    with (shared / "site.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not said.exists():
+            done = subprocess.run(
+                [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(site)],
+                cwd=ROOT,
+                # Examples without outputs, whatever notebooks there are.
+                env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "NOTEBOOKS": str(site / "none")},
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            said.write_text(f"exit code {done.returncode}\n{done.stderr}", "utf-8")
+    return site, said.read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -75,9 +83,9 @@ def pages(built):
 
 
 def test_it_builds_without_a_warning(built):
-    _, done = built
-    assert done.returncode == 0, done.stderr
-    assert "WARNING" not in done.stderr
+    _, said = built
+    assert said.startswith("exit code 0\n"), said
+    assert "WARNING" not in said
 
 
 def test_data_and_parameters_are_shown_in_place_of_their_marks(built):

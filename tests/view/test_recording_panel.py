@@ -133,11 +133,13 @@ def test_keys(page, ball):
     assert time_of(page) == pytest.approx(end - 10 * STEP)
     page.keyboard.press("Home")
     assert time_of(page) == 0.0
+    page.evaluate("recording.rate = 0.01")  # not at its end before the next key
     page.keyboard.press("Space")
     assert page.evaluate("recording.playing")
     page.wait_for_function("recording.time > 0")
     page.keyboard.press("Space")
     assert not page.evaluate("recording.playing")
+    page.evaluate("recording.rate = 1.0")
     page.keyboard.press("ArrowDown")
     assert page.evaluate("recording.rate") == 0.5
     page.keyboard.press("ArrowUp")
