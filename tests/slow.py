@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 LIST = Path(__file__).with_name("slow.txt")
-LONG = 0.75  # [s] of a function's tests together
+LONG = 0.5  # [s] of a function's tests together
 
 _taken: Counter[str] = Counter()
 

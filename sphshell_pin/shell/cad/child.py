@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import pickle
+import re
 import resource
 import select
 import signal
@@ -103,6 +104,11 @@ def _of_memory(error: BaseException | None) -> bool:
     """Whether an exception, or one that it came from, says that no memory was left."""
     while error is not None:
         if isinstance(error, MemoryError) or type(error).__name__ == "Standard_OutOfMemory":
+            return True
+        # Of a library that is loaded within the limit, in the words of the loader.
+        if isinstance(error, ImportError) and re.search(
+            "failed to map|allocate memory", str(error)
+        ):
             return True
         error = error.__cause__ or error.__context__
     return False
