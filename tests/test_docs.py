@@ -38,7 +38,7 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 PRINT = re.compile(r"^\s*print\(.*\)  # (.+)$")
 PRINTED = re.compile(r"<!-- printed by: (.+) -->\s*```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 PRINTING = [page for page in PAGES if PRINTED.search(page.read_text("utf-8"))]
-LONG = ("grasping", "export")  # commands that take over ten seconds
+LONG = ("grasping", "export", "sweeps")  # what they show takes long
 # A line of a block, or code within a line; what follows may go on behind a backslash.
 COMMAND = re.compile(r"(?:^ *(?:\$ )?|`)(sphshell-pin (?:[^`\n\\]|\\\n)*)", re.MULTILINE)
 
@@ -68,7 +68,9 @@ def anchors(page: Path) -> set[str]:
     return {heading.replace(" ", "-") for heading in plain}
 
 
-@pytest.mark.parametrize("page", with_blocks("python"), ids=name_of)
+@pytest.mark.parametrize(
+    "page", mostly_studies(with_blocks("python"), lambda p: p.stem not in LONG), ids=name_of
+)
 def test_the_python_of_a_page_runs(page, tmp_path, monkeypatch):
     """It prints what the comments behind its prints say."""
     monkeypatch.chdir(tmp_path)

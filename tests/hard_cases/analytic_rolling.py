@@ -99,7 +99,7 @@ def sliding_to_rolling() -> Verdicts:
         )
 
 
-@case("turntable")
+@case("turntable", slow=True)
 def turntable() -> Verdicts:
     for turn in (2 * math.pi, 20.0):
         run = rolling.on_turntable(

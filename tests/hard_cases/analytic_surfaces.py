@@ -79,7 +79,7 @@ def rolling_bowl() -> Verdicts:
 ORBIT = 40.0
 
 
-@case("rolls in a vertical cylinder")
+@case("rolls in a vertical cylinder", slow=True)
 def cylinder() -> Verdicts:
     """The ball does not run down: it bobs at sqrt(2/7) of its orbit."""
     run = rolling.in_cylinder(BALL, surfaces.cylinder(), surfaces.CYLINDER, ORBIT, stiffness=STIFF)
@@ -150,7 +150,7 @@ def tautochrone() -> Verdicts:
     yield at_most("largest / smallest period - 1", tried, "0", spread, 1e-5)
 
 
-@case("circles in a cone")
+@case("circles in a cone", slow=True)
 def cone() -> Verdicts:
     """Without friction a small push makes the circle breathe at sqrt(3) sin(half angle)."""
     for degrees in (30, 50):

@@ -137,7 +137,7 @@ def stretched(integrator: Any, start: float, friction: Any) -> tuple[float, floa
     return float(residual) if finite else math.nan, float(np.abs(result.q[-1]).max())
 
 
-@case("finger that presses along its own length")
+@case("finger that presses along its own length", slow=True)
 def singular() -> Verdicts:
     friction = sp.CoulombFriction(0.3, 0.25, 0.005, 0.05)
     for integrator, bound in (

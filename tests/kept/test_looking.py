@@ -12,6 +12,7 @@ import pytest
 
 from tests.kept.looking import looks
 from tests.kept.scenes import run
+from tests.studies import mostly_studies
 
 TRUSTED = ("trusted", "another scenario")
 WAYS = [name for name in looks("") if name not in TRUSTED]
@@ -25,7 +26,10 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return home
 
 
-@pytest.fixture(scope="module", params=["beside their scenario", "alone"])
+@pytest.fixture(
+    scope="module",
+    params=mostly_studies(["beside their scenario", "alone"], lambda place: place != "alone"),
+)
 def seen(
     home: Path, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
 ) -> dict[str, dict[str, object]]:

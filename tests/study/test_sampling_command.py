@@ -94,6 +94,7 @@ def test_faults_are_one_sentence(scenario, options, words):
     assert not list(scenario.parent.glob("fault*"))
 
 
+@pytest.mark.study
 def test_a_killed_sample_resumes_to_the_same_bytes(scenario):
     options = [STIFFNESS, DAMPING, "--sample", "sobol", "--n", 16, "--indices", "--bands", DEPTH]
     whole, killed = (scenario.parent / f"{name}.parquet" for name in ("whole", "killed"))
