@@ -184,7 +184,10 @@ def test_a_word_is_a_menu_and_views_have_switches(opened, tmp_path):  # noqa: F8
     text = DROP.replace('shell = "plate"\n', 'shell = "plate"\nmethod = "smooth"\n')
     text += '\n[[knob]]\nkey = "contact.ball-plate.method"\n'
     live, tab = opened(LiveRun(build(write(tmp_path, text))))
-    tab.wait("state.contacts.length")
+    tab.wait("state.t > 1.0 && state.contacts.length")
+    # At rest and standing still: this leaves the machine time to draw.
+    tab.click("#run")
+    tab.wait("!state.running")
     visible = '[data-part="distance"]'
     assert tab.page.locator(visible).is_visible()
     tab.click('[data-part="distance"]')
