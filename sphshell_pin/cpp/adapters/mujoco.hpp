@@ -26,7 +26,7 @@ struct MujocoLayout {
 
 // A body of MuJoCo that is joint k + 1 of the scene's model.
 struct MujocoBody {
-  int id, root;           // root: of its kinematic tree, whose center of mass cvel and cdof refer to
+  int id, root;  // root: of its kinematic tree, whose center of mass cvel and cdof refer to
   std::vector<int> dofs;  // that move it
 };
 
