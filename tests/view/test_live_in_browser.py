@@ -1,5 +1,6 @@
 """The live page in a real browser: pixels, clicks, keys, sliders, several tabs, no network."""
 
+import re
 from urllib.parse import urljoin
 
 import numpy as np
@@ -9,7 +10,7 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.live import Live
-from tests.scenario.files import write
+from tests.scenario.files import FINGER, write
 from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
 from tests.view.test_recording_in_browser import count, is_blue, pixels_of, watch
 
@@ -215,34 +216,14 @@ def test_a_second_tab_follows(opened):
     assert live.speed < 0.9
 
 
-UR5 = """
-title = "an arm over a plate"
-
-[robot]
-name = "ur5"
-
-[[shell]]
-name = "plate"
-primitive = { type = "box", size = [0.4, 0.4, 0.02] }
-placement = { xyz = [0.0, 0.0, -0.3] }
-
-[[contact]]
-name = "tip-plate"
-sphere = { frame = "tool0", radius = 0.01 }
-shell = "plate"
-law = { type = "impact", stiffness = 1e6, exponent = 1.5, damping = 20.0 }
-
-[run]
-duration = 0.05
-dt = 1e-4
-"""
-
-
 @pytest.mark.robots
 def test_meshes_of_several_materials_are_drawn(opened, tmp_path):
     """meshcat's merge nests the list of materials that one of several meshes has."""
     pytest.importorskip("example_robot_data")
-    _, tab = opened(LiveRun(build(write(tmp_path, UR5))), running=False)
+    arm = FINGER.partition("[controller]")[0] + "[run]\nduration = 0.05\ndt = 1e-4\n"
+    arm = arm.replace("three_link_finger", "ur5").replace('frame = "tip"', 'frame = "tool0"')
+    arm = re.sub("^start = .*$", "", arm, flags=re.M)
+    _, tab = opened(LiveRun(build(write(tmp_path, arm))), running=False)
     materials = """() => {
         const found = [];
         viewer.scene.traverse((one) => Array.isArray(one.material) && found.push(...one.material));
