@@ -14,6 +14,8 @@ from tests.kept.looking import looks
 from tests.kept.scenes import run
 from tests.studies import mostly_studies
 
+pytestmark = pytest.mark.browser  # `render` opens one, where there is one
+
 TRUSTED = ("trusted", "another scenario")
 WAYS = [name for name in looks("") if name not in TRUSTED]
 

@@ -26,6 +26,7 @@ class Tab:
     def __init__(self, context, live, **options):
         self.live = live
         self.page = context.new_page(**options)
+        self.page.set_default_timeout(LONG)
         self.complaints = watch(self.page, urljoin(live.url, "/"))
         self.page.goto(live.url)
         self.wait("globalThis.state && document.body.classList.contains('ready')")
