@@ -45,6 +45,7 @@ __all__ = [
     "end_spheres",
     "exactly",
     "fingertips",
+    "floats",
     "is_path",
     "keep_collision_of",
     "keep_spheres",
@@ -62,6 +63,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from sphshell_pin.dynamics.scene.mimic import Mimic
+
+_AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # of a root that floats
 
 URDF_FOLDER = Path(__file__).parent / "urdf"
 
@@ -113,10 +116,13 @@ def names() -> list[str]:
     return [*OWN, *(name for name in _library() if name not in OWN)]
 
 
-def load(name: str, *, mimic: bool = False, pose: str | None = None) -> LoadedRobot:
+def load(
+    name: str, *, free_flyer: bool | None = None, mimic: bool = False, pose: str | None = None
+) -> LoadedRobot:
     """Return the robot called `name`, its mimic joints free unless `mimic` is set.
 
-    `mimic` and `pose` are those of `load_file`.
+    `mimic` and `pose` are those of `load_file`. With `free_flyer` the root link floats, with False
+    it is fixed where the reference posture has it; by default it is as its collection has it.
 
     Raises
     ------
@@ -129,7 +135,8 @@ def load(name: str, *, mimic: bool = False, pose: str | None = None) -> LoadedRo
     """
     if name in OWN:
         file = URDF_FOLDER / f"{name}.urdf"
-        return load_file(file, free_flyer=OWN[name], name=name, mimic=mimic, pose=pose)
+        free = OWN[name] if free_flyer is None else free_flyer
+        return load_file(file, free_flyer=free, name=name, mimic=mimic, pose=pose)
     try:
         import example_robot_data
     except ImportError:
@@ -147,6 +154,13 @@ def load(name: str, *, mimic: bool = False, pose: str | None = None) -> LoadedRo
     # A reference posture may state a free-flyer's quaternion with a few digits only.
     q0 = pin.normalize(robot.model, np.asarray(robot.q0, dtype=float))
     loaded = LoadedRobot(name, robot.model, robot.collision_model, robot.visual_model, q0)
+    if free_flyer is False and floats(robot.model):
+        geometry = [robot.collision_model, robot.visual_model]
+        model, (collision, visual) = pin.buildReducedModel(robot.model, geometry, [1], q0)
+        loaded = LoadedRobot(name, model, collision, visual, q0[7:])
+    elif free_flyer and not floats(robot.model):
+        loaded = load_file(robot.urdf, free_flyer=True, name=name)
+        loaded = replace(loaded, q0=np.append(_AT_ORIGIN, q0))
     if mimic:
         rules, note = mimics_of_library(name, read(robot.urdf).mimics)
         loaded = replace(_mimicking(loaded, rules, name), notes=note)
@@ -269,6 +283,11 @@ def mimics_of_library(
         "its file names mimicked joints without the hand, "
         f"'{first.of.partition('_')[2]}' for '{first.of}': read with it",
     )
+
+
+def floats(model: pin.Model) -> bool:
+    """Whether the root of the robot is free to move in space."""
+    return bool(model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer")
 
 
 def _mimicking(robot: LoadedRobot, rules: Iterable[Mimic], what: str) -> LoadedRobot:

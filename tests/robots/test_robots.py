@@ -91,3 +91,16 @@ def test_a_robot_this_machine_cannot_read_is_told_in_a_sentence():
         pytest.skip("this pinocchio reads SDF files")
     with pytest.raises(robots.RobotError, match=r"cassie.*wheel of pinocchio has no SDF reader"):
         robots.load("cassie")
+
+
+@pytest.mark.parametrize("name", ["so101", "panda", "ball"])
+def test_the_base_of_a_shipped_robot_is_what_it_is_asked_to_be(name):
+    plain, fixed, free = (robots.load(name, free_flyer=one) for one in (None, False, True))
+    assert fixed.model.nq == free.model.nq - 7
+    assert list(fixed.model.names)[1:] == list(free.model.names)[2:]
+    # Where the reference posture has joints it stays.
+    np.testing.assert_array_equal(free.q0[7:], fixed.q0)
+    np.testing.assert_array_equal(free.q0[:7], [0, 0, 0, 0, 0, 0, 1])
+    np.testing.assert_array_equal(plain.q0[plain.model.nq - fixed.model.nq :], fixed.q0)
+    mass = [pin.computeTotalMass(one.model) for one in (plain, free)]
+    assert mass[0] == pytest.approx(mass[1]) or name == "panda"  # whose base moves now

@@ -271,8 +271,10 @@ def test_its_knobs_turn(tmp_path):
         (("ball",), {"press": 3.0}, SphshellError, "leave out --press"),
         (("ball",), {"material": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"against": "iron"}, NameNotFound, "steel, aluminium"),
+        (("ball",), {"base": "fixed"}, SphshellError, "no joint: .* --base floating"),
+        (("solo12",), {"press": 3.0}, SphshellError, "leave out --press, .* with --base fixed"),
         (("ball",), {"place": "left"}, NameNotFound, "below, above"),
-        (("ball",), {"base": "fixed"}, SphshellError, "belong to a file, not to ball"),
+        (("ball",), {"xacro_args": {"a": "1"}}, SphshellError, "belong to a file, not to ball"),
         (("ball", BLADE), {"unit": "um"}, SphshellError, "less than the sphere's radius"),
         (("gear_pair",), {}, SphshellError, "one of gear_1, gear_2"),
         pytest.param(

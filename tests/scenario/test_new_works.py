@@ -129,6 +129,32 @@ def test_what_would_not_work_is_refused(robot, surface, options, match, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(tmp_path):
+    with pytest.raises(SphshellError, match=r"LEG' is in the part .* hold it with --base fixed"):
+        new_scenario("solo12", BLADE, unit="mm", base="floating", out=tmp_path / "a.toml")
+    made = new_scenario("solo12", BLADE, unit="mm", out=tmp_path / "a.toml")
+    assert "cannot stand on the surface: link 'FL_LOWER_LEG' is in the part" in made.why[0]
+    built = build(made.path)
+    # Three joints of the leg are left, of which none is the base.
+    assert built.scene.model.nv == built.scene.model.njoints - 1 == 3
+    result, stopped = simulate(built)
+    assert stopped is None
+    assert [v.figure for v in judge(built, result) if not v.met] == []
+    assert held(built, result) == pytest.approx(built.scenario.controller.normal_force, rel=0.05)
+
+
+@pytest.mark.study
+def test_an_arm_whose_collection_lets_it_float_is_fixed(tmp_path):
+    made = new_scenario("so101", BLADE, unit="mm", out=tmp_path / "a.toml")
+    assert made.why[0] == "the base is fixed, by the robot's shape: or --base"
+    assert 'name = "so101"\nbase = "fixed"' in made.text
+    built = build(made.path)
+    assert built.scene.model.nq == 6
+    result, stopped = simulate(built)
+    assert stopped is None
+    assert [v.figure for v in judge(built, result) if not v.met] == []
+
+
 def test_links_in_a_part_are_found():
     """A cube of 0.1 m before, around and beside links of the arm that stands straight up."""
     robot = robots.load_urdf(PROBE)

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips
+from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry
 
 Array = npt.NDArray[np.float64]
@@ -54,6 +54,8 @@ def find_tips(
     SphshellError
         Which frame cannot be found out, or the sphere is inside its own link.
     """
+    if not robot.model.nv:
+        raise SphshellError("the robot has no joint: let its root float with --base floating")
     known = _known(robot, shipped)
     if frame is not None:
         find_frame(robot.model, frame)
@@ -110,11 +112,6 @@ def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
             f"the end of this link: --frame {tip.frame} --offset {x:g} {y:g} {z:g} --radius "
             f"{end.radius:g}"
         )
-
-
-def floats(model: pin.Model) -> bool:
-    """Whether the root of the robot is free to move in space."""
-    return bool(model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer")
 
 
 def _known(robot: LoadedRobot, shipped: str | None) -> list[Tip]:

@@ -12,9 +12,9 @@ import pinocchio as pin
 from sphshell_pin.contact.materials import Material, friction_between
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots import LoadedRobot, end_spheres
+from sphshell_pin.robots import LoadedRobot, end_spheres, floats
 from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
-from sphshell_pin.scenario.drafting.fingertips import Tip, floats
+from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.drafting.hand_text import DURATION, GAP, HandDraft

@@ -15,17 +15,18 @@ import pinocchio as pin
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, check_vector
-from sphshell_pin.contact.materials import find_material
+from sphshell_pin.contact.materials import Material, find_material
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
-from sphshell_pin.robots import is_path
+from sphshell_pin.robots import floats, is_path
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
-from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips, floats
+from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
 from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.pose_search import PLACES, Request, find_working, sphere_centers
+from sphshell_pin.scenario.drafting.refusals import CannotStand
 from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.format.reading import parse_scenario
 from sphshell_pin.scenario.format.schema import RobotSection, RunSection, Scenario, ShellSection
@@ -95,8 +96,8 @@ def new_scenario(
         Name of a shipped robot, or path of a URDF, xacro (`xacro_args`: its arguments) or MJCF file
         (`package_dirs`: folders above the packages of its meshes).
     base
-        "fixed" or "floating"; by default as the file states it, but a single limb on a free base is
-        an arm, which is fixed.
+        "fixed" or "floating"; by default as its file states it, but a single limb on a free base is
+        an arm, which is fixed, and so is a robot that cannot stand on the surface.
     surface
         A surface file, its `unit` where the format has none, or a word of WORDS.
     bodies, faces
@@ -157,7 +158,7 @@ def new_scenario(
         xacro_args=xacro_args or {},
     )
     bare = _build_bare(section, file)
-    shaped = None if base is not None or section.path is None else _base(bare.assembly.model)
+    shaped = None if base is not None else _base(bare.assembly.model)
     if shaped is not None:
         section = section.model_copy(update={"base": shaped})
         bare = _build_bare(section, file)
@@ -179,22 +180,7 @@ def new_scenario(
     shell_section, with_shell = _sided(shell_section, with_shell, word)
     if tips == "all":
         pair = find_material(material or "rubber"), find_material(against)
-        grasp = hold_in_hand(
-            section,
-            shell_section,
-            with_shell,
-            found,
-            pair,
-            press,
-            file.stem,
-            lambda text, reuse: _build_text(text, file, reuse),
-        )
-        part = file.with_name(part_file(file.stem))
-        if part.exists() and not force:
-            raise ScenarioError(part, "", "is there already: give another --out, or --force")
-        _write(part, grasp.urdf)
-        _write(file, grasp.text)
-        return NewScenario(file, grasp.text, grasp.built, explain_built(grasp.built), grasp.why)
+        return _held(section, shell_section, with_shell, found, pair, press, file, force=force)
     request = Request(material, against, press, place, word, asked, tell)
     title = f"{loaded.name} {{}} {shell_section.name}"
 
@@ -204,11 +190,65 @@ def new_scenario(
         return text, _build_text(text, file, with_shell)
 
     # What is written is what was built, and tried.
-    text, built, plan = find_working(section, with_shell, found, request, draft)
+    try:
+        text, built, plan = find_working(section, with_shell, found, request, draft)
+    except CannotStand as error:
+        if base is not None:
+            raise
+        note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
+        fixed = new_scenario(
+            robot,
+            surface,
+            frame=frame,
+            radius=radius,
+            offset=offset,
+            unit=unit,
+            bodies=bodies,
+            faces=faces,
+            material=material,
+            against=against,
+            base="fixed",
+            package_dirs=package_dirs,
+            xacro_args=xacro_args,
+            out=out,
+            force=force,
+            tell=tell,
+        )
+        return replace(fixed, why=(note, *fixed.why))
     _write(file, text)
     of_base = () if shaped is None else (f"the base is {shaped}, by the robot's shape: or --base",)
     why = (*of_base, *plan.why, _materials_note(plan))
     return NewScenario(file, text, built, explain_built(built), why)
+
+
+def _held(
+    section: RobotSection,
+    shell: ShellSection,
+    built: Built,
+    tips: Sequence[Tip],
+    materials: tuple[Material, Material],
+    press: float | None,
+    file: Path,
+    *,
+    force: bool,
+) -> NewScenario:
+    """Write the scenario in which the fingertips hold the surface, and its part's URDF."""
+    grasp = hold_in_hand(
+        section,
+        shell,
+        built,
+        tips,
+        materials,
+        press,
+        file.stem,
+        lambda text, reuse: _build_text(text, file, reuse),
+    )
+    part = file.with_name(part_file(file.stem))
+    if part.exists() and not force:
+        raise ScenarioError(part, "", "is there already: give another --out, or --force")
+    _write(part, grasp.urdf)
+    _write(file, grasp.text)
+    return NewScenario(file, grasp.text, grasp.built, explain_built(grasp.built), grasp.why)
 
 
 def _sided(shell: ShellSection, built: Built, word: str | None) -> tuple[ShellSection, Built]:
@@ -264,11 +304,11 @@ def _robot_section(
 ) -> RobotSection:
     file = Path(robot)
     if not is_path(robot):
-        if base or package_dirs or xacro_args:
+        if package_dirs or xacro_args:
             raise SphshellError(
-                f"a base, mesh folders and xacro arguments belong to a file, not to {robot}"
+                f"mesh folders and xacro arguments belong to a file, not to {robot}"
             )
-        return RobotSection(name=str(robot))
+        return RobotSection(name=str(robot), base=base)
     place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
     return RobotSection(
         urdf=place if is_urdf else None,

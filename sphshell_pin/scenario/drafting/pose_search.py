@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeGuard
 
 import numpy as np
@@ -15,11 +14,11 @@ from sphshell_pin.contact.materials import Material, find_material
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots import WORKING
+from sphshell_pin.robots import WORKING, floats
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
-from sphshell_pin.scenario.drafting.fingertips import Tip, floats
-from sphshell_pin.scenario.drafting.placing import Bench, Place, Searched, nearest_side
+from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
 from sphshell_pin.scenario.drafting.plan import (
     GRAVITY,
     TIP_GAP,
@@ -36,6 +35,7 @@ from sphshell_pin.scenario.drafting.plan import (
     press_plan,
 )
 from sphshell_pin.scenario.drafting.poses import Stance, home_approach, joints_aside
+from sphshell_pin.scenario.drafting.refusals import Tried, cannot_stand, refusal
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
 from sphshell_pin.scenario.drafting.trial import Fault, try_out
 from sphshell_pin.scenario.format.bodies import joint_spans
@@ -100,31 +100,6 @@ class Request:
         return rubber if bears else find_material("plastic"), other
 
 
-@dataclass
-class _Tried(Searched):
-    """What a search came across, for the sentence that refuses."""
-
-    runs: int = 0
-    faults: list[Fault] = field(default_factory=list)
-    without: tuple[str, ...] = ()
-    """Kinds of what acts in the joints that are left out."""
-    note: str = ""
-    """Why they are."""
-    errors: list[SphshellError] = field(default_factory=list)
-    stays: list[tuple[RobotSection, Plan]] = field(default_factory=list)
-    """Plans that press in one place, where a path failed."""
-    ways: list[str] = field(default_factory=list)
-    """Why a path that was asked for could not be taken."""
-
-    def leave_out(self, kind: str, fault: Fault) -> None:
-        """Leave one more kind of what the file states of the joints out, for this `fault`."""
-        self.without = (*self.without, kind)
-        self.note = (
-            f"the {' and '.join(self.without)} that the robot's file states for its joints is not "
-            f"modeled, because with it {fault.text}"
-        )
-
-
 def find_working(
     section: RobotSection, built: Built, tips: Sequence[Tip], request: Request, draft: Draft
 ) -> tuple[str, Built, Plan]:
@@ -136,7 +111,7 @@ def find_working(
     Raises
     ------
     SphshellError
-        None does; the text says what fails and what to change.
+        None does; the text says what fails and what to change. CannotStand of a robot that floats.
     """
     if floats(built.assembly.model):
         return _drop(section, built, tips, request, draft)
@@ -161,7 +136,7 @@ def _press(
             f"no joint moves frame '{tip.frame}': name another with --frame, or let the root "
             "float with --free-flyer"
         )
-    tried = _Tried()
+    tried = Tried()
     geometry = built.assembly.loaded[0].collision_model
     links = Links(model, geometry, shell, [tip], joints_aside(model, tip))
     still: list[Candidate] = []
@@ -214,7 +189,7 @@ def _press(
     for one in still:
         if (done := work(one)) is not None:
             return done
-    raise _refusal(tip, request, tried)
+    raise refusal(tip.frame, request.place, request.word, tried)
 
 
 class Candidate(NamedTuple):
@@ -234,7 +209,7 @@ def _places(
     shell: Shell,
     links: Links,
     request: Request,
-    tried: _Tried,
+    tried: Tried,
 ) -> Iterator[Place]:
     """Yield places of the part before the tip, those on the floor of the robot's base first.
 
@@ -315,7 +290,7 @@ def _first_working(
     plan: Plan,
     links: Links,
     draft: Draft,
-    tried: _Tried,
+    tried: Tried,
     request: Request,
 ) -> tuple[str, Built, Plan] | None:
     queue = [plan]
@@ -388,10 +363,9 @@ def _drop(
     (shell,) = built.shells.values()
     inside = request.word == "bowl"
     if request.press is not None or request.place is not None or not request.asked.is_default:
-        raise SphshellError(
-            "a robot that floats comes down on the surface by its weight: leave out --press, "
-            "--place, --at and --path"
-        )
+        said = "a robot that floats comes down on the surface by its weight: leave out --press, "
+        hold = ", or hold it with --base fixed" if model.njoints > 2 else ""
+        raise SphshellError(f"{said}--place, --at and --path{hold}")
     centers = sphere_centers(built, tips)
     root = q0[:7]
     if model.njoints == 2:
@@ -409,7 +383,7 @@ def _drop(
         plan = plan_stand(shell, tuple(tips), centers, mass, inertia, leg, pair)
     links = Links(model, built.assembly.loaded[0].collision_model, shell, tips, ())
     section = section.model_copy(update={"joints": stated_kinds(model, ())})
-    tried = _Tried(postures=1)
+    tried = Tried(postures=1)
     while True:
         text, made = draft(section, plan)
         fault = try_out(made, plan, links)
@@ -421,7 +395,7 @@ def _drop(
         # What can stand has to stand.
         falls = fault.kind == "links" and (plan.control is None or len(plan.tips) < 3)
         if not falls or end < _SHORTEST or tried.runs >= _MOST_DROPS:
-            raise _refusal(tips[0], request, tried, floating=True)
+            raise cannot_stand(tried)
         note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the surface"
         plan = replace(plan, duration=end, why=(*plan.why, note))
 
@@ -440,54 +414,3 @@ def _changed_joints(model: pin.Model, q0: Array, q: Array) -> dict[str, float | 
             values = [round(float(one), 9) for one in q[span]]
             start[name] = values[0] if len(values) == 1 else values
     return start
-
-
-def _refusal(tip: Tip, request: Request, tried: _Tried, *, floating: bool = False) -> SphshellError:
-    """Return the error that says why no draft works, and what to change."""
-    if not tried.postures:
-        way = f"along {request.place}" if request.place else "along any axis"
-        return SphshellError(
-            f"the tip on frame '{tip.frame}' cannot move {way} in any posture that was tried: its "
-            "joints do not allow it; take another --place or --frame"
-        )
-    if tried.faults:
-        fault = tried.faults[-1]
-        when = f" at t = {fault.t:.2g} s" if fault.link else ""
-        advice = _ADVICE_FLOATING if floating else _ADVICE[fault.kind]
-        return SphshellError(
-            f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}; {advice}"
-        )
-    if tried.errors:
-        return tried.errors[0]
-    if tried.ways:
-        return SphshellError(
-            f"the path cannot be taken: {tried.ways[0]}; take a shorter --length, another --at or "
-            "--place"
-        )
-    if tried.blocked:
-        ((link, _),) = Counter(tried.blocked).most_common(1)
-        advice = _ADVICE_BOWL if request.word == "bowl" else _ADVICE["links"]
-        return SphshellError(
-            f"link '{link}' would be in the part, or another one: in each of "
-            f"{_count(tried.postures, 'posture')} and {_count(tried.places, 'place')} on the part "
-            f"that were tried; {advice}"
-        )
-    return SphshellError("the surface has no point to touch")
-
-
-_ADVICE = {
-    "run": "take a softer --law, or a larger --radius",
-    "touch": "take another --place, or another --frame",
-    "force": "take a smaller --radius, another --press or --place",
-    "path": "take a shorter --length, another --at or --place",
-    "links": "take another --place, a smaller part, or a sphere farther out (--frame, --offset)",
-    "figure": "take another --law or --radius",
-}
-_ADVICE_BOWL = "the bowl is a whole ball, which the limb would pass: take the file of an open one"
-_ADVICE_FLOATING = (
-    "take a flatter or larger part, on which all spheres can come down, or another --law"
-)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

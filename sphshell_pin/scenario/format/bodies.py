@@ -263,7 +263,7 @@ def joint_spans(model: pin.Model, name: str) -> tuple[slice, slice]:
 
 def _load(section: RobotSection, path: Path) -> LoadedRobot:
     if section.name is not None:
-        return load(section.name, mimic=section.mimic, pose=section.pose)
+        return load(section.name, free_flyer=section.floats, mimic=section.mimic, pose=section.pose)
     folder, file = path.parent, section.path or ""
     return load_file(
         folder / file,

@@ -112,7 +112,7 @@ class RobotSection(Section):
                 "give either name (a shipped robot) or file (a URDF, xacro or MJCF; urdf is the "
                 "same key), not both"
             )
-        of_files = ("package_dirs", "xacro_args", "srdf", "base", "free_flyer")
+        of_files = ("package_dirs", "xacro_args", "srdf")
         beside = [key for key in of_files if getattr(self, key)]
         if self.name is not None and beside:
             raise ValueError(f"{' and '.join(beside)} belong to a file; drop them beside name")
