@@ -275,7 +275,12 @@ def test_its_knobs_turn(tmp_path):
         (("solo12",), {"press": 3.0}, SphshellError, "leave out --press, .* with --base fixed"),
         (("ball",), {"place": "left"}, NameNotFound, "below, above"),
         (("ball",), {"xacro_args": {"a": "1"}}, SphshellError, "belong to a file, not to ball"),
-        (("ball", BLADE), {"unit": "um"}, SphshellError, "less than the sphere's radius"),
+        (
+            ("ball", BLADE),
+            {"unit": "um"},
+            SphshellError,
+            r"less than the sphere's radius .* --radius [0-9.]+mm$",
+        ),
         (("gear_pair",), {}, SphshellError, "one of gear_1, gear_2"),
         pytest.param(
             ("three_link_finger",),

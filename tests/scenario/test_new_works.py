@@ -21,6 +21,7 @@ from sphshell_pin.scenario.running.run import simulate
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
+BLADE_STEP = BLADE.with_name("blade.step")
 PLACES = ("below", "above", "+x", "-x", "+y", "-y")
 
 
@@ -141,6 +142,18 @@ def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(tmp_pa
     assert stopped is None
     assert [v.figure for v in judge(built, result) if not v.met] == []
     assert held(built, result) == pytest.approx(built.scenario.controller.normal_force, rel=0.05)
+
+
+def test_half_the_force_is_tried_where_the_whole_is_not_held(tmp_path):
+    told = []
+    path = tmp_path / "a.toml"
+    made = new_scenario("three_link_finger", BLADE_STEP, out=path, tell=told.append)
+    first, last = (float(re.search(r"force of (\S+) N", said)[1]) for said in (told[0], told[-1]))
+    assert last == pytest.approx(first / 2, rel=0.1)
+    assert any(why.startswith("half the force that suits its joints: ") for why in made.why)
+    built = build(path)
+    assert built.scenario.controller.normal_force == last
+    assert held(built, simulate(built)[0]) == pytest.approx(last, rel=0.05)
 
 
 @pytest.mark.study

@@ -407,7 +407,7 @@ def _check_size(shell: Shell, tips: Sequence[Tip]) -> None:
     if shell.size < radius:
         raise SphshellError(
             f"the surface measures {shell.size:.3g} m, less than the sphere's radius {radius:g} m: "
-            "state its --unit, or a smaller --radius"
+            f"state its --unit, or a smaller sphere, --radius {500 * shell.size:.2g}mm"
         )
 
 

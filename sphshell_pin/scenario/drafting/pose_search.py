@@ -143,6 +143,7 @@ def _press(
 
     def work(one: Candidate) -> tuple[str, Built, Plan] | None:
         place, way, pair, force, gap = one
+        tried.force = force
         stood = section.model_copy(
             update={
                 "lock": list(place.stance.lock),
@@ -189,6 +190,12 @@ def _press(
     for one in still:
         if (done := work(one)) is not None:
             return done
+    if request.press is None and tried.faults and tried.faults[-1].kind == "force":
+        # What gives way turns less under a smaller force.
+        gentle = replace(request, press=float(f"{tried.force / 2:.2g}"))
+        text, made, plan = _press(section, built, tips, gentle, draft)
+        note = f"half the force that suits its joints: {tried.faults[-1].text}"
+        return text, made, replace(plan, why=(*plan.why, note))
     raise refusal(tip.frame, request.place, request.word, tried)
 
 

@@ -39,6 +39,8 @@ class Tried(Searched):
     """What a search came across, for the sentence that refuses."""
 
     runs: int = 0
+    force: float = 0.0
+    """Of the last draft [N]."""
     faults: list[Fault] = field(default_factory=list)
     without: tuple[str, ...] = ()
     """Kinds of what acts in the joints that are left out."""
