@@ -1,9 +1,10 @@
-"""Shells and spheres as a Display draws them: each once, hanging on a joint."""
+"""Shells, spheres and planes as a Display draws them: each once, hanging on a joint."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.view.distance import draw_distance
@@ -16,6 +17,7 @@ from sphshell_pin.view.nodes import (
     set_object,
     show,
     sphere,
+    triangle_mesh,
 )
 from sphshell_pin.view.surface import draw_faces, draw_patches, draw_shell, great_circles
 
@@ -25,12 +27,15 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair, PlacedSphere
 
 SPHERE_COLOR = 0x2F6FDE
+PLANE_COLOR = 0x7A8794
+_CELLS = 12  # of the square that stands for a plane, along a side
 
 COLORINGS = ("distance", "faces", "patches")
 """Ways to color a shell; of several that are on the first is seen."""
 
 ShellKey = tuple[int, int, bytes, bool]
 SphereKey = tuple[int, bytes, float]  # joint, placement in it, radius
+PlaneKey = tuple[int, bytes]
 
 
 def shell_key(pair: ContactPair) -> ShellKey:
@@ -42,6 +47,11 @@ def shell_key(pair: ContactPair) -> ShellKey:
 def sphere_key(sphere: PlacedSphere) -> SphereKey:
     """Return a key: spheres with equal keys share a picture."""
     return sphere.joint, sphere.placement.homogeneous.tobytes(), sphere.radius
+
+
+def plane_key(pair: ContactPair) -> PlaneKey:
+    """Return a key: pairs with equal keys share the picture of their plane."""
+    return pair.joint_i, pair.placement_i.homogeneous.tobytes()
 
 
 class DrawnShell:
@@ -135,3 +145,40 @@ class DrawnSphere:
     def update(self, data: pin.Data) -> None:
         """Place it where forward kinematics left its joint in `data`."""
         self._move((data.oMi[self.joint] * self._offset).homogeneous)
+
+
+class DrawnPlane:
+    """The plane of `pair`: a square of cells of half the shell's size, where the shell is."""
+
+    def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
+        low, high = np.asarray(pair.shell.box) if pair.shell is not None else np.zeros((2, 3))
+        self._cell = 0.5 * float(np.linalg.norm(high - low))
+        self._plane, self._shell = (
+            (pair.joint_i, pair.placement_i),
+            (pair.joint_j, pair.placement_j),
+        )
+        self._center = 0.5 * (low + high)
+        self._middle = np.full(3, np.inf)
+        node = visualizer[f"{index}_{node_name(pair.name)}"]
+        ticks = np.arange(_CELLS + 1) - 0.5 * _CELLS
+        points = self._cell * np.array([(x, y, 0.0) for y in ticks for x in ticks])
+        number = np.arange(len(points), dtype=np.int32).reshape(len(ticks), -1)
+        corners = number[[0, 0, -1, -1], [0, -1, -1, 0]]
+        look = material("MeshBasic", PLANE_COLOR, 0.25, depthWrite=False)
+        set_object(
+            node["square"], triangle_mesh(points, corners[[0, 1, 2, 0, 2, 3]]), look, order=1
+        )
+        # Pieces from crossing to crossing: some browsers lose lines that pass the camera.
+        ends = ((number[:, :-1], number[:, 1:]), (number[:-1], number[1:]))
+        lines = np.concatenate([np.stack(one, axis=-1).reshape(-1, 2) for one in ends])
+        look = material("LineBasic", PLANE_COLOR, 0.5, depthWrite=False)
+        set_object(node["cells"], line_segments(points, lines), look, "LineSegments", order=2)
+        self._move = mover(node)
+
+    def update(self, data: pin.Data) -> None:
+        """Place it where forward kinematics left its joint in `data`, a cell on with the shell."""
+        plane, shell = (data.oMi[joint] * place for joint, place in (self._plane, self._shell))
+        seen = plane.actInv(shell.act(self._center)) * [1.0, 1.0, 0.0]
+        if np.abs(seen - self._middle).max() > 0.25 * _CELLS * self._cell:
+            self._middle = self._cell * np.round(seen / self._cell)
+        self._move((plane * pin.SE3(np.eye(3), self._middle)).homogeneous)

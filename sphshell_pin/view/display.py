@@ -1,4 +1,4 @@
-"""A Scene in a meshcat page: robot, shells, spheres, contact points and force arrows."""
+"""A Scene in a meshcat page: robot, shells, spheres, planes, contact points and force arrows."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns, pushing
 from sphshell_pin.view.bodies import (
     COLORINGS,
+    DrawnPlane,
     DrawnShell,
     DrawnSphere,
+    PlaneKey,
     ShellKey,
     SphereKey,
+    plane_key,
     shell_key,
     sphere_key,
 )
@@ -106,8 +109,10 @@ class Display:
         self._frames: FrameAxes | None = None  # until they are shown
         self._shells: dict[ShellKey, DrawnShell] = {}
         self._spheres: dict[SphereKey, DrawnSphere] = {}
+        self._planes: dict[PlaneKey, DrawnPlane] = {}
         self._draw_shells()
         self._draw_spheres()
+        self._draw_planes()
         self._visual_model = visual_model
         self._robot = self._make_robot(visual_model)
         self.patch_scale = PatchScale(1.0)
@@ -142,11 +147,13 @@ class Display:
             shell.update(self._data)
         for ball in self._spheres.values():
             ball.update(self._data)
+        for plane in self._planes.values():
+            plane.update(self._data)
         if self._frames is not None and "frames" not in self._hidden:
             self._frames.update(self._data)
         pair = getattr(contacts, "pair", None)
-        drawn = contacts if contacts is None or pair is None else pushing(contacts, pair)
-        self._arrows.update(drawn, self.arrow_scale)
+        seen = contacts if contacts is None or pair is None else pushing(contacts, pair)
+        self._arrows.update(seen, self.arrow_scale)
         if patches is None:
             return
         if self._patches is None:
@@ -237,6 +244,9 @@ class Display:
         if {sphere_key(one) for pair in scene.pairs for one in pair.spheres} != set(self._spheres):
             self.visualizer["spheres"].delete()
             self._draw_spheres()
+        if {plane_key(pair) for pair in scene.pairs if pair.plane} != set(self._planes):
+            self.visualizer["planes"].delete()
+            self._draw_planes()
         self._show_frames("frames" not in self._hidden)
         if visual_model is not self._visual_model:
             self._visual_model = visual_model
@@ -333,6 +343,13 @@ class Display:
         if "spheres" in self._hidden:
             show(self.visualizer["spheres"], False)
 
+    def _draw_planes(self) -> None:
+        self._planes.clear()
+        for pair in self.scene.pairs:
+            if pair.plane is not None and plane_key(pair) not in self._planes:
+                drawn = DrawnPlane(self.visualizer["planes"], pair, len(self._planes))
+                self._planes[plane_key(pair)] = drawn
+
     def _make_robot(self, visual_model: pin.GeometryModel | None) -> GeometryRobot | SkeletonRobot:
         if visual_model is not None and len(visual_model.geometryObjects):
             return GeometryRobot(self.visualizer, self._model, visual_model)
@@ -417,7 +434,9 @@ def choose_view(
     normal = np.zeros(3)
     if touched and normals_world is not None:
         mean = normals_world.mean(axis=0)
-        normal = mean / max(float(np.linalg.norm(mean)), 1e-9)
+        # Normals on a plane lead into it; the eye stays on the side of the shells.
+        below = all(pair.plane is not None for pair in scene.pairs)
+        normal = (-mean if below else mean) / max(float(np.linalg.norm(mean)), 1e-9)
     return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
 
 

@@ -54,6 +54,7 @@ def contact_pair(model, frame, radius, shell, shell_frame="universe", placement=
     return SimpleNamespace(
         spheres=() if radius is None else (PlacedSphere(joint, center, radius),),
         name=name,
+        plane=None,
         frame_i=frame,
         sphere=None if radius is None else SimpleNamespace(radius=radius),
         shell=shell,

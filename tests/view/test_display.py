@@ -6,9 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin import ImpactLaw, Scene, Sphere
+from sphshell_pin import ImpactLaw, Plane, Scene, Shell, Sphere
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import ArrowScale, Display
+from sphshell_pin.view.display import choose_view
 from sphshell_pin.view.page import FilmWindow
 from tests.view.stand_ins import (
     a_scene,
@@ -180,3 +181,25 @@ def test_importing_the_folders_loads_no_picture_library():
     )
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "set()"
+
+
+def test_a_plane_is_drawn_where_its_shell_is_and_the_eye_above_it():
+    model = ball_model()
+    scene = Scene(model)
+    tilted = Plane("table", (0.0, 0.0, -0.5), (1.0, 0.0, 1.0))
+    foot = Shell([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    scene.add_contact(tilted, foot, frame="ball", law=ImpactLaw(1e4), name="on")
+    q = ball_configuration([30.0, 2.0, 3.0], 0.7)
+    where, commands = filmed(scene, q)
+    square = where["planes/0_on"]
+    up = pin.utils.rotate("z", 0.7) @ [np.sqrt(0.5), 0.0, np.sqrt(0.5)]
+    np.testing.assert_allclose(square[:3, 2], up, atol=1e-12)
+    assert abs((square[:3, 3] - [0.0, 0.0, -0.5]) @ up) < 1e-12  # on the plane
+    # Below the shell, to a cell.
+    away = square[:3, 3] - [30.0, 2.0, 3.0]
+    low, high = scene.pairs[0].shell.box
+    assert np.linalg.norm(away - (away @ up) * up) < np.linalg.norm(high - low)
+    assert sum(c["path"].endswith("/square") for c in commands if c["type"] == "set_object") == 1
+    # Normals of contacts lead into the plane.
+    view = choose_view(scene, q[None, :], np.array([[30.0, 2.0, 3.0]]), -up[None, :])
+    assert (view.eye - view.target) @ up > 0
