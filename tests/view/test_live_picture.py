@@ -11,12 +11,13 @@ from sphshell_pin.contact import CoulombFriction
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, SceneContacts
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
-from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW
-from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown
+from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View
+from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, lowered
 from sphshell_pin.view.live.window import LiveWindow
 from tests.scenario.files import DROP, write
 from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
 from tests.view.stand_ins import ball_configuration, ball_model, contact_pair, plate
+from tests.view.test_camera import in_picture
 from tests.view.test_live_window import Browser
 
 
@@ -302,6 +303,16 @@ def test_the_first_camera_of_a_finished_run_has_all_of_its_part():
     player.seek(0.7)
     Easel(player)
     assert player.time == 0.7
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_moved_down_below_the_figures_stays_in_the_picture(seed):
+    random = np.random.default_rng(seed)
+    around = random.uniform(-1, 1, (300, 3))
+    view = View.of(np.zeros((1, 3)), around, np.zeros(3), 0.05, reach=100.0)
+    before, after = (in_picture(one, around) for one in (view, lowered(view)))
+    assert np.abs(after).max() < 1.0
+    assert after[:, 1].max() < before[:, 1].max() - 0.1
 
 
 def test_the_camera_of_a_run_that_diverged_is_finite():

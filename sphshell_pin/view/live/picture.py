@@ -57,9 +57,7 @@ class Picture:
         q, points, normals = _seen_in(player)
         whole = player.duration is not None
         view = choose_view(scene, q, points, normals, player.visual_model, FAR, whole=whole)
-        # Down a little, from below the figures that lie over the top of the scene.
-        lift = np.array([0.0, 0.0, 0.05 * view.distance])
-        view = View(view.eye + lift, view.target + lift)
+        view = lowered(view)
         self.display = Display(scene, player.visual_model, visualizer, view=view, pool=_pool(scene))
         self.view: View = view
         self.shown = {part: part in PARTS and part not in HIDDEN_AT_FIRST for part in LIVE_PARTS}
@@ -352,6 +350,15 @@ def _empty_parts(scene: Scene) -> frozenset[str]:
         "pressure": bool(scene.pairs),
     }
     return frozenset(part for part, some in has.items() if not some)
+
+
+def lowered(view: View) -> View:
+    """Return a view of the same a little lower in the picture, below the figures over its top.
+
+    It is farther off, so that nothing leaves the picture at the bottom.
+    """
+    lift = np.array([0.0, 0.0, 0.05 * view.distance])
+    return View(view.eye + lift + 0.08 * (view.eye - view.target), view.target + lift)
 
 
 def _seen_in(player: Player) -> tuple[FloatArray, FloatArray, FloatArray]:
