@@ -48,7 +48,7 @@ _PARTS = (
 # What a type checker sees above; tests compare the two.
 _NAMES = {
     "contact": "BristleFriction BristleState ContactSet CoulombFriction Feature FoundationLaw "
-    "Friction FunctionLaw HertzLaw MATERIALS Material Method "
+    "Friction FunctionFriction FunctionLaw HertzLaw MATERIALS Material Method "
     "MindlinFriction NormalLaw Plane Sphere TableLaw contact_wrench find_material "
     "foundation_pressure friction_between restitution_between",
     "contact.laws": "HuntCrossleyLaw ImpactLaw",

@@ -3,6 +3,7 @@
 from sphshell_pin.contact.bristle import BristleFriction, MindlinFriction
 from sphshell_pin.contact.foundation import FoundationLaw, foundation_pressure
 from sphshell_pin.contact.friction import CoulombFriction, Friction
+from sphshell_pin.contact.function_friction import FunctionFriction
 from sphshell_pin.contact.function_law import FunctionLaw
 from sphshell_pin.contact.hertz_law import HertzLaw
 from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw
@@ -29,6 +30,7 @@ __all__ = [
     "Feature",
     "FoundationLaw",
     "Friction",
+    "FunctionFriction",
     "FunctionLaw",
     "HertzLaw",
     "HuntCrossleyLaw",

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_not_negative, check_type
+from sphshell_pin.checks import check_not_negative, check_positive, check_type
 from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
@@ -56,9 +56,18 @@ class Friction(Component):
         """
         raise NotImplementedError
 
-    def coefficient(self, slip_speed: float) -> float:
-        """Return mu of steady sliding at `slip_speed` [m/s] >= 0."""
-        return self._binding.coefficient(check_not_negative("slip_speed", slip_speed, "m/s"))
+    def coefficient(self, slip_speed: float, load: float = 1.0) -> float:
+        """Return mu of steady sliding at `slip_speed` [m/s] >= 0.
+
+        The `load` [N] counts for a FunctionFriction alone.
+        """
+        speed = check_not_negative("slip_speed", slip_speed, "m/s")
+        return self._binding.coefficient(speed, check_positive("load", load, "N"))
+
+    @property
+    def largest_coefficient(self) -> float:
+        """The largest mu, at rest or nearly so; of a FunctionFriction under 1 N."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -77,6 +86,11 @@ class Coefficients(Friction):
         label="dynamic friction",
         help="coefficient of fast sliding; not above `mu_static`",
     )
+
+    @property
+    def largest_coefficient(self) -> float:
+        """The static coefficient."""
+        return float(self.mu_static)
 
     def __post_init__(self) -> None:
         """Put numbers in place of names; raise InvalidParameter for a value outside its bounds."""
@@ -176,5 +190,5 @@ def check_friction(friction: object) -> Friction | None:
     """Return `friction`; raise InvalidParameter unless it is a friction law, or None."""
     if friction is None:
         return None
-    kinds = "a CoulombFriction, a BristleFriction, a MindlinFriction or None"
+    kinds = "a CoulombFriction, a BristleFriction, a MindlinFriction, a FunctionFriction or None"
     return check_type("friction", friction, Friction, f"must be {kinds}")

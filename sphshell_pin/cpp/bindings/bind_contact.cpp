@@ -43,11 +43,18 @@ NormalLaw of_function(Numbers parameters, std::uintptr_t force, nb::object of_fo
   return {std::move(law)};
 }
 
+FrictionLaw friction_of_function(Numbers parameters, std::uintptr_t force, nb::object of_force) {
+  FunctionFriction law;
+  law.function = LawForce(force, std::move(of_force));
+  law.parameters = std::move(parameters);
+  return {std::move(law)};
+}
+
 // A fault of a user's function, as the package's own error.
 void translate_fault(const std::exception_ptr& thrown, void*) {
   try {
     std::rethrow_exception(thrown);
-  } catch (const FunctionLaw::Fault& fault) {
+  } catch (const OwnFunction::Fault& fault) {
     const nb::object type = nb::module_::import_("sphshell_pin.errors").attr("SphshellError");
     PyErr_SetString(type.ptr(), fault.what());
   }
@@ -55,6 +62,9 @@ void translate_fault(const std::exception_ptr& thrown, void*) {
 
 PyType_Slot law_slots[] = {
     {Py_tp_traverse, reinterpret_cast<void*>(&traverse<NormalLaw, visit_law>)}, {0, nullptr}};
+PyType_Slot friction_slots[] = {
+    {Py_tp_traverse, reinterpret_cast<void*>(&traverse<FrictionLaw, visit_friction>)},
+    {0, nullptr}};
 
 }  // namespace
 
@@ -77,10 +87,11 @@ void bind_contact(nb::module_& m) {
       .def("energy",
            [](const NormalLaw& law, double depth) { return depth > 0 ? law.energy(depth) : 0.0; });
   // The same for friction; no friction is null in Python.
-  bind_family<FrictionLaw>(m, "FrictionLaw")
+  bind_family<FrictionLaw>(m, "FrictionLaw", nb::type_slots(friction_slots))
+      .def_static("of_function", &friction_of_function, "parameters"_a, "force"_a, "of_force"_a)
       .def_prop_ro("has_state", &FrictionLaw::has_state)
       .def_prop_ro("torsional", &FrictionLaw::torsional)
-      .def("coefficient", &FrictionLaw::coefficient, "speed"_a);
+      .def("coefficient", &FrictionLaw::coefficient, "speed"_a, "load"_a = 1.0);
   m.def(
       "contact_force",
       [](const NormalLaw& law, const FrictionLaw* friction, double depth, const Vec3& normal,

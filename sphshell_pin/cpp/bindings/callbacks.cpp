@@ -112,9 +112,17 @@ int visit_law(const NormalLaw& law, visitproc visit, void* arg) {
   return 0;
 }
 
+int visit_friction(const FrictionLaw& friction, visitproc visit, void* arg) {
+  const auto* own = std::get_if<FunctionFriction>(&friction.law);
+  if (!own) return 0;
+  if (const auto* force = own->function.target<LawForce>()) Py_VISIT(force->object().ptr());
+  return 0;
+}
+
 int visit_pair(const Pair& pair, visitproc visit, void* arg) {
   if (const auto* points = std::get_if<SourcePoints>(&pair.geometry))
     if (const auto* own = points->source.target<PythonSource>()) Py_VISIT(own->object().ptr());
+  if (const int stop = visit_friction(pair.friction, visit, arg)) return stop;
   return visit_law(pair.law, visit, arg);
 }
 

@@ -78,6 +78,7 @@ class PythonController : public Controller {
 
 // For Python's garbage collector: the Python objects that a law, a pair or pairs hold.
 int visit_law(const NormalLaw& law, visitproc visit, void* arg);
+int visit_friction(const FrictionLaw& friction, visitproc visit, void* arg);
 int visit_pair(const Pair& pair, visitproc visit, void* arg);
 int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg);
 

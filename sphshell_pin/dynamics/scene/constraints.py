@@ -52,7 +52,7 @@ def constraints_of(
         ends = (pair.joint_j, on_shell), (pair.joint_i, on_sphere)
         placed = [one for joint, at in ends for one in (joint, data.oMi[joint].actInv(at))]
         made = pin.PointContactConstraintModel(model, *placed)
-        made.setFriction(pair.friction.mu_static if pair.friction else 0.0)
+        made.setFriction(pair.friction.largest_coefficient if pair.friction else 0.0)
         models.append(made)
         stiffness = pair.plane_law.normal_stiffness(float(depth))
         compliance.append(1.0 / stiffness if stiffness > 0.0 else np.inf)

@@ -11,7 +11,16 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.contact import Friction, Method, MindlinFriction, NormalLaw, Plane, Sphere
+from sphshell_pin.contact import (
+    FoundationLaw,
+    Friction,
+    FunctionFriction,
+    Method,
+    MindlinFriction,
+    NormalLaw,
+    Plane,
+    Sphere,
+)
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.scene.sources import Find, checked_source
@@ -65,6 +74,9 @@ class ContactPair(Summarized):
         """Raise InvalidParameter for what needs a sphere or a shell where there is none."""
         if self.plane is not None:
             self._check_plane()
+        if isinstance(self.friction, FunctionFriction) and isinstance(self.law, FoundationLaw):
+            must = "is for contacts at a point: beside a FoundationLaw take a CoulombFriction"
+            raise InvalidParameter("friction", self.friction.kind, must)
         if self.find is None:
             return
         check_law(self.law, "at the points of a contact source")

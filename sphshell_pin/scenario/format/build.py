@@ -15,6 +15,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.contact.friction import Friction
+from sphshell_pin.contact.function_friction import FunctionFrictionFile
 from sphshell_pin.contact.function_law import FunctionFile
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.control.callables import check_callable
@@ -184,21 +186,14 @@ def build_scenario(
         raise ScenarioError(path, "shell", "two shells share a name")
     for i, contact in enumerate(scenario.contact):
         key = item_key("contact", scenario.contact, i)
-        law = _build_law(contact.law, path, key, load)
-        _add_contact(scene, contact, law, shells, assembly, path, key)
+        laws = _build_laws(contact, path, key, load)
+        _add_contact(scene, contact, laws, shells, assembly, path, key)
     for i, source in enumerate(scenario.source):
         key = item_key("source", scenario.source, i)
         find = load(source.find, f"{key}.find")
-        law = _build_law(source.law, path, key, load)
+        laws = _build_laws(source, path, key, load)
         with blamed_on(path, key):
-            scene.add_contact_source(
-                find,
-                source.frame_i,
-                source.frame_j,
-                law,
-                source.friction._build(path.parent),
-                name=source.name,
-            )
+            scene.add_contact_source(find, source.frame_i, source.frame_j, *laws, name=source.name)
     q0, v0 = restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
     controller = _build_controller(scenario.controller, scene, q0, shells, path, load)
     sensors = _build_sensors(scenario.sensor, scene, path)
@@ -297,20 +292,29 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
         return shell if section.magnify == 1.0 else shell.transformed(scale=section.magnify)
 
 
-def _build_law(
-    stated: Component, path: Path, key: str, load: Callable[[str, str], Function]
-) -> NormalLaw:
+def _build_laws(
+    stated: schema.ContactSection | schema.SourceSection,
+    path: Path,
+    key: str,
+    load: Callable[[str, str], Function],
+) -> tuple[NormalLaw, Friction | None]:
+    def loader(name: str) -> Callable[[str, str], Function]:
+        return lambda where, field: load(where, f"{key}.{name}.{field}")
+
+    folder, law, friction = path.parent, stated.law, stated.friction
     with blamed_on(path, key):
-        if isinstance(stated, FunctionFile):
-            return stated.loaded(lambda where, field: load(where, f"{key}.law.{field}"))
-        made: NormalLaw = stated._build(path.parent)
-        return made
+        return (
+            law.loaded(loader("law")) if isinstance(law, FunctionFile) else law._build(folder),
+            friction.loaded(loader("friction"))
+            if isinstance(friction, FunctionFrictionFile)
+            else friction._build(folder),
+        )
 
 
 def _add_contact(
     scene: sp.Scene,
     contact: schema.ContactSection,
-    law: NormalLaw,
+    laws: tuple[NormalLaw, Friction | None],
     shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
     assembly: Assembly,
     path: Path,
@@ -332,7 +336,7 @@ def _add_contact(
         several = spheres_of(contact, assembly, carrier)
     with blamed_on(path, key), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
-        friction = contact.friction._build(path.parent)
+        law, friction = laws
         one = contact.sphere or contact.plane
         if one is not None:
             scene.add_contact(

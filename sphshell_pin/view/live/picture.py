@@ -219,7 +219,8 @@ class ConePool:
             if slot < len(order):
                 k = int(order[slot])
                 law = pairs[int(contacts.pair[k])].friction
-                matrix = self._cone(contacts, k, getattr(law, "mu_static", 0.0), scale)
+                limit = 0.0 if law is None else law.largest_coefficient
+                matrix = self._cone(contacts, k, limit, scale)
             move(pose(np.eye(3), np.zeros(3), HIDDEN_SCALE) if matrix is None else matrix)
 
     @staticmethod

@@ -52,7 +52,7 @@ struct ContactKinematics {
 };
 
 // The friction laws. Each has its name, its parameters, and
-// - coefficient: of steady sliding at a slip speed [m/s];
+// - coefficient: of steady sliding at a slip speed [m/s] under a load [N];
 // - add: writes friction, torsion and the bristle's rates to the force at a contact. `radius` [m]
 //   is that of the sphere, `relaxation` [s] that of the bristles.
 // Those that stick derive from Sticking, and have besides
@@ -64,7 +64,7 @@ struct NoFriction {
   static constexpr const char* kind = "none";
   explicit NoFriction(const Numbers&) {}
 
-  double coefficient(double) const { return 0; }
+  double coefficient(double, double) const { return 0; }
 
   template <class S>
   void add(ContactForce<S>&, const ContactKinematics<S>&, double, double) const {}
@@ -89,11 +89,51 @@ struct CoulombFriction {
     return step(speed, v_static, mu_static, v_dynamic, mu_dynamic) / speed;
   }
 
-  double coefficient(double speed) const { return speed * over_speed(speed * speed); }
+  double coefficient(double speed, double) const { return speed * over_speed(speed * speed); }
 
   template <class S>
   void add(ContactForce<S>& out, const ContactKinematics<S>&, double, double) const {
     out.friction = -out.normal * over_speed(S(out.slip.squaredNorm())) * out.slip;
+  }
+};
+
+// Of slip speed [m/s] and normal force [N], against the slip: it creeps. Negative values count as
+// zero.
+struct FunctionFriction : OwnFunction {
+  static constexpr const char* kind = "function";
+  static constexpr double kLeast = 1e-6;  // a slower slip bears a force in proportion [m/s]
+
+  double coefficient(double speed, double load) const {
+    return speed * over_speed(speed, load) / load;
+  }
+
+  // The force over the slip speed [N s/m].
+  double over_speed(double speed, double normal) const {
+    const double taken = std::max(speed, kLeast);
+    const double force = function(taken, normal, parameters.data());
+    finite(force, "force of a FunctionFriction", "slip speed [m/s]", taken, "normal force [N]",
+           normal);
+    return std::max(0.0, force) / taken;
+  }
+
+  template <class S>
+  void add(ContactForce<S>& out, const ContactKinematics<S>&, double, double) const {
+    using std::sqrt;
+    if constexpr (std::is_same_v<S, double>) {
+      out.friction = -over_speed(out.slip.norm(), out.normal) * out.slip;
+    } else {
+      // The chain rule by hand: a user's function takes doubles only.
+      const S speed2 = out.slip.squaredNorm();
+      const double s = sqrt(speed2.value), n = out.normal.value;
+      S over(over_speed(s, n));
+      if (n > 0)
+        over.slope +=
+            slope([&](double x) { return over_speed(s, x); }, n, kStep * n) * out.normal.slope;
+      if (s > kLeast)
+        over.slope += slope([&](double x) { return over_speed(x, n); }, s, kStep * s) / (2 * s) *
+                      speed2.slope;
+      out.friction = -over * out.slip;
+    }
   }
 };
 
@@ -110,7 +150,7 @@ struct Sticking {
     return mu_dynamic + (mu_static - mu_dynamic) * exp(-speed2 / (v_stribeck * v_stribeck));
   }
 
-  double coefficient(double speed) const { return stribeck(speed * speed); }
+  double coefficient(double speed, double) const { return stribeck(speed * speed); }
 
   // Radius of the disc of contact; on an ellipse of Hertz's law, that of the disc of the same
   // normal stiffness.
@@ -311,7 +351,8 @@ struct MindlinFriction : Sticking {
 
 // One of the friction laws.
 struct FrictionLaw {
-  std::variant<NoFriction, CoulombFriction, BristleFriction, MindlinFriction> law = NoFriction({});
+  std::variant<NoFriction, CoulombFriction, BristleFriction, MindlinFriction, FunctionFriction>
+      law = NoFriction({});
 
   bool active() const { return !std::holds_alternative<NoFriction>(law); }
   // What the contacts that have a stretch for a state have in common, else null.
@@ -343,8 +384,9 @@ struct FrictionLaw {
         law);
   }
 
-  double coefficient(double speed) const {
-    return std::visit([&](const auto& one) { return one.coefficient(speed); }, law);
+  // The load [N] counts for a user's function alone.
+  double coefficient(double speed, double load = 1) const {
+    return std::visit([&](const auto& one) { return one.coefficient(speed, load); }, law);
   }
 };
 

@@ -253,12 +253,9 @@ struct FoundationLaw {
   }
 };
 
-// A user's function of depth and gap rate; its elastic part is that at rest. It is known by its
-// values alone: slopes are differences of fourth order over a ten-thousandth of where it is taken,
-// which agree with smooth functions to about 1e-11.
-struct FunctionLaw {
-  static constexpr const char* kind = "function";
-  static constexpr double kStep = 1e-4, kLeastRate = 1e-2;  // relative, [m/s]
+// A user's function of two numbers, which is known by its values alone.
+struct OwnFunction {
+  static constexpr double kStep = 1e-4;  // relative
 
   // What returned a number that is not finite.
   struct Fault : std::runtime_error {
@@ -266,8 +263,36 @@ struct FunctionLaw {
   };
 
   std::function<double(double, double, const double*)> function;  // [N]
-  std::function<double(double, const double*)> potential;  // [J]; empty: the integral of the force
   Numbers parameters;
+
+  // Differences of fourth order: they agree with the slopes of smooth functions to about 1e-11.
+  template <class Function>
+  static double slope(const Function& f, double x, double h) {
+    return (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h);
+  }
+
+  // `what` of which law it is, and of which numbers.
+  static double finite(double value, const char* what, const char* first, double x,
+                       const char* second, double y) {
+    if (!std::isfinite(value)) fail(value, what, first, x, second, y);
+    return value;
+  }
+
+  [[noreturn]] static void fail(double value, const char* what, const char* first, double x,
+                                const char* second, double y) {
+    std::ostringstream said;
+    said << "the " << what << " is " << value << " at " << first << ' ' << x << ", " << second
+         << ' ' << y << ": its function must return finite numbers";
+    throw Fault(said.str());
+  }
+};
+
+// Of depth [m] and gap rate [m/s]; its elastic part is that at rest.
+struct FunctionLaw : OwnFunction {
+  static constexpr const char* kind = "function";
+  static constexpr double kLeastRate = 1e-2;  // over which slopes are taken at rest [m/s]
+
+  std::function<double(double, const double*)> potential;  // [J]; empty: the integral of the force
 
   bool needs_rate() const { return true; }
 
@@ -292,7 +317,8 @@ struct FunctionLaw {
   // The integral goes over the root of the depth: Gauss's rule is exact for a sum of its powers,
   // halves among them, up to the seventh.
   double energy(double depth) const {
-    if (potential) return finite(potential(depth, parameters.data()), "energy", depth, 0);
+    if (potential)
+      return checked(potential(depth, parameters.data()), "energy of a FunctionLaw", depth, 0);
     const GaussRule rule = gauss_rule(8);
     double sum = 0;
     for (int i = 0; i < rule.size; ++i) {
@@ -305,25 +331,12 @@ struct FunctionLaw {
  private:
   // Calls the user's function, and checks what it returns.
   double at(double depth, double gap_rate) const {
-    return finite(function(depth, gap_rate, parameters.data()), "force", depth, gap_rate);
+    return checked(function(depth, gap_rate, parameters.data()), "force of a FunctionLaw", depth,
+                   gap_rate);
   }
 
-  // Central difference of fourth order.
-  template <class Function>
-  static double slope(const Function& f, double x, double h) {
-    return (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h);
-  }
-
-  static double finite(double value, const char* what, double depth, double gap_rate) {
-    if (!std::isfinite(value)) fail(value, what, depth, gap_rate);
-    return value;
-  }
-
-  [[noreturn]] static void fail(double value, const char* what, double depth, double gap_rate) {
-    std::ostringstream said;
-    said << "the " << what << " of a FunctionLaw is " << value << " at depth " << depth
-         << " m, gap rate " << gap_rate << " m/s: its function must return finite numbers";
-    throw Fault(said.str());
+  static double checked(double value, const char* what, double depth, double gap_rate) {
+    return finite(value, what, "depth [m]", depth, "gap rate [m/s]", gap_rate);
   }
 };
 
