@@ -1,33 +1,54 @@
-"""Writes what docs/validation.md shows: `python docs/site/validation.py`, some minutes.
+"""Writes what docs/validation.md shows: `python docs/site/validation.py [CASE ...]`, some minutes.
 
 That is docs/measured/validation.json and the pictures in docs/pictures/validation.
 """
 
 from __future__ import annotations
 
+import json
+import sys
 import time
 from pathlib import Path
 
 from sphshell_pin.cases.contents import Finding
-from sphshell_pin.cases.measured import Measured, write
+from sphshell_pin.cases.measured import FOLDER, Measured, write
 from sphshell_pin.study.validation import Case, Outcome, collect
 from sphshell_pin.study.validation.cases import NOT_FOUND, explanations
 
 PICTURES = Path(__file__).parents[1] / "pictures" / "validation"
 
 
-def sections(ran: list[tuple[Case, Outcome]]) -> list[Measured]:
-    """Return what the page shows: a table of all cases, then a section for each."""
+# What the table of all cases says of one, and its section.
+Part = tuple[list[list[str]], Measured]
+
+
+def part(one: Case, found: Outcome) -> Part:
+    """Return what the page shows of a case."""
     rows = [
         [one.title if k == 0 else "", f.what, f.text, *judged(f)]
-        for one, found in ran
         for k, f in enumerate(found.findings)
     ]
+    return rows, section(one, found)
+
+
+def kept() -> dict[str, Part]:
+    """Return what the page shows now, by the title of the case."""
+    first, *sections = json.loads((FOLDER / "validation.json").read_text("utf-8"))["sections"]
+    rows: dict[str, list[list[str]]] = {}
+    for row in first["table"][1:]:
+        rows.setdefault(row[0] or list(rows)[-1], []).append(row)
+    made = {one["title"]: Measured(**one) for one in sections}
+    return {title: (rows[title], made[title]) for title in rows}
+
+
+def page(parts: list[Part]) -> list[Measured]:
+    """Return what the page shows: a table of all cases, then a section for each."""
+    rows = [row for of_case, _ in parts for row in of_case]
     within = [row[-1] for row in rows].count("within")
     text = f"{within} of {len(rows)} figures are within their bounds."
     names = ["case", "figure", "error", "bound", "verdict"]
     missing = Measured("Not found", notes=NOT_FOUND)
-    return [Measured(text=text, table=[names, *rows]), *(section(*one) for one in ran), missing]
+    return [Measured(text=text, table=[names, *rows]), *(one for _, one in parts), missing]
 
 
 def judged(finding: Finding) -> tuple[str, str]:
@@ -51,16 +72,24 @@ def section(one: Case, found: Outcome) -> Measured:
     )
 
 
-def main() -> None:
-    """Run all cases and write what they found."""
+def main(*names: str) -> None:
+    """Run the cases with these names, by default all, and write what they found."""
     PICTURES.mkdir(parents=True, exist_ok=True)
-    ran = []
+    if unknown := set(names) - {one.key for one in collect()}:
+        sys.exit(
+            f"no case called {', '.join(unknown)}: see sphshell_pin/study/validation/cases.toml"
+        )
+    before = kept() if names else {}
+    parts = []
     for one in collect():
+        if names and one.key not in names:
+            parts.append(before[one.title])
+            continue
         begin = time.perf_counter()
-        ran.append((one, one.run()))
+        parts.append(part(one, one.run()))
         print(f"{one.key} ({time.perf_counter() - begin:.1f} s)", flush=True)
-    print(write("validation", "python docs/site/validation.py", sections(ran)))
+    print(write("validation", "python docs/site/validation.py", page(parts)))
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])
