@@ -132,8 +132,7 @@ def _check_signature(name: str, pointer: Any, count: int) -> None:
     is_pointer = last is ctypes.c_void_p or hasattr(last, "contents")
     doubles = all(one is ctypes.c_double for one in (pointer.restype, *numbers))
     if len(given) != count or not is_pointer or not doubles:
-        where = "double depth, double gap_rate" if count == 3 else "double depth"
-        must = f"must be a double f({where}, const double* parameters)"
+        must = f"must be a double f({'double, ' * (count - 1)}const double* parameters)"
         raise InvalidParameter(name, pointer, must)
 
 
