@@ -155,9 +155,7 @@ def load(
     q0 = pin.normalize(robot.model, np.asarray(robot.q0, dtype=float))
     loaded = LoadedRobot(name, robot.model, robot.collision_model, robot.visual_model, q0)
     if free_flyer is False and floats(robot.model):
-        geometry = [robot.collision_model, robot.visual_model]
-        model, (collision, visual) = pin.buildReducedModel(robot.model, geometry, [1], q0)
-        loaded = LoadedRobot(name, model, collision, visual, q0[7:])
+        loaded, pose = _held(_posed(loaded, pose, name), robot.urdf), None
     elif free_flyer and not floats(robot.model):
         loaded = load_file(robot.urdf, free_flyer=True, name=name)
         loaded = replace(loaded, q0=np.append(_AT_ORIGIN, q0))
@@ -282,6 +280,35 @@ def mimics_of_library(
     return corrected, (
         "its file names mimicked joints without the hand, "
         f"'{first.of.partition('_')[2]}' for '{first.of}': read with it",
+    )
+
+
+def _held(robot: LoadedRobot, urdf: str) -> LoadedRobot:
+    """Return a robot of `urdf` that floats with its root fixed where q0 has it."""
+    # Pinocchio's routine that locks a joint confuses joints and links of the same name.
+    model, root = pin.buildModelFromUrdf(urdf), pin.XYZQUATToSE3(robot.q0[:7])
+    for one in ("armature", "rotorInertia", "rotorGearRatio"):
+        setattr(model, one, np.array(getattr(robot.model, one))[6:])
+    for joint in range(1, model.njoints):
+        if model.parents[joint] == 0:
+            model.jointPlacements[joint] = root * model.jointPlacements[joint]
+    for frame in list(model.frames)[1:]:
+        if frame.parentJoint == 0:
+            frame.placement = root * frame.placement
+
+    def hung(geometry: pin.GeometryModel) -> pin.GeometryModel:
+        out = geometry.copy()
+        for one in out.geometryObjects:
+            frame = robot.model.frames[one.parentFrame]
+            one.parentFrame = model.getFrameId(frame.name, frame.type)
+            if one.parentJoint == 1:
+                one.placement = root * one.placement
+            one.parentJoint = max(one.parentJoint - 1, 0)
+        return out
+
+    shapes = hung(robot.collision_model), hung(robot.visual_model)
+    return replace(
+        robot, model=model, collision_model=shapes[0], visual_model=shapes[1], q0=robot.q0[7:]
     )
 
 

@@ -157,6 +157,18 @@ def test_half_the_force_is_tried_where_the_whole_is_not_held(tmp_path):
 
 
 @pytest.mark.study
+def test_what_its_shape_fixes_may_float(tmp_path):
+    """A drone with an arm of two joints, which cannot press."""
+    path = tmp_path / "a.toml"
+    with pytest.raises(
+        SphshellError, match=r"do not allow it; .* or let it float, --base floating"
+    ):
+        new_scenario("borinot", out=path)
+    made = new_scenario("borinot", base="floating", out=path)
+    assert any("the robot floats" in why for why in made.why)
+
+
+@pytest.mark.study
 def test_an_arm_whose_collection_lets_it_float_is_fixed(tmp_path):
     made = new_scenario("so101", BLADE, unit="mm", out=tmp_path / "a.toml")
     assert made.why[0] == "the base is fixed, by the robot's shape: or --base"

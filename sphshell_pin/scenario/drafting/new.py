@@ -139,16 +139,8 @@ def new_scenario(
         What cannot be found out and is not given, a file that cannot be read or written, or that no
         draft works: the text says what fails in it and what to change.
     """
-    if radius is not None:
-        check_positive("radius", radius, "m")
-    if press is not None:
-        check_positive("press", press, "N")
-    if place is not None and place not in PLACES:
-        raise NameNotFound("place", place, "a surface", PLACES)
+    _check_asked(radius, press, place, (material, against))
     asked = Asked.checked(at, path, length)
-    for one in (material, against):
-        if one is not None:
-            find_material(one)
     file = _free_path(out, robot, surface, force=force)
     section = _robot_section(
         robot,
@@ -215,10 +207,28 @@ def new_scenario(
             tell=tell,
         )
         return replace(fixed, why=(note, *fixed.why))
+    except SphshellError as error:
+        if shaped != "fixed":
+            raise
+        raise SphshellError(f"{error}; or let it float, --base floating") from None
     _write(file, text)
     of_base = () if shaped is None else (f"the base is {shaped}, by the robot's shape: or --base",)
     why = (*of_base, *plan.why, _materials_note(plan))
     return NewScenario(file, text, built, explain_built(built), why)
+
+
+def _check_asked(
+    radius: float | None, press: float | None, place: str | None, materials: Sequence[str | None]
+) -> None:
+    if radius is not None:
+        check_positive("radius", radius, "m")
+    if press is not None:
+        check_positive("press", press, "N")
+    if place is not None and place not in PLACES:
+        raise NameNotFound("place", place, "a surface", PLACES)
+    for one in materials:
+        if one is not None:
+            find_material(one)
 
 
 def _held(
