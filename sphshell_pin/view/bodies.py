@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from sphshell_pin.view.distance import draw_distance
 from sphshell_pin.view.nodes import (
+    lattice,
     line_segments,
     material,
     mover,
@@ -160,17 +161,11 @@ class DrawnPlane:
         self._center = 0.5 * (low + high)
         self._middle = np.full(3, np.inf)
         node = visualizer[f"{index}_{node_name(pair.name)}"]
-        ticks = np.arange(_CELLS + 1) - 0.5 * _CELLS
-        points = self._cell * np.array([(x, y, 0.0) for y in ticks for x in ticks])
-        number = np.arange(len(points), dtype=np.int32).reshape(len(ticks), -1)
-        corners = number[[0, 0, -1, -1], [0, -1, -1, 0]]
+        points, lines = lattice(np.arange(_CELLS + 1.0) - 0.5 * _CELLS)
+        points, last = self._cell * points, len(points) - 1
+        corners = np.array([0, _CELLS, last, 0, last, last - _CELLS], np.int32)
         look = material("MeshBasic", PLANE_COLOR, 0.25, depthWrite=False)
-        set_object(
-            node["square"], triangle_mesh(points, corners[[0, 1, 2, 0, 2, 3]]), look, order=1
-        )
-        # Pieces from crossing to crossing: some browsers lose lines that pass the camera.
-        ends = ((number[:, :-1], number[:, 1:]), (number[:-1], number[1:]))
-        lines = np.concatenate([np.stack(one, axis=-1).reshape(-1, 2) for one in ends])
+        set_object(node["square"], triangle_mesh(points, corners), look, order=1)
         look = material("LineBasic", PLANE_COLOR, 0.5, depthWrite=False)
         set_object(node["cells"], line_segments(points, lines), look, "LineSegments", order=2)
         self._move = mover(node)

@@ -11,6 +11,7 @@ from sphshell_pin.view.arrows import nice
 from sphshell_pin.view.nodes import (
     Json,
     Move,
+    lattice,
     line_segments,
     material,
     mover,
@@ -82,13 +83,7 @@ def grid_spacing(view: View) -> float:
 def draw_grid(node: Visualizer, view: View) -> None:
     """Draw a grid at z = 0 below `node`, around what `view` looks at."""
     step = grid_spacing(view)
-    ticks = np.arange(-LINES, LINES + 1.0)
-    x, y = np.meshgrid(ticks, ticks)
-    points = np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), axis=1)
+    points, segments = lattice(np.arange(-LINES, LINES + 1.0))
     points = points + np.round(np.array([*view.target[:2], 0.0]) / step)
-    # Pieces from crossing to crossing: some browsers lose lines that pass the camera.
-    number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
-    ends = ((number[:, :-1], number[:, 1:]), (number[:-1], number[1:]))
-    segments = np.concatenate([np.stack(pair, axis=-1).reshape(-1, 2) for pair in ends])
     look = material("LineBasic", GRID_COLOR, 0.45, depthWrite=False)
     set_object(node, line_segments(step * points, segments), look, "LineSegments")

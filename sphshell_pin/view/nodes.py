@@ -105,6 +105,18 @@ def line_segments(vertices: FloatArray, segments: IntArray) -> Json:
     return triangle_mesh(vertices, segments)
 
 
+def lattice(ticks: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the crossings (n, 3) of lines at `ticks` (k,) of x and y, z = 0, and the lines (s, 2).
+
+    They are in pieces from crossing to crossing: some browsers lose lines that pass the camera.
+    """
+    x, y = np.meshgrid(ticks, ticks)
+    points = np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), axis=1)
+    number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
+    ends = ((number[:, :-1], number[:, 1:]), (number[:-1], number[1:]))
+    return points, np.concatenate([np.stack(pair, axis=-1).reshape(-1, 2) for pair in ends])
+
+
 def sphere(radius: float, segments: int = 32) -> Json:
     """Geometry of a sphere of `radius` [m]."""
     return {
