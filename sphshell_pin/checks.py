@@ -136,6 +136,14 @@ def check_names(name: str, value: object) -> tuple[str, ...]:
     return names
 
 
+def split_stated(name: str, text: str, must: str) -> tuple[str, str]:
+    """Return key and value of the text KEY=VALUE; InvalidParameter says what `name` `must` be."""
+    key, equals, value = (one.strip() for one in text.partition("="))
+    if not (key and equals):
+        raise InvalidParameter(name, text, must)
+    return key, value
+
+
 def check_placement(name: str, value: object) -> pin.SE3:
     """Return a copy of `value` (None: the identity).
 

@@ -16,19 +16,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from sphshell_pin.adapters import imports_of
 from sphshell_pin.adapters.evaluator import check_without_history
 from sphshell_pin.checks import check_names, check_type
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.dynamics.scene.variations import Variations
-from sphshell_pin.errors import MissingExtra
 from sphshell_pin.named_numbers import find_name, names_of_pairs
 
-try:
+with imports_of("casadi"):
     import casadi
-except ModuleNotFoundError as missing:
-    if missing.name != "casadi":
-        raise
-    raise MissingExtra("casadi", "casadi", "sphshell_pin.adapters.casadi") from missing
 
 __all__ = ["ForwardDynamics", "Step"]
 

@@ -7,7 +7,8 @@ from typing import Annotated, Literal, cast, get_args
 
 import typer
 
-from sphshell_pin.cli.app import app, faults, make_table, plain, terminal
+from sphshell_pin.cli.app import command, print_table, say
+from sphshell_pin.errors import InvalidParameter, SphshellError, UnitMissing
 
 Side = Literal["both", "outside", "inside"]
 FORMATS = ".stl .obj .ply .off .shl, .step .iges .brep"
@@ -38,9 +39,8 @@ MemoryLimitOption = Annotated[
 ]
 
 
-@app.command()
+@command()
 def check(
-    context: typer.Context,
     file: Annotated[Path, typer.Argument(help=f"A surface file: {FORMATS}")],
     unit: Annotated[
         str | None, typer.Option(help="Length unit of the file: mm, cm, m, inch, ...")
@@ -62,31 +62,28 @@ def check(
 
     Example: sphshell-pin check blade.stl --unit mm
     """
-    with faults(context):
-        from sphshell_pin import Shell
-        from sphshell_pin.errors import SphshellError, UnitMissing
+    from sphshell_pin import Shell
 
-        try:
-            shell = Shell.from_file(
-                file,
-                unit,
-                _number_or_word(scale),
-                chord_error=chord_error,
-                bodies=body,
-                faces=faces_of(face),
-                time_limit=time_limit,
-                memory_limit=memory_limit,
-                side=_side(side),
-            )
-        except UnitMissing as error:
-            raise SphshellError(f"the unit {error.must('--unit {}')}") from error
-        shell.curvature_report()
-        terminal().print(str(shell.health), markup=False, highlight=False)
+    try:
+        shell = Shell.from_file(
+            file,
+            unit,
+            _number_or_word(scale),
+            chord_error=chord_error,
+            bodies=body,
+            faces=faces_of(face),
+            time_limit=time_limit,
+            memory_limit=memory_limit,
+            side=_side(side),
+        )
+    except UnitMissing as error:
+        raise SphshellError(f"the unit {error.must('--unit {}')}") from error
+    shell.curvature_report()
+    say(str(shell.health))
 
 
-@app.command()
+@command()
 def convert(
-    context: typer.Context,
     source: Annotated[Path, typer.Argument(help=f"The file to read: {FORMATS}")],
     target: Annotated[Path, typer.Argument(help="The file to write; its suffix names the format.")],
     unit_in: Annotated[
@@ -108,41 +105,33 @@ def convert(
 
     Example: sphshell-pin convert blade.step blade.stl --chord-error 1e-4
     """
-    with faults(context):
-        from sphshell_pin.errors import SphshellError, UnitMissing
-        from sphshell_pin.shell.converting import convert as convert_file
+    from sphshell_pin.shell.converting import convert as convert_file
 
-        try:
-            done = convert_file(
-                source,
-                target,
-                unit_in,
-                unit_out,
-                chord_error=chord_error,
-                bodies=body,
-                faces=faces_of(face),
-                time_limit=time_limit,
-                memory_limit=memory_limit,
-            )
-        except UnitMissing as error:
-            raise SphshellError(f"the unit {error.must('--unit-in {}')}") from error
-        rows = make_table("file", "unit", "holds", "size", "area")
-        for held in (done.source, done.target):
-            rows.add_row(
-                plain(str(held.path)),
-                held.unit,
-                f"{held.count} {held.kind}",
-                f"{held.size:.6g} m",
-                f"{held.area:.6g} m^2",
-            )
-        terminal().print(rows)
-        terminal().print(
-            f"deviation measured at {len(done.forth) + len(done.back)} points: "
-            f"largest {done.largest:.3g} m, root mean square {done.rms:.3g} m",
-            highlight=False,
+    try:
+        done = convert_file(
+            source,
+            target,
+            unit_in,
+            unit_out,
+            chord_error=chord_error,
+            bodies=body,
+            faces=faces_of(face),
+            time_limit=time_limit,
+            memory_limit=memory_limit,
         )
-        for note in done.notes:
-            terminal().print(f"note: {note}", markup=False, highlight=False)
+    except UnitMissing as error:
+        raise SphshellError(f"the unit {error.must('--unit-in {}')}") from error
+    rows = []
+    for held in (done.source, done.target):
+        size, area = f"{held.size:.6g} m", f"{held.area:.6g} m^2"
+        rows.append((str(held.path), held.unit, f"{held.count} {held.kind}", size, area))
+    print_table(("file", "unit", "holds", "size", "area"), rows)
+    say(
+        f"deviation measured at {len(done.forth) + len(done.back)} points: "
+        f"largest {done.largest:.3g} m, root mean square {done.rms:.3g} m"
+    )
+    for note in done.notes:
+        say(f"note: {note}")
 
 
 def faces_of(names: list[str] | None) -> list[str | int] | None:
@@ -158,8 +147,6 @@ def _number_or_word(text: str | None) -> str | float | None:
 
 
 def _side(side: str) -> Side:
-    from sphshell_pin.errors import InvalidParameter
-
     if side not in get_args(Side):
         raise InvalidParameter("--side", side, "must be both, outside or inside")
     return cast(Side, side)

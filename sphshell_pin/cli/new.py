@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,21 +11,20 @@ import typer
 from sphshell_pin.cli.app import (
     PackageDirOption,
     XacroArgOption,
-    app,
-    faults,
+    command,
     length_of,
-    terminal,
+    say,
     xacro_args_of,
 )
 from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
+from sphshell_pin.errors import SphshellError, UnitMissing
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario.drafting.new import NewScenario
 
 
-@app.command()
+@command()
 def new(
-    context: typer.Context,
     robot: Annotated[
         str,
         typer.Option(
@@ -117,65 +117,48 @@ def new(
 
     Example: sphshell-pin new --robot panda --surface blade.stl --unit mm
     """
-    with faults(context):
-        from sphshell_pin.errors import SphshellError, UnitMissing
-        from sphshell_pin.scenario.drafting.new import new_scenario
+    from sphshell_pin.scenario.drafting.new import new_scenario
 
-        try:
-            made = new_scenario(
-                robot,
-                surface,
-                frame=frame,
-                radius=length_of("--radius", radius),
-                offset=offset,
-                unit=unit,
-                bodies=body,
-                faces=faces_of(face),
-                material=law,
-                against=against,
-                press=press,
-                place=place,
-                at=at,
-                path=path,
-                length=length_of("--length", length),
-                tips=tips,
-                base="floating" if free_flyer else base,
-                package_dirs=package_dir or (),
-                xacro_args=xacro_args_of(xacro_arg),
-                out=out,
-                force=force,
-                tell=_tell,
-            )
-        except UnitMissing as error:
-            raise SphshellError(f"the unit {error.must('--unit {}')}") from error
-        _show(made)
-
-
-def _tell(what: str) -> None:
-    """Show what was tried, on the error stream: the answer goes to the other."""
-    typer.echo(what, err=True)
+    try:
+        made = new_scenario(
+            robot,
+            surface,
+            frame=frame,
+            radius=length_of("--radius", radius),
+            offset=offset,
+            unit=unit,
+            bodies=body,
+            faces=faces_of(face),
+            material=law,
+            against=against,
+            press=press,
+            place=place,
+            at=at,
+            path=path,
+            length=length_of("--length", length),
+            tips=tips,
+            base="floating" if free_flyer else base,
+            package_dirs=package_dir or (),
+            xacro_args=xacro_args_of(xacro_arg),
+            out=out,
+            force=force,
+            # What was tried goes to the error stream, the answer to the other.
+            tell=lambda what: typer.echo(what, err=True),
+        )
+    except UnitMissing as error:
+        raise SphshellError(f"the unit {error.must('--unit {}')}") from error
+    _show(made)
 
 
 def _show(made: NewScenario) -> None:
-    console = terminal()
-
-    def show(text: str) -> None:
-        console.print(text, markup=False, highlight=False)
-
     for section in made.built.scenario.shell:
         if section.file is not None:
-            show(f"{made.built.shells[section.name].health}\n")
-    show(f"{made.explanation}\n")
-    show("Chosen:")
+            say(f"{made.built.shells[section.name].health}\n")
+    say(f"{made.explanation}\n")
+    say("Chosen:")
     for one in made.why:
-        show(f"  {one}")
-    show(f"\nWritten: {made.path}")
-    show("Next:")
-    for command in ("run", "view"):
-        show(f"  sphshell-pin {command} {_quoted(made.path)}")
-
-
-def _quoted(path: Path) -> str:
-    import shlex
-
-    return shlex.quote(str(path))
+        say(f"  {one}")
+    say(f"\nWritten: {made.path}")
+    say("Next:")
+    for way in ("run", "view"):
+        say(f"  sphshell-pin {way} {shlex.quote(str(made.path))}")

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import app, faults, progress_bar
+from sphshell_pin.cli.app import RunArgument, command, progress_bar
+from sphshell_pin.errors import InvalidParameter, SphshellError
 
 
-@app.command()
+@command()
 def render(
-    context: typer.Context,
-    run: Annotated[Path, typer.Argument(help="A finished run: its results folder or run.npz.")],
+    run: RunArgument,
     out: Annotated[
         Path,
         typer.Option(
@@ -55,40 +56,35 @@ def render(
 
     Example: sphshell-pin render results/fingertip_on_blade --out blade.mp4 --camera follow
     """
-    with faults(context):
-        import re
+    from sphshell_pin.scenario.running.replay import Replay
+    from sphshell_pin.view.film import render_film
+    from sphshell_pin.view.live.opening import result_file
 
-        from sphshell_pin.errors import InvalidParameter, SphshellError
-        from sphshell_pin.scenario.running.replay import Replay
-        from sphshell_pin.view.film import render_film
-        from sphshell_pin.view.live.opening import result_file
-
-        pixels = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
-        if pixels is None:
-            raise InvalidParameter("--size", size, "must be WIDTHxHEIGHT, for instance 1280x720")
-        file = result_file(run)
-        if file is None:
-            raise SphshellError(
-                f"{run} is no finished run: give its results folder or run.npz, which "
-                "sphshell-pin run writes"
-            )
-        replay = Replay(file, of)
-        with progress_bar() as bar:
-            task = bar.add_task(str(out), total=None)
-            drawn = render_film(
-                out,
-                replay.result,
-                replay.scene,
-                replay.visual_model,
-                time=time,
-                span=(from_, to),
-                size=(int(pixels[1]), int(pixels[2])),
-                fps=fps,
-                speed=speed if speed is not None or out.suffix == ".png" else replay.speed,
-                camera=camera,  # type: ignore[arg-type]
-                chart=chart,
-                dark=dark,
-                title=replay.title,
-                told=lambda done, count: bar.update(task, completed=done, total=count),
-            )
-        typer.echo(drawn)
+    pixels = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
+    if pixels is None:
+        raise InvalidParameter("--size", size, "must be WIDTHxHEIGHT, for instance 1280x720")
+    file = result_file(run)
+    if file is None:
+        raise SphshellError(
+            f"{run} is no finished run: give its results folder or run.npz, which "
+            "sphshell-pin run writes"
+        )
+    replay = Replay(file, of)
+    with progress_bar(str(out), total=None) as update:
+        drawn = render_film(
+            out,
+            replay.result,
+            replay.scene,
+            replay.visual_model,
+            time=time,
+            span=(from_, to),
+            size=(int(pixels[1]), int(pixels[2])),
+            fps=fps,
+            speed=speed if speed is not None or out.suffix == ".png" else replay.speed,
+            camera=camera,  # type: ignore[arg-type]
+            chart=chart,
+            dark=dark,
+            title=replay.title,
+            told=lambda done, count: update(completed=done, total=count),
+        )
+    typer.echo(drawn)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import app, faults
+from sphshell_pin.cli.app import RunArgument, command, if_installed
+from sphshell_pin.cli.export import file_of
 
 
-@app.command()
+@command()
 def taxels(
-    context: typer.Context,
-    run: Annotated[Path, typer.Argument(help="A finished run: its run.npz or results folder.")],
+    run: RunArgument,
     contact: Annotated[str, typer.Option(help="Contact whose sphere has the taxels.")],
     shape: Annotated[tuple[int, int], typer.Option(help="Numbers of taxels: rows and columns.")] = (
         16,
@@ -41,24 +42,18 @@ def taxels(
 
     Example: sphshell-pin taxels results/polished_valve --contact tool --axis 0 0 1
     """
-    with faults(context):
-        import math
+    from sphshell_pin.patches import TaxelGrid
+    from sphshell_pin.scenario.running.replay import Replay
 
-        from sphshell_pin.errors import MissingExtra
-        from sphshell_pin.patches import TaxelGrid
-        from sphshell_pin.scenario.running.replay import Replay
-
-        height, width = map(math.radians, extent_deg)
-        grid = TaxelGrid(contact, shape, axis=axis, up=up, extent=(height, width))
-        file = run / "run.npz" if run.is_dir() else run
-        replay = Replay(file)
-        images = grid.images(replay.result, replay.scene)
-        folder = file.parent if out is None else out
-        folder.mkdir(parents=True, exist_ok=True)
-        typer.echo(images.save(folder / "taxels.npz"))
-        try:
-            typer.echo(images.save_film(folder / "taxels.gif", speed=speed))
-        except MissingExtra as missing:
-            typer.echo(str(missing), err=True)
-        felt, missed = float(images.forces.max()), float(abs(images.outside).max())
-        typer.echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")
+    height, width = map(math.radians, extent_deg)
+    grid = TaxelGrid(contact, shape, axis=axis, up=up, extent=(height, width))
+    file = file_of(run)
+    replay = Replay(file)
+    images = grid.images(replay.result, replay.scene)
+    folder = file.parent if out is None else out
+    folder.mkdir(parents=True, exist_ok=True)
+    typer.echo(images.save(folder / "taxels.npz"))
+    with if_installed():
+        typer.echo(images.save_film(folder / "taxels.gif", speed=speed))
+    felt, missed = float(images.forces.max()), float(abs(images.outside).max())
+    typer.echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")

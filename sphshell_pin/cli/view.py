@@ -6,13 +6,12 @@ from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import PackageDirOption, SetOption, app, changes_of, faults
+from sphshell_pin.cli.app import PackageDirOption, SetOption, changes_of, command
 
 
-@app.command()
+@command()
 def view(
     *,
-    context: typer.Context,
     scenario: Annotated[
         str,
         typer.Argument(
@@ -47,18 +46,17 @@ def view(
 
     Example: sphshell-pin view fingertip_on_blade --speed 0.5
     """
-    with faults(context):
-        from sphshell_pin.view import preview
+    from sphshell_pin.view import preview
 
-        preview(
-            scenario,
-            changes=changes_of(set_, None, None),
-            scenario=of,
-            speed=speed,
-            paused=paused,
-            host=host,
-            port=port,
-            open=open_,
-            color=color,  # type: ignore[arg-type]
-            told=lambda url: typer.echo(f"{url}  (Ctrl-C ends the run)"),
-        )
+    preview(
+        scenario,
+        changes=changes_of(set_),
+        scenario=of,
+        speed=speed,
+        paused=paused,
+        host=host,
+        port=port,
+        open=open_,
+        color=color,  # type: ignore[arg-type]
+        told=lambda url: typer.echo(f"{url}  (Ctrl-C ends the run)"),
+    )

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sphshell_pin.cases.machine import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.study.fit import fit
-from sphshell_pin.study.fit.quantities import quantities_of
+from sphshell_pin.study.quantities import quantities_of
 
 Array = NDArray[np.float64]
 

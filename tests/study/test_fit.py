@@ -16,9 +16,9 @@ from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.study.fit import runs
 from sphshell_pin.study.fit.data import read_experiment
 from sphshell_pin.study.fit.parameters import free_parameters
-from sphshell_pin.study.fit.quantities import quantities_of, row_step
 from sphshell_pin.study.fit.runs import Runs, Trial
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
+from sphshell_pin.study.quantities import quantities_of, row_step
 from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH

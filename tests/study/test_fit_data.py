@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 pytest.importorskip("scipy")
@@ -12,9 +11,9 @@ import sphshell_pin as sp
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
 from sphshell_pin.study.fit.data import read_experiment
-from sphshell_pin.study.fit.quantities import quantities_of, unit_of
 from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.fit.writing import scenario_text
+from sphshell_pin.study.quantities import quantities_of
 from tests.command import call
 from tests.study.fitted_sets import SCENARIO
 
@@ -197,29 +196,6 @@ def test_the_command_ends_with_2(built, tmp_path, monkeypatch):
         assert done.exit_code == 2
         assert "must be " in done.output
     assert not (tmp_path / "results").exists()
-
-
-AXIS = np.array([0.0, 0.6, 0.8])
-JOINTS = [
-    (pin.JointModelRY(), ["rad"], ["rad/s"]),
-    (pin.JointModelRevoluteUnaligned(AXIS), ["rad"], ["rad/s"]),
-    (pin.JointModelRUBZ(), ["1"] * 2, ["rad/s"]),
-    (pin.JointModelRevoluteUnboundedUnaligned(), ["1"] * 2, ["rad/s"]),
-    (pin.JointModelPX(), ["m"], ["m/s"]),
-    (pin.JointModelPrismaticUnaligned(AXIS), ["m"], ["m/s"]),
-    (pin.JointModelTranslation(), ["m"] * 3, ["m/s"] * 3),
-    (pin.JointModelSpherical(), ["1"] * 4, ["rad/s"] * 3),
-    (pin.JointModelSphericalZYX(), ["rad"] * 3, ["rad/s"] * 3),
-    (pin.JointModelPlanar(), ["m"] * 2 + ["1"] * 2, ["m/s"] * 2 + ["rad/s"]),
-    (pin.JointModelFreeFlyer(), ["m"] * 3 + ["1"] * 4, ["m/s"] * 3 + ["rad/s"] * 3),
-]
-
-
-@pytest.mark.parametrize(("joint", "q", "v"), JOINTS, ids=lambda one: str(one)[:20].strip())
-def test_coordinates_of_joints_have_units(joint, q, v):
-    assert (len(q), len(v)) == (joint.nq, joint.nv)
-    assert [unit_of(joint.shortname(), "q", i) for i in range(joint.nq)] == q
-    assert [unit_of(joint.shortname(), "v", i) for i in range(joint.nv)] == v
 
 
 @pytest.mark.parametrize(

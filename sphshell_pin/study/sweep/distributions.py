@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.checks import split_stated
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.study.sweep.job import need
@@ -118,18 +119,17 @@ def distributions_of(dist: Dist | Iterable[str]) -> dict[str, Distribution]:
     if not isinstance(dist, Iterable):
         raise InvalidParameter("dist", dist, "must map keys to distributions")
     found: dict[str, Distribution] = {}
-    for key, given in dist.items() if isinstance(dist, Mapping) else map(_split, dist):
+    must = f"must be KEY=DISTRIBUTION, one of {forms()}"
+    pairs = (
+        dist.items()
+        if isinstance(dist, Mapping)
+        else (split_stated("dist", one, must) for one in dist)
+    )
+    for key, given in pairs:
         if key in found:
             raise InvalidParameter("dist", key, "is given twice: leave one of the two out")
         found[key] = given if isinstance(given, Distribution) else _parse(key, given)
     return found
-
-
-def _split(text: str) -> tuple[str, str]:
-    key, equals, given = text.partition("=")
-    if not equals or not key.strip() or not given.strip():
-        raise InvalidParameter("dist", text, f"must be KEY=DISTRIBUTION, one of {forms()}")
-    return key.strip(), given.strip()
 
 
 def _parse(key: str, text: object) -> Distribution:

@@ -26,6 +26,7 @@ from sphshell_pin.study.sweep.table import (
     check_suffix,
     columns_of,
     frame_of,
+    main_figures,
     varied_keys,
     write_table,
 )
@@ -80,9 +81,8 @@ class SweepReport(Summarized):
 
     def _rows(self) -> Detail:
         units = self.table.attrs.get("units", {})
-        own = [name for name in self.table if name.startswith("figures.")]
-        own += [name for name in self.table if name.endswith(".peak_force")]
-        shown = ["run", *varied_keys(self.table), "status", *own[:MOST_FIGURES]]
+        own = main_figures(self.table)[:MOST_FIGURES]
+        shown = ["run", *varied_keys(self.table), "status", *own]
         rows = self.table[shown].head(MOST_ROWS).to_numpy(dtype=object).tolist()
         return Detail([column(name, units.get(name, "")) for name in shown], rows, len(self.table))
 

@@ -19,7 +19,7 @@ from sphshell_pin.study.sweep.sampling import (
     at_quantile,
     swapped,
 )
-from sphshell_pin.study.sweep.table import DESIGN
+from sphshell_pin.study.sweep.table import DESIGN, varied_keys
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,12 +46,6 @@ def drawn(table: pd.DataFrame) -> pd.DataFrame:
             "table", None, "no sample, only a tornado: make the sweep with sample = sobol", "has"
         )
     return rows
-
-
-def keys_of(table: pd.DataFrame) -> list[str]:
-    """Return the uncertain inputs of a table."""
-    names = [str(name) for name in table.columns]
-    return names[1 : names.index("status")]
 
 
 def figures_of(table: pd.DataFrame) -> list[str]:
@@ -120,7 +114,7 @@ def sobol_indices(
     if not isinstance(confidence, float) or not 0.0 < confidence < 1.0:
         raise InvalidParameter("confidence", confidence, "must lie between 0 and 1")
     table = table.sort_values("run")
-    keys = keys_of(table)
+    keys = varied_keys(table)
     wanted = [A, B, *map(swapped, keys)]
     if A not in set(table[DESIGN]):
         raise InvalidParameter(
@@ -181,7 +175,7 @@ def tornado(table: pd.DataFrame, figure: str) -> pd.DataFrame:
         The table is not that of a sweep with `tornado`, or one of its runs has no such figure.
     """
     _check_design(table)
-    keys = keys_of(table)
+    keys = varied_keys(table)
     parts = [MEDIAN, *(at_quantile(key, one) for key in keys for one in (LOW, HIGH))]
     rows = table[table[DESIGN].isin(parts)]
     if len(rows) != len(parts):
