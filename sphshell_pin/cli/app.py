@@ -52,6 +52,15 @@ DtOption = Annotated[float | None, typer.Option(help="Time step \\[s] in place o
 DurationOption = Annotated[
     float | None, typer.Option(help="Time to simulate \\[s] in place of run.duration.")
 ]
+OfOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scenario", help="Scenario that a finished run is from, if it holds none, or another one."
+    ),
+]
+RadiusOption = Annotated[
+    str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
+]
 RunArgument = Annotated[Path, typer.Argument(help="A finished run: its run.npz or results folder.")]
 
 

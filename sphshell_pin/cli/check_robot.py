@@ -16,6 +16,7 @@ from sphshell_pin.cli.app import (
     INTERRUPTED,
     MISSED,
     PackageDirOption,
+    RadiusOption,
     XacroArgOption,
     colored,
     command,
@@ -53,9 +54,7 @@ def check_robot_(
             "longest limb and the outermost sphere inside its collision mesh."
         ),
     ] = None,
-    radius: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
-    ] = None,
+    radius: RadiusOption = None,
     free_flyer: Annotated[
         bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
     ] = False,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import RunArgument, command, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, progress_bar
 from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
@@ -41,12 +41,7 @@ def export(
             help="Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.",
         ),
     ] = "0",
-    of: Annotated[
-        str | None,
-        typer.Option(
-            "--scenario", help="Scenario that the run is from, if it holds no robots and surfaces."
-        ),
-    ] = None,
+    of: OfOption = None,
 ) -> None:
     """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.
 

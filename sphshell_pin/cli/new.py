@@ -10,6 +10,7 @@ import typer
 
 from sphshell_pin.cli.app import (
     PackageDirOption,
+    RadiusOption,
     XacroArgOption,
     command,
     length_of,
@@ -42,9 +43,7 @@ def new(
             help="Frame that carries the sphere; by default a known tip or the end of a limb."
         ),
     ] = None,
-    radius: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
-    ] = None,
+    radius: RadiusOption = None,
     offset: Annotated[
         tuple[float, float, float] | None,
         typer.Option(

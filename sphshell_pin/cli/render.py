@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import RunArgument, command, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, progress_bar
 from sphshell_pin.errors import InvalidParameter, SphshellError
 
 
@@ -45,10 +45,7 @@ def render(
         bool, typer.Option("--chart/--no-chart", help="Forces and depth under the scene.")
     ] = True,
     dark: Annotated[bool, typer.Option("--dark", help="Dark background.")] = False,
-    of: Annotated[
-        str | None,
-        typer.Option("--scenario", help="Scenario that the run is drawn in, if not its own."),
-    ] = None,
+    of: OfOption = None,
 ) -> None:
     """Draw a finished run: one picture, a film, or a folder of pictures for slides.
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import PackageDirOption, SetOption, changes_of, command
+from sphshell_pin.cli.app import OfOption, PackageDirOption, SetOption, changes_of, command
 
 
 @command()
@@ -37,10 +37,7 @@ def view(
             "elements from the flat ones)."
         ),
     ] = "surface",
-    of: Annotated[
-        str | None,
-        typer.Option("--scenario", help="Scenario that a finished run is shown in."),
-    ] = None,
+    of: OfOption = None,
 ) -> None:
     """Run a scenario in a page: pause, push, change parameters; or play a finished run.
 

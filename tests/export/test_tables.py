@@ -1,6 +1,5 @@
 """Tables of a run: every number is read back exactly, columns have their units."""
 
-import csv
 import json
 import sys
 
@@ -27,24 +26,14 @@ def table():
 
 
 def read(folder, format):
-    if format == "parquet":
-        return {one.stem: pd.read_parquet(one) for one in folder.iterdir()}
-    found = {}
-    for path in folder.iterdir():
-        with path.open(encoding="utf-8", newline="") as file:
-            head, *rows = csv.reader(file)
-        columns = zip(*rows, strict=True) if rows else [()] * len(head)
-        found[path.stem] = pd.DataFrame(
-            {name: list(map(number, one)) for name, one in zip(head, columns, strict=True)}
+    def one(path):
+        if format == "parquet":
+            return pd.read_parquet(path)
+        return pd.read_csv(
+            path, float_precision="round_trip", keep_default_na=False, na_values=[""]
         )
-    return found
 
-
-def number(cell):
-    try:
-        return float(cell) if cell else np.nan
-    except ValueError:
-        return cell
+    return {path.stem: one(path) for path in folder.iterdir()}
 
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])

@@ -146,15 +146,9 @@ def sobol_indices(
         )
         .confidence_interval
     )
-    first, total = _estimate(values)
-    columns = {
-        "first": first,
-        "first_low": low[0],
-        "first_high": high[0],
-        "total": total,
-        "total_low": low[1],
-        "total_high": high[1],
-    }
+    columns: dict[str, FloatArray] = {}
+    for kind, *three in zip(("first", "total"), _estimate(values), low, high, strict=True):
+        columns |= dict(zip((kind, f"{kind}_low", f"{kind}_high"), three, strict=True))
     return need("pandas").DataFrame(columns, index=keys)
 
 

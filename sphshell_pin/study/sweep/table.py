@@ -164,20 +164,17 @@ def _write_hdf5(
 ) -> None:
     h5py = need("h5py")
     # One array of records: a column's name may hold the slash that would make it a folder.
-    fields: list[tuple[str, np.dtype[np.generic]]] = []
-    encoded: Columns = {}
-    for name, values in columns.items():
+    encoded: list[NDArray[np.generic]] = []
+    kinds = []
+    for values in columns.values():
         if _is_text(values):
             # Of fixed length: texts elsewhere in the file would leave gaps of unknown bytes.
-            encoded[name] = np.array([one.encode() for one in values], dtype=np.bytes_)
-            length = max(encoded[name].dtype.itemsize, 1)
-            fields.append((name, h5py.string_dtype("utf-8", length)))
+            encoded.append(np.array([one.encode() for one in values], dtype=np.bytes_))
+            kinds.append(h5py.string_dtype("utf-8", max(encoded[-1].dtype.itemsize, 1)))
         else:
-            encoded[name] = values
-            fields.append((name, values.dtype))
-    records = np.zeros(len(next(iter(columns.values()))), dtype=fields)
-    for name, values in encoded.items():
-        records[name] = values
+            encoded.append(values)
+            kinds.append(values.dtype)
+    records = np.rec.fromarrays(encoded, dtype=list(zip(columns, kinds, strict=True)))
     with h5py.File(file, "w") as table:
         dataset = table.create_dataset(DATASET, data=records, track_times=False)
         dataset.attrs["description"] = description
