@@ -79,13 +79,14 @@ def check_robot_(
     """
     from sphshell_pin.atomic import write_whole
     from sphshell_pin.study import robot_check as study
+    from sphshell_pin.study.robot_check import models, report
 
     if every and robot:
         raise SphshellError("give robots or --all, not both")
     if not every and not robot:
         raise SphshellError("say which robots: names, files, or --all")
-    names = study.all_names() if every else list(robot or [])
-    study.check_known(names)
+    names = models.all_names() if every else list(robot or [])
+    models.check_known(names)
     for path in (json, write):
         if path is not None:
             _check_writable(path)
@@ -108,16 +109,16 @@ def check_robot_(
         raise typer.Exit(INTERRUPTED)
     command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
     if json is not None:
-        text = study.as_json(reports, f"{command} --json {json}", seed, sizes)
+        text = report.as_json(reports, f"{command} --json {json}", seed, sizes)
         write_whole(json, text.encode())
     if write is not None:
-        page = study.as_markdown(reports, f"{command} --write {write}")
+        page = report.as_markdown(reports, f"{command} --write {write}")
         write_whole(write, page.encode())
     verdicts = [one.verdict for one in reports]
     # A robot that was asked for by name and cannot be checked is wrong input, and so is what
     # no robot there is can be checked with.
-    unread = study.NOT_CHECKED in verdicts and (not every or len(set(verdicts)) == 1)
-    raise typer.Exit(MISSED if study.FAILED in verdicts else ERROR if unread else 0)
+    unread = report.NOT_CHECKED in verdicts and (not every or len(set(verdicts)) == 1)
+    raise typer.Exit(MISSED if report.FAILED in verdicts else ERROR if unread else 0)
 
 
 def _check_writable(path: Path) -> None:
@@ -159,7 +160,8 @@ def _check(
 
 
 def _print(reports: Sequence[RobotReport]) -> None:
-    from sphshell_pin.study.robot_check import CHECKS, PASS, as_table, remarks
+    from sphshell_pin.study.robot_check.checks import CHECKS
+    from sphshell_pin.study.robot_check.report import PASS, as_table, remarks
 
     console = terminal()
     if not sys.stdout.isatty():

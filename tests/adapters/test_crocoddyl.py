@@ -203,23 +203,6 @@ def test_derivatives_are_those_of_differences(case, kind):
     close(data.Lx, differences(lambda x: at(lambda d: [d.cost], x), model.state, x)[0])
 
 
-def test_forces_are_those_of_the_scene():
-    scene, x = arm_on_moving_plate()
-    model = dynamics(scene)
-    data = model.createData()
-    model.calc(data, x, np.zeros(model.nu))
-    contacts = scene.contacts(x[: scene.model.nq], x[scene.model.nq :])
-    costs = data.costs.costs
-    np.testing.assert_allclose(costs["normal"].residual.r, contacts.normal_force.sum() - 3.0)
-    wanted = contacts.force_world.sum(axis=0) - [1.0, 0.5, 2.0]
-    np.testing.assert_allclose(costs["world"].residual.r, wanted)
-    # As of a last node.
-    last = model.createData()
-    model.calc(last, x)
-    model.calcDiff(last, x)
-    np.testing.assert_array_equal(last.costs.costs["world"].residual.r, wanted)
-
-
 @pytest.mark.parametrize("joints", [None, sp.JointComponents(damping={"slides": 7.0})])
 def test_forces_of_several_pairs_and_of_joints(joints):
     """Each pair has its own force; the acceleration is ABA's with the scene's forces."""
@@ -239,6 +222,12 @@ def test_forces_of_several_pairs_and_of_joints(joints):
         residual = data.costs.costs["world" if name == "touch" else name].residual
         reference = np.array([1.0, 0.5, 2.0]) if name == "touch" else np.zeros(3)
         np.testing.assert_allclose(residual.r, row - reference, rtol=1e-14)
+    last = model.createData()  # of a last node
+    model.calc(last, x)
+    model.calcDiff(last, x)
+    for name in ("wall", "normal", "world"):
+        found = (one.costs.costs[name].residual.r for one in (last, data))
+        np.testing.assert_array_equal(*found)
     total = tau + scene.joint_forces(q, v)
     fext = scene.external_forces(q, v)
     expected = pin.aba(scene.model, scene.model.createData(), q, v, total, fext)

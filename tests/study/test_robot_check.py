@@ -12,22 +12,12 @@ import pytest
 from sphshell_pin import Scene, robots
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.study import robot_check
-from sphshell_pin.study.robot_check import (
-    CHECKS,
-    FAILED,
-    NOT_CHECKED,
-    PASS,
-    QUICK,
-    RobotReport,
-    Sizes,
-    as_json,
-    as_markdown,
-    check_robot,
-    contact_scene,
-)
+from sphshell_pin.study.robot_check import QUICK, RobotReport, Sizes, check_robot, contact_scene
+from sphshell_pin.study.robot_check.checks import CHECKS
 from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
 from sphshell_pin.study.robot_check.probe_spheres import find_sphere
+from sphshell_pin.study.robot_check.report import FAILED, NOT_CHECKED, PASS, as_json, as_markdown
 from sphshell_pin.study.robot_check.setting import patch
 from sphshell_pin.testing.finding import Finding
 from tests.command import call, refused
@@ -90,13 +80,6 @@ def test_every_robot_passes(part: int) -> None:
 @pytest.mark.parametrize("name", robots.OWN)
 def test_own_robots_pass_at_full_size(name: str) -> None:
     assert passes(check_robot(name))
-
-
-@pytest.mark.parametrize("joint", JOINTS)
-def test_each_kind_of_joint(joint: str, tmp_path: Path) -> None:
-    report = check_robot(str(chain(tmp_path, ("revolute", joint, "revolute"))), sizes=QUICK)
-    assert passes(report)
-    assert report.name == "chain"
 
 
 def test_all_joints_in_one_on_a_free_root(tmp_path: Path) -> None:

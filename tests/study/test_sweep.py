@@ -57,14 +57,6 @@ def test_the_depth_of_rest_follows_its_closed_form(serial):
     assert not [name for name in table.columns if "wall" in name or "real_time" in name]
 
 
-def test_two_workers_leave_the_same_bytes(scenario, serial):
-    table = scenario.parent / "two.parquet"
-    sweep(scenario, VARY, workers=2, out=table)
-    check_once(table, 60)
-    assert len({one["worker"] for one in entries(table)}) in (1, 2)
-    assert table.read_bytes() == serial.read_bytes()
-
-
 def test_a_killed_worker_costs_nothing(scenario, serial):
     table = scenario.parent / "killed.parquet"
 

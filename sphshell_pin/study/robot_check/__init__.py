@@ -20,39 +20,12 @@ from sphshell_pin.errors import (
     SphshellError,
 )
 from sphshell_pin.robots import RobotError
-from sphshell_pin.study.robot_check.checks import CHECKS, QUICK, SPEED, Check, Sizes, run_checks
-from sphshell_pin.study.robot_check.models import all_names, check_known, load_subject
-from sphshell_pin.study.robot_check.report import (
-    FAILED,
-    NOT_CHECKED,
-    PASS,
-    RobotReport,
-    as_json,
-    as_markdown,
-    as_table,
-    remarks,
-)
+from sphshell_pin.study.robot_check.checks import QUICK, SPEED, Sizes, run_checks
+from sphshell_pin.study.robot_check.models import load_subject
+from sphshell_pin.study.robot_check.report import RobotReport
 from sphshell_pin.study.robot_check.setting import Touch, fixed_touch, free_touch, setting_of
 
-__all__ = [
-    "CHECKS",
-    "FAILED",
-    "NOT_CHECKED",
-    "PASS",
-    "QUICK",
-    "Check",
-    "RobotReport",
-    "Sizes",
-    "Touch",
-    "all_names",
-    "as_json",
-    "as_markdown",
-    "as_table",
-    "check_known",
-    "check_robot",
-    "contact_scene",
-    "remarks",
-]
+__all__ = ["QUICK", "RobotReport", "Sizes", "Touch", "check_robot", "contact_scene"]
 
 
 def check_robot(
