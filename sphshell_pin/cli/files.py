@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, cast, get_args
+from typing import Annotated
 
 import typer
 
 from sphshell_pin.cli.app import command, print_table, say
-from sphshell_pin.errors import InvalidParameter, SphshellError, UnitMissing
+from sphshell_pin.errors import SphshellError, UnitMissing
 
-Side = Literal["both", "outside", "inside"]
 FORMATS = ".stl .obj .ply .off .shl, .step .iges .brep"
 
 ChordErrorOption = Annotated[
@@ -74,7 +73,7 @@ def check(
             faces=faces_of(face),
             time_limit=time_limit,
             memory_limit=memory_limit,
-            side=_side(side),
+            side=side,
         )
     except UnitMissing as error:
         raise SphshellError(f"the unit {error.must('--unit {}')}") from error
@@ -144,9 +143,3 @@ def _number_or_word(text: str | None) -> str | float | None:
         return text if text is None else float(text)
     except ValueError:
         return text
-
-
-def _side(side: str) -> Side:
-    if side not in get_args(Side):
-        raise InvalidParameter("--side", side, "must be both, outside or inside")
-    return cast(Side, side)

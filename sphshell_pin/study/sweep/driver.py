@@ -305,11 +305,8 @@ def _count_workers(workers: int | None, scheduler: str | None) -> int:
     if scheduler is not None and workers is not None:
         raise InvalidParameter("workers", workers, "is for this machine: a scheduler has its own")
     if workers is None:
-        return (
-            len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else os.cpu_count() or 1
-        )
+        allowed = getattr(os, "sched_getaffinity", None)
+        return len(allowed(0)) if allowed else os.cpu_count() or 1
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 0:
         raise InvalidParameter("workers", workers, "must be a whole number, 0 or more")
     return workers
