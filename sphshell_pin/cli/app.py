@@ -11,7 +11,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec
 
 import typer
 
@@ -176,16 +176,9 @@ def _plain_warnings() -> Iterator[None]:
     """Print each warning of this package once, as a sentence without its place in the code."""
     shown: set[str] = set()
 
-    def show(
-        message: Warning | str,
-        category: type[Warning],
-        filename: str,
-        lineno: int,
-        file: TextIO | None = None,
-        line: str | None = None,
-    ) -> None:
+    def show(message: Warning | str, *place: Any, **more: Any) -> None:
         if getattr(errors, type(message).__name__, None) is not type(message):
-            usual(message, category, filename, lineno, file, line)
+            usual(message, *place, **more)
         elif str(message) not in shown:
             shown.add(str(message))
             typer.echo(f"warning: {message}", err=True)

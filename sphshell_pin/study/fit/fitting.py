@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
+from sphshell_pin.checks import check_positive
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.reading import (
@@ -74,8 +74,7 @@ def fit(
     if not 0.0 < level < 1.0:
         raise InvalidParameter("level", level, "must lie between 0 and 1")
     for name, value in (sigma or {}).items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InvalidParameter(f"sigma of '{name}'", value, "must be positive")
+        check_positive(f"sigma of '{name}'", value)
     path = find_scenario(scenario)
     texts = {key: str(value) for key, value in (changes or {}).items()}
     base = read_scenario(path, texts)
