@@ -165,12 +165,7 @@ FAN = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n
 @pytest.mark.parametrize(
     ("name", "text", "options", "words"),
     [
-        (
-            "twice.obj",
-            TRIANGLE.replace("f", SPARE),
-            ["--unit", "mm"],
-            "1 vertex is used by no",
-        ),
+        ("twice.obj", TRIANGLE.replace("f", SPARE), ["--unit", "mm"], "1 vertex is used by no"),
         ("fan.obj", FAN, ["--unit", "mm"], "ok, with "),  # three triangles on one edge
         ("a.shl", SHL, ["--scale", "apply"], "SCALE 0.001 of the file applied"),
         ("a.shl", SHL, ["--scale", "ignore"], "SCALE 0.001 of the file ignored"),

@@ -140,11 +140,7 @@ class _SceneFunction(_Callback):
         return True
 
     def get_jacobian(
-        self,
-        name: str,
-        inames: Sequence[str],
-        onames: Sequence[str],
-        opts: dict[str, object],
+        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: dict[str, object]
     ) -> casadi.Function:
         """Return the function of all derivatives."""
         jacobian = _Jacobian(self, name, inames, onames, opts)

@@ -23,8 +23,7 @@ MOST_ROWS = 24
 def compare(
     *,
     runs: Annotated[
-        list[Path],
-        typer.Argument(help="Two or more finished runs: run.npz or results folders."),
+        list[Path], typer.Argument(help="Two or more finished runs: run.npz or results folders.")
     ],
     out: Annotated[
         Path, typer.Option(help="Folder of figures.csv, curves.csv and compare.png.")

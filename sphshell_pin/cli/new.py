@@ -34,8 +34,7 @@ def new(
         ),
     ],
     surface: Annotated[
-        str,
-        typer.Option(help="A surface file, or one of: plane, box, sphere, cylinder, bowl."),
+        str, typer.Option(help="A surface file, or one of: plane, box, sphere, cylinder, bowl.")
     ] = "plane",
     frame: Annotated[
         str | None,

@@ -85,8 +85,7 @@ def sweep(
         typer.Option(help="Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO."),
     ] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(help="Processes; by default one per processor; 0: this one alone."),
+        int | None, typer.Option(help="Processes; by default one per processor; 0: this one alone.")
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler whose workers do the runs.")
@@ -96,8 +95,7 @@ def sweep(
         typer.Option(metavar="FIGURE", help="Figure to draw; may be given several times."),
     ] = None,
     pictures: Annotated[
-        bool,
-        typer.Option("--pictures/--no-pictures", help="Draw curves or maps of the table."),
+        bool, typer.Option("--pictures/--no-pictures", help="Draw curves or maps of the table.")
     ] = True,
     verdicts: Annotated[
         bool, typer.Option("--verdicts", help="A column for each expectation: met or not.")

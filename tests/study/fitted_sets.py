@@ -52,11 +52,7 @@ duration = 0.25
 rtol = 1e-7
 """
 LAW = "contact.tip.law."
-TRUTH = {
-    f"{LAW}stiffness": 1e5,
-    f"{LAW}dissipation": 0.3,
-    "contact.tip.friction.mu_dynamic": 0.2,
-}
+TRUTH = {f"{LAW}stiffness": 1e5, f"{LAW}dissipation": 0.3, "contact.tip.friction.mu_dynamic": 0.2}
 COLUMNS = {"pairs.tip.normal_force": "N", "pairs.tip.force_x": "N"}
 
 

@@ -24,12 +24,7 @@ from sphshell_pin.study.robot_check.setting import (
     random_torques,
     stopping_law,
 )
-from sphshell_pin.testing.conservation import (
-    elastic_energy,
-    energy,
-    kinetic_energy,
-    momentum,
-)
+from sphshell_pin.testing.conservation import elastic_energy, energy, kinetic_energy, momentum
 from sphshell_pin.testing.differences import derivatives
 from sphshell_pin.testing.finding import Finding, worst
 from sphshell_pin.testing.forces import balance, reaction

@@ -99,10 +99,7 @@ def as_markdown(reports: Sequence[RobotReport], command: str) -> str:
                 [[key, one.compares, f"{one.tolerance:g}"] for key, one in CHECKS.items()],
             ),
             "",
-            *_lines(
-                ["robot", "frame", "nq/nv", *CHECKS, "verdict"],
-                rows,
-            ),
+            *_lines(["robot", "frame", "nq/nv", *CHECKS, "verdict"], rows),
             "",
             "## Remarks",
             "",

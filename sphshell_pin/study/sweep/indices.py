@@ -9,16 +9,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.study.sweep.job import need
-from sphshell_pin.study.sweep.sampling import (
-    DRAWN,
-    HIGH,
-    LOW,
-    MEDIAN,
-    A,
-    B,
-    at_quantile,
-    swapped,
-)
+from sphshell_pin.study.sweep.sampling import DRAWN, HIGH, LOW, MEDIAN, A, B, at_quantile, swapped
 from sphshell_pin.study.sweep.table import DESIGN, varied_keys
 
 if TYPE_CHECKING:

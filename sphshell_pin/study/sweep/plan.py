@@ -14,13 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError
-from sphshell_pin.scenario import (
-    Built,
-    Scenario,
-    find_scenario,
-    read_scenario,
-    shipped_scenarios,
-)
+from sphshell_pin.scenario import Built, Scenario, find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.build import build_scenario
 from sphshell_pin.scenario.format.reading import full_name, look_up
 from sphshell_pin.scenario.format.sliders import meaning
