@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -136,12 +137,22 @@ def check_names(name: str, value: object) -> tuple[str, ...]:
     return names
 
 
-def split_stated(name: str, text: str, must: str) -> tuple[str, str]:
-    """Return key and value of the text KEY=VALUE; InvalidParameter says what `name` `must` be."""
-    key, equals, value = (one.strip() for one in text.partition("="))
-    if not (key and equals):
-        raise InvalidParameter(name, text, must)
-    return key, value
+def stated_pairs(
+    name: str, stated: Mapping[str, T] | Iterable[str], must: str
+) -> list[tuple[str, T | str]]:
+    """Return keys and values of a mapping, of texts KEY=VALUE, or of a single one.
+
+    InvalidParameter says what `name` `must` be where a text has no key or no "=".
+    """
+    if isinstance(stated, Mapping):
+        return list(stated.items())
+    pairs: list[tuple[str, T | str]] = []
+    for text in [stated] if isinstance(stated, str) else stated:
+        key, equals, value = (one.strip() for one in text.partition("="))
+        if not (key and equals):
+            raise InvalidParameter(name, text, must)
+        pairs.append((key, value))
+    return pairs
 
 
 def check_placement(name: str, value: object) -> pin.SE3:

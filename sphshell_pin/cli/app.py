@@ -17,7 +17,7 @@ import typer
 
 from sphshell_pin import errors
 from sphshell_pin._interrupts import interrupts_heard
-from sphshell_pin.checks import split_stated
+from sphshell_pin.checks import stated_pairs
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ def changes_of(
 ) -> dict[str, str]:
     """Return the values that --set, --dt and --duration change, by dotted key."""
     must = "must be KEY=VALUE, for instance run.dt=1e-4"
-    changes = dict(split_stated("--set", one, must) for one in set_ or [])
+    changes = dict(stated_pairs("--set", set_ or [], must))
     for key, value in (("run.dt", dt), ("run.duration", duration)):
         changes |= {} if value is None else {key: repr(value)}
     return changes
@@ -213,7 +213,7 @@ def changes_of(
 
 def xacro_args_of(stated: list[str] | None) -> dict[str, str]:
     """Return the arguments of a xacro file that --xacro-arg states."""
-    return dict(split_stated("--xacro-arg", one, "must be NAME=VALUE") for one in stated or [])
+    return dict(stated_pairs("--xacro-arg", stated or [], "must be NAME=VALUE"))
 
 
 @contextlib.contextmanager

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sphshell_pin.checks import stated_pairs
 from sphshell_pin.cli.app import (
     MISSED,
     PackageDirOption,
@@ -131,13 +132,13 @@ def _experiment(text: str) -> Experiment:
 
 
 def _deviations(stated: list[str] | None) -> dict[str, float]:
+    must = "must be NAME=VALUE, in SI units"
     found = {}
-    for one in stated or []:
-        name, _, value = one.partition("=")
+    for name, value in stated_pairs("--sigma", stated or [], must):
         try:
-            found[name.strip()] = float(value)
+            found[name] = float(value)
         except ValueError:
-            raise InvalidParameter("--sigma", one, "must be NAME=VALUE, in SI units") from None
+            raise InvalidParameter("--sigma", f"{name}={value}", must) from None
     return found
 
 

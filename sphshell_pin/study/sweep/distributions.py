@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.checks import split_stated
+from sphshell_pin.checks import stated_pairs
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.study.sweep.job import need
@@ -114,18 +114,11 @@ def distributions_of(dist: Dist | Iterable[str]) -> dict[str, Distribution]:
     InvalidParameter
         A text that is no distribution, values that it cannot have, or a key given twice.
     """
-    if isinstance(dist, str):
-        dist = [dist]
     if not isinstance(dist, Iterable):
         raise InvalidParameter("dist", dist, "must map keys to distributions")
     found: dict[str, Distribution] = {}
     must = f"must be KEY=DISTRIBUTION, one of {forms()}"
-    pairs = (
-        dist.items()
-        if isinstance(dist, Mapping)
-        else (split_stated("dist", one, must) for one in dist)
-    )
-    for key, given in pairs:
+    for key, given in stated_pairs("dist", dist, must):
         if key in found:
             raise InvalidParameter("dist", key, "is given twice: leave one of the two out")
         found[key] = given if isinstance(given, Distribution) else _parse(key, given)

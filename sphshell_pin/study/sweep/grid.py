@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sphshell_pin.checks import split_stated
+from sphshell_pin.checks import stated_pairs
 from sphshell_pin.errors import InvalidParameter
 
 Value = bool | int | float | str
@@ -48,16 +48,8 @@ def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:
     InvalidParameter
         A text that says no values, a key or a value given twice, or nothing to vary.
     """
-    if isinstance(vary, str):
-        vary = [vary]
-    must = f"must be {HOW}"
-    pairs = (
-        vary.items()
-        if isinstance(vary, Mapping)
-        else (split_stated("--vary", one, must) for one in vary)
-    )
     axes: list[Axis] = []
-    for key, given in pairs:
+    for key, given in stated_pairs("--vary", vary, f"must be {HOW}"):
         if not isinstance(given, Iterable):
             raise InvalidParameter(f"vary {key}", given, "must be a list of values, or a text")
         values = _parse(key, given) if isinstance(given, str) else tuple(map(_plain, given))
