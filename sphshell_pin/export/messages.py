@@ -8,9 +8,9 @@ branch jazzy; licenses Apache 2.0 and BSD); `tests/export/test_messages.py` comp
 from __future__ import annotations
 
 import re
-from importlib import resources
+from pathlib import Path
 
-_TEXT = resources.files(__package__).joinpath("messages.txt").read_text(encoding="utf-8")
+_TEXT = Path(__file__).with_name("messages.txt").read_text(encoding="utf-8")
 
 DEFINITIONS = dict(text.strip().split("\n", 1) for text in _TEXT.split("\n\n"))
 """By type (package/Name), the lines of its .msg file."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from statistics import mode
 from typing import Self
 
 import numpy as np
@@ -83,10 +82,12 @@ class _Table:
     lines: Sequence[int] | None
 
     @classmethod
-    def of(cls, source: str, columns: Mapping[str, Array], lines: list[int] | None = None) -> Self:
-        """Return the table of columns by header; DataError where two have one name."""
+    def of(
+        cls, source: str, columns: Iterable[tuple[str, Array]], lines: list[int] | None = None
+    ) -> Self:
+        """Return the table of headers and columns; DataError where two have one name."""
         table = cls(source, {}, lines)
-        for header, values in columns.items():
+        for header, values in columns:
             found = _HEADER.fullmatch(header)
             assert found is not None
             name = found[1].strip()
@@ -250,7 +251,7 @@ def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
     if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
         shown = ", ".join(f"'{key}' {shape}" for key, shape in lengths.items())
         raise DataError(name, f"columns must be of one length, of shape (n,): {shown}")
-    return _Table.of(name, columns)
+    return _Table.of(name, columns.items())
 
 
 def _read_csv(path: Path) -> _Table:
@@ -280,8 +281,6 @@ def _read_csv(path: Path) -> _Table:
     if all(_number(one) is not None for one in head):
         reason = f"the first line must be a header, as '{_EXAMPLE}'"
         raise DataError(source, reason, numbers[0])
-    if len(set(head)) < len(head):
-        raise DataError(source, f"two columns are called '{mode(head)}'", numbers[0])
     values = np.full((len(rows) - 1, len(head)), math.nan)
     for k, (number, row) in enumerate(zip(numbers[1:], rows[1:], strict=True)):
         if len(row) != len(head):
@@ -297,7 +296,7 @@ def _read_csv(path: Path) -> _Table:
                     reason += "; leave the cell empty where nothing was measured"
                 raise DataError(source, reason, number)
             values[k, i] = value
-    return _Table.of(source, dict(zip(head, values.T, strict=True)), numbers[1:])
+    return _Table.of(source, zip(head, values.T, strict=True), numbers[1:])
 
 
 def _number(text: str) -> float | None:
