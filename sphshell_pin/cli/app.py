@@ -37,31 +37,35 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+
+def option(help: str, *names: str, **more: Any) -> Any:
+    """Return an option with its help; `names` are by default that of the parameter."""
+    return typer.Option(*names, help=help, **more)
+
+
+def argument(help: str, **more: Any) -> Any:
+    """Return an argument with its help."""
+    return typer.Argument(help=help, **more)
+
+
 # Exit codes: 1 an expectation was missed, 2 an error, 130 interrupted (as shells have it).
 MISSED, ERROR, INTERRUPTED = 1, 2, 130
-ScenarioArgument = Annotated[
-    str, typer.Argument(help="Name of a shipped scenario, or path of a .toml file.")
-]
+PERCENT = "{task.percentage:>3.0f} %"  # a column of progress_bar
+ScenarioArgument = Annotated[str, argument("Name of a shipped scenario, or path of a .toml file.")]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a value; may be given several times."),
+    option("Change a value; may be given several times.", "--set", metavar="KEY=VALUE"),
 ]
-PERCENT = "{task.percentage:>3.0f} %"
-"""A column of a bar."""
-DtOption = Annotated[float | None, typer.Option(help="Time step \\[s] in place of run.dt.")]
-DurationOption = Annotated[
-    float | None, typer.Option(help="Time to simulate \\[s] in place of run.duration.")
-]
+DtOption = Annotated[float | None, option("Time step \\[s] in place of run.dt.")]
+DurationOption = Annotated[float | None, option("Time to simulate \\[s] in place of run.duration.")]
 OfOption = Annotated[
     str | None,
-    typer.Option(
-        "--scenario", help="Scenario that a finished run is from, if it holds none, or another one."
-    ),
+    option("Scenario that a finished run is from, if it holds none, or another one.", "--scenario"),
 ]
 RadiusOption = Annotated[
-    str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
+    str | None, option("Of the sphere: 0.012 \\[m] or 12mm.", metavar="LENGTH")
 ]
-RunArgument = Annotated[Path, typer.Argument(help="A finished run: its run.npz or results folder.")]
+RunArgument = Annotated[Path, argument("A finished run: its run.npz or results folder.")]
 
 
 def _search_in(folders: list[Path] | None) -> list[Path] | None:
@@ -78,19 +82,19 @@ def _search_in(folders: list[Path] | None) -> list[Path] | None:
 
 PackageDirOption = Annotated[
     list[Path] | None,
-    typer.Option(
+    option(
+        "Folder above the packages of the robot's meshes; may be given several times.",
         "--package-dir",
         metavar="FOLDER",
         callback=_search_in,
-        help="Folder above the packages of the robot's meshes; may be given several times.",
     ),
 ]
 XacroArgOption = Annotated[
     list[str] | None,
-    typer.Option(
+    option(
+        "Argument of a xacro file, which is code; may be given several times.",
         "--xacro-arg",
         metavar="NAME=VALUE",
-        help="Argument of a xacro file, which is code; may be given several times.",
     ),
 ]
 
@@ -109,14 +113,14 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    debug: Annotated[bool, option("Show the traceback of an error.", "--debug")] = False,
     version: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Print the versions of this package, Pinocchio and Coal.",
             "--version",
             callback=_print_version,
             is_eager=True,
-            help="Print the versions of this package, Pinocchio and Coal.",
         ),
     ] = False,
 ) -> None:

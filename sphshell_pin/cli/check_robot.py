@@ -18,10 +18,12 @@ from sphshell_pin.cli.app import (
     PackageDirOption,
     RadiusOption,
     XacroArgOption,
+    argument,
     colored,
     command,
     length_of,
     make_table,
+    option,
     plain,
     progress_bar,
     say,
@@ -41,32 +43,32 @@ _PIPE_WIDTH, _WIDE = 170, 125
 def check_robot_(
     robot: Annotated[
         list[str] | None,
-        typer.Argument(
-            help="Names of shipped robots (sphshell-pin list), or URDF, xacro (which is code) or "
+        argument(
+            "Names of shipped robots (sphshell-pin list), or URDF, xacro (which is code) or "
             "MJCF files."
         ),
     ] = None,
-    every: Annotated[bool, typer.Option("--all", help="Check every robot there is.")] = False,
+    every: Annotated[bool, option("Check every robot there is.", "--all")] = False,
     frame: Annotated[
         str | None,
-        typer.Option(
-            help="Frame that carries the sphere; by default a known tip, or the end of the "
+        option(
+            "Frame that carries the sphere; by default a known tip, or the end of the "
             "longest limb and the outermost sphere inside its collision mesh."
         ),
     ] = None,
     radius: RadiusOption = None,
     free_flyer: Annotated[
-        bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
+        bool, option("The root link of the URDF floats.", "--free-flyer")
     ] = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer postures and runs.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random postures.")] = 0,
+    quick: Annotated[bool, option("Fewer postures and runs.", "--quick")] = False,
+    seed: Annotated[int, option("Seed of the random postures.", min=0)] = 0,
     json: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures to this file.")
+        Path | None, option("Write all figures to this file.", "--json", metavar="FILE")
     ] = None,
     write: Annotated[
-        Path | None, typer.Option("--write", metavar="FILE", help="Write the table as Markdown.")
+        Path | None, option("Write the table as Markdown.", "--write", metavar="FILE")
     ] = None,
 ) -> None:
     """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.

@@ -6,9 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from sphshell_pin.cli.app import command, if_installed, print_table, say
+from sphshell_pin.cli.app import argument, command, if_installed, option, print_table, say
 from sphshell_pin.cli.export import file_of, with_scene
 from sphshell_pin.tables import column
 
@@ -22,15 +20,11 @@ MOST_ROWS = 24
 @command()
 def compare(
     *,
-    runs: Annotated[
-        list[Path], typer.Argument(help="Two or more finished runs: run.npz or results folders.")
-    ],
-    out: Annotated[
-        Path, typer.Option(help="Folder of figures.csv, curves.csv and compare.png.")
-    ] = Path("results/compare"),
-    picture: Annotated[
-        bool, typer.Option("--picture/--no-picture", help="Draw compare.png.")
-    ] = True,
+    runs: Annotated[list[Path], argument("Two or more finished runs: run.npz or results folders.")],
+    out: Annotated[Path, option("Folder of figures.csv, curves.csv and compare.png.")] = Path(
+        "results/compare"
+    ),
+    picture: Annotated[bool, option("Draw compare.png.", "--picture/--no-picture")] = True,
 ) -> None:
     """Lay finished runs over each other: figures and curves, with their differences from the first.
 

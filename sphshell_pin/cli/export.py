@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import OfOption, RunArgument, command, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, option, progress_bar
 from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
@@ -24,21 +24,19 @@ FORMATS = ("mcap", "csv", "parquet")
 def export(
     *,
     run: RunArgument,
-    to: Annotated[
-        str, typer.Option(metavar="FORMAT", help="mcap (ROS 2 messages), csv or parquet (tables).")
-    ],
+    to: Annotated[str, option("mcap (ROS 2 messages), csv or parquet (tables).", metavar="FORMAT")],
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="The .mcap file, or the folder of the tables; by default beside the run: "
+        option(
+            "The .mcap file, or the folder of the tables; by default beside the run: "
             "RUN.mcap, RUN_csv, RUN_parquet."
         ),
     ] = None,
     start: Annotated[
         str,
-        typer.Option(
+        option(
+            "Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.",
             metavar="TIME",
-            help="Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.",
         ),
     ] = "0",
     of: OfOption = None,

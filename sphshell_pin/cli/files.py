@@ -5,51 +5,39 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from sphshell_pin.cli.app import command, print_table, say
+from sphshell_pin.cli.app import argument, command, option, print_table, say
 from sphshell_pin.errors import SphshellError, UnitMissing
 
 FORMATS = ".stl .obj .ply .off .shl, .step .iges .brep"
 
 ChordErrorOption = Annotated[
-    float | None,
-    typer.Option(help="Of CAD: largest distance of the elements from the exact surface \\[m]."),
+    float | None, option("Of CAD: largest distance of the elements from the exact surface \\[m].")
 ]
 BodyOption = Annotated[
-    list[str] | None,
-    typer.Option(metavar="NAME", help="Of CAD: take this body; may be given several times."),
+    list[str] | None, option("Of CAD: take this body; may be given several times.", metavar="NAME")
 ]
 FaceOption = Annotated[
     list[str] | None,
-    typer.Option(
-        metavar="NAME",
-        help="Of CAD: take this face, by name or number; may be given several times.",
+    option(
+        "Of CAD: take this face, by name or number; may be given several times.", metavar="NAME"
     ),
 ]
 
 TimeLimitOption = Annotated[
-    float | None,
-    typer.Option(help="Of CAD: end OpenCASCADE after this time \\[s], 600 unless given."),
+    float | None, option("Of CAD: end OpenCASCADE after this time \\[s], 600 unless given.")
 ]
 MemoryLimitOption = Annotated[
-    float | None,
-    typer.Option(help="Of CAD: let OpenCASCADE take so much memory \\[bytes], 8e9 unless given."),
+    float | None, option("Of CAD: let OpenCASCADE take so much memory \\[bytes], 8e9 unless given.")
 ]
 
 
 @command()
 def check(
-    file: Annotated[Path, typer.Argument(help=f"A surface file: {FORMATS}")],
-    unit: Annotated[
-        str | None, typer.Option(help="Length unit of the file: mm, cm, m, inch, ...")
-    ] = None,
-    side: Annotated[
-        str, typer.Option(help="Where spheres may be: both, outside, inside.")
-    ] = "both",
+    file: Annotated[Path, argument(f"A surface file: {FORMATS}")],
+    unit: Annotated[str | None, option("Length unit of the file: mm, cm, m, inch, ...")] = None,
+    side: Annotated[str, option("Where spheres may be: both, outside, inside.")] = "both",
     scale: Annotated[
-        str | None,
-        typer.Option(help="Use of the SCALE of a .shl file: apply, ignore, or a number instead."),
+        str | None, option("Use of the SCALE of a .shl file: apply, ignore, or a number instead.")
     ] = None,
     chord_error: ChordErrorOption = None,
     body: BodyOption = None,
@@ -83,13 +71,13 @@ def check(
 
 @command()
 def convert(
-    source: Annotated[Path, typer.Argument(help=f"The file to read: {FORMATS}")],
-    target: Annotated[Path, typer.Argument(help="The file to write; its suffix names the format.")],
+    source: Annotated[Path, argument(f"The file to read: {FORMATS}")],
+    target: Annotated[Path, argument("The file to write; its suffix names the format.")],
     unit_in: Annotated[
-        str | None, typer.Option(help="Length unit of the file to read; STEP and IGES state it.")
+        str | None, option("Length unit of the file to read; STEP and IGES state it.")
     ] = None,
     unit_out: Annotated[
-        str | None, typer.Option(help="Length unit of the file to write; the same unless given.")
+        str | None, option("Length unit of the file to write; the same unless given.")
     ] = None,
     chord_error: ChordErrorOption = None,
     body: BodyOption = None,

@@ -15,9 +15,11 @@ from sphshell_pin.cli.app import (
     PackageDirOption,
     ScenarioArgument,
     SetOption,
+    argument,
     changes_of,
     command,
     if_installed,
+    option,
     print_table,
     progress_bar,
     say,
@@ -32,44 +34,38 @@ if TYPE_CHECKING:
 def fit(
     *,
     data: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="DATA.csv", help="Measured data: columns by name and unit."),
+        list[Path] | None, argument("Measured data: columns by name and unit.", metavar="DATA.csv")
     ] = None,
     scenario: ScenarioArgument,
     param: Annotated[
         list[str],
-        typer.Option(
+        option(
+            "What is fitted, in this range if it is given; may be given several times. "
+            "KEY+KEY: one value for both.",
             "--param",
             metavar="KEY[=LO:HI]",
-            help="What is fitted, in this range if it is given; may be given several times. "
-            "KEY+KEY: one value for both.",
         ),
     ],
     experiment: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="'DATA.csv KEY=VALUE...'",
-            help="Data of an experiment with other values than the scenario; may be given several "
+        option(
+            "Data of an experiment with other values than the scenario; may be given several "
             "times.",
+            metavar="'DATA.csv KEY=VALUE...'",
         ),
     ] = None,
     column: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="Use this column; by default all; several times."),
+        list[str] | None, option("Use this column; by default all; several times.", metavar="NAME")
     ] = None,
     sigma: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "Standard deviation of a column, in SI; by default from the residuals.",
             metavar="NAME=VALUE",
-            help="Standard deviation of a column, in SI; by default from the residuals.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of the files; by default results/SCENARIO.")
-    ] = None,
-    picture: Annotated[
-        bool, typer.Option("--picture/--no-picture", help="Draw fit and residuals.")
-    ] = True,
+    out: Annotated[Path | None, option("Folder of the files; by default results/SCENARIO.")] = None,
+    picture: Annotated[bool, option("Draw fit and residuals.", "--picture/--no-picture")] = True,
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
 ) -> None:

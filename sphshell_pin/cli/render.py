@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import OfOption, RunArgument, command, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, option, progress_bar
 from sphshell_pin.errors import InvalidParameter, SphshellError
 
 
@@ -16,35 +16,27 @@ from sphshell_pin.errors import InvalidParameter, SphshellError
 def render(
     run: RunArgument,
     out: Annotated[
-        Path,
-        typer.Option(
-            help="A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures."
-        ),
+        Path, option("A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures.")
     ],
     time: Annotated[
-        float | None, typer.Option(help="Of a picture: time of the run \\[s]; by default its end.")
+        float | None, option("Of a picture: time of the run \\[s]; by default its end.")
     ] = None,
     from_: Annotated[
-        float | None, typer.Option("--from", help="Of a film: time at which it begins \\[s].")
+        float | None, option("Of a film: time at which it begins \\[s].", "--from")
     ] = None,
-    to: Annotated[
-        float | None, typer.Option("--to", help="Of a film: time at which it ends \\[s].")
-    ] = None,
-    size: Annotated[str, typer.Option(help="Width and height in pixels.")] = "1280x720",
+    to: Annotated[float | None, option("Of a film: time at which it ends \\[s].", "--to")] = None,
+    size: Annotated[str, option("Width and height in pixels.")] = "1280x720",
     fps: Annotated[
-        float | None, typer.Option(help="Pictures per second; by default 30, of a .gif 20.")
+        float | None, option("Pictures per second; by default 30, of a .gif 20.")
     ] = None,
     speed: Annotated[
-        float | None,
-        typer.Option(help="Simulated seconds per second; by default as the scenario has it."),
+        float | None, option("Simulated seconds per second; by default as the scenario has it.")
     ] = None,
-    camera: Annotated[
-        str, typer.Option(help="From where: fit, front, side, top, follow, contact.")
-    ] = "fit",
+    camera: Annotated[str, option("From where: fit, front, side, top, follow, contact.")] = "fit",
     chart: Annotated[
-        bool, typer.Option("--chart/--no-chart", help="Forces and depth under the scene.")
+        bool, option("Forces and depth under the scene.", "--chart/--no-chart")
     ] = True,
-    dark: Annotated[bool, typer.Option("--dark", help="Dark background.")] = False,
+    dark: Annotated[bool, option("Dark background.", "--dark")] = False,
     of: OfOption = None,
 ) -> None:
     """Draw a finished run: one picture, a film, or a folder of pictures for slides.

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import MISSED, PERCENT, colored, command, print_table, progress_bar, say
+from sphshell_pin.cli.app import (
+    MISSED,
+    PERCENT,
+    colored,
+    command,
+    option,
+    print_table,
+    progress_bar,
+    say,
+)
 from sphshell_pin.errors import SphshellError
 
 if TYPE_CHECKING:
@@ -17,22 +26,16 @@ if TYPE_CHECKING:
 
 @command()
 def report(
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Some four minutes: fewer rounds and sizes.")
-    ] = False,
-    peers: Annotated[
-        bool, typer.Option("--peers", help="The same scenes in other engines, too.")
-    ] = False,
+    quick: Annotated[bool, option("Some four minutes: fewer rounds and sizes.", "--quick")] = False,
+    peers: Annotated[bool, option("The same scenes in other engines, too.", "--peers")] = False,
     validation: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Against published experiments instead; --quick leaves out the slow cases.",
             "--validation",
-            help="Against published experiments instead; --quick leaves out the slow cases.",
         ),
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder of the page and its tables.")] = Path(
-        "results/report"
-    ),
+    out: Annotated[Path, option("Folder of the page and its tables.")] = Path("results/report"),
 ) -> None:
     """Measure speed against error on this machine and write a page of it.
 

@@ -21,6 +21,7 @@ from sphshell_pin.cli.app import (
     changes_of,
     colored,
     command,
+    option,
     print_table,
     progress_bar,
     say,
@@ -40,19 +41,16 @@ MOST_PAIRS = 16
 def run(
     *,
     scenario: ScenarioArgument,
-    out: Annotated[
-        Path | None, typer.Option(help="Results folder; by default results/SCENARIO.")
-    ] = None,
+    out: Annotated[Path | None, option("Results folder; by default results/SCENARIO.")] = None,
     dt: DtOption = None,
     duration: DurationOption = None,
     recording: Annotated[
-        bool, typer.Option("--recording/--no-recording", help="Write recording.html.")
+        bool, option("Write recording.html.", "--recording/--no-recording")
     ] = True,
     audit_cad: Annotated[
         bool,
-        typer.Option(
-            "--audit-cad",
-            help="Compare every contact with that on the exact faces of the CAD file.",
+        option(
+            "Compare every contact with that on the exact faces of the CAD file.", "--audit-cad"
         ),
     ] = False,
     set_: SetOption = None,

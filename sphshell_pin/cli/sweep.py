@@ -19,6 +19,7 @@ from sphshell_pin.cli.app import (
     SetOption,
     changes_of,
     command,
+    option,
     print_table,
     progress_bar,
     say,
@@ -39,69 +40,59 @@ def sweep(
     scenario: ScenarioArgument,
     vary: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.",
             metavar="KEY=VALUES",
-            help="What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.",
         ),
     ] = None,
     together: Annotated[
-        bool, typer.Option("--together", help="Take the values of all keys in step: no grid.")
+        bool, option("Take the values of all keys in step: no grid.", "--together")
     ] = False,
     dist: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="'KEY=DISTRIBUTION'",
-            help="An uncertain input: normal(mean, deviation), uniform(low, high) or "
+        option(
+            "An uncertain input: normal(mean, deviation), uniform(low, high) or "
             "lognormal(median, factor): 68 % from median / factor to median * factor.",
+            metavar="'KEY=DISTRIBUTION'",
         ),
     ] = None,
     sample: Annotated[
         str | None,
-        typer.Option(
-            metavar="KIND", help="Points: sobol (a Sobol sequence) or lhs (a Latin hypercube)."
-        ),
+        option("Points: sobol (a Sobol sequence) or lhs (a Latin hypercube).", metavar="KIND"),
     ] = None,
-    n: Annotated[
-        int | None, typer.Option("--n", help="Number of points; a power of 2 for sobol.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the points.")] = 0,
+    n: Annotated[int | None, option("Number of points; a power of 2 for sobol.", "--n")] = None,
+    seed: Annotated[int, option("Seed of the points.")] = 0,
     indices: Annotated[
-        bool,
-        typer.Option("--indices", help="Sobol indices: n (d + 2) runs for d uncertain inputs."),
+        bool, option("Sobol indices: n (d + 2) runs for d uncertain inputs.", "--indices")
     ] = False,
     tornado: Annotated[
-        bool,
-        typer.Option("--tornado", help="2 d + 1 runs more: each input alone at 5 and at 95 %."),
+        bool, option("2 d + 1 runs more: each input alone at 5 and at 95 %.", "--tornado")
     ] = False,
     bands: Annotated[
         list[str] | None,
-        typer.Option(metavar="CURVE", help="Record a curve of each run; draw quantiles over time."),
+        option("Record a curve of each run; draw quantiles over time.", metavar="CURVE"),
     ] = None,
-    band_steps: Annotated[
-        int | None, typer.Option(help="Equal steps of the curves; by default 200.")
-    ] = None,
+    band_steps: Annotated[int | None, option("Equal steps of the curves; by default 200.")] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO."),
+        Path | None, option("Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO.")
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes; by default one per processor; 0: this one alone.")
+        int | None, option("Processes; by default one per processor; 0: this one alone.")
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler whose workers do the runs.")
+        str | None, option("Address of a Dask scheduler whose workers do the runs.")
     ] = None,
     plot: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FIGURE", help="Figure to draw; may be given several times."),
+        list[str] | None, option("Figure to draw; may be given several times.", metavar="FIGURE")
     ] = None,
     pictures: Annotated[
-        bool, typer.Option("--pictures/--no-pictures", help="Draw curves or maps of the table.")
+        bool, option("Draw curves or maps of the table.", "--pictures/--no-pictures")
     ] = True,
     verdicts: Annotated[
-        bool, typer.Option("--verdicts", help="A column for each expectation: met or not.")
+        bool, option("A column for each expectation: met or not.", "--verdicts")
     ] = False,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Do failed runs of an earlier call again.")
+        bool, option("Do failed runs of an earlier call again.", "--retry-failed")
     ] = False,
     dt: DtOption = None,
     duration: DurationOption = None,

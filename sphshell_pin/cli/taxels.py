@@ -8,33 +8,28 @@ from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import RunArgument, command, if_installed
+from sphshell_pin.cli.app import RunArgument, command, if_installed, option
 from sphshell_pin.cli.export import file_of
 
 
 @command()
 def taxels(
     run: RunArgument,
-    contact: Annotated[str, typer.Option(help="Contact whose sphere has the taxels.")],
-    shape: Annotated[tuple[int, int], typer.Option(help="Numbers of taxels: rows and columns.")] = (
-        16,
-        16,
-    ),
+    contact: Annotated[str, option("Contact whose sphere has the taxels.")],
+    shape: Annotated[tuple[int, int], option("Numbers of taxels: rows and columns.")] = (16, 16),
     axis: Annotated[
         tuple[float, float, float],
-        typer.Option(help="From the sphere's center to the middle of the grid, in its frame."),
+        option("From the sphere's center to the middle of the grid, in its frame."),
     ] = (0.0, 0.0, 1.0),
     up: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(help="Direction of the columns, in the same frame; by default any."),
+        option("Direction of the columns, in the same frame; by default any."),
     ] = None,
     extent_deg: Annotated[
-        tuple[float, float], typer.Option(help="Angles over which rows and columns reach.")
+        tuple[float, float], option("Angles over which rows and columns reach.")
     ] = (90.0, 90.0),
-    speed: Annotated[float, typer.Option(help="Simulated seconds in a second of the film.")] = 1.0,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder to write into; by default that of the run.")
-    ] = None,
+    speed: Annotated[float, option("Simulated seconds in a second of the film.")] = 1.0,
+    out: Annotated[Path | None, option("Folder to write into; by default that of the run.")] = None,
 ) -> None:
     """Write what a grid of tactile sensors on a sphere felt: taxels.npz, and a film of it.
 

@@ -6,7 +6,15 @@ from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import OfOption, PackageDirOption, SetOption, changes_of, command
+from sphshell_pin.cli.app import (
+    OfOption,
+    PackageDirOption,
+    SetOption,
+    argument,
+    changes_of,
+    command,
+    option,
+)
 
 
 @command()
@@ -14,26 +22,24 @@ def view(
     *,
     scenario: Annotated[
         str,
-        typer.Argument(
-            help="Name of a shipped scenario, path of a .toml file, or a finished run: its "
+        argument(
+            "Name of a shipped scenario, path of a .toml file, or a finished run: its "
             "run.npz or results folder."
         ),
     ],
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
-    speed: Annotated[float, typer.Option(help="Simulated seconds per second.")] = 1.0,
-    paused: Annotated[bool, typer.Option("--paused", help="Wait for the button Run.")] = False,
+    speed: Annotated[float, option("Simulated seconds per second.")] = 1.0,
+    paused: Annotated[bool, option("Wait for the button Run.", "--paused")] = False,
     host: Annotated[
-        str, typer.Option(help="Address to serve the page at; 0.0.0.0 lets other machines in.")
+        str, option("Address to serve the page at; 0.0.0.0 lets other machines in.")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port of the page; 0 takes any that is free.")] = 0,
-    open_: Annotated[
-        bool, typer.Option("--open/--no-open", help="Open the page in the web browser.")
-    ] = True,
+    port: Annotated[int, option("Port of the page; 0 takes any that is free.")] = 0,
+    open_: Annotated[bool, option("Open the page in the web browser.", "--open/--no-open")] = True,
     color: Annotated[
         str,
-        typer.Option(
-            help="Colors of the shells: surface, patches, faces (by kind), or distance (of curved "
+        option(
+            "Colors of the shells: surface, patches, faces (by kind), or distance (of curved "
             "elements from the flat ones)."
         ),
     ] = "surface",
