@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.adapters import imports_of
-from sphshell_pin.adapters.evaluator import check_without_history
+from sphshell_pin.adapters.evaluator import check_fixed_step, check_without_history
 from sphshell_pin.checks import check_names, check_type
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.dynamics.scene.variations import Variations
@@ -225,8 +225,7 @@ class Step(_SceneFunction):
     ) -> None:
         check_type("simulation", simulation, Simulation, "must be a sphshell_pin.Simulation")
         self._integrator = simulation.integrator
-        q, v = simulation.scene.check_state(simulation.scene.neutral)
-        simulation.step_derivatives(q, v)  # refuses an integrator without fixed steps
+        check_fixed_step(simulation)
         super().__init__(
             simulation.scene, q0, parameters=parameters, without_history=without_history
         )
