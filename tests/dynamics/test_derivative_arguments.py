@@ -11,9 +11,15 @@ from numpy.typing import NDArray
 from sphshell_pin import CoulombFriction, Simulation
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import differences
-from tests.dynamics.test_contact_derivatives import FRICTIONS
-from tests.dynamics.test_dynamics_derivatives import BRISTLE, COULOMB, LAWS, in_bowl
-from tests.dynamics.test_two_spheres import in_touch, two_spheres
+from tests.dynamics.scenes import (
+    BRISTLE,
+    COULOMB,
+    FRICTIONS,
+    LAWS,
+    in_bowl,
+    in_touch,
+    two_spheres,
+)
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import pytest
 
 from sphshell_pin import CoulombFriction, ImpactLaw, Scene, Shell, Sphere
 from tests import meshes
-from tests.models import JOINTS, add_body, ball, empty, free_q, on_plate
+from tests.models import JOINTS, TURNING, add_body, ball, empty, free_q, on_plate
 from tests.oracle import laws, mechanics
 
 RADIUS, DEPTH = 0.08, 0.01
@@ -43,7 +43,7 @@ class Case:
         self.j = add_body(
             model,
             "shell_body",
-            JOINTS[joint_j](),
+            (JOINTS | TURNING)[joint_j](),
             parents[1],
             placement=somewhere(),
             inertia=inertia(),
@@ -52,7 +52,7 @@ class Case:
         self.i = add_body(
             model,
             "tip",
-            JOINTS[joint_i](),
+            (JOINTS | TURNING)[joint_i](),
             self.j if parents[0] is None else parents[0],
             placement=somewhere(),
             inertia=inertia(),

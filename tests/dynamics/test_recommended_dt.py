@@ -13,7 +13,7 @@ import sphshell_pin as sp
 from sphshell_pin.dynamics.scene.explain import _round_down, relaxation_time, weakness
 from sphshell_pin.errors import SetupWarning
 from tests import models
-from tests.dynamics.test_two_spheres import in_touch, two_spheres
+from tests.dynamics.scenes import in_touch, two_spheres
 
 RADIUS, MASS, SPEED = 0.05, 0.7, 0.4
 STEEL = {"young": 2e8, "poisson": 0.3}

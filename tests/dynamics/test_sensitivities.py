@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import sphshell_pin as sp
 from sphshell_pin.errors import Interrupted, InvalidParameter, NameNotFound, ResultError
 from tests import differences, meshes, models
-from tests.dynamics.test_contact_derivatives import FRICTIONS
+from tests.dynamics.scenes import FRICTIONS
 from tests.sensitivities import (
     BRISTLE,
     COULOMB,

@@ -14,47 +14,21 @@ import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import DeepStart, InvalidParameter
 from tests import models
-from tests.dynamics.test_contact_derivatives import (
+from tests.dynamics.scenes import (
     FRICTIONS,
     LAWS,
+    OFFSET,
+    ONE,
+    OTHER,
+    OTHER_OFFSET,
+    TWO,
+    R,
+    in_touch,
+    two_bodies,
+    two_spheres,
 )
 
 Array = NDArray[np.float64]
-
-R, OTHER = 0.05, 0.08
-OFFSET, OTHER_OFFSET = (0.01, -0.02, 0.03), (-0.03, 0.01, 0.02)
-
-
-def two_bodies() -> pin.Model:
-    """Free bodies "one" and "two", no gravity."""
-    model = models.empty(0.0)
-    lump = pin.Inertia(2.0, np.array([0.02, -0.03, 0.01]), np.diag([0.03, 0.02, 0.04]))
-    models.add_body(model, "one", pin.JointModelFreeFlyer())
-    models.add_body(model, "two", pin.JointModelFreeFlyer(), inertia=lump)
-    return model
-
-
-ONE, TWO = sp.Sphere(R, "one", OFFSET), sp.Sphere(OTHER, "two", OTHER_OFFSET)
-
-
-def two_spheres(law, friction=None, *, turned: bool = False, **more) -> sp.Scene:  # type: ignore[no-untyped-def]
-    """Scene of both spheres; `turned`: the second one is given first."""
-    scene = sp.Scene(two_bodies())
-    first, second = (TWO, ONE) if turned else (ONE, TWO)
-    scene.add_contact(first, second, law=law, friction=friction, name="balls", **more)
-    return scene
-
-
-def in_touch(seed: int, depth: float = 0.004, spin: float = 20.0) -> tuple[Array, Array]:
-    """State in which the spheres are `depth` deep in each other."""
-    rng = np.random.default_rng(seed)
-    turns = [pin.Quaternion(rng.normal(size=4)).normalized().matrix() for _ in range(2)]
-    one, two = (pin.SE3(turn, rng.normal(size=3)) for turn in turns)
-    way = rng.normal(size=3)
-    way *= (R + OTHER - depth) / np.linalg.norm(way)
-    one.translation = two * np.array(OTHER_OFFSET) + way - one.rotation @ np.array(OFFSET)
-    v = np.concatenate([rng.normal(size=3), spin * rng.normal(size=3)] * 2)
-    return np.concatenate([pin.SE3ToXYZQUAT(one), pin.SE3ToXYZQUAT(two)]), v
 
 
 @pytest.mark.parametrize("turned", [False, True])
