@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter, ScenarioError
+from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.format.build import build
 from tests import meshes, models
 from tests.scenario import files
@@ -215,21 +215,6 @@ def test_events_are_sorted_and_exact(integrator) -> None:
     assert times == sorted(times)
     drop = ((0.2**2 + 2 * 9.81 * 0.01) ** 0.5 - 0.2) / 9.81
     assert times[0] == pytest.approx(drop, abs=1e-9)
-
-
-@pytest.mark.parametrize("kind", [sp.Adaptive, sp.Implicit])
-@pytest.mark.parametrize("rtol", [0, -1e-3, float("nan"), float("inf"), 1, "fine", None, [1e-3]])
-def test_wrong_rtol(kind, rtol) -> None:
-    with pytest.raises(InvalidParameter, match="rtol"):
-        kind(rtol)
-
-
-@pytest.mark.parametrize("kind", [sp.Adaptive, sp.Implicit])
-def test_a_tolerance_is_no_step(kind) -> None:
-    with pytest.raises(TypeError, match="dt"):
-        kind(dt=1e-3)
-    with pytest.raises(InvalidParameter, match="atol"):
-        kind(1e-6, -1.0)
 
 
 def scenario(run_keys: str, friction: str = "") -> str:

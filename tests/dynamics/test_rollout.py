@@ -19,6 +19,7 @@ import trimesh
 import sphshell_pin as sp
 from sphshell_pin import errors
 from tests import models
+from tests.results import assert_same_bits
 
 G = 9.81
 R = 0.05
@@ -51,17 +52,6 @@ def slider_scene(law) -> sp.Scene:
     scene = sp.Scene(models.slider())
     scene.add_contact(sp.Sphere(R, "ball"), models.plate(), law=law, name=PAIR)
     return scene
-
-
-def assert_same_bits(a: sp.Result, b: sp.Result) -> None:
-    for name in ("t", "q", "v"):
-        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
-    for name in ("depth", "contact_id", "friction_force_world", "t", "row"):
-        np.testing.assert_array_equal(getattr(a.contacts, name), getattr(b.contacts, name))
-    np.testing.assert_array_equal(a.energy.total, b.energy.total)
-    assert a.events == b.events
-    assert a.stats.pairs == b.stats.pairs
-    assert a.stats.steps == b.stats.steps
 
 
 @every

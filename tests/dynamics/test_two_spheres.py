@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.errors import DeepStart, InvalidParameter
+from sphshell_pin.errors import DeepStart
 from tests import models
 from tests.dynamics.scenes import (
     FRICTIONS,
@@ -260,19 +260,6 @@ def test_scene_says_what_it_models() -> None:
     # Along the line of their centers two bodies move as one of the mass 1 / (1 / m_1 + 1 / m_2),
     # less for the turning of the second one.
     assert 0.1 < explained.pairs[0].effective_mass < 2 / 3
-
-
-@pytest.mark.parametrize(
-    ("more", "what"),
-    [
-        ({"frame": "two"}, "frame = 'two'"),
-        ({"placement": pin.SE3.Identity()}, "placement"),
-        ({"method": "smooth"}, "method = 'smooth'"),
-    ],
-)
-def test_what_a_sphere_in_place_of_a_shell_does_not_take(more, what: str) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(InvalidParameter, match=f"{what}.* must not be given where shell is a"):
-        two_spheres(sp.ImpactLaw(1e4, 1.5), **more)
 
 
 def test_a_deep_start_is_refused_by_the_smaller_radius() -> None:

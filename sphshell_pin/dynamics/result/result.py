@@ -98,16 +98,15 @@ class Result(Summarized):
         return None if rows is None else replace(rows, result=self)
 
     @classmethod
-    def _from_blocks(
+    def _from_record(
         cls,
-        blocks: list[Columns],
+        whole: Columns,
         pairs: tuple[str, ...],
         stats: RunStats,
         scene: Scene,
         sensors: SensorSet,
     ) -> Result:
-        """Join the core's blocks of recorded rows."""
-        whole = {k: np.concatenate([b[k] for b in blocks]) for k in blocks[0]}
+        """Build from the rows that the core has recorded."""
         row = whole["contact_row"].astype(np.int64)
         log = {**columns(whole["contacts"]), "t": whole["t"][row], "row": row}
         energy = {

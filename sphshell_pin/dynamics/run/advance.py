@@ -248,7 +248,7 @@ def result_of(
         pairs=dict(zip(names, figures, strict=True)),
         joints=joint_figures(scene, summaries[len(names) :], core.limits),
     )
-    return Result._from_blocks([record], names, stats, scene, sensors)
+    return Result._from_record(record, names, stats, scene, sensors)
 
 
 def joint_figures(
