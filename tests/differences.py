@@ -54,8 +54,8 @@ def off(
         step = share * scale
         expected = derivative(f, step, ahead=ahead)
         assert got.shape == expected.shape
-        size = max(np.abs(expected).max(), floor, 10.0 / tolerance * known / step)
-        error = np.abs(got - expected).max()
+        size = max(np.abs(expected).max(initial=0.0), floor, 10.0 / tolerance * known / step)
+        error = np.abs(got - expected).max(initial=0.0)
         best = min(best, error / size if size > 0.0 else (0.0 if error == 0.0 else np.inf))
         if best <= 0.1 * tolerance:
             break

@@ -296,26 +296,3 @@ def test_force_and_moment_share_the_limit() -> None:
     assert whole[late] == pytest.approx(1.0, rel=2e-3)
     v = 0.5 * (rows.v[1:] + rows.v[:-1])
     assert (moment / force)[late] == pytest.approx((LEVER**2 * v[:, 1] / v[:, 0])[late], rel=1e-2)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_energy_of_random_rolls(seed: int) -> None:
-    """Friction gives nothing back: less than what a bristle holds, where contacts join."""
-    rng = np.random.default_rng(seed)
-    vertices, triangles = meshes.dome(cells=10, size=1.0, radius=1.0)
-    height = 0.02 * np.sin(9 * vertices[:, 0]) * np.cos(7 * vertices[:, 1])
-    shell = sp.Shell(vertices * [1, 1, -1] + height[:, None] * [0, 0, 1], triangles)
-    scene = sp.Scene(models.ball(radius=R))
-    friction = sp.BristleFriction(0.3, 0.25, 1e4, 20.0, torsional=bool(seed % 2))
-    law = models.linear_law(1e4, 30.0)
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, method="smooth")
-    q = models.free_q([*rng.uniform(-0.1, 0.1, 2), 0.0])
-    top = max(0.0, -float(shell.closest_points(q[None, :3]).distances[0]))
-    q[2] = 0.1 + top
-    v = np.concatenate([rng.uniform(-0.5, 0.5, 3), rng.uniform(-10, 10, 3)])
-    rows = run(scene, sp.Adaptive(1e-8), q, v, 0.6)
-    assert len(rows.contacts.t) > 100
-    energy = rows.energy
-    held = 0.5 * (0.3 * 5 * G) ** 2 / 1e4  # of a bristle at five times the weight
-    assert np.diff(energy.friction_loss).min() > -0.05 * held
-    assert np.abs(energy.residual).max() < 1e-5 * energy.exchanged

@@ -167,6 +167,12 @@ def test_scenes_touch_as_they_are_meant_to() -> None:
     assert SCENES["locked joint"]()[0].model.nv == 2
 
 
+def test_forces_of_several_pairs_add_up() -> None:
+    scene, q, v = SCENES["two pairs"]()
+    scene.replace_pair("second", law=IMPACT, friction=COULOMB)
+    testing.assert_forces_balance(scene, q, v)
+
+
 @pytest.mark.parametrize(("friction", "tolerance"), [("none", 1e-6), ("coulomb", 1e-5)])
 def test_a_cluster_shown_as_one(friction: str, tolerance: float) -> None:
     """With friction it acts as one contact, right but for the square of the normals' angle."""

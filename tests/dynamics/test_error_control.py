@@ -19,6 +19,8 @@ from tests.scenario import files
 R = 0.05
 ROOT = Path(__file__).parents[2]
 CONTROLLED = [sp.Adaptive(1e-7), sp.Implicit(1e-6)]
+FIXED = [sp.SemiImplicitEuler(1e-4), sp.RungeKutta4(1e-4), sp.LinearlyImplicitEuler(1e-4)]
+every = pytest.mark.parametrize("integrator", CONTROLLED + FIXED, ids=lambda one: one.kind)
 both = pytest.mark.parametrize("integrator", CONTROLLED, ids=["Adaptive", "Implicit"])
 BRISTLE = sp.BristleFriction(0.4, 0.3, 1e4, 20.0)
 
@@ -57,7 +59,7 @@ def models_free() -> sp.Scene:
     return sp.Scene(models.slider())
 
 
-@both
+@every
 def test_recording_does_not_change_the_motion(integrator) -> None:
     whole = run(bouncing(), integrator, *START, 0.4)
     assert len(whole.events) > 2
@@ -99,7 +101,7 @@ def test_a_later_start_is_the_same_motion(integrator) -> None:
     assert [e.kind for e in late.events] == [e.kind for e in early.events]
 
 
-@both
+@every
 @pytest.mark.parametrize("t0", [0.0, 0.1, 3.7, 1e3])
 def test_held_torques(integrator, t0: float) -> None:
     """Called once a period, held in between: the speed is the sum of what was given."""
@@ -237,16 +239,6 @@ def test_scenario_refuses(tmp_path: Path, keys: str, said: str) -> None:
     with pytest.raises(ScenarioError, match=said) as caught:
         build(files.write(tmp_path, scenario(keys)))
     assert len(str(caught.value).splitlines()) <= 2
-
-
-def test_scenario_reads_bristles(tmp_path: Path) -> None:
-    keys = "mu_static = 0.4, mu_dynamic = 0.3, stiffness = 2e4, damping = 3.0, torsional = true"
-    friction = f'friction = {{ type = "bristle", {keys} }}\n'
-    built = build(
-        files.write(tmp_path, scenario('integrator = "implicit"\nrtol = 1e-4\n', friction))
-    )
-    assert built.scene.pairs[0].friction == sp.BristleFriction(0.4, 0.3, 2e4, 3.0, torsional=True)
-    assert built.simulation.integrator == sp.Implicit(1e-4)
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 1.0), (0.5, 0, 0), (0, 1.5, 0.3)])

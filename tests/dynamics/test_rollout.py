@@ -125,23 +125,6 @@ def test_the_number_of_threads_changes_no_bit() -> None:
     assert many.threads == 7
 
 
-def test_impacts_of_many_speeds_and_stiffnesses_have_the_closed_form() -> None:
-    """Largest depth ((e + 1) m v^2 / (2 k))^(1 / (e + 1)) of an undamped blow without gravity."""
-    rng = np.random.default_rng(2)
-    count = 200
-    speed, stiffness = rng.uniform(0.05, 1.0, count), 10 ** rng.uniform(7, 9, count)
-    scene = sp.Scene(models.slider(gravity=0.0))
-    law = sp.ImpactLaw(1e8, 1.5)
-    scene.add_contact(sp.Sphere(R, "ball"), models.plate(), law=law, name=PAIR)
-    rollout = sp.Simulation(scene, sp.Adaptive(1e-9)).rollout(
-        [R + 1e-3], -speed[:, None], 0.05, vary={f"{PAIR}.law.stiffness": stiffness}
-    )
-    depth = (2.5 * speed**2 / (2 * stiffness)) ** 0.4
-    # The figure is the largest of the depths at the ends of steps.
-    np.testing.assert_allclose(rollout.figures[f"{PAIR}.max_depth"], depth, rtol=2e-4)
-    np.testing.assert_allclose(rollout.v[:, 0], speed, rtol=1e-7)
-
-
 def test_controllers_of_ones_own_and_of_the_package() -> None:
     """A force that holds the weight, and one short of it by a tenth, each in a run of its own."""
     simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))

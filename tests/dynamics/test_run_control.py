@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -143,24 +142,6 @@ def test_a_failed_run_leaves_the_simulation_usable() -> None:
     assert np.array_equal(sim.run(*START, 0.05).q, before.q)
 
 
-def test_a_python_controller_is_called_every_control_dt_and_held() -> None:
-    calls = []
-
-    def controller(t, q, v, contacts):
-        calls.append((t, q.copy(), v.copy(), len(contacts.depth)))
-        return np.array([float(len(calls))])
-
-    scene = models.on_plate(models.slider(gravity=0.0, mass=2.0), models.LAW)
-    sim = sp.Simulation(scene, sp.SemiImplicitEuler(dt=1e-3))
-    result = sim.run(np.array([1.0]), np.zeros(1), 0.1, controller, control_dt=1e-2)
-    assert [c[0] for c in calls] == pytest.approx(np.arange(10) * 1e-2, abs=1e-12)
-    held = np.repeat(np.arange(1.0, 11.0), 10) / 2.0 * 1e-3
-    assert result.v[-1, 0] == pytest.approx(held.sum(), rel=1e-12)
-    for k, (_, _, v, touching) in enumerate(calls):
-        assert v[0] == pytest.approx(held[: 10 * k].sum(), abs=1e-13)
-        assert touching == 0
-
-
 def test_a_python_controller_sees_contacts() -> None:
     seen = []
 
@@ -217,16 +198,6 @@ def test_repeated_runs_are_bit_identical(stepper) -> None:
     assert_same_bits(first, again)
     assert_same_bits(first, bouncing(stepper(dt=1e-4)).run(*START, 0.3))
     assert len(first.contacts.depth) > 10
-
-
-def test_recording_less_often_changes_nothing_else() -> None:
-    full = bouncing().run(*START, 0.3)
-    sparse = bouncing().run(*START, 0.3, record_dt=1e-2)
-    assert len(sparse.t) == 31
-    assert np.array_equal(sparse.q[-1], full.q[-1])
-    assert np.array_equal(sparse.v[-1], full.v[-1])
-    assert sparse.events == full.events
-    assert sparse.t == pytest.approx(np.arange(31) * 1e-2, abs=1e-9)
 
 
 def test_rows_of_a_result() -> None:
@@ -318,13 +289,6 @@ def test_a_file_of_version_0_1_is_read() -> None:
     assert set(result.contacts.contact_id) == {0}
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_unwritable_folder(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(errors.ResultError):
-        bouncing().run(*START, 0.01).save(tmp_path / "run.npz")
-
-
 def test_saving_into_a_missing_folder_is_a_clear_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(errors.ResultError):
@@ -353,14 +317,3 @@ def test_lock_equals_the_model_reduced_by_hand() -> None:
     a, b = (sp.Simulation(s, sp.RungeKutta4(dt=1e-3)).run(q0, v0, 0.4) for s in (by_hand, scene))
     assert len(a.contacts.depth) > 0
     assert_same_bits(a, b)
-
-
-def test_the_scene_keeps_its_own_model() -> None:
-    model = models.ball()
-    scene = models.on_plate(model, models.LAW)
-    model.gravity.linear = np.zeros(3)
-    model.inertias[1] = pin.Inertia.FromSphere(50.0, RADIUS)
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(dt=1e-3)).run(
-        models.free_q([0, 0, 1.0]), np.zeros(6), 0.1
-    )
-    assert result.v[-1, 2] == pytest.approx(-0.981, rel=1e-9)

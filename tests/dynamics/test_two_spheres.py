@@ -65,7 +65,7 @@ def test_two_spheres_with_one_center_are_pushed_along_some_normal() -> None:
 # Of two spheres exchanged, the contact point moves by the depth, which is all that differs: at
 # velocities that do not turn the force is the same to rounding.
 @pytest.mark.parametrize("friction", FRICTIONS)
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", [one for one in LAWS if one != "foundation"])
 def test_the_force_is_symmetric(law: str, friction: str) -> None:
     q, v = in_touch(2, spin=0.0)
     forces = []

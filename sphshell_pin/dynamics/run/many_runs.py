@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import as_floats
+from sphshell_pin.checks import check_floats
 from sphshell_pin.dynamics.run.advance import GLANCE, AnyController, CtrlC, bind_controller
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -135,10 +135,7 @@ def states_of(
     for name, given, size in (("q0s", q0s, model.nq), ("v0s", v0s, model.nv)):
         if given is None:
             continue
-        try:
-            table = as_floats(given)
-        except (TypeError, ValueError, OverflowError):
-            raise InvalidParameter(name, given, f"must be numbers, (n, {size})") from None
+        table = check_floats(name, given, f"must be numbers, (n, {size})")
         if table.ndim not in (1, 2) or table.shape[-1] != size:
             raise InvalidParameter(
                 name, given, f"must have shape (n, {size})", given=f"of shape {table.shape}"

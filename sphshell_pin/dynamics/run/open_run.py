@@ -220,7 +220,7 @@ class OpenRun:
         self._act(frame, at, np.zeros(3), anchor, stiffness, damping)
 
     def _act(self, frame: str, point: Array, force: Array, anchor: Array, *spring: float) -> None:
-        """Let a force, and a spring to an anchor (stiffness, damping), act on a point of `frame`."""
+        """Let a force and a spring to an anchor (stiffness, damping) act on a point of `frame`."""
         model = self.scene.model
         number = find_frame(model, frame)
         where = model.frames[number]

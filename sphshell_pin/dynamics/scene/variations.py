@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeGuard, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.checks import as_floats, check_placement, check_type
+from sphshell_pin.checks import check_floats, check_placement, check_type
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.scene.pairs import ContactPair
@@ -135,10 +135,7 @@ def _values(
                 called, given, f"must be {count} values, one a run", given=f"of {len(given)} values"
             )
         return [one.item() if isinstance(one, np.generic) else one for one in given]
-    try:
-        values = as_floats(given)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidParameter(called, given, f"must be {count} numbers, one a run") from None
+    values = check_floats(called, given, f"must be {count} numbers, one a run")
     if values.shape != (count, *shape):
         wanted = (count, *shape)
         raise InvalidParameter(
