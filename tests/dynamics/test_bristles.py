@@ -7,7 +7,6 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import _core
 from tests import meshes, models
 
 R = 0.05
@@ -153,29 +152,6 @@ def test_a_block_rides_on_a_turntable(integrator) -> None:
     assert (np.abs(across) < 2.5 * stretch + drift).all()
     if not first_order:
         assert along[20:] == pytest.approx(x + stretch, abs=2e-8)
-
-
-def test_rates_do_not_know_the_turn_of_the_shell() -> None:
-    """A block on a cart on the disc: whatever the disc's angle and speed, the bristle sees none."""
-    model = models.empty()
-    joint = models.add_body(model, "disc", pin.JointModelRZ())
-    models.add_body(model, "ball", pin.JointModelTranslation(), joint)
-    friction = _core.FrictionLaw("bristle", [0.5, 0.3, K, 30.0, 0.01, 0.0])
-    shell = sp.Shell(*meshes.random_plate(300, seed=2, size=2.0))
-    scene = sp.Scene(model)
-    law, bristle = models.linear_law(K, 300.0), sp.BristleFriction(0.5, 0.3, K, 30.0)
-    assert bristle._binding.coefficient(0.02) == friction.coefficient(0.02)
-    scene.add_contact(sp.Sphere(R, "ball"), shell, frame="disc", law=law, friction=bristle)
-    core = scene._binding
-    z = np.zeros(core.bristle_size)
-    z[:3] = [3e-5, -1e-5, 0.0]
-    rates = []
-    for angle, speed in ((0.0, 0.0), (1.3, 0.0), (0.4, 20.0)):
-        q, v = np.array([angle, 0.2, 0.1, R - DEPTH]), np.array([speed, 1e-3, 2e-3, 0.0])
-        rates.append(core.rates(q, v, z, np.zeros(4))[4:])
-    assert np.abs(rates[0][:2]) == pytest.approx([1e-3, 2e-3], rel=1e-9)
-    assert rates[1] == pytest.approx(rates[0], abs=1e-12)
-    assert rates[2] == pytest.approx(rates[0], abs=1e-12)
 
 
 def crossing(angle: float, record_dt: float, method: str = "smooth") -> sp.Result:

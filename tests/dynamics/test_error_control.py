@@ -209,16 +209,6 @@ def test_a_graze_without_load_does_not_chatter(integrator) -> None:
     assert rows.stats.steps < 3000
 
 
-@both
-def test_events_are_sorted_and_exact(integrator) -> None:
-    """The first touch of a falling ball: g t^2 / 2 + v t = gap."""
-    rows = run(bouncing(), integrator, *START, 0.5)
-    times = [e.t for e in rows.events]
-    assert times == sorted(times)
-    drop = ((0.2**2 + 2 * 9.81 * 0.01) ** 0.5 - 0.2) / 9.81
-    assert times[0] == pytest.approx(drop, abs=1e-9)
-
-
 def scenario(run_keys: str, friction: str = "") -> str:
     text = files.DROP.replace("dt = 1e-4\n", run_keys)
     return text.replace("\n[run]", f"{friction}\n[run]")

@@ -10,15 +10,13 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.errors import InvalidParameter, ScenarioError
-from sphshell_pin.scenario import build
-from tests import meshes
+from sphshell_pin.errors import InvalidParameter
+from tests import differences, meshes
 from tests.contact.smooth.surfaces import shell_of
 from tests.contact.smooth.test_sweeps_edges import edged
 from tests.dynamics import scenes
 from tests.dynamics.scenes import assert_rate_jacobian
 from tests.models import ball, free_q, on_plate, two_free_bodies, two_free_state
-from tests.scenario.files import DROP, write
 
 KAPPA = 2e4  # modulus / thickness [Pa/m]
 LAW = sp.FoundationLaw(1e4, 0.5)
@@ -106,6 +104,24 @@ def test_local_dissipation() -> None:
         )
 
 
+def torques(scene: sp.Scene, q, v, tau):  # type: ignore[no-untyped-def]
+    """The contact forces as joint torques (nv,)."""
+    model, zero = scene.model, np.zeros(scene.model.nv)
+    data = model.createData()
+    free = np.array(pin.rnea(model, data, q, zero, zero))
+    return free - pin.rnea(model, data, q, zero, zero, scene.external_forces(q, v))
+
+
+def assert_derivatives(scene: sp.Scene, q, v) -> None:  # type: ignore[no-untyped-def]
+    """By q and v; where the pressed area has kinks, other numbers are differenced less well."""
+    moves = differences.moves(scene, q, v)
+    for letter, by in zip("qv", scene.contact_derivatives(q, v), strict=True):
+        for k, column in enumerate(by.T):
+            moved, scale, _ = moves[f"{letter}.{k}"]
+            f = lambda x, moved=moved: torques(*moved(x))  # noqa: E731
+            assert differences.off(column, f, scale, floor=1e-2 * np.abs(by).max()) <= 1e-6
+
+
 PLACES = {
     "dome": lambda: (shell_of("dome", 0.6), [1.0, 2.0, 4.3]),
     "cube": lambda: (edged("cube"), [2.3, 2.2, 2.6]),
@@ -121,7 +137,7 @@ def test_derivatives(place: str, law: sp.FoundationLaw, friction) -> None:
     scene = free_ball(shell, law, friction, gravity=9.81)
     rng = np.random.default_rng(2)
     q = pin.integrate(scene.model, free_q(center), np.r_[np.zeros(3), rng.normal(size=3)])
-    testing.assert_derivatives(scene, q, 0.3 * rng.normal(size=6))
+    assert_derivatives(scene, q, 0.3 * rng.normal(size=6))
 
 
 def test_bristle_holds_at_the_center_of_pressure() -> None:
@@ -217,7 +233,7 @@ def test_two_spheres() -> None:
     )
     q, v = free_q([0.0, 1.7, 2.35]), np.array([0.3, 0.1, -0.2, 0.4, 0.3, 2.0])
     scene.replace_pair("ball", friction=None)
-    testing.assert_derivatives(scene, q, v)
+    assert_derivatives(scene, q, v)
     result = drop(scene, free_q([0.2, 0.1, 3.2]), np.array([0, 0, -2.0, 0, 0, 0]), 1.0)
     assert result.stats.pairs["ball"].max_depth > 0.1
     assert np.abs(result.energy.residual).max() <= 1e-6 * np.ptp(result.energy.kinetic)
@@ -227,16 +243,6 @@ def test_contact_sources_are_refused() -> None:
     scene = sp.Scene(ball())
     with pytest.raises(InvalidParameter, match="contact source"):
         scene.add_contact_source(lambda i, j: None, "ball", "universe", LAW)  # type: ignore
-
-
-def test_in_a_scenario_file(tmp_path) -> None:
-    law = 'law = { type = "foundation", modulus = 1e6, thickness = 5e-3, dissipation = 1.0 }'
-    given = next(line for line in DROP.splitlines() if line.startswith("law"))
-    built = build(write(tmp_path, DROP.replace(given, law)))
-    assert built.scene.pairs[0].law == sp.FoundationLaw(1e6, 5e-3, dissipation=1.0)
-    assert "elastic foundation" in str(built.scene.explain(built.q0, np.zeros(6)))
-    with pytest.raises(ScenarioError, match="thickness"):
-        build(write(tmp_path, DROP.replace(given, 'law = { type = "foundation", modulus = 1 }')))
 
 
 def test_a_foundation_that_cannot_carry_its_load_says_so() -> None:

@@ -127,13 +127,6 @@ def test_an_egg_falls_and_is_an_event_of_touch() -> None:
     assert first.t == pytest.approx(np.sqrt(2 * fall / 9.81), rel=1e-5)
 
 
-def test_bits_repeat() -> None:
-    scene = egg(LAW, FRICTIONS[2])
-    q, v = touching(scene, 1e-4)
-    runs = [sp.Simulation(scene, sp.Adaptive(rtol=1e-7)).run(q, v, 0.02) for _ in range(2)]
-    assert np.array_equal(runs[0].q, runs[1].q)
-
-
 def test_explanation_of_a_plane() -> None:
     """The gap of the vertices, and the mass with which the egg resists along the normal."""
     scene = egg(LAW)

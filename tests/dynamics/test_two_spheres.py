@@ -300,11 +300,3 @@ def test_spheres_of_a_geometry_model_collide() -> None:
     assert [pair.name for pair in scene.pairs] == ["a-b"]
     q, v = in_touch(8)
     assert np.allclose(scene.contacts(q, v).depth, two_spheres(law).contacts(q, v).depth)
-
-
-def test_hertz_takes_two_radii() -> None:
-    law = sp.ImpactLaw.hertz(0.02, 1e9, 0.3, 2e9, 0.4, radius_2=0.03)
-    alone = sp.ImpactLaw.hertz(0.012, 1e9, 0.3, 2e9, 0.4)
-    assert np.isclose(law.stiffness, alone.stiffness, rtol=1e-15)
-    plane = sp.ImpactLaw.hertz(0.02, 1e9, 0.3, 2e9, 0.4, radius_2=1e9)
-    assert np.isclose(plane.stiffness, sp.ImpactLaw.hertz(0.02, 1e9, 0.3, 2e9, 0.4).stiffness)

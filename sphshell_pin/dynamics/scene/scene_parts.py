@@ -20,9 +20,7 @@ from sphshell_pin.checks import (
     check_names,
     check_vector,
 )
-from sphshell_pin.contact import Friction, ImpactLaw, Method, NormalLaw, Plane, Sphere
-from sphshell_pin.contact.friction import check_friction
-from sphshell_pin.contact.normal_law import check_law
+from sphshell_pin.contact import Friction, ImpactLaw, NormalLaw, Plane, Sphere
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
 from sphshell_pin.dynamics.scene.models import (
     check_model,
@@ -258,11 +256,6 @@ class SceneParts(Summarized):
         unknown = set(changes) - set(known)
         if unknown:
             raise NameNotFound("setting", unknown.pop(), "a pair", known)
-        if "law" in changes:
-            check_law(changes["law"])
-        check_friction(changes.get("friction"))
-        if "method" in changes:
-            Method.from_name(changes["method"])
         old = self.pair(name)
         self._pairs = tuple(replace(p, **changes) if p is old else p for p in self._pairs)
         self._core = None
@@ -309,8 +302,6 @@ class SceneParts(Summarized):
                 FutureWarning,
                 stacklevel=3,
             )
-        check_law(law)
-        check_friction(friction)
         (joint_i, pose_i), (joint_j, pose_j) = (self.frame_in_joint(*frame) for frame in (i, j))
         pair = ContactPair(
             name=self._pair_name(name, default),
