@@ -173,18 +173,6 @@ REFUSED: list[tuple[str, Call]] = [
     ("q = .* finite", lambda: run(HIGH * np.nan)),
     ("v = .* finite", lambda: run(v=np.full(6, np.inf))),
     *(("duration", lambda one=one: run(duration=one)) for one in (-1.0, NAN, np.inf)),
-    *(
-        ("dt", lambda kind=kind, dt=dt: kind(dt=dt))
-        for kind in (sp.SemiImplicitEuler, sp.RungeKutta4)
-        for dt in (0.0, -1e-3, NAN, np.inf)
-    ),
-    *(
-        ("rtol", lambda kind=kind, rtol=rtol: kind(rtol))
-        for kind in (sp.Adaptive, sp.Implicit)
-        for rtol in (0, -1e-3, NAN, np.inf, 1, "fine", None, [1e-3])
-    ),
-    ("atol", lambda: sp.Adaptive(1e-6, -1.0)),
-    ("atol", lambda: sp.Implicit(1e-6, -1.0)),
     ("fixed to the world", lambda: push("universe", [1, 0, 0])),
     ("force_world", lambda: push("ball", [1, 0])),
     ("force_world", lambda: push("ball", [1, 0, NAN])),

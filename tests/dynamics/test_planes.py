@@ -25,13 +25,11 @@ def egg(law, friction=None, *, ground: bool = True, cells: int = 10) -> sp.Scene
     if not ground:
         frame = "table"
         add_body(model, frame, pin.JointModelFreeFlyer())
-    body = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "egg")
-    model.appendBodyToJoint(body, INERTIA, pin.SE3.Identity())
-    model.addFrame(pin.Frame("shell", body, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    add_body(model, "egg", pin.JointModelFreeFlyer(), inertia=INERTIA)
     scene = sp.Scene(model)
     tilt = (0.1, -0.05, 1.0)
     scene.add_contact(
-        sp.Plane(frame, (0.0, 0.0, 0.01), tilt), egg_shell(cells, EGG), "shell", None, law, friction
+        sp.Plane(frame, (0.0, 0.0, 0.01), tilt), egg_shell(cells, EGG), "egg", None, law, friction
     )
     return scene
 
@@ -132,6 +130,6 @@ def test_explanation_of_a_plane() -> None:
     scene = egg(LAW)
     q, v = touching(scene, -0.01)
     figures = scene.explain(q, v).pairs[0]
-    assert "plane on frame 'universe' against shell 'shell' on frame 'shell'" in figures.modelled
+    assert "plane on frame 'universe' against shell 'shell' on frame 'egg'" in figures.modelled
     assert figures.gap == pytest.approx(0.01, abs=2e-4)
     assert 0 < figures.effective_mass < INERTIA.mass

@@ -203,11 +203,7 @@ def test_a_controller_of_the_users_own(integrator: str) -> None:
 @pytest.mark.parametrize("integrator", ["adaptive", "implicit"])
 def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     """The acceleration jumps there; so do the derivatives of v."""
-    model = pin.Model()
-    slide = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
-    model.appendBodyToJoint(slide, pin.Inertia.FromSphere(0.3, R), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", slide, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model)
+    scene = sp.Scene(models.slider(9.81, 0.3))
     scene.add_contact(sp.Sphere(R, "ball"), models.plate(1.0), law=HUNT, name="ball")
 
     def tau(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:

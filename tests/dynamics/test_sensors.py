@@ -327,10 +327,7 @@ def test_an_unknown_sensor_is_named_in_a_controller():
         (lambda: slider(None, [torque(), torque()]), r"sensors\[1\].name = 'torque' is taken"),
         (lambda: slider(None, torque()), "must be a list of sensors"),
         (lambda: slider(None, ["wrist"]), r"sensors\[0\] = 'wrist' must be a sensor"),
-        (lambda: torque(rate=0), "rate = 0 must lie in"),
-        (lambda: torque(delay=-1), "delay = -1 must not be negative"),
         (lambda: torque(seed=1.5), "seed = 1.5 must be a whole number"),
-        (lambda: torque(range=0), "range = 0 must be positive"),
         (lambda: sp.ContactSwitch(name="a", threshold=1), "must be one of the two"),
         (
             lambda: sp.ContactSwitch(name="a", contact="b", threshold=1, release=2),
