@@ -20,6 +20,24 @@ JOINTS = {
 }
 
 
+def composite() -> pin.JointModelComposite:
+    """A hinge, and behind it three slides."""
+    joint = pin.JointModelComposite(2)
+    turn = pin.SE3(meshes.random_rotation(1), np.array([0.1, 0.2, 0.3]))
+    joint.addJoint(pin.JointModelRX(), turn)
+    joint.addJoint(pin.JointModelTranslation(), turn)
+    return joint
+
+
+# Their axes turn with the joint.
+TURNING = {
+    "spherical zyx": pin.JointModelSphericalZYX,
+    "universal": lambda: pin.JointModelUniversal(np.eye(3)[0], np.eye(3)[1]),
+    "composite": composite,
+    "planar": pin.JointModelPlanar,
+}
+
+
 def empty(gravity: float = 9.81) -> pin.Model:
     """Model without bodies; gravity along -z [m/s^2]."""
     model = pin.Model()
