@@ -116,11 +116,7 @@ class _OnPlane(FoundationLaw):
 
 
 def foundation_pressure(
-    shell: Shell,
-    center: npt.ArrayLike,
-    radius: float,
-    law: FoundationLaw,
-    method: str = "smooth",
+    shell: Shell, center: npt.ArrayLike, radius: float, law: FoundationLaw, method: str = "smooth"
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return where a FoundationLaw presses, by quadrature points on the shell.
 

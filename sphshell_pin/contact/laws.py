@@ -85,12 +85,7 @@ class ImpactLaw(_PowerLaw, kind="impact"):
 
     @classmethod
     def from_adams(
-        cls,
-        k: float = 1e5,
-        e: float = 2.2,
-        c: float = 10.0,
-        d: float = 0.1,
-        units: str = "mm-N-s",
+        cls, k: float = 1e5, e: float = 2.2, c: float = 10.0, d: float = 0.1, units: str = "mm-N-s"
     ) -> ImpactLaw:
         """Build from ADAMS's numbers, by default its defaults, in the system `units`.
 

@@ -9,6 +9,8 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from tests import meshes
+from tests.models import ball
 from tests.oracle.hertz import hertz_contact
 
 YOUNG, POISSON = 1e7, 0.3
@@ -25,10 +27,7 @@ class Surface:
         grid = [np.linspace(*span, n + 1) for span, n in zip(spans, counts, strict=True)]
         u, v = (one.ravel() for one in np.meshgrid(*grid, indexing="ij"))
         self.vertices, self.normals = point(u, v), normal(u, v)
-        rows = counts[1] + 1
-        corner = (np.arange(counts[0])[:, None] * rows + np.arange(counts[1])).ravel()
-        a, b, c, d = corner, corner + rows, corner + rows + 1, corner + 1
-        triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+        triangles = meshes.grid_plate(*counts)[1]
         self.triangles = triangles[:, ::-1] if turn else triangles
 
     def shell(self, *, exact=True):
@@ -97,11 +96,8 @@ SURFACES = {
 
 
 def ball_scene(shell, radius, law, gravity=(0, 0, 0), **more):
-    model = pin.Model()
-    model.gravity = pin.Motion(np.array([*gravity, 0, 0, 0]))
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, radius), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model = ball(radius=radius)
+    model.gravity.linear = np.array(gravity, dtype=float)
     scene = sp.Scene(model)
     scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law, method="smooth", **more)
     return scene
@@ -144,10 +140,7 @@ def test_flat_is_the_plane() -> None:
 
 
 def test_two_balls_are_hertz_on_both_radii() -> None:
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
-    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model)
+    scene = sp.Scene(ball(joint=pin.JointModelTranslation()))
     scene.add_contact(sp.Sphere(0.1, "ball"), sp.Sphere(0.3, "universe"), law=LAW)
     force = scene.external_forces(np.array([0, 0, 0.399]), np.zeros(3))[1].linear
     expected = sp.ImpactLaw.hertz(0.1, YOUNG, POISSON, YOUNG, POISSON, radius_2=0.3)

@@ -23,6 +23,7 @@ from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 from sphshell_pin.shell.faces import Face
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import mean_edge
+from tests.contact.walks import narrowed
 from tests.shell.surfaces import DATA
 from tests.shell.test_corpus import FILES, load
 
@@ -237,17 +238,17 @@ def steepest_between(
 ) -> tuple[Array, Array]:
     """The two centres `width` apart, between `start` and `end`, between which the potential changes
     most beside what the forces account for, by halving."""
-    first, last = find(start), find(end)
-    while np.linalg.norm(end - start) > width:
-        middle = (start + end) / 2
-        if (middle == start).all() or (middle == end).all():
-            break
-        found = find(middle)
-        if change(first, found, middle - start)[0] > change(found, last, end - middle)[0]:
-            end, last = middle, found
-        else:
-            start, first = middle, found
-    return start, end
+
+    def lost(before: tuple[ContactSet, Array], after: tuple[ContactSet, Array]) -> float:
+        return change(before[0], after[0], after[1] - before[1])[0]
+
+    return narrowed(
+        lambda center: (find(center), center),
+        start,
+        end,
+        width,
+        lambda first, here, last: lost(first, here) > lost(here, last),
+    )[:2]
 
 
 @pytest.mark.parametrize("name", cases(CROSSED))

@@ -20,22 +20,14 @@ def lens(half: float, rows: int, columns: int):
     """Two caps of a sphere of radius four that meet in a circle of radius `half`, and their normals
     per corner: a round crease."""
     drop = np.sqrt(16.0 - half**2)
-    polar = np.arcsin(half / 4) * np.arange(1, rows + 1) / rows
-    turn = 2 * np.pi * np.arange(columns) / columns
-    polar, turn = (g.ravel() for g in np.meshgrid(polar, turn, indexing="ij"))
-    upper = 4 * np.stack(
-        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=1
-    )
-    upper = np.concatenate([[[0.0, 0.0, 4.0]], upper])
-    triangles = cone(columns, 0.5, rows)[1]
-    upper[-columns:, 2] = drop
-    below = np.arange(len(upper)) + len(upper)
-    below[-columns:] = np.arange(len(upper) - columns, len(upper))
-    vertices = np.concatenate([upper - [0, 0, drop], (upper - [0, 0, drop]) * [1, 1, -1]])
-    normals = np.concatenate([upper[triangles], (upper * [1, 1, -1])[triangles][:, ::-1]]) / 4
-    triangles = np.concatenate([triangles, below[triangles][:, ::-1]])
-    used, triangles = np.unique(triangles, return_inverse=True)
-    return vertices[used], triangles.reshape(-1, 3).astype(np.int32), normals
+    polar = np.arcsin(half / 4) * np.arange(rows + 1) / rows
+    upper = np.stack([4 * np.sin(polar), 4 * np.cos(polar) - drop], axis=1)
+    upper[-1] = half, 0.0
+    vertices, triangles = meshes.revolved([*upper, *(upper[-2::-1] * [1, -1])], columns)
+    triangles, at = triangles[:, ::-1].copy(), vertices[triangles[:, ::-1]]
+    # From the middles of the caps' spheres, which are behind each other.
+    above = at.sum(axis=1)[:, None, 2:] > 0
+    return vertices, triangles, (at + np.where(above, [0, 0, drop], [0, 0, -drop])) / 4
 
 
 def curved_sheet(name: str):
@@ -126,7 +118,14 @@ EDGED = [
     for exact in (True, False)
 ] + [(kind, False) for kind in ("sheet", "l plate", "cube", "box", "cone")]
 SOME_EDGED = {
-    *(("can", True), ("cup", False), ("lens", False), ("wave", True)),
+    *(
+        ("can", True),
+        ("can", False),
+        ("cup", False),
+        ("lens", False),
+        ("wave", True),
+        ("tube", True),
+    ),
     *(("sheet", False), ("box", False), ("cone", False)),
 }
 EDGED = mostly_studies(EDGED, SOME_EDGED.__contains__)
