@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -242,21 +240,25 @@ def test_a_socket_of_nearly_the_ball_s_radius_is_beyond_hertz() -> None:
         assert {e.kind for e in result.events} - {"touch", "lift_off", "deep"} == kinds
 
 
+TWICE = {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0}
+
+
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "more", "message"),
     [
-        ({"young": -1.0}, r"young = -1.0 must be positive"),
-        ({"young_2": 1e9}, r"young_2, poisson_2 = .* must be given together"),
-        ({"restitution": 0.5}, r"restitution, speed = .* must be given together"),
-        (
-            {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0},
-            "must not be given with a restitution",
-        ),
+        ((-1.0, 0.3), {}, "young = -1.0 must be positive"),
+        ((1e9, 0.3), {"young_2": 1e9}, "young_2, poisson_2 = .* must be given together"),
+        ((1e9, 0.3), {"restitution": 0.5}, "restitution, speed = .* must be given together"),
+        ((1e9, 0.3), TWICE, "must not be given with a restitution"),
+        (("steel", "gum"), {}, "no material 'gum'; the table has: steel, "),
+        (("steel", 0.3), {}, "young = 'steel' must be a number"),
+        ((2.1e11, "rubber"), {}, "poisson = 'rubber' must be a number"),
+        (("steel", "rubber", 1e7, 0.4), {}, r"young_2 = 1\d+.0 must be left out where materials"),
     ],
 )
-def test_wrong_arguments_are_named(arguments, message) -> None:
-    with pytest.raises(sp.errors.InvalidParameter, match=message):
-        sp.HertzLaw(**{"young": 1e9, "poisson": 0.3, **arguments})
+def test_wrong_arguments_are_named(arguments, more, message) -> None:
+    with pytest.raises(sp.SphshellError, match=message):
+        sp.HertzLaw(*arguments, **more)
 
 
 def test_where_nothing_is_known_of_the_shell_it_is_refused() -> None:
@@ -314,17 +316,3 @@ def test_names_of_materials_stand_for_their_values() -> None:
     assert bristle == sp.BristleFriction(*coefficients, 1e4)
     mindlin = sp.BristleFriction.mindlin("rubber", "steel")
     assert mindlin == sp.BristleFriction.mindlin(*coefficients, *numbers)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("steel", "gum"), "no material 'gum'; the table has: steel, "),
-        (("steel", 0.3), "young = 'steel' must be a number"),
-        ((2.1e11, "rubber"), "poisson = 'rubber' must be a number"),
-        (("steel", "rubber", 1e7, 0.4), "young_2 = 10000000.0 must be left out where materials"),
-    ],
-)
-def test_names_and_numbers_do_not_mix(arguments, message) -> None:
-    with pytest.raises(sp.SphshellError, match=re.escape(message)):
-        sp.HertzLaw(*arguments)

@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
@@ -220,19 +221,6 @@ def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
     return max(lost - most, 0.0) / potential if potential > 0 else 0.0
 
 
-@pytest.mark.parametrize("name", cases(CROSSED))
-def test_potential_beside_each_sphere(name: str) -> None:
-    """A centre 1e-9 r further has the same potential; many stand exactly over sides and corners."""
-    some, rng, jumps = spheres(name), np.random.default_rng(1), {}
-    for i, found in enumerate(answers(name)):
-        move = rng.normal(size=3)
-        move *= 1e-9 * some.radii[i] / np.linalg.norm(move)
-        share = jump(found, some.find(i, move), move)
-        if not share <= 1e-6:
-            jumps[i] = share
-    assert not jumps
-
-
 def steepest_between(
     find: Callable[[Array], ContactSet], start: Array, end: Array, width: float
 ) -> tuple[Array, Array]:
@@ -249,21 +237,6 @@ def steepest_between(
         width,
         lambda first, here, last: lost(first, here) > lost(here, last),
     )[:2]
-
-
-@pytest.mark.parametrize("name", cases(CROSSED))
-def test_potential_along_walks(name: str) -> None:
-    """Over a tenth of its radius a sphere crosses many borders; the potential jumps at none."""
-    some, rng, jumps = spheres(name), np.random.default_rng(2), {}
-    for i in range(WALKS):
-        move = rng.normal(size=3)
-        move *= 0.1 * some.radii[i] / np.linalg.norm(move)
-        look = partial(some.find, i)
-        start, end = steepest_between(look, np.zeros(3), move, 1e-9 * some.radii[i])
-        share = jump(look(start), look(end), end - start)
-        if not share <= 1e-6:
-            jumps[i] = share
-    assert not jumps
 
 
 def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: float):
@@ -288,21 +261,41 @@ def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: 
     return np.array(path)
 
 
-@pytest.mark.parametrize("name", cases(CROSSED))
-def test_potential_along_long_walks(name: str) -> None:
+def beside(some: Spheres):
+    """1e-9 r further; many stand exactly over sides and corners."""
+    rng = np.random.default_rng(1)
+    for i in range(COUNT):
+        move = rng.normal(size=3)
+        yield i, partial(some.find, i), np.zeros(3), 1e-9 * some.radii[i] * move / norm(move)
+
+
+def walks(some: Spheres):
+    """Over a tenth of its radius a sphere crosses many borders."""
+    rng = np.random.default_rng(2)
+    for i in range(WALKS):
+        move, look = rng.normal(size=3), partial(some.find, i)
+        move *= 0.1 * some.radii[i] / norm(move)
+        yield i, look, *steepest_between(look, np.zeros(3), move, 1e-9 * some.radii[i])
+
+
+def long_walks(some: Spheres):
     """Over 30 radii at a twentieth of one; SPHSHELL_WALKS=100 takes more than the usual walk."""
-    some, rng, jumps = spheres(name), np.random.default_rng(3), {}
+    rng = np.random.default_rng(3)
     for i in rng.integers(COUNT, size=LONG_WALKS):
-        radius = some.radii[i]
-
-        def find(center: Array, radius: float = radius) -> ContactSet:
-            return some.shell.contacts(center, radius, method="smooth")
-
+        look = partial(some.shell.contacts, radius=some.radii[i], method="smooth")
         for start, end in pairwise(roll(some, i, rng, 30.0, 0.05)):
-            a, b = steepest_between(find, start, end, 1e-9 * radius)
-            share = jump(find(a), find(b), b - a)
-            if not share <= 1e-6:
-                jumps[int(i)] = share
+            yield i, look, *steepest_between(look, start, end, 1e-9 * some.radii[i])
+
+
+@pytest.mark.parametrize("ways", [beside, walks, long_walks])
+@pytest.mark.parametrize("name", cases(CROSSED))
+def test_potential_does_not_jump(name: str, ways) -> None:
+    """Between two centres that are near each other."""
+    jumps = {}
+    for i, look, start, end in ways(spheres(name)):
+        share = jump(look(start), look(end), end - start)
+        if not share <= 1e-6:
+            jumps[int(i)] = share
     assert not jumps
 
 
