@@ -17,7 +17,7 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS_Compound
 
 import sphshell_pin as sp
-from tests.contact.helpers import places_by_area
+from tests.contact.helpers import directions, places_by_area
 from tests.contact.smooth.test_gradient import assert_gradient
 from tests.contact.walks import jumps, paths
 from tests.models import ball
@@ -65,8 +65,7 @@ def spheres(shell: sp.Shell, count: int, radius: float, seed: int = 0):
     rng = np.random.default_rng(seed)
     which, on = places_by_area(shell.vertices, shell.triangles, rng, count)
     away = 0.9 * shell._binding.triangle_normals[which]
-    aside = rng.normal(size=(count, 3))
-    aside *= 0.6 / np.linalg.norm(aside, axis=1, keepdims=True)
+    aside = 0.6 * directions(rng, count)
     return on + radius * np.where(rng.random(count)[:, None] < 0.5, away, aside)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Shell
 from tests import meshes
+from tests.contact.helpers import directions
 
 Array = NDArray[np.float64]
 
@@ -78,8 +79,7 @@ def ball_mesh(h: float) -> tuple[Array, NDArray[np.int32], Array]:
 
 
 def ball_points(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    normal = rng.normal(size=(count, 3))
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal = directions(rng, count)
     return BALL * normal, normal
 
 

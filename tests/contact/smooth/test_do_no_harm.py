@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from sphshell_pin import Shell
 from tests import meshes
-from tests.contact.helpers import places_by_area
+from tests.contact.helpers import directions, places_by_area
 from tests.contact.smooth.parts import (
     Part,
     averaged_normals,
@@ -137,8 +137,7 @@ def test_coarse_spheres_with_good_normals_stay_curved(level: int) -> None:
     shell = Shell(vertices, elements, normals=vertices)
     assert not shell.core_for("smooth").normals_set_aside.any()
     rng = np.random.default_rng(0)
-    places = rng.normal(size=(500, 3))
-    places *= 1.3 / np.linalg.norm(places, axis=1)[:, None]
+    places = 1.3 * directions(rng, 500)
     off = np.abs(shell.closest_points(places).distances - 0.3).max()
     assert off <= (0.03, 1.5e-3, 1e-4)[level]
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Scene, Sphere
+from tests.contact.helpers import directions
 from tests.contact.smooth.surfaces import SURFACES, shell_of
 from tests.contact.smooth.test_sweeps_edges import edged
 from tests.models import ball, free_q, linear_law
@@ -25,8 +26,7 @@ def paths(name: str):
     else:
         shell = edged(name)
         edges = shell.edge_vertices[np.flatnonzero(shell.edge_class > 0)]
-        normals = rng.normal(size=(12, 3))
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        normals = directions(rng, 12)
         centers = shell.vertices[rng.choice(edges, 12)[:, 0]] + 0.97 * normals
     for center, normal in zip(centers, normals, strict=True):
         pace = rng.choice([1e-5, 1e-3, 5e-3])

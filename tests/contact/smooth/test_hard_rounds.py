@@ -10,12 +10,11 @@ import pytest
 from sphshell_pin import Shell
 from sphshell_pin.shell.curved import curved_mesh
 from tests import meshes
-from tests.contact.helpers import energy, force_sum
+from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.hard_cases import (
     DEPTH,
     UP,
     assert_no_jump,
-    directions,
     fails,
     find,
     given,

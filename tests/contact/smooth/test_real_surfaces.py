@@ -15,14 +15,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 from sphshell_pin.shell.faces import Face
-from tests.contact.helpers import energy, force_sum
+from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import mean_edge
 from tests.contact.walks import narrowed
 from tests.shell.surfaces import DATA
@@ -265,16 +264,14 @@ def beside(some: Spheres):
     """1e-9 r further; many stand exactly over sides and corners."""
     rng = np.random.default_rng(1)
     for i in range(COUNT):
-        move = rng.normal(size=3)
-        yield i, partial(some.find, i), np.zeros(3), 1e-9 * some.radii[i] * move / norm(move)
+        yield i, partial(some.find, i), np.zeros(3), 1e-9 * some.radii[i] * directions(rng)
 
 
 def walks(some: Spheres):
     """Over a tenth of its radius a sphere crosses many borders."""
     rng = np.random.default_rng(2)
     for i in range(WALKS):
-        move, look = rng.normal(size=3), partial(some.find, i)
-        move *= 0.1 * some.radii[i] / norm(move)
+        move, look = 0.1 * some.radii[i] * directions(rng), partial(some.find, i)
         yield i, look, *steepest_between(look, np.zeros(3), move, 1e-9 * some.radii[i])
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from sphshell_pin import Shell
 from tests import meshes
+from tests.contact.helpers import directions
 from tests.contact.smooth import sweeps
 from tests.contact.smooth.surfaces import SURFACES, can
 from tests.contact.smooth.test_potential import query
@@ -89,8 +90,7 @@ def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0
     while count:
         a, b = shell.vertices[rng.choice(edges)]
         place = a + rng.choice([0.0, rng.uniform(), 1.0]) * (b - a)
-        out = rng.normal(size=3)
-        out /= np.linalg.norm(out)
+        out = directions(rng)
         if sign * out @ (place - inner) < 0:
             out = -out
         low, high = 0.7, 1.8
@@ -102,8 +102,7 @@ def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0
                 low = middle
             else:
                 high = middle
-        along = rng.normal(size=3)
-        along *= reach / np.linalg.norm(along)
+        along = reach * directions(rng)
         path = sweeps.segment(place + low * out - along, place + low * out + along, 9)
         # At the surface itself no normal is defined, and behind it a one-sided shell pushes back.
         distance = shell.closest_points(path).distances
@@ -242,8 +241,7 @@ def test_corner_of_a_box() -> None:
     rng = np.random.default_rng(6)
     for depth in sweeps.DEPTHS:
         corner = 2.0 - (1 - depth) * np.ones(3)
-        along = rng.normal(size=(6, 3))
-        along *= 0.02 / np.linalg.norm(along, axis=1)[:, None]
+        along = 0.02 * directions(rng, 6)
         paths = [sweeps.segment(corner - d, corner + 0.8 * d, 9) for d in along]
         sweeps.assert_continuous(shell, paths, depth)
         sweeps.assert_as_defined(shell, [c for path in paths for c in path[:4]], depth)
