@@ -65,11 +65,16 @@ def add_body(
     return int(index)
 
 
-def ball(gravity: float = 9.81, mass: float = 1.0, radius: float = 0.05) -> pin.Model:
-    """Free ball whose center is the frame "ball"."""
+def ball(
+    gravity: float = 9.81,
+    mass: float = 1.0,
+    radius: float = 0.05,
+    joint: pin.JointModel | None = None,
+) -> pin.Model:
+    """Ball whose center is the frame "ball"; free unless a joint is given."""
     model = empty(gravity)
     inertia = pin.Inertia.FromSphere(mass, radius)
-    add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=inertia)
+    add_body(model, "ball", joint or pin.JointModelFreeFlyer(), inertia=inertia)
     return model
 
 
