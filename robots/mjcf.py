@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.robots.description import MOST_LINKS
+from sphshell_pin.robots.files import Description
 from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom, plain_place
 from sphshell_pin.robots.mjcf_values import (
     add_inertial,
@@ -81,21 +82,8 @@ class Site:
         model.addFrame(pin.Frame(self.name, joint, frame, place, kind), False)
 
 
-@dataclass
-class Plain:
-    """An MJCF in its plain form, and what of it cannot be said in it."""
-
-    root: ET.Element
-    mimics: tuple[Mimic, ...] = ()
-    loops: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    extras: dict[str, Extras] = field(default_factory=dict)
-    start: dict[str, Array] = field(default_factory=dict)
-    sites: list[Site] = field(default_factory=list)
-
-
-def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> Plain:
-    """Return the plain form of an MJCF; ValueError says what in it cannot be read.
+def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> Description:
+    """Return an MJCF in the plain form; ValueError says what in it cannot be read.
 
     What it includes is put into `root`, whose base `floats` or is fixed; None: as it states.
     """
@@ -153,7 +141,7 @@ class _Reader:
                     f"<{tag}> is not supported: let MuJoCo write the bodies out "
                     "(mujoco.MjSpec.from_file(...), compile(), to_xml())"
                 )
-        self.given = root
+        self.given, self.folders = root, folders
         self.compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
         if self.compiler.get("coordinate") == "global":
             raise ValueError('coordinate="global" is not supported: MuJoCo 2.3.3 converts it')
@@ -173,7 +161,7 @@ class _Reader:
         self.cones: list[str] = []
         self.weightless: list[str] = []
 
-    def read(self) -> Plain:
+    def read(self) -> Description:
         made = ET.Element("mujoco", model=self.given.get("model") or "robot")
         ET.SubElement(made, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
         made.append(self.meshes.asset())
@@ -204,8 +192,18 @@ class _Reader:
         self._weigh(made)
         self._keys(made)
         mimics, loops = self._equalities()
-        notes = tuple(self._notes(scenery))
-        return Plain(made, mimics, loops, notes, self.extras, self.start, self.sites)
+        return Description(
+            self.folders.file,
+            self.folders,
+            made,
+            mimics,
+            loops,
+            tuple(self._notes(scenery)),
+            self.start,
+            self.extras,
+            tuple(self.sites),
+            self.given,
+        )
 
     def _read_class(
         self, element: ET.Element, name: str, inherited: Mapping[str, Mapping[str, str]]

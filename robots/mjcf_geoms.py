@@ -16,7 +16,27 @@ from sphshell_pin.robots.packages import Folders
 
 Array = NDArray[np.float64]
 
-_SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh")
+_INERTIA = pin.Inertia
+# Numbers in `size` of each kind of geom, its volume by these, and its inertia by mass and these.
+_SHAPES: dict[str, tuple[int, Callable[..., float], Callable[..., pin.Inertia]]] = {
+    "sphere": (1, lambda r: 4 / 3 * np.pi * r**3, _INERTIA.FromSphere),
+    "capsule": (
+        2,
+        lambda r, h: np.pi * r**2 * (2 * h + 4 / 3 * r),
+        lambda m, r, h: _INERTIA.FromCapsule(m, r, 2 * h),
+    ),
+    "cylinder": (
+        2,
+        lambda r, h: np.pi * r**2 * 2 * h,
+        lambda m, r, h: _INERTIA.FromCylinder(m, r, 2 * h),
+    ),
+    "box": (
+        3,
+        lambda x, y, z: 8 * x * y * z,
+        lambda m, x, y, z: _INERTIA.FromBox(m, 2 * x, 2 * y, 2 * z),
+    ),
+    "ellipsoid": (3, lambda x, y, z: 4 / 3 * np.pi * x * y * z, _INERTIA.FromEllipsoid),
+}
 _SEEN = ("contype", "conaffinity", "group")
 
 
@@ -127,17 +147,18 @@ def plain_geom(
     if half is not None and size:
         size = [size[0], half] if kind in ("capsule", "cylinder") else [size[0], size[0], half]
     fitted = kind != "mesh" and "mesh" in stated
-    if kind not in _SHAPES or fitted or (kind == "mesh" and not meshes.known(stated.get("mesh"))):
+    known = meshes.known(stated.get("mesh")) if kind == "mesh" else kind in _SHAPES and not fitted
+    if not known:
         meshes.left_out.append(f"{kind} fitted to a mesh" if fitted else kind)
         return None, pose
-    need = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3, "mesh": 0}[kind]
-    if len(size) < need:
-        raise ValueError(f"a geom of the type {kind} needs {need} numbers in size")
     made = ET.Element("geom", type=kind)
-    if need:
-        made.set("size", " ".join(repr(k) for k in size[:need]))
-    else:
+    if kind == "mesh":
         made.set("mesh", stated["mesh"])
+    else:
+        need, *_ = _SHAPES[kind]
+        if len(size) < need:
+            raise ValueError(f"a geom of the type {kind} needs {need} numbers in size")
+        made.set("size", " ".join(repr(k) for k in size[:need]))
     for key in (*_SEEN, "name"):
         if key in stated:
             made.set(key, stated[key])
@@ -165,22 +186,9 @@ def geom_inertia(
         factor = density if mass is None else mass / volume
         return pin.Inertia(factor * inertia.mass, inertia.lever, factor * inertia.inertia)
     size = numbers(made.attrib["size"]).tolist()
-    volumes: dict[str, Callable[..., float]] = {
-        "sphere": lambda r: 4 / 3 * np.pi * r**3,
-        "capsule": lambda r, h: np.pi * r**2 * (2 * h + 4 / 3 * r),
-        "cylinder": lambda r, h: np.pi * r**2 * 2 * h,
-        "box": lambda x, y, z: 8 * x * y * z,
-        "ellipsoid": lambda x, y, z: 4 / 3 * np.pi * x * y * z,
-    }
-    inertias: dict[str, Callable[..., pin.Inertia]] = {
-        "sphere": pin.Inertia.FromSphere,
-        "capsule": lambda m, r, h: pin.Inertia.FromCapsule(m, r, 2 * h),
-        "cylinder": lambda m, r, h: pin.Inertia.FromCylinder(m, r, 2 * h),
-        "box": lambda m, x, y, z: pin.Inertia.FromBox(m, 2 * x, 2 * y, 2 * z),
-        "ellipsoid": pin.Inertia.FromEllipsoid,
-    }
+    _, volume_of, inertia_of = _SHAPES[made.attrib["type"]]
     try:
-        weight = float(density * volumes[made.attrib["type"]](*size)) if mass is None else mass
+        weight = float(density * volume_of(*size)) if mass is None else mass
     except OverflowError:
         raise ValueError(f"a geom of body '{body}' is too large to compute with: {size}") from None
-    return inertias[made.attrib["type"]](weight, *size)
+    return inertia_of(weight, *size)
