@@ -24,7 +24,7 @@ from sphshell_pin.robots.packages import Folders
 from sphshell_pin.shell.readers.ply import read_ply
 
 if TYPE_CHECKING:
-    from sphshell_pin.robots.mjcf import Extras, Site
+    from sphshell_pin.robots.mjcf_additions import Extras, Site
 
 Array = NDArray[np.float64]
 

@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.robots.description import MOST_LINKS
 from sphshell_pin.robots.files import Description
+from sphshell_pin.robots.mjcf_additions import Extras, Site
+from sphshell_pin.robots.mjcf_couplings import couplings
 from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom, plain_place
 from sphshell_pin.robots.mjcf_values import (
     add_inertial,
@@ -41,45 +41,6 @@ _SCALARS = ("damping", "frictionloss", "armature", "stiffness")
 _UNKNOWN = ("composite", "flexcomp", "replicate", "attach", "deformable", "flex", "plugin")
 _MOST_JOINTS = 6  # of a body; each becomes a body in the plain form, inside that of the one before
 _COUNT = {"free": 7, "ball": 4, "slide": 1, "hinge": 1}
-
-
-@dataclass(frozen=True)
-class Extras:
-    """Damping and dry friction of a joint of several degrees of freedom: in SI units, for each."""
-
-    damping: float
-    friction: float
-
-    def give(self, model: pin.Model, joint: pin.JointModel) -> None:
-        """Write them into `model`."""
-        span = slice(joint.idx_v, joint.idx_v + joint.nv)
-        for name, value in (
-            ("damping", self.damping),
-            ("lowerDryFrictionLimit", -self.friction),
-            ("upperDryFrictionLimit", self.friction),
-        ):
-            values = np.array(getattr(model, name))
-            values[span] = value
-            setattr(model, name, values)
-
-
-@dataclass(frozen=True)
-class Site:
-    """A frame on a body, which pinocchio reads on bodies with joints only."""
-
-    name: str
-    body: str
-    place: pin.SE3
-
-    def give(self, model: pin.Model) -> None:
-        """Add it to `model`."""
-        place, frame, joint = self.place, 0, 0
-        if self.body != "world":
-            frame = model.getFrameId(self.body, pin.FrameType.BODY)
-            place = model.frames[frame].placement * place
-            joint = model.frames[frame].parentJoint
-        kind = pin.FrameType.OP_FRAME
-        model.addFrame(pin.Frame(self.name, joint, frame, place, kind), False)
 
 
 def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> Description:
@@ -191,7 +152,7 @@ class _Reader:
             raise ValueError("its <worldbody> has no <body>")
         self._weigh(made)
         self._keys(made)
-        mimics, loops = self._equalities()
+        mimics, loops = couplings(self.given, self.start, self.parents, self.joints_of)
         return Description(
             self.folders.file,
             self.folders,
@@ -297,11 +258,8 @@ class _Reader:
             if part.tag != "geom":
                 continue
             geom = self._with_defaults(part, cls)
-
-            def pose_of(one: Mapping[str, str], at: pin.SE3 = at) -> pin.SE3:
-                return at * self._pose(one)
-
-            made, pose = plain_geom(geom, self.meshes, pose_of)
+            made, pose = plain_geom(geom, self.meshes, self._pose)
+            pose = at * pose
             if needs and low <= number(geom.get("group"), 0) <= high:
                 summed += geom_inertia(geom, made, self.meshes, name).se3Action(pose)
             if made is not None:
@@ -407,51 +365,6 @@ class _Reader:
             qpos = key.get("qpos", "")
             if key.get("name") and len(qpos.split()) == self.nq:
                 ET.SubElement(keys, "key", name=key.attrib["name"], qpos=qpos)
-
-    def _equalities(self) -> tuple[tuple[Mimic, ...], tuple[str, ...]]:
-        """Return the equalities that are mimic joints, and a sentence on each of the others."""
-        mimics, loops = [], []
-        for one in self.given.iterfind("equality/*"):
-            if one.get("active") == "false":
-                continue
-            label = f"<{one.tag}>" + (f" '{one.get('name')}'" if one.get("name") else "")
-            first, second = one.get(f"{one.tag}1"), one.get(f"{one.tag}2")
-            if one.tag == "joint" and first is not None:
-                terms = np.zeros(5)
-                stated = numbers(one.get("polycoef", "0 1 0 0 0"))[:5]
-                terms[: len(stated)] = stated
-                if second is not None and not terms[2:].any():
-                    # It is of the distances from ref.
-                    refs = [float(self.start.get(one, np.zeros(1))[0]) for one in (first, second)]
-                    offset = float(terms[0] + refs[0] - terms[1] * refs[1])
-                    mimics.append(Mimic(first, second, float(terms[1]), offset))
-                elif second is None:
-                    loops.append(f"{label} holds joint '{first}' at {terms[0]:g} (lock it instead)")
-                else:
-                    loops.append(f"{label} makes joint '{first}' follow '{second}' by a polynomial")
-            elif one.tag in ("connect", "weld"):
-                ends = [one.get("body1") or one.get("site1"), one.get("body2") or one.get("site2")]
-                names = self._between(*(end or "world" for end in ends))
-                bodies = " and ".join(f"'{end or 'world'}'" for end in ends)
-                loops.append(
-                    f"the kinematic loop that {label} closes between {bodies}"
-                    + (f", of the joints {', '.join(map(repr, names))}" if names else "")
-                )
-            else:
-                loops.append(f"{label} of <equality>")
-        return tuple(mimics), tuple(loops)
-
-    def _between(self, first: str, second: str) -> list[str]:
-        """Return the joints on the way from one body to another; none where one is unknown."""
-        ways = []
-        for body in (first, second):
-            way = [body]
-            while way[-1] in self.parents:
-                way.append(self.parents[way[-1]])
-            ways.append(way)
-        apart = set(ways[0]) ^ set(ways[1])
-        order = [*ways[0][::-1], *ways[1][::-1]]
-        return [name for body in order if body in apart for name in self.joints_of.get(body, [])]
 
     def _notes(self, scenery: list[str]) -> Iterator[str]:
         for names, text in (

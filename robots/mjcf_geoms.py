@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.robots.mjcf_values import numbers, turned_to
+from sphshell_pin.robots.mjcf_values import number, numbers, text_of, turned_to
 from sphshell_pin.robots.packages import Folders
 
 Array = NDArray[np.float64]
@@ -79,8 +79,7 @@ class Meshes:
         """Return the <asset> of the plain form."""
         made = ET.Element("asset")
         for name, (path, scale) in self.files.items():
-            numbers = " ".join(repr(float(k)) for k in scale)
-            ET.SubElement(made, "mesh", name=name, file=str(path), scale=numbers)
+            ET.SubElement(made, "mesh", name=name, file=str(path), scale=text_of(scale))
         return made
 
     def known(self, name: str | None) -> bool:
@@ -134,7 +133,7 @@ def plain_place(
     ends = numbers(stated["fromto"], 6).reshape(2, 3)
     along = ends[0] - ends[1]
     place = pin.SE3(turned_to(along), ends.mean(axis=0))
-    return pose_of({}) * place, 0.5 * float(np.linalg.norm(along))
+    return place, 0.5 * float(np.linalg.norm(along))
 
 
 def plain_geom(
@@ -173,8 +172,8 @@ def geom_inertia(
 ) -> pin.Inertia:
     """Return the inertia that a geom gives its body, in the geom's frame."""
     kind = stated.get("type", "sphere")
-    density = float(numbers(stated.get("density", "1000"), 1)[0])
-    mass = float(numbers(stated["mass"], 1)[0]) if "mass" in stated else None
+    density = number(stated.get("density"), 1000.0)
+    mass = number(stated["mass"], 0.0) if "mass" in stated else None
     if kind in ("plane", "hfield") or mass == 0.0 or (mass is None and density == 0.0):
         return pin.Inertia.Zero()
     if made is None:

@@ -19,7 +19,7 @@ from OCP.TopoDS import TopoDS_Compound
 import sphshell_pin as sp
 from tests.contact.walks import jumps, paths
 from tests.parts import occ
-from tests.shell.cad_shapes import parts
+from tests.parts.occ import parts
 
 MM = 1e-3
 VALVE_BODY = Path(__file__).parents[2] / "scenarios" / "surfaces" / "valve_body.step"
