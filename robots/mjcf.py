@@ -9,6 +9,7 @@ frame and unit is resolved, every body states its inertia and has one joint, whi
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
@@ -110,7 +111,9 @@ class _Reader:
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for one in root.findall("default"):
             self._read_class(one, "main", self.classes["main"])
-        self.meshes = Meshes(root, folders, self.compiler, self._with_defaults)
+        # What is not modeled: the names that each sentence is about.
+        self.notes: defaultdict[str, list[str]] = defaultdict(list)
+        self.meshes = Meshes(root, folders, self.compiler, self._with_defaults, self.notes)
         self.extras: dict[str, Extras] = {}
         self.parents: dict[str, str] = {}
         self.joints_of: dict[str, list[str]] = {"world": []}
@@ -118,16 +121,12 @@ class _Reader:
         self.sites: list[Site] = []
         # Where the file draws the joints that are not at zero there.
         self.start: dict[str, Array] = {}
-        self.springs: list[str] = []
-        self.cones: list[str] = []
-        self.weightless: list[str] = []
 
     def read(self) -> Description:
         made = ET.Element("mujoco", model=self.given.get("model") or "robot")
         ET.SubElement(made, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
         made.append(self.meshes.asset())
         world = ET.SubElement(made, "worldbody")
-        scenery: list[str] = []
         bodies: list[ET.Element] = []
         for one in self.given.findall("worldbody"):
             held = ET.Element("body", name="world")
@@ -139,7 +138,8 @@ class _Reader:
                 elif element.tag == "geom":
                     geom = self._with_defaults(element, childclass)
                     if (geom.get("contype"), geom.get("conaffinity")) != ("0", "0"):
-                        scenery.append(geom.get("name", geom.get("type", "sphere")))
+                        text = "geoms of the world are no part of the robot, add them as shells"
+                        self.notes[text].append(geom.get("name", geom.get("type", "sphere")))
             bodies += list(held)
         if len(bodies) == 1 and bodies[0].find("joint") is not None:
             world.append(bodies[0])
@@ -152,6 +152,8 @@ class _Reader:
             raise ValueError("its <worldbody> has no <body>")
         self._weigh(made)
         self._keys(made)
+        for one in self.given.iterfind("tendon/*"):
+            self.notes["tendons are not modeled"].append(one.get("name", one.tag))
         mimics, loops = couplings(self.given, self.start, self.parents, self.joints_of)
         return Description(
             self.folders.file,
@@ -159,7 +161,10 @@ class _Reader:
             made,
             mimics,
             loops,
-            tuple(self._notes(scenery)),
+            tuple(
+                f"{text}: {', '.join(map(repr, dict.fromkeys(names)))}"
+                for text, names in self.notes.items()
+            ),
             self.start,
             self.extras,
             tuple(self.sites),
@@ -208,7 +213,7 @@ class _Reader:
         childclass = body.get("childclass", childclass)
         self.parents[name], self.joints_of[name] = parent, []
         if number(body.get("gravcomp"), 0.0):
-            self.weightless.append(name)
+            self.notes["gravity acts on bodies with gravcomp too"].append(name)
         place = pose * self._pose(body.attrib)
         parts = list(self._inside(body, pin.SE3.Identity(), childclass))
         joints = [part for part in parts if part[0].tag in ("joint", "freejoint")]
@@ -302,7 +307,7 @@ class _Reader:
         made = ET.Element("joint", name=name, type=kind)
         scalar = {key: number(" ".join(stated.get(key, "0").split()[:1]), 0.0) for key in _SCALARS}
         if scalar["stiffness"] or "springdamper" in stated:
-            self.springs.append(name)
+            self.notes["springs of joints (stiffness, springdamper) are not modeled"].append(name)
         if kind == "free":
             made.set("pos", "0 0 0")
         else:
@@ -313,7 +318,7 @@ class _Reader:
         if kind in ("free", "ball"):
             self.extras[name] = Extras(scalar["damping"], scalar["frictionloss"])
             if is_limited and kind == "ball":
-                self.cones.append(name)
+                self.notes["ranges of ball joints are not modeled"].append(name)
             return made
         unit = self.angle if kind == "hinge" else 1.0
         made.set("damping", repr(scalar["damping"]))
@@ -365,25 +370,3 @@ class _Reader:
             qpos = key.get("qpos", "")
             if key.get("name") and len(qpos.split()) == self.nq:
                 ET.SubElement(keys, "key", name=key.attrib["name"], qpos=qpos)
-
-    def _notes(self, scenery: list[str]) -> Iterator[str]:
-        for names, text in (
-            (self.springs, "springs of joints (stiffness, springdamper) are not modeled"),
-            (self.cones, "ranges of ball joints are not modeled"),
-            (self.weightless, "gravity acts on bodies with gravcomp too"),
-            (
-                self.meshes.exact,
-                "masses of meshes that are not convex are those of their volume (inertia=exact)",
-            ),
-            (
-                self.meshes.hulls,
-                "masses of meshes that are not closed are those of their convex hulls",
-            ),
-            (self.meshes.left_out, "geoms of these kinds are left out"),
-            (scenery, "geoms of the world are no part of the robot, add them as shells"),
-        ):
-            if names:
-                yield f"{text}: {', '.join(map(repr, dict.fromkeys(names)))}"
-        tendons = [one.get("name", one.tag) for one in self.given.iterfind("tendon/*")]
-        if tendons:
-            yield f"tendons are not modeled: {', '.join(map(repr, tendons))}"

@@ -37,6 +37,8 @@ _SHAPES: dict[str, tuple[int, Callable[..., float], Callable[..., pin.Inertia]]]
     ),
     "ellipsoid": (3, lambda x, y, z: 4 / 3 * np.pi * x * y * z, _INERTIA.FromEllipsoid),
 }
+_EXACT = "masses of meshes that are not convex are those of their volume (inertia=exact)"
+_HULLS = "masses of meshes that are not closed are those of their convex hulls"
 _SEEN = ("contype", "conaffinity", "group")
 
 
@@ -49,14 +51,13 @@ class Meshes:
         folders: Folders,
         compiler: Mapping[str, str],
         resolved: Callable[[ET.Element, str], dict[str, str]],
+        notes: Mapping[str, list[str]],
     ) -> None:
         folder = Path(compiler.get("meshdir", compiler.get("assetdir", "")))
         strip = compiler.get("strippath") == "true"
         self.files: dict[str, tuple[Path, Array]] = {}
         self.colors: dict[str, str] = {}
-        self.exact: list[str] = []
-        self.hulls: list[str] = []
-        self.left_out: list[str] = []
+        self.notes = notes
         self._moved: set[str] = set()
         self._kinds: dict[str, str] = {}
         for one in root.iterfind("asset/mesh"):
@@ -104,10 +105,10 @@ class Meshes:
             if kind == "convex":
                 mesh = mesh.convex_hull
             if not mesh.is_watertight or not mesh.volume:
-                self.hulls.append(name)
+                self.notes[_HULLS].append(name)
                 mesh = _hull(mesh)
             if kind == "legacy" and not mesh.is_convex:
-                self.exact.append(name)
+                self.notes[_EXACT].append(name)
             volume, center = float(mesh.volume), np.asarray(mesh.center_mass)
             sign = float(np.sign(volume))
             moments = sign * np.asarray(mesh.moment_inertia)
@@ -148,7 +149,8 @@ def plain_geom(
     fitted = kind != "mesh" and "mesh" in stated
     known = meshes.known(stated.get("mesh")) if kind == "mesh" else kind in _SHAPES and not fitted
     if not known:
-        meshes.left_out.append(f"{kind} fitted to a mesh" if fitted else kind)
+        what = f"{kind} fitted to a mesh" if fitted else kind
+        meshes.notes["geoms of these kinds are left out"].append(what)
         return None, pose
     made = ET.Element("geom", type=kind)
     if kind == "mesh":

@@ -93,6 +93,14 @@ def area_vectors(corners: Floats) -> Floats:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
+def random_places(corners: Floats, count: int, rng: np.random.Generator) -> tuple[Longs, Floats]:
+    """Random points (count, 3) of triangles (t, 3, 3), spread by area, and the triangle of each."""
+    area = np.linalg.norm(area_vectors(corners), axis=1)
+    chosen = rng.choice(len(area), count, p=area / area.sum())
+    weights = rng.dirichlet((1.0, 1.0, 1.0), count)
+    return chosen, np.einsum("nk,nkx->nx", weights, corners[chosen])
+
+
 def raw_surface(vertices: object, elements: object, normals: object = None) -> RawSurface:
     """Check arrays and copy them into a `RawSurface`.
 

@@ -27,6 +27,7 @@ from scipy.spatial import cKDTree
 from sphshell_pin import Shell
 from sphshell_pin.shell.cad.model import box_size
 from sphshell_pin.shell.curved import curved_mesh, points_at
+from sphshell_pin.shell.raw import area_vectors, random_places
 from tests.parts.occ import faces, parts
 
 Array = NDArray[np.float64]
@@ -105,13 +106,14 @@ class ExactShape:
 
     def samples(self, count: int, rng: np.random.Generator) -> Array:
         """Random points (n <= count, 3) of the trimmed faces [m], spread by area."""
-        areas = [_areas(points, rows) for points, _, rows in self._triangles]
+        spans = [area_vectors(points[rows]) for points, _, rows in self._triangles]
+        areas = [np.linalg.norm(one, axis=1) for one in spans]
         face = np.concatenate([np.full(len(area), k) for k, area in enumerate(areas)])
         row = np.concatenate([np.arange(len(area)) for area in areas])
         share = np.concatenate(areas)
         chosen = rng.choice(len(share), count, p=share / share.sum())
         found = []
-        for pick, weights in zip(chosen, _barycentric(rng, count), strict=True):
+        for pick, weights in zip(chosen, rng.dirichlet((1.0, 1.0, 1.0), count), strict=True):
             k = int(face[pick])
             _, uv, rows = self._triangles[k]
             at = weights @ uv[rows[row[pick]]]
@@ -188,9 +190,7 @@ def deviation(shell: Shell, exact: ExactShape, samples: int, seed: int = 0) -> D
     """Distances of random points of a shell from the exact shape, and the other way."""
     rng = np.random.default_rng(seed)
     corners = shell.vertices[shell.triangles]
-    share = _areas(shell.vertices, shell.triangles)
-    chosen = rng.choice(len(share), samples, p=share / share.sum())
-    flat = np.einsum("nk,nkx->nx", _barycentric(rng, samples), corners[chosen])
+    chosen, flat = random_places(corners, samples, rng)
     points, _, _ = curved_mesh(shell, 4)
     smooth = points.reshape(len(corners), -1, 3)
     smooth = smooth[chosen, rng.integers(0, smooth.shape[1], samples)]
@@ -256,13 +256,3 @@ def _spread(corners: Array, spacing: float) -> tuple[Array, NDArray[np.int64]]:
         weights.append(np.tile(np.array(grid) / number, (len(own), 1)))
         triangle.append(np.repeat(own, len(grid)))
     return np.concatenate(weights), np.concatenate(triangle)
-
-
-def _areas(points: Array, rows: NDArray[Any]) -> Array:
-    corners = points[rows]
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(0.5 * np.linalg.norm(spans, axis=1))
-
-
-def _barycentric(rng: np.random.Generator, count: int) -> Array:
-    return rng.dirichlet((1.0, 1.0, 1.0), count)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
 
@@ -81,8 +82,9 @@ def meshed_faces(solid: Solid, deflection: float, angle: float) -> list[Face]:
         mesh = take_mesh(shape)
         if mesh is None:
             raise OccFailed("a face without triangles")
-        # The number of other kinds is -1, of the last name.
-        found.append(Face(shape, KINDS[int(mesh.surface.shape()[0])], mesh))
+        # OpenCASCADE numbers the kinds of surfaces in this order.
+        number = int(BRepAdaptor_Surface(shape).GetType())
+        found.append(Face(shape, KINDS[min(number, len(KINDS) - 1)], mesh))
     return found
 
 

@@ -18,7 +18,7 @@ from OCP.TopAbs import TopAbs_OUT
 from sphshell_pin.shell.cad.face_mesh import FaceMesh
 from sphshell_pin.shell.cad.face_surface import stationary_parameter
 from sphshell_pin.shell.cad.surface import CadSurface
-from sphshell_pin.shell.raw import Floats, Ints, area_vectors
+from sphshell_pin.shell.raw import Floats, Ints, random_places
 from sphshell_pin.shell.shell import Shell
 
 TRIMMING = 1e-9
@@ -83,12 +83,8 @@ class TrimmedFaces:
 
     def samples(self, count: int, rng: np.random.Generator) -> Floats:
         """Random points (n <= count, 3) of the exact surfaces, spread by area."""
-        area = np.linalg.norm(area_vectors(self._corners), axis=1)
-        chosen = rng.choice(len(area), count, p=area / area.sum())
-        weights = rng.dirichlet((1.0, 1.0, 1.0), count)
-        places = np.einsum("nk,nkx->nx", weights, self._corners[chosen])
         points = []
-        for face, mesh, _, uv in self._cad.found.locate(chosen, places):
+        for face, mesh, _, uv in self._cad.found.locate(*random_places(self._corners, count, rng)):
             # Along a hollow border the triangles reach beyond the face.
             points.append(mesh.surface.nodes(uv[[self._holds(face, one) for one in uv]])[0])
         return np.concatenate(points)

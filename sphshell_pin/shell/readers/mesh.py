@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,7 +96,7 @@ def read_obj(path: Path) -> RawSurface:
         raise ShellFileError(
             path, f"a face uses normal {which.max() + 1}, but the file has {len(table) - 1} normals"
         )
-    return RawSurface(raw.vertices, raw.offsets, raw.corners, table[which])
+    return replace(raw, normals=table[which])
 
 
 def _obj_index(path: Path, line: int, word: str, latest: int, what: str) -> int:
@@ -179,7 +180,7 @@ def read_off(path: Path) -> RawSurface:
     raw = finish(path, np.ascontiguousarray(table[:, :3]), offsets, corners)
     if "N" not in kind.replace("OFF", ""):
         return raw
-    return RawSurface(raw.vertices, raw.offsets, raw.corners, table[corners, 3:6])
+    return replace(raw, normals=table[corners, 3:6])
 
 
 def _off_faces(words: list[str], count: int, all_words: bool) -> list[list[int]] | None:

@@ -18,6 +18,7 @@ from sphshell_pin.shell.raw import (
     check_vertices,
     offsets_of,
 )
+from sphshell_pin.shell.rounding import rounding
 
 
 def read_text(path: Path) -> str:
@@ -71,4 +72,5 @@ def finish(
         check_indices(offsets, corners, len(vertices), 1)
     except InvalidShell as error:
         raise ShellFileError(path, str(error)) from None
-    return RawSurface(np.ascontiguousarray(vertices, np.float64), offsets, corners, normals, notes)
+    points = np.ascontiguousarray(vertices, np.float64)
+    return RawSurface(points, offsets, corners, normals, notes, rounding=rounding(points))
