@@ -17,9 +17,8 @@ import pinocchio as pin
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.mimic import shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
-from sphshell_pin.robots.description import check_poses, check_size, parsed
+from sphshell_pin.robots.description import Description, check_poses, check_size, parsed
 from sphshell_pin.robots.files import (
-    Description,
     RobotError,
     build_geometry,
     build_model,

@@ -8,10 +8,8 @@ import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -19,12 +17,9 @@ from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.errors import ShellFileError, SphshellError
-from sphshell_pin.robots.description import check_memory, check_size, parsed
+from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.shell.readers.ply import read_ply
-
-if TYPE_CHECKING:
-    from sphshell_pin.robots.mjcf_additions import Extras, Site
 
 Array = NDArray[np.float64]
 
@@ -59,41 +54,6 @@ MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
 """Formats of the meshes that a robot may name."""
 
 _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files"
-
-
-@dataclass(frozen=True)
-class Description:
-    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of mjcf.py."""
-
-    file: Path
-    folders: Folders
-    root: ET.Element
-    mimics: tuple[Mimic, ...] = ()
-    loops: tuple[str, ...] = ()
-    """What closes kinematic loops or couples joints otherwise than by mimicking: not modeled."""
-    notes: tuple[str, ...] = ()
-    """What else the file states that is not modeled, one sentence each."""
-    start: Mapping[str, Array] = field(default_factory=dict)
-    """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
-    extras: Mapping[str, Extras] = field(default_factory=dict)
-    """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
-    sites: tuple[Site, ...] = ()
-    """Of MJCF."""
-    stated: ET.Element | None = None
-    """An MJCF as it was before it was brought into the plain form, with what it includes."""
-
-    def q0(self, model: pin.Model) -> Array:
-        """Return the configuration (nq,) that the file draws, of the model of `build_model`."""
-        q = np.array(pin.neutral(model))
-        for name, values in self.start.items():
-            at = model.joints[model.getJointId(name)].idx_q
-            q[at : at + len(values)] = values
-        return q
-
-    @property
-    def is_mjcf(self) -> bool:
-        """Whether it is MJCF."""
-        return self.root.tag == "mujoco"
 
 
 def read(

@@ -16,8 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.robots.description import MOST_LINKS
-from sphshell_pin.robots.files import Description
+from sphshell_pin.robots.description import MOST_LINKS, Description
 from sphshell_pin.robots.mjcf_additions import Extras, Site
 from sphshell_pin.robots.mjcf_couplings import couplings
 from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom, plain_place

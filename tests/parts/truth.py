@@ -17,6 +17,7 @@ from OCP.IntTools import IntTools_FClass2d
 from OCP.TopAbs import TopAbs_IN
 
 from sphshell_pin import Shell
+from sphshell_pin.shell.cad.face_mesh import FaceMesh
 from sphshell_pin.shell.cad.tessellation import Tessellation
 from tests.parts.cad_mesh import (
     KINDS,
@@ -119,7 +120,8 @@ class ExactFaces:
             depth = self.size * np.exp(rng.uniform(*np.log(DEPTHS)))
             for radius in self.size * np.array(RADII):
                 center = at + (radius - depth) * normal
-                if set(self._faces_within(center, radius + clear + self.error)) == {k}:
+                near = self._nearest_of_faces(center, radius + clear + self.error)
+                if near.keys() == {k}:
                     rows.append((center, radius, depth))
                     break
         columns = zip(*rows, strict=True) if rows else (np.zeros((0, 3)), np.zeros(0), np.zeros(0))
@@ -133,9 +135,8 @@ class ExactFaces:
     def _beside(self, k: int, rng: Rng) -> tuple[Array, Array, float] | None:
         """Return a random point of a face, the normal there and an offset that the bend allows."""
         mesh = self.faces[k].mesh
-        areas = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
-        row = rng.choice(len(areas), p=areas / areas.sum())
-        uv = rng.dirichlet((1.0, 1.0, 1.0)) @ mesh.parameters(mesh.triangles[row : row + 1])[0]
+        row, weights = _anywhere(mesh, rng)
+        uv = weights @ mesh.parameters(mesh.triangles[row : row + 1])[0]
         if self._trimming(k).Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_IN:
             return None
         bend = BRepLProp_SLProps(self._adaptor(k), *uv.tolist(), 2, 1e-9)
@@ -150,10 +151,8 @@ class ExactFaces:
 
     def _inside_plane(self, k: int, rng: Rng) -> tuple[Array, Array]:
         mesh = self.faces[k].mesh
-        areas = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
-        row = rng.choice(len(areas), p=areas / areas.sum())
-        at = rng.dirichlet((1.0, 1.0, 1.0)) @ mesh.points[mesh.triangles[row]]
-        return at, mesh.corner_normals()[row, 0]
+        row, weights = _anywhere(mesh, rng)
+        return weights @ mesh.points[mesh.triangles[row]], mesh.corner_normals()[row, 0]
 
     def _is_nearest(self, points: Array, offset: Array) -> np.ndarray:
         """Whether no face is nearer to points (n, 3) than `offset` (n,)."""
@@ -181,5 +180,9 @@ class ExactFaces:
             int(k): (int(triangles[i]), touched.point[i]) for k, i in zip(faces, first, strict=True)
         }
 
-    def _faces_within(self, point: Array, radius: float) -> list[int]:
-        return list(self._nearest_of_faces(point, radius))
+
+def _anywhere(mesh: FaceMesh, rng: Rng) -> tuple[int, Array]:
+    """Return a random triangle of a face, by area, and random weights (3,) of its corners."""
+    areas = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
+    row = rng.choice(len(areas), p=areas / areas.sum())
+    return int(row), rng.dirichlet((1.0, 1.0, 1.0))

@@ -49,6 +49,7 @@ def test_exact_normals_reach_the_file_corner_by_corner(plate, suffix, tmp_path):
     assert not any("normals" in note for note in done.notes)
     shell = Shell.from_file(tmp_path / f"out{suffix}", None if suffix == ".shl" else "mm")
     assert len(shell.triangles) == len(exact.triangles)
+    assert shell.normals is not None
     # The curved elements, which follow from the normals, are the same.
     middles = exact.vertices[exact.triangles].mean(axis=1)
     places, again = (one.closest_points(middles) for one in (exact, shell))
