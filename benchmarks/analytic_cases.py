@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,24 +15,10 @@ from sphshell_pin.benchmarks.work_precision_cases import (
     Array,
     Case,
     decades,
-    difference,
     rectangle,
     steps,
 )
-from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
-
-
-@dataclass(frozen=True)
-class Exact:
-    """Judges the results of a case by its closed form: figures at the times t (n,)."""
-
-    case: Case
-    figures: Callable[[Array], list[Array]]
-
-    def error(self, integrator: Integrator, result: Result) -> float:
-        """Return the largest length of a difference from the closed form at any row."""
-        return difference(self.case.figures(result), self.figures(result.t))
 
 
 def settings() -> tuple[Integrator, ...]:
@@ -56,12 +40,12 @@ def ball_on_plate(law: sp.ImpactLaw, joint: Any, plate: float = 0.1) -> sp.Scene
     return scene
 
 
-def bob() -> Exact:
+def bob() -> Case:
     """Let a ball bob on an undamped spring that it never leaves: a cosine."""
     stiffness = 1e4
     omega, sag = math.sqrt(stiffness / MASS), MASS * GRAVITY / stiffness
     amplitude = 0.8 * sag
-    case = Case(
+    return Case(
         name="bob",
         title="Ball bobs on a spring",
         judged="error of height / amplitude, against a cosine",
@@ -70,10 +54,10 @@ def bob() -> Exact:
         duration=0.1,
         record_dt=0.004,
         figures=lambda result: [(result.q - RADIUS + sag) / amplitude],
+        exact=lambda t: [np.cos(omega * t)[:, None]],
         integrators=settings(),
         quick_dt=4e-5,
     )
-    return Exact(case, lambda t: [np.cos(omega * t)[:, None]])
 
 
 FALL = 0.02  # [m]
@@ -91,10 +75,10 @@ def bounce_height(t: Array, stiffness: float) -> Array:
     return np.where(since <= flight, flying, pressed)
 
 
-def bounces() -> Exact:
+def bounces() -> Case:
     """Let a ball fall on an undamped spring, five times: parabolas and sines, joined."""
     stiffness = 1e4
-    case = Case(
+    return Case(
         name="bounces",
         title="Ball bounces five times",
         judged="error of height / fall, against parabolas and sines",
@@ -103,16 +87,16 @@ def bounces() -> Exact:
         duration=0.74,
         record_dt=0.02,
         figures=lambda result: [(result.q - RADIUS) / FALL],
+        exact=lambda t: [bounce_height(t, stiffness)[:, None] / FALL],
         integrators=settings(),
         quick_dt=4e-5,
     )
-    return Exact(case, lambda t: [bounce_height(t, stiffness)[:, None] / FALL])
 
 
 STIFF, SPRING, REACH = 1e6, 5.0, 0.05  # plate and slow spring [N/m], amplitude along it [m]
 
 
-def glide() -> Exact:
+def glide() -> Case:
     """Let a ball glide on a stiff, overdamped plate, to and fro on a soft spring.
 
     Along the plate a cosine of 10 rad/s; into it the sum of two decays, of 1e2 and 2e5 per second,
@@ -129,7 +113,7 @@ def glide() -> Exact:
         decay = (fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (fast - slow)
         return [np.c_[np.cos(omega * t), np.zeros_like(t), 1 + 0.5 * decay]]
 
-    case = Case(
+    return Case(
         name="glide",
         title="Ball glides on a stiff plate",
         judged="error of way / reach, of depth / depth at rest",
@@ -141,6 +125,7 @@ def glide() -> Exact:
         figures=lambda result: [
             np.c_[result.q[:, :1] / REACH, result.q[:, 1:2], (RADIUS - result.q[:, 2:]) / sag]
         ],
+        exact=exact,
         integrators=(
             *steps(sp.SemiImplicitEuler, 4e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6),
             *steps(sp.RungeKutta4, 2e-5, 1e-5, 5e-6, 2e-6),
@@ -150,4 +135,3 @@ def glide() -> Exact:
         ),
         quick_dt=5e-6,
     )
-    return Exact(case, exact)

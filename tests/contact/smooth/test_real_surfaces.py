@@ -25,8 +25,8 @@ from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 from sphshell_pin.shell.faces import Face
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import mean_edge
-from tests.shell.surfaces import DATA
 from tests.shell import test_corpus as corpus
+from tests.shell.surfaces import DATA
 
 Array = NDArray[np.float64]
 
