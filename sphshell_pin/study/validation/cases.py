@@ -135,6 +135,11 @@ class Case:
         )
 
 
+def within(aim: float, *errors: tuple[str, str, float], unit: str = "") -> list[Finding]:
+    """Return findings of errors (key, what, error), of which only the size counts."""
+    return [Finding(key, what, abs(float(error)), unit, aim=aim) for key, what, error in errors]
+
+
 def explanations(found: Outcome) -> list[str]:
     """Return why findings are out of their bounds, a text for those that have the same reason."""
     reasons: dict[str, list[str]] = {}
