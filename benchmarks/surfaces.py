@@ -138,9 +138,9 @@ def sheet(side: float) -> Mesh:
     return Mesh(points, triangles, normals)
 
 
-def random_grid(cells: int, half: float) -> tuple[Array, Array, NDArray[np.int32]]:
+def random_grid(cells: int, half: float, seed: int = 1) -> tuple[Array, Array, NDArray[np.int32]]:
     """Return moved x, y (n,) over the square of side 2 `half`, and random halves of the cells."""
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     vertices, triangles = wavy_sheet(cells, 2 * half)
     x, y, _ = vertices.T
     inner = np.maximum(np.abs(x), np.abs(y)) < half * (1 - 1e-9)
@@ -189,12 +189,6 @@ def torus_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, count)))
 
 
-def sheet_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    clear = SHEET - 1.3  # of the borders
-    points, normals = on_sheet(*rng.uniform(-clear, clear, (2, count)))
-    return RADIUS * points, normals
-
-
 def plate_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     clear = PLATE - 1.3 * RADIUS
     xy = rng.uniform(-clear, clear, (count, 2))
@@ -209,11 +203,6 @@ def tori() -> list[Mesh]:
     return [torus(RING, TUBE, side * RADIUS) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
 
 
-def sheets() -> list[Mesh]:
-    meshes = [sheet(side) for side in (1.2, 0.6, 0.3, 0.15, 0.075)]
-    return [Mesh(RADIUS * m.vertices, m.triangles, m.normals) for m in meshes]
-
-
 def plates() -> list[Mesh]:
     return [plate(side * RADIUS, PLATE) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
 
@@ -222,6 +211,5 @@ SURFACES = {
     "bowl": Surface(balls, on_ball, inside=True),
     "dome": Surface(balls, on_ball, inside=False),
     "torus": Surface(tori, torus_places, inside=True),
-    "wavy sheet": Surface(sheets, sheet_places, inside=False),
     "flat plate": Surface(plates, plate_places, inside=False),
 }

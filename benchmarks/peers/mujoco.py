@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
+from sphshell_pin.benchmarks.peers.merged import text
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
 from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
@@ -124,11 +125,6 @@ def option_of(scene: Scene, params: Params) -> str:
         f'<option timestep="{params["dt"]}" integrator="{params["integrator"]}" solver="Newton" '
         f'tolerance="1e-10" gravity="{text(gravity)}" {friction}>{flag}</option>'
     )
-
-
-def text(numbers: Any) -> str:
-    """Return numbers as MJCF has them."""
-    return " ".join(repr(float(number)) for number in np.ravel(numbers))
 
 
 def law_of(scene: Scene, mass: float, d: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
