@@ -302,19 +302,12 @@ def table(period: float) -> Table:
 
 
 def long_table() -> Table:
-    """Return the largest energy errors of 200 swings, and of 20 in an uneven ellipsoid."""
+    """Return the largest energy errors of 200 swings."""
     changes = energy_changes(long_run(mesh_scene(bowl(0.3)), start(float(AZIMUTHS[0])), 200))
     rows = [
         (f"bowl, swings {20 * k + 1} to {20 * (k + 1)}", float(np.abs(part).max()))
         for k, part in enumerate(np.array_split(changes, 10))
     ]
-    for level in (4, 5):
-        mesh = ellipsoid(level)
-        for exact, normals in ((True, "exact"), (False, "estimated")):
-            scene = mesh_scene(mesh, exact_normals=exact)
-            worst = max(ellipsoid_energy(scene, azimuth, 20) for azimuth in (0.1, 0.9))
-            name = f"ellipsoid, h / r = {mesh.mean_side / RADIUS:.2f}, {normals} normals"
-            rows.append((name, worst))
     return Table("long", "Energy errors, largest.", columns("run", "energy error"), rows)
 
 
@@ -323,7 +316,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.swing", description=(__doc__ or "").partition("\n")[0]
     )
-    parser.add_argument("--long", action="store_true", help="200 swings, and an uneven ellipsoid")
+    parser.add_argument("--long", action="store_true", help="200 swings, too")
     long = parser.parse_args().long
     one_core()
     print(machine())

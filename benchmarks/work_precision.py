@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -246,10 +246,7 @@ def rows_table(rows: list[Row]) -> Table:
             "case; integrator; setting; error; cpu_s_per_s: CPU s/s; evaluations_per_s: "
             "evaluations / s; steps; rejected"
         ),
-        [
-            (r.case, r.integrator, r.setting, r.error, r.cpu, r.evaluations, r.steps, r.rejected)
-            for r in rows
-        ],
+        [astuple(row) for row in rows],
         folded=True,
     )
 

@@ -35,6 +35,7 @@ WHOLE = (
     "rim of the disc carries none of the force, and no path gains energy. The measured points of "
     "Kharaz are on the other side of our line."
 )
+INCIDENCE = "angle of incidence [deg]"
 THEORY = "with micro-slip (Maw and others)"
 
 
@@ -86,7 +87,13 @@ def measured() -> Outcome:
         error = rms(values(GLASS, quantity, angle) - value) / scale
         findings += within(bound, (quantity, what(quantity), error), unit=unit(quantity))
         theory[quantity] = rms(with_micro_slip(GLASS, quantity, angle) - value) / scale
-        panels.append(_panel(quantity, points, lines))
+        marks = []
+        for one in dict.fromkeys(points.texts("reading")):
+            chosen = points.where("reading", one)
+            marks.append((f"read by {one}", chosen["angle"], chosen["value"]))
+        ours = [(name, ANGLES, taken(line, quantity, ANGLES)) for name, line in lines.items()]
+        dashed = [(THEORY, ANGLES, with_micro_slip(GLASS, quantity, ANGLES))]
+        panels.append(Panel(INCIDENCE, NAMES[quantity], marks, ours, dashed))
     own = (
         "The measured spins, and the angles of the patch that follow from them, have an error of "
         "their own: whatever the friction, angular momentum about the contact point gives "
@@ -129,20 +136,6 @@ def unit(quantity: str) -> str:
     return "degrees" if quantity.endswith("angle") else ""
 
 
-def _panel(quantity: str, points: Data, lines: dict[str, list[Rebound]]) -> Panel:
-    marks = []
-    for one in dict.fromkeys(points.texts("reading")):
-        chosen = points.where("reading", one)
-        marks.append((f"read by {one}", chosen["angle"], chosen["value"]))
-    return Panel(
-        "angle of incidence [deg]",
-        NAMES[quantity],
-        marks,
-        [(name, ANGLES, taken(line, quantity, ANGLES)) for name, line in lines.items()],
-        [(THEORY, ANGLES, with_micro_slip(GLASS, quantity, ANGLES))],
-    )
-
-
 @case("chung_ooi_4")
 def rigid() -> Outcome:
     """Run test 4, and at a tenth and a hundredth of its speed."""
@@ -168,7 +161,7 @@ def rigid() -> Outcome:
             (f"ours, {name}", ANGLES, taken(line, quantity, ANGLES)) for name, line in lines.items()
         ]
         theory = [(THEORY, ANGLES, with_micro_slip(OXIDE, quantity, ANGLES))]
-        panels.append(Panel("angle of incidence [deg]", NAMES[quantity], marks, ours, theory))
+        panels.append(Panel(INCIDENCE, NAMES[quantity], marks, ours, theory))
     findings += _speeds()
     steep = f"It is the point at 5 degrees alone. {WHOLE}"
     depth = (
@@ -211,7 +204,7 @@ def mfix() -> Outcome:
             one = (quantity + key, what(quantity) + where, rms((here - there)[chosen]) / scale)
             findings += within(bound, one, unit=unit(quantity))
         theirs, line = [("MFIX", angle, there)], [("ours", angle, here)]
-        panels.append(Panel("angle of incidence [deg]", NAMES[quantity], theirs, line))
+        panels.append(Panel(INCIDENCE, NAMES[quantity], theirs, line))
     shallow = f"It is the points below 10 degrees. {WHOLE}"
     explained = {f.key: shallow for f in findings if not f.met and "_from_10" not in f.key}
     caption = "Points computed by MFIX, and our line."
