@@ -32,11 +32,11 @@ def settings() -> tuple[Integrator, ...]:
     )
 
 
-def ball_on_plate(law: sp.ImpactLaw, joint: Any, plate: float = 0.1) -> sp.Scene:
+def ball_on_plate(law: sp.ImpactLaw, joint: Any) -> sp.Scene:
     """Return a ball on `joint` above the plate z = 0."""
     ball = ("ball", joint, pin.Inertia.FromSphere(MASS, RADIUS))
     scene = sp.Scene(model_of(ball, gravity=GRAVITY))
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), rectangle(plate, plate), law=law)
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), rectangle(0.1, 0.1), law=law)
     return scene
 
 
@@ -63,16 +63,23 @@ def bob() -> Case:
 FALL = 0.02  # [m]
 
 
-def bounce_height(t: Array, stiffness: float) -> Array:
-    """Return how far (n,) [m] the ball's lowest point is above the plate; let go at t = 0."""
+def bounce(t: Array, stiffness: float) -> tuple[Array, Array]:
+    """Return how far (n,) [m] above the plate the ball's lowest point is, and its speed [m/s].
+
+    It is let go at t = 0, FALL above the plate.
+    """
     omega, speed = math.sqrt(stiffness / MASS), math.sqrt(2 * GRAVITY * FALL)
     flight = 2 * speed / GRAVITY
     touch = 2 * (math.pi - math.atan(speed * omega / GRAVITY)) / omega
     since = (t + flight / 2) % (flight + touch)
     angle, sag = omega * (since - flight), GRAVITY / omega**2
-    flying = speed * since - 0.5 * GRAVITY * since**2
-    pressed = sag * (np.cos(angle) - 1) - speed / omega * np.sin(angle)
-    return np.where(since <= flight, flying, pressed)
+    flying = speed * since - 0.5 * GRAVITY * since**2, speed - GRAVITY * since
+    pressed = (
+        sag * (np.cos(angle) - 1) - speed / omega * np.sin(angle),
+        -sag * omega * np.sin(angle) - speed * np.cos(angle),
+    )
+    height, upward = np.where(since <= flight, flying, pressed)
+    return height, upward
 
 
 def bounces() -> Case:
@@ -87,7 +94,7 @@ def bounces() -> Case:
         duration=0.74,
         record_dt=0.02,
         figures=lambda result: [(result.q - RADIUS) / FALL],
-        exact=lambda t: [bounce_height(t, stiffness)[:, None] / FALL],
+        exact=lambda t: [bounce(t, stiffness)[0][:, None] / FALL],
         integrators=settings(),
         quick_dt=4e-5,
     )
