@@ -73,12 +73,11 @@ def integrators(*, quick, progress):
 
 
 def steps(*, quick, progress):
-    names = (step.BARE, step.FREE, step.FAR, step.TOUCHING, step.CONTROL_FREE)
+    names = (*step.WHOLE[:-1], "... and damping")
     whole = {name: times(2e-6 + 2e-7 * k) for k, name in enumerate(names)}
     whole[step.CONTROL_TOUCHING] = times(3.5e-6)
-    added = {"no contact": times(2e-6), "... and damping": times(2.1e-6)}
     imports = {"sphshell_pin": times(0.14), "pinocchio": times(0.13)}
-    return step.assemble(whole, added, imports)
+    return step.assemble(whole, imports)
 
 
 def hard(*, quick, progress):
