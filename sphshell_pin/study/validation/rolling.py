@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
+import coal
 import numpy as np
-import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.rolling import Ball, in_bowl, in_cylinder, on_turntable, velocities
@@ -23,20 +23,17 @@ SHARE = 3e-5  # depth under the weight, over the radius: it does not count
 FILE = "rolling_balls"
 
 
-def wall(radius: float, angle: float, length: float, columns: int, rows: int = 1) -> sp.Shell:
+def wall(radius: float, angle: float, length: float, columns: int) -> sp.Shell:
     """Return the inside of a cylinder of `radius` and `length` [m] about y, `angle` [rad] from -z.
 
-    It goes to both sides; with pi it is closed.
+    It goes to both sides.
     """
-    turn = np.linspace(-angle, angle, columns + 1)[: columns + (angle < math.pi)]
+    turn = np.linspace(-angle, angle, columns + 1)
     inward = np.stack([-np.sin(turn), np.zeros(turn.size), np.cos(turn)], axis=1)
-    along = np.linspace(-length / 2, length / 2, rows + 1)
-    vertices = [-radius * inward + [0.0, y, 0.0] for y in along]
-    k, line = np.arange(columns), turn.size * np.arange(rows)[:, None]
-    a, b = line + k, line + (k + 1) % turn.size
-    elements = np.stack([a, b, b + turn.size, a + turn.size], axis=-1).reshape(-1, 4)
-    normals = np.concatenate([inward] * (rows + 1))
-    return sp.Shell(np.concatenate(vertices), elements, normals=normals)
+    vertices = [-radius * inward + [0.0, y, 0.0] for y in (-length / 2, length / 2)]
+    k = np.arange(columns)
+    elements = np.stack([k, k + 1, k + 1 + turn.size, k + turn.size], axis=-1)
+    return sp.Shell(np.concatenate(vertices), elements, normals=np.tile(inward, (2, 1)))
 
 
 @case("turntable")
@@ -85,8 +82,7 @@ def golf_ball() -> Outcome:
     """Roll the ball three times down and up again."""
     given = read(FILE).where("case", "cylinder").published
     radius, cup, orbit = given["ball radius [m]"], given["cup radius [m]"], 30.0
-    upright = pin.SE3(pin.utils.rotate("x", math.pi / 2), np.zeros(3))
-    shell = wall(cup, math.pi, 0.2, columns=60, rows=30).transformed(upright)
+    shell = sp.Shell.from_geometry(coal.Cylinder(cup, 0.2), side="inside")
     run = in_cylinder(Ball(0.046, radius), shell, cup, orbit, stiffness=1e6)
     t, height = run.result.t, run.result.q[:, 2] - run.swing
     exact = run.swing * (np.cos(run.expected * orbit * t) - 1)
