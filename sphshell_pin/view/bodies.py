@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from sphshell_pin.view.distance import draw_distance
 from sphshell_pin.view.nodes import (
+    OnJoint,
     lattice,
     line_segments,
     material,
@@ -55,26 +56,20 @@ def plane_key(pair: ContactPair) -> PlaneKey:
     return pair.joint_i, pair.placement_i.homogeneous.tobytes()
 
 
-class DrawnShell:
+class DrawnShell(OnJoint):
     """The shell of `pair`, drawn below `visualizer`; `index` numbers the shells of the scene."""
 
     def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         shell = pair.shell
         if shell is None:
             raise ValueError("a pair without a shell")
+        node = visualizer[f"{index}_{node_name(shell.name)}"]
+        super().__init__(node, pair.joint_j, pair.placement_j)
         self.shell = shell
-        self.joint = pair.joint_j
-        self.node = visualizer[f"{index}_{node_name(shell.name)}"]
         self._curved = pair.method == "smooth"
         self._index = index
-        self._offset = pair.placement_j
         self._colorings: dict[str, bool] = {}
-        draw_shell(self.node, shell, index, curved=self._curved)
-        self._move = mover(self.node)
-
-    def update(self, data: pin.Data) -> None:
-        """Place it where forward kinematics left its joint in `data`."""
-        self._move((data.oMi[self.joint] * self._offset).homogeneous)
+        draw_shell(node, shell, index, curved=self._curved)
 
     @property
     def largest_distance(self) -> float:
@@ -108,12 +103,13 @@ class DrawnShell:
             show(self.node[name], name == seen)
 
 
-class DrawnSphere:
+class DrawnSphere(OnJoint):
     """A sphere of the pair `name`, drawn below `visualizer`; `index` numbers those of the scene."""
 
     def __init__(self, visualizer: Visualizer, name: str, drawn: PlacedSphere, index: int) -> None:
-        self.joint, self._offset, radius = drawn
-        node = self.node = visualizer[f"{index}_{node_name(name)}"]
+        joint, placement, radius = drawn
+        node = visualizer[f"{index}_{node_name(name)}"]
+        super().__init__(node, joint, placement)
         set_object(
             node["ball"],
             sphere(radius, 48),
@@ -141,11 +137,6 @@ class DrawnSphere:
             "LineSegments",
             order=6,
         )
-        self._move = mover(node)
-
-    def update(self, data: pin.Data) -> None:
-        """Place it where forward kinematics left its joint in `data`."""
-        self._move((data.oMi[self.joint] * self._offset).homogeneous)
 
 
 class DrawnPlane:
@@ -154,10 +145,8 @@ class DrawnPlane:
     def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         low, high = np.asarray(pair.shell.box) if pair.shell is not None else np.zeros((2, 3))
         self._cell = 0.5 * float(np.linalg.norm(high - low))
-        self._plane, self._shell = (
-            (pair.joint_i, pair.placement_i),
-            (pair.joint_j, pair.placement_j),
-        )
+        self._plane = pair.joint_i, pair.placement_i
+        self._shell = pair.joint_j, pair.placement_j
         self._center = 0.5 * (low + high)
         self._middle = np.full(3, np.inf)
         node = visualizer[f"{index}_{node_name(pair.name)}"]

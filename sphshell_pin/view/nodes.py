@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin._interrupts import interrupts_delayed
@@ -230,6 +231,33 @@ def pose(
     matrix[:3, 3] = translation
     matrix[3, 3] = 1.0
     return matrix
+
+
+def hidden_at(place: FloatArray) -> FloatArray:
+    """Return the matrix (4, 4) of a node that waits, too small to be seen, at `place` (3,) [m]."""
+    return pose(np.eye(3), place, HIDDEN_SCALE)
+
+
+def rod_along(start: FloatArray, step: FloatArray, width: float) -> FloatArray:
+    """Return the matrix (4, 4) that makes a unit rod the one from `start` along `step` (3,) [m].
+
+    `width` [m] is what its radii are multiplied by; `step` must have a length.
+    """
+    shape = np.array([width, math.hypot(*step.tolist()), width])
+    return pose(rotation_to(step), start + 0.5 * step, shape)
+
+
+class OnJoint:
+    """A node that hangs on a `joint` of the model, at `placement` in it."""
+
+    def __init__(self, node: Visualizer, joint: int, placement: pin.SE3 | None = None) -> None:
+        self.node, self.joint = node, joint
+        self._placement = pin.SE3.Identity() if placement is None else placement
+        self._move = mover(node)
+
+    def update(self, data: pin.Data) -> None:
+        """Place it where forward kinematics left its joint in `data`."""
+        self._move((data.oMi[self.joint] * self._placement).homogeneous)
 
 
 def rotation_to(direction: FloatArray) -> FloatArray:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.view.arrows import ContactColumns
+from sphshell_pin.view.arrows import Contacts, strongest
 from sphshell_pin.view.nodes import (
-    HIDDEN_SCALE,
     FloatArray,
     Move,
+    hidden_at,
     material,
     mover,
     pose,
@@ -92,21 +92,16 @@ class PatchPool:
                 set_object(node, mesh, look, order=9)
                 moves.append(mover(node))
             self._moves.append(moves)
-        self._hidden = pose(np.eye(3), np.zeros(3), HIDDEN_SCALE)
+        self._hidden = hidden_at(np.zeros(3))
 
-    def update(
-        self, contacts: ContactColumns | None, patches: PatchRows, scale: PatchScale
-    ) -> None:
+    def update(self, contacts: Contacts | None, patches: PatchRows, scale: PatchScale) -> None:
         """Show `patches` (k,) of `contacts` at `scale`: the largest forces, if there are many."""
-        count = 0 if contacts is None else len(contacts.normal_force)
-        order = np.arange(count)
-        if contacts is not None and count > self.size:
-            order = np.sort(np.argsort(-contacts.normal_force, kind="stable")[: self.size])
+        force = np.zeros(0) if contacts is None else contacts.normal_force
+        shown = strongest(force, self.size)
         for slot, moves in enumerate(self._moves):
             level, matrix = -1, self._hidden
-            if contacts is not None and slot < count:
-                k = int(order[slot])
-                level, matrix = self._place(contacts, k, patches[k], scale)
+            if contacts is not None and slot < len(shown):
+                level, matrix = self._place(contacts, int(shown[slot]), patches, scale)
             # The others wait where it is: else they would sweep across the picture when shown.
             waiting = matrix.copy()
             waiting[:3, :3] = self._hidden[:3, :3]
@@ -114,8 +109,9 @@ class PatchPool:
                 move(matrix if number == level else waiting)
 
     def _place(
-        self, contacts: ContactColumns, k: int, patch: np.void, scale: PatchScale
+        self, contacts: Contacts, k: int, patches: PatchRows, scale: PatchScale
     ) -> tuple[int, FloatArray]:
+        patch = patches[k]
         normal, axis = contacts.normal_world[k], patch["axis_world"]
         a, b = patch["half_axes"] * scale.factor
         share = patch["peak_pressure"] / scale.pressure

@@ -142,12 +142,11 @@ class FilmPlayer(BallPlayer):
 class ArmPlayer(BallPlayer):
     """Pinocchio's sample manipulator with its geometry, which stands still and touches nothing."""
 
-    def __init__(self, mesh_scale=(1.0, 1.0, 1.0)):
+    def __init__(self):
         super().__init__(height=1.0)
         model = pin.buildSampleModelManipulator()
         pair = contact_pair(model, "effector_body", 0.08, plate())
         self.visual_model = pin.buildSampleGeometryModelManipulator(model)
-        self.visual_model.geometryObjects[1].meshScale = np.array(mesh_scale)
         self.scene = SimpleNamespace(model=model, pairs=(pair,))
         self.q = pin.integrate(model, pin.neutral(model), np.linspace(0.1, 0.6, model.nv))
 

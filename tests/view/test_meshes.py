@@ -5,7 +5,6 @@ import re
 import struct
 from pathlib import Path
 
-import meshcat
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -23,6 +22,7 @@ from sphshell_pin.view.meshes import (
     take_out_numbers,
 )
 from sphshell_pin.view.robot import GeometryRobot
+from tests.view.drawn import Film
 
 PAGE = (
     Path(page_module.__file__)
@@ -236,15 +236,8 @@ def test_a_robot_s_mesh_is_sent_with_normals(tmp_path):
     )
     model = pin.buildModelFromUrdf(str(tmp_path / "dark.urdf"))
     visual = pin.buildGeomFromUrdf(model, str(tmp_path / "dark.urdf"), pin.GeometryType.VISUAL)
-    window = page_module.FilmWindow()
-    GeometryRobot(meshcat.Visualizer(window=window), model, visual)
-    meshes = [
-        geometry["data"].data
-        for command in window.commands(np.zeros(1))
-        if command["type"] == "set_object"
-        for geometry in command["object"]["geometries"]
-        if geometry.get("format") == "stl"
-    ]
-    (sent,) = meshes
-    facets = np.frombuffer(sent, STL_FACET, -1, STL_HEADER)
+    film = Film()
+    GeometryRobot(film.canvas, model, visual)
+    (sent,) = [geometry for drawn in film.objects.values() for geometry in drawn["geometries"]]
+    facets = np.frombuffer(sent["data"].data, STL_FACET, -1, STL_HEADER)
     np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [1, 0, 0]], atol=1e-7)

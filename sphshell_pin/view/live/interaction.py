@@ -8,8 +8,9 @@ import numpy as np
 
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import NameNotFound
+from sphshell_pin.view.arrows import Forces
 from sphshell_pin.view.live.events import BadMessage, Client, Event
-from sphshell_pin.view.live.picture import Picture, PushShown, frame_point
+from sphshell_pin.view.live.picture import Picture, frame_point
 from sphshell_pin.view.live.player import Interactive
 from sphshell_pin.view.live.window import LiveWindow
 from sphshell_pin.view.nodes import FloatArray, Json
@@ -39,7 +40,7 @@ class Interaction:
         self._pushed: tuple[str, FloatArray, float] | None = None  # until a time [s]
 
     @property
-    def push(self) -> PushShown | None:
+    def push(self) -> Forces | None:
         """The push of now."""
         if self._pushed is None or self._player.time > self._pushed[2]:
             self._pushed = None
@@ -47,7 +48,7 @@ class Interaction:
         body, force, _ = self._pushed
         display = self._picture.display
         point = frame_point(display.scene.model, display.data, body)
-        return None if point is None else PushShown.at(point, force)
+        return None if point is None else Forces(point[None], force[None], np.zeros((1, 3)))
 
     @property
     def drag(self) -> Dragged | None:
