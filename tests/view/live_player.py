@@ -39,7 +39,6 @@ class BallPlayer:
         self.knob_values = {"stiffness": stiffness, "radius": RADIUS}
         self.wall_per_second = wall_per_second
         self.calls = []
-        self.fails = None
         self._make_scene()
         self.reset()
 
@@ -82,8 +81,6 @@ class BallPlayer:
 
     def advance(self, duration, wall=np.inf):
         self.calls.append((duration, wall))
-        if self.fails is not None:
-            raise self.fails
         if self.wall_per_second:
             duration = min(duration, wall / self.wall_per_second)
         end = self.time + duration

@@ -1,5 +1,6 @@
-"""Shells coloured by how far curved elements stand off the flat ones."""
+"""Shells coloured by how far curved elements stand off the flat ones, and by kinds of faces."""
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,7 +11,7 @@ from sphshell_pin.shell.curved import curved_mesh
 from sphshell_pin.view.display import Display
 from sphshell_pin.view.distance import RAMP, check_coloring, draw_distance
 from sphshell_pin.view.recording import render_recording
-from sphshell_pin.view.surface import ramp_colors
+from sphshell_pin.view.surface import FACE_COLORS, hex_colors, ramp_colors
 from tests.shell.surfaces import plate
 from tests.shell.test_curvature import ball
 from tests.view.drawn import Film, attribute
@@ -107,14 +108,38 @@ def test_many_elements_have_one_colour_each(monkeypatch):
     assert np.ptp(colors[:, 0], axis=0).max() > 0.1
 
 
-def test_a_recording_states_the_range():
-    shell = ball(8)
+@pytest.mark.parametrize("method", ["smooth", "facets"])
+def test_each_kind_has_its_color(method):
+    shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3), segments=36)
+    sheet = Sheet(scene_of(shell, method=method))
+    sheet.display.show("faces", True)
+    ((points, colors),) = sheet.drawn("faces")
+    flat = np.isclose(np.abs(points[:, 2]), 0.15)
+    kinds = dict(zip(FACE_COLORS, hex_colors(tuple(FACE_COLORS.values())), strict=True))
+    is_plane = np.isclose(colors, kinds["plane"], atol=1e-6).all(axis=1)
+    is_cylinder = np.isclose(colors, kinds["cylinder"], atol=1e-6).all(axis=1)
+    assert (is_plane ^ is_cylinder).all()
+    assert flat[is_plane].all()
+    assert np.allclose(np.linalg.norm(points[is_cylinder, :2], axis=1), 0.1, rtol=5e-3)
+    assert is_cylinder.any()
+    assert is_plane.any()
+
+
+def test_a_recording_states_range_and_kinds():
+    shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3))
     scene = scene_of(shell)
-    integrator = sp.SemiImplicitEuler(1e-3)
-    result = sp.Simulation(scene, integrator).run(np.array([0.0, 0.0, 2.2]), np.zeros(3), 0.01)
-    text = f"distance of curved from flat: 0 to {1e3 * shell.curvature_report().largest:.3g} mm"
-    assert text in render_recording(result, scene, color="distance")
-    assert text not in render_recording(result, scene)
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
+        [0.0, 0.0, 0.3], np.zeros(3), 0.01
+    )
+    largest = f"0 to {1e3 * shell.curvature_report().largest:.3g} mm"
+    said = {
+        "distance": f"distance of curved from flat: {largest}",
+        "faces": "on no face recognized",
+    }
+    for color in ("surface", *said):
+        page = render_recording(result, scene, color=color)
+        assert {one for one, text in said.items() if text in page} == {color} - {"surface"}
+    assert FACE_COLORS["torus"] in page
     with pytest.raises(InvalidParameter, match="surface, patches, distance"):
         render_recording(result, scene, color="depth")
 
