@@ -110,5 +110,5 @@ def _draw(
         if run.label in curves:
             t, values = thinned(curves[run.label].t, curves[run.label].values * factor)
             color = FIRST_COLOR if number == 0 else COLORS[(number - 1) % len(COLORS)]
-            width, style = (2.2, "-") if number == 0 else (1.2, "-")
-            axis.plot(t, values, style, color=color, linewidth=width, label=run.label)
+            width = 1.2 if number else 2.2
+            axis.plot(t, values, color=color, linewidth=width, label=run.label)

@@ -56,7 +56,7 @@ def plot_uncertainty(
     parts = [one is not None for one in (values, tornado, indices)]
     inputs = max((len(one) for one in (tornado, indices) if one is not None), default=0)
     height = max(4.2, 1.6 + 0.42 * min(inputs, _MOST_INPUTS))
-    canvas = new_figure(max(7.0, 5.4 * sum(parts)), height)
+    canvas = new_figure(max(7.0, 5.4 * sum(parts)), height, figure)
     if units is None:
         units = {} if tornado is None else units_of(tornado)
     axes = iter(canvas.subplots(1, max(sum(parts), 1), squeeze=False)[0])
@@ -66,7 +66,6 @@ def plot_uncertainty(
         _draw_tornado(next(axes), tornado, figure, units)
     if indices is not None:
         _draw_indices(next(axes), indices)
-    canvas.suptitle(figure, fontsize=12)
     return canvas
 
 

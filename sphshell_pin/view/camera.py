@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.view.nodes import Command, FloatArray, set_camera
+from sphshell_pin.view.nodes import Command, FloatArray
 from sphshell_pin.view.robot import check_geometry_model
 
 if TYPE_CHECKING:
@@ -207,17 +207,18 @@ def look(visualizer: Visualizer, view: View) -> None:
 
     meshcat 0.3.2's own live page does not know the target yet, and looks at the world's origin.
     """
-    set_camera(
-        visualizer,
-        {
-            "type": "PerspectiveCamera",
-            "fov": FIELD_OF_VIEW,
-            "aspect": ASPECT,
-            "near": 0.005 * view.distance,
-            "far": 200.0 * view.distance,
-            "zoom": 1.0,
-        },
-    )
+    path = visualizer["/Cameras/default/rotated"].path.lower()
+    camera = {
+        "uuid": f"{path}#camera",
+        "type": "PerspectiveCamera",
+        "fov": FIELD_OF_VIEW,
+        "aspect": ASPECT,
+        "near": 0.005 * view.distance,
+        "far": 200.0 * view.distance,
+        "zoom": 1.0,
+    }
+    placed = {"type": "set_object", "path": path, "object": {"object": camera}}
+    visualizer.window.send(Command(placed))
     visualizer["/Cameras/default/rotated/<object>"].set_property("position", _y_up(view.eye))
     target = {"type": "set_target", "path": "", "value": _y_up(view.target)}
     visualizer.window.send(Command(target))

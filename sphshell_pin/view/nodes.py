@@ -204,14 +204,6 @@ def show(visualizer: Visualizer, on: bool) -> None:
     visualizer.set_property("visible", bool(on))
 
 
-def set_camera(visualizer: Visualizer, camera: Json) -> None:
-    """Replace the page's camera by the three.js `camera` description."""
-    node = visualizer["/Cameras/default/rotated"]
-    path = node.path.lower()
-    data = {"object": {"uuid": f"{path}#camera", **camera}}
-    visualizer.window.send(Command({"type": "set_object", "path": path, "object": data}))
-
-
 def is_below(path: str, parent: str) -> bool:
     """Whether the node at `path` is the one at `parent`, or below it."""
     return f"{path}/".startswith(parent.rstrip("/") + "/")
