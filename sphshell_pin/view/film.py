@@ -26,7 +26,7 @@ from sphshell_pin.atomic.files import write_folder
 from sphshell_pin.checks import check_finite, check_vector
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.films import Pixels, check_film, write_film
-from sphshell_pin.view.recording import Shown, check_pace, render_recording, sound_rows
+from sphshell_pin.view.recording import Shown, check_pace, sound_rows
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
@@ -137,17 +137,7 @@ def render_film(
     if film:
         check_film(path, size, fps)
     times = _times(result, (time, time) if still else span, still=still)
-    page = render_recording(
-        result,
-        shown.scene,
-        shown.visual_model,
-        fps=fps,
-        speed=shown.speed,
-        title=shown.title,
-        span=times,
-        whole=True,
-    )
-    stage = _Stage(page, size, camera, chart, dark, told)
+    stage = _Stage(shown.page(fps, times), size, camera, chart, dark, told)
 
     def draw() -> None:
         with stage.opened(path):

@@ -90,15 +90,15 @@ def typed_array(values: FloatArray | IntArray) -> Json:
     }
 
 
-def triangle_mesh(vertices: FloatArray, triangles: IntArray) -> Json:
-    """Geometry of an indexed mesh: `vertices` (n, 3) [m], `triangles` (t, 3)."""
-    return {
-        "type": "BufferGeometry",
-        "data": {
-            "attributes": {"position": typed_array(vertices)},
-            "index": typed_array(triangles.reshape(-1)),
-        },
-    }
+def triangle_mesh(
+    vertices: FloatArray, triangles: IntArray, colors: FloatArray | None = None
+) -> Json:
+    """Geometry of an indexed mesh: `vertices` (n, 3) [m] of `colors` (n, 3), `triangles` (t, 3)."""
+    attributes = {"position": typed_array(vertices)}
+    if colors is not None:
+        attributes["color"] = typed_array(colors)
+    data = {"attributes": attributes, "index": typed_array(triangles.reshape(-1))}
+    return {"type": "BufferGeometry", "data": data}
 
 
 def line_segments(vertices: FloatArray, segments: IntArray) -> Json:

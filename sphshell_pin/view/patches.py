@@ -13,14 +13,13 @@ from sphshell_pin.view.nodes import (
     FloatArray,
     Move,
     hidden_at,
-    material,
     mover,
+    on_top,
     pose,
     set_object,
     triangle_mesh,
-    typed_array,
 )
-from sphshell_pin.view.surface import ramp_colors
+from sphshell_pin.view.surface import between_rings, ramp_colors
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -81,14 +80,7 @@ class PatchPool:
             moves = []
             for level, mesh in enumerate(meshes):
                 node = visualizer[f"patch_{index}_{level}"]
-                look = material(
-                    "MeshBasic",
-                    0xFFFFFF,
-                    vertexColors=True,
-                    depthTest=False,
-                    depthWrite=False,
-                    transparent=True,
-                )
+                look = on_top(0xFFFFFF) | {"side": 2, "vertexColors": True}
                 set_object(node, mesh, look, order=9)
                 moves.append(mover(node))
             self._moves.append(moves)
@@ -135,14 +127,5 @@ def _disc(level: float, rings: int = 10, sectors: int = 40) -> dict[str, Any]:
     angle = 2.0 * np.pi * np.arange(sectors) / sectors
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros(sectors)], axis=1)
     vertices = (radius[:, None, None] * around).reshape(-1, 3)
-    ring, sector = np.meshgrid(np.arange(len(radius) - 1), np.arange(sectors), indexing="ij")
-    first, beside = sector + sectors * ring, (sector + 1) % sectors + sectors * ring
-    triangles = np.concatenate(
-        [
-            np.stack([first, first + sectors, beside + sectors], axis=-1).reshape(-1, 3),
-            np.stack([first, beside + sectors, beside], axis=-1).reshape(-1, 3),
-        ]
-    )
-    mesh = triangle_mesh(vertices, triangles.astype(np.int32))
-    mesh["data"]["attributes"]["color"] = typed_array(np.repeat(color, sectors, axis=0))
-    return mesh
+    triangles = between_rings(len(radius), sectors)
+    return triangle_mesh(vertices, triangles, np.repeat(color, sectors, axis=0))

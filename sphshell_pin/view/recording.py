@@ -256,6 +256,19 @@ class Shown:
         speed = 1.0 if speed is None else speed
         return cls(result, scene, visual_model, title or "A finished run", speed)
 
+    def page(self, fps: float = 30, span: tuple[float, float] | None = None) -> str:
+        """Return the page of all of the robot: see `render_recording`."""
+        return render_recording(
+            self.result,
+            self.scene,
+            self.visual_model,
+            fps=fps,
+            speed=self.speed,
+            title=self.title,
+            span=span,
+            whole=True,
+        )
+
 
 def view_result(
     result: Result,
@@ -270,16 +283,8 @@ def view_result(
     if isinstance(height, bool) or not isinstance(height, int) or height <= 0:
         raise InvalidParameter("height", height, "must be a positive number of pixels")
     shown = Shown.of(result, scene, visual_model, title, speed)
-    page = render_recording(
-        result,
-        shown.scene,
-        shown.visual_model,
-        speed=shown.speed,
-        title=shown.title,
-        whole=True,
-    )
     bare = shown.visual_model is None and has_links(shown.scene.model)
-    return RecordingView(page, height, BARE if bare else "")
+    return RecordingView(shown.page(), height, BARE if bare else "")
 
 
 def choose_rows(

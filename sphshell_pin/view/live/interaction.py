@@ -17,6 +17,7 @@ from sphshell_pin.view.nodes import FloatArray, Json
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario.live.drag import Dragged
+    from sphshell_pin.scenario.live.joint_targets import Target
     from sphshell_pin.view.live.player import Player
 
 G = 9.81
@@ -68,18 +69,15 @@ class Interaction:
         if self._interactive is not None and self._window is not None:
             stiffness = float(f"{G / (SAG * self._picture.view.distance):.2g}")
             drag = {"nodes": self._picture.display.grips(), "stiffness": stiffness}
-        targets = () if self._interactive is None else self._interactive.targets
         names = ("joint", "rotates", "low", "high", "limited", "value")
-        return {
-            "drag": drag,
-            "targets": [{name: getattr(one, name) for name in names} for one in targets],
-        }
+        targets = [{name: getattr(one, name) for name in names} for one in self._targets()]
+        return {"drag": drag, "targets": targets}
 
     def state(self) -> Json:
         """Return what is done now, for the panel."""
-        drag, targets = self.drag, () if self._interactive is None else self._interactive.targets
+        drag = self.drag
         return {
-            "targets": {one.joint: one.value for one in targets},
+            "targets": {one.joint: one.value for one in self._targets()},
             "drag": drag
             and {
                 "body": drag.frame,
@@ -87,6 +85,9 @@ class Interaction:
                 "target": drag.target_world,
             },
         }
+
+    def _targets(self) -> tuple[Target, ...]:
+        return () if self._interactive is None else self._interactive.targets
 
     def do(self, client: Client, event: Event) -> None:
         """Push or drag a body, or move the target of a joint."""
