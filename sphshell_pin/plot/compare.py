@@ -93,10 +93,7 @@ def _quantity(name: str) -> str:
 
 
 def _draw(
-    axis: Axes,
-    quantity: str,
-    curves: dict[str, Curve | CurveDifference],
-    comparison: Comparison,
+    axis: Axes, quantity: str, curves: dict[str, Curve | CurveDifference], comparison: Comparison
 ) -> None:
     """Draw `curves` by the label of their run, in a unit that fits the largest."""
     axis.margins(x=0.01)

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sphshell_pin.dynamics.result.pair_series import PairSeries
-from sphshell_pin.plot.figure import (
-    NO_CONTACT,
-    count,
-    finish_axis,
-    label_axis,
-    new_figure,
-    say,
-)
+from sphshell_pin.plot.figure import NO_CONTACT, count, finish_axis, label_axis, new_figure, say
 from sphshell_pin.plot.series import FloatArray, thinned
 
 if TYPE_CHECKING:

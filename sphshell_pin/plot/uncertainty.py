@@ -139,10 +139,7 @@ def _draw_tornado(axis: Axes, tornado: pd.DataFrame, figure: str, units: Mapping
     median = float(shown["median"].iloc[0])
     places = np.arange(len(shown))[::-1]
     # Each half as high as its row: both may lie on one side of the median.
-    for kind, percent, color, shift in (
-        ("low", 5, LOW_COLOR, 0.2),
-        ("high", 95, HIGH_COLOR, -0.2),
-    ):
+    for kind, percent, color, shift in (("low", 5, LOW_COLOR, 0.2), ("high", 95, HIGH_COLOR, -0.2)):
         ends = shown[kind].to_numpy(float)
         axis.barh(
             places + shift,

@@ -121,10 +121,7 @@ class Display:
         self.update(neutral)
 
     def update(
-        self,
-        q: ArrayLike,
-        contacts: Contacts | None = None,
-        patches: PatchRows | None = None,
+        self, q: ArrayLike, contacts: Contacts | None = None, patches: PatchRows | None = None
     ) -> None:
         """Show configuration `q` (nq,) and `contacts` (of `scene.contacts`, or None for none).
 

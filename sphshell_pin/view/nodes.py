@@ -268,6 +268,4 @@ def rotation_to(direction: FloatArray) -> FloatArray:
         across = (y, -x, 0.0)
     length = math.sqrt(1.0 - least * least)
     a, b, c = across[0] / length, across[1] / length, across[2] / length
-    return np.array(
-        ((a, x, b * z - c * y), (b, y, c * x - a * z), (c, z, a * y - b * x)),
-    )
+    return np.array(((a, x, b * z - c * y), (b, y, c * x - a * z), (c, z, a * y - b * x)))

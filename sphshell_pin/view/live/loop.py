@@ -15,13 +15,7 @@ from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.view.live.charts import Charts, Point
 from sphshell_pin.view.live.events import BadMessage, Client, Event, newest
 from sphshell_pin.view.live.foreign import ForeignWindow, window_of
-from sphshell_pin.view.live.greeting import (
-    FASTEST,
-    SLOWEST,
-    STRIP_SECONDS,
-    check_speed,
-    greeting,
-)
+from sphshell_pin.view.live.greeting import FASTEST, SLOWEST, STRIP_SECONDS, check_speed, greeting
 from sphshell_pin.view.live.interaction import Interaction
 from sphshell_pin.view.live.panel import Panel, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture

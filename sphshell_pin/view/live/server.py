@@ -16,13 +16,7 @@ from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 from sphshell_pin.view.live.access import Access
-from sphshell_pin.view.live.events import (
-    LARGEST_MESSAGE,
-    BadMessage,
-    Client,
-    Event,
-    read_event,
-)
+from sphshell_pin.view.live.events import LARGEST_MESSAGE, BadMessage, Client, Event, read_event
 from sphshell_pin.view.nodes import viewer_script
 
 if TYPE_CHECKING:
@@ -201,10 +195,7 @@ class Server:
         files |= {"": PAGE / "index.html", "viewer.js": viewer}
         shared = {"server": self, "files": files}
         application = tornado.web.Application(
-            [
-                (r"/(?:[^/]*/)?socket", socket_handler, shared),
-                (r".*", file_handler, shared),
-            ],
+            [(r"/(?:[^/]*/)?socket", socket_handler, shared), (r".*", file_handler, shared)],
             websocket_max_message_size=4 * LARGEST_MESSAGE,
             websocket_ping_interval=15,
             websocket_ping_timeout=15,
