@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,23 +36,19 @@ _CELLS = 12  # of the square that stands for a plane, along a side
 COLORINGS = ("distance", "faces", "patches")
 """Ways to color a shell; of several that are on the first is seen."""
 
-ShellKey = tuple[int, int, bytes, bool]
-SphereKey = tuple[int, bytes, float]  # joint, placement in it, radius
-PlaneKey = tuple[int, bytes]
 
-
-def shell_key(pair: ContactPair) -> ShellKey:
+def shell_key(pair: ContactPair) -> Hashable:
     """Return a key: pairs with equal keys share the picture of their shell."""
     place = pair.placement_j.homogeneous.tobytes()
     return id(pair.shell), pair.joint_j, place, pair.method == "smooth"
 
 
-def sphere_key(sphere: PlacedSphere) -> SphereKey:
+def sphere_key(sphere: PlacedSphere) -> Hashable:
     """Return a key: spheres with equal keys share a picture."""
     return sphere.joint, sphere.placement.homogeneous.tobytes(), sphere.radius
 
 
-def plane_key(pair: ContactPair) -> PlaneKey:
+def plane_key(pair: ContactPair) -> Hashable:
     """Return a key: pairs with equal keys share the picture of their plane."""
     return pair.joint_i, pair.placement_i.homogeneous.tobytes()
 
@@ -61,8 +58,7 @@ class DrawnShell(OnJoint):
 
     def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         shell = pair.shell
-        if shell is None:
-            raise ValueError("a pair without a shell")
+        assert shell is not None
         node = visualizer[f"{index}_{node_name(shell.name)}"]
         super().__init__(node, pair.joint_j, pair.placement_j)
         self.shell = shell
