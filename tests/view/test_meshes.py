@@ -120,12 +120,12 @@ def ball(rings=24):
     return np.concatenate(facets)
 
 
-def stl(corners, title=b""):
+def stl(corners, title=b"", normals=None):
     """A binary STL file of these facets, written field by field."""
     parts = [title.ljust(80, b" "), len(corners).to_bytes(4, "little")]
-    for facet in corners:
-        normal = np.cross(facet[1] - facet[0], facet[2] - facet[0])
-        normal /= np.linalg.norm(normal) or 1.0
+    if normals is None:
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    for normal, facet in zip(normals, corners, strict=True):
         parts += [np.vstack((normal, facet)).astype("<f4").tobytes(), b"\0\0"]
     return b"".join(parts)
 
@@ -190,15 +190,12 @@ def plain(value):
 
 def stl_of(normals, corners):
     """Return facets as a binary STL file, and as a text file."""
-    facets = np.zeros(len(corners), STL_FACET)
-    facets["normal"], facets["corners"] = normals, corners
-    binary = b"a title".ljust(80) + len(facets).to_bytes(4, "little") + facets.tobytes()
-    text = "solid a\n"
-    for normal, three in zip(facets["normal"], facets["corners"], strict=True):
+    text, normals, corners = "solid a\n", np.asarray(normals, "<f4"), np.asarray(corners, "<f4")
+    for normal, three in zip(normals, corners, strict=True):
         text += f"facet normal {' '.join(map(repr, normal.tolist()))}\n outer loop\n"
         text += "".join(f"  vertex {' '.join(map(repr, one.tolist()))}\n" for one in three)
         text += " endloop\nendfacet\n"
-    return binary, (text + "endsolid a\n").encode()
+    return stl(corners, b"a title", normals), (text + "endsolid a\n").encode()
 
 
 @pytest.mark.parametrize("kind", [0, 1])
