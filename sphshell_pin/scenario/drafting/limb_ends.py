@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import coal
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-from scipy.spatial import ConvexHull, QhullError
 
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.robots import LoadedRobot
+from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
 
 Array = npt.NDArray[np.float64]
@@ -21,6 +22,8 @@ Array = npt.NDArray[np.float64]
 _STANDS_OUT, _BALL, _OF_REACH = 0.25, 1 / 3, 0.01
 # Steps of the search for the ball that covers an end, and of that for the smallest ball.
 _DEPTHS, _STEPS = 40, 300
+# Of corners in a plane: their distance from it, as a part of their spread.
+_FLAT = 1e-6
 # Of what is at the axis of a joint: its distance from it, as a part of the link's size.
 _AT_AXIS = 0.2
 
@@ -52,11 +55,23 @@ class LinkGeometry:
 
     def depth(self, center: Array) -> float:
         """Return how far `center` (3,) [m] is inside the convex hull [m]; negative outside."""
-        try:
-            hull = ConvexHull(self.corners)
-        except (QhullError, ValueError):  # flat, or nothing
+        spread = self.corners - self.corners.mean(axis=0) if len(self.corners) else np.zeros((1, 3))
+        # Coal crashes on what is flat.
+        if np.linalg.matrix_rank(spread, tol=_FLAT * float(np.linalg.norm(spread))) < 3:
             return -math.inf
-        return float(-(hull.equations[:, :3] @ center + hull.equations[:, 3]).max())
+        cloud = coal.BVHModelOBBRSS()
+        cloud.beginModel(0, len(self.corners))
+        cloud.addVertices(self.corners)
+        cloud.endModel()
+        cloud.buildConvexHull(True, "Qt")
+        hull, points = cloud.convex, np.array(cloud.convex.points())
+        faces = [[hull.polygons(k)[i] for i in range(3)] for k in range(hull.num_polygons)]
+        first, second, third = points[np.array(faces)].transpose(1, 0, 2)
+        normals = np.cross(second - first, third - first)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        inward = np.einsum("ij,ij->i", normals, points.mean(axis=0) - first)
+        depths = np.einsum("ij,ij->i", normals, center - first) * np.sign(inward)
+        return float(depths.min())
 
     def end(self, radius: float | None = None) -> End:
         """Return a ball at the end, of `radius` [m] if that is given.
@@ -65,7 +80,7 @@ class LinkGeometry:
         fingertip's own sphere. On a flat end it is a smaller ball in the middle of it.
         """
         if not len(self.corners):
-            ball = radius or _rounded(_OF_REACH * model_reach(self._model))
+            ball = radius or rounded(_OF_REACH * model_reach(self._model))
             return End(np.zeros(3), ball, "a ball on its origin, as its link has no geometry")
         ahead = self._ahead()
         along = self.corners @ ahead
@@ -77,8 +92,8 @@ class LinkGeometry:
                 break
         before = float(along.max() - center @ ahead)
         if radius is None and covers - before < _STANDS_OUT * covers:
-            return End(center, _rounded(covers), f"it covers the end of link '{self.link}'")
-        ball = _rounded(_BALL * covers) if radius is None else radius
+            return End(center, rounded(covers), f"it covers the end of link '{self.link}'")
+        ball = rounded(_BALL * covers) if radius is None else radius
         front = center + (before + ball) * ahead
         return End(front, ball, f"a ball on the end of link '{self.link}'")
 
@@ -125,10 +140,6 @@ class LinkGeometry:
             if found:
                 return np.concatenate(found)
         return np.zeros((0, 3))
-
-
-def _rounded(x: float) -> float:
-    return float(f"{x:.2g}")
 
 
 def _moved(place: pin.SE3, points: Array) -> Array:

@@ -56,7 +56,7 @@ def try_out(built: Built, plan: Plan, links: Links) -> Fault | None:
         or _link_fault(built, result, links)
         or _force_fault(built, plan, result)
         or _path_fault(built, plan, result)
-        or _figure_fault(built, result)
+        or figure_fault(built, result)
     )
 
 
@@ -142,7 +142,8 @@ def _forces(result: Result) -> Array:
     return sizes
 
 
-def _figure_fault(built: Built, result: Result) -> Fault | None:
+def figure_fault(built: Built, result: Result) -> Fault | None:
+    """Say which of the scenario's expected figures is not met, if one is not."""
     for one in judge(built, result):
         if not one.met:
             return Fault("figure", f"{one.figure} is {one.measured:.3g}, not {one.expected}")

@@ -262,33 +262,20 @@ def explain_built(built: Built) -> Explanation:
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
-    crease_angle = float(np.deg2rad(section.crease_angle_deg))
+    options: dict[str, Any] = {
+        name: getattr(section, name) for name in ("chord_error", "side", "name")
+    }
+    options["crease_angle"] = float(np.deg2rad(section.crease_angle_deg))
     with blamed_on(path, key):
         if section.primitive is not None:
-            shell = section.primitive.shell(
-                chord_error=section.chord_error,
-                segments=section.segments,
-                side=section.side,
-                crease_angle=crease_angle,
-                name=section.name,
-            )
+            shell = section.primitive.shell(segments=section.segments, **options)
         else:
             file = path.parent / str(section.file)
             if not os.path.isfile(file):
                 raise SphshellError(f"no such surface file: {file}")
-            shell = sp.Shell.from_file(
-                file,
-                unit=section.unit,
-                scale=section.scale,
-                chord_error=section.chord_error,
-                bodies=section.bodies,
-                faces=section.faces,
-                time_limit=section.time_limit,
-                memory_limit=section.memory_limit,
-                side=section.side,
-                crease_angle=crease_angle,
-                name=section.name,
-            )
+            of_files = ("unit", "scale", "bodies", "faces", "time_limit", "memory_limit")
+            options |= {name: getattr(section, name) for name in of_files}
+            shell = sp.Shell.from_file(file, **options)
         return shell if section.magnify == 1.0 else shell.transformed(scale=section.magnify)
 
 
@@ -337,22 +324,17 @@ def _add_contact(
     with blamed_on(path, key), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
         law, friction = laws
+        how: dict[str, Any] = {
+            "law": law,
+            "friction": friction,
+            "method": contact.method,
+            "name": contact.name,
+        }
         one = contact.sphere or contact.plane
         if one is not None:
-            scene.add_contact(
-                to_end(one), shell, frame, placement, law, friction, contact.method, contact.name
-            )
+            scene.add_contact(to_end(one), shell, frame, placement, **how)
         else:
-            scene.add_contacts(
-                several,
-                shell,
-                frame,
-                placement,
-                law=law,
-                friction=friction,
-                method=contact.method,
-                name=contact.name,
-            )
+            scene.add_contacts(several, shell, frame, placement, **how)
 
 
 def _build_sensors(stated: Sequence[Component], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
