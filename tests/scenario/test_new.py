@@ -269,6 +269,7 @@ def test_its_knobs_turn(tmp_path):
         (("ball",), {"frame": "bal"}, FrameNotFound, "no frame 'bal'"),
         (("ball",), {"radius": -1.0}, InvalidParameter, "must be positive"),
         (("ball",), {"press": 3.0}, SphshellError, "leave out --press"),
+        (("ball",), {"at": (0.0, 0.0, 0.0)}, SphshellError, "leave out --press, --place, --at and"),
         (("ball",), {"material": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"against": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"base": "fixed"}, SphshellError, "no joint: .* --base floating"),

@@ -207,11 +207,6 @@ def test_what_cannot_be_asked(options, error, match, arm, plate, tmp_path):
     assert not (tmp_path / "a.toml").exists()
 
 
-def test_a_body_that_falls_takes_no_place(tmp_path):
-    with pytest.raises(SphshellError, match="leave out --press, --place, --at and --path"):
-        new_scenario("ball", "plane", at=(0.0, 0.0, 0.0), out=tmp_path / "a.toml")
-
-
 def test_what_fails_is_told_while_others_are_tried(tmp_path):
     """Dry friction keeps the force off: the first run says so."""
     text = arm_urdf(tmp_path).read_text(encoding="utf-8")
