@@ -20,8 +20,8 @@ from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.drafting.hand_text import DURATION, GAP, HandDraft
 from sphshell_pin.scenario.drafting.part import Part, part_file
-from sphshell_pin.scenario.drafting.plan import GRAVITY
 from sphshell_pin.scenario.drafting.pose_search import Working, stated_kinds
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
 from sphshell_pin.scenario.drafting.trial import figure_fault
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built

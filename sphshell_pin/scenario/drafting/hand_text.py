@@ -16,7 +16,12 @@ from sphshell_pin.contact.materials import Material, friction_between
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.part import Part, part_file
-from sphshell_pin.scenario.drafting.plan import bearable, hertz_stiffness, materials_note, sticking
+from sphshell_pin.scenario.drafting.tip_contact import (
+    Contact,
+    bearable,
+    hertz_stiffness,
+    sticking,
+)
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
@@ -55,6 +60,12 @@ class HandDraft:
     def shell(self) -> ShellSection:
         """The table of the surface."""
         return self.built.scenario.shell[0]
+
+    @property
+    def contact(self) -> Contact:
+        """Of its tips with the part."""
+        radius, share = float(self.hand.radii.min()), self.part.mass / len(self.hand.tips)
+        return sticking(self.materials, radius, 0.1, self.press, share)
 
     @property
     def press(self) -> float:
@@ -111,7 +122,6 @@ class HandDraft:
         kp, kd = self.gains()
         drawn = pin.integrate(model, self.pressed_in(), hand.torques(grasp) / kp)
         one, other = self.materials
-        radius, mass = float(hand.radii.min()), self.part.mass / len(hand.tips)
         place = grasp.placement
         root = [*place.translation.tolist(), *pin.Quaternion(place.rotation).coeffs().tolist()]
         stated = self.built.scenario.robot[0].model_dump(exclude_defaults=True)
@@ -131,7 +141,7 @@ class HandDraft:
             draft=self,
             tip=one,
             part=other,
-            contact=sticking(self.materials, radius, 0.1, self.press, mass),
+            contact=self.contact,
             title=title,
             title_text=_toml(title),
             source=source,
@@ -143,7 +153,7 @@ class HandDraft:
             surface="\n".join(f"{key} = {_toml(value)}" for key, value in surface.items()),
             spheres=spheres,
             shell=_toml(self.shell.name),
-            radius=radius,
+            radius=float(hand.radii.min()),
             kp=kp,
             kd=kd,
             drawn=_joints(model, drawn, hand.joints, "hand/"),
@@ -167,7 +177,7 @@ class HandDraft:
             f"the part is {other.name} all through and weighs {self.part.mass:.3g} kg",
             f"the fingertips press with {self.press:.3g} N at most; its weight and their forces "
             f"use {100 * used:.0f} % of the friction",
-            materials_note(one, other),
+            self.contact.note,
             *notes,
         )
 

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.contact.materials import (
-    Material,
-    find_material,
-    friction_between,
-    restitution_between,
-)
+from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.placing import Place
 from sphshell_pin.scenario.drafting.poses import Stance
+from sphshell_pin.scenario.drafting.tip_contact import (
+    GRAVITY,
+    Contact,
+    bearable,
+    contact_of,
+    hertz_stiffness,
+    sticking,
+)
 from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
 from sphshell_pin.scenario.drafting.wording import (
     axis_name,
@@ -34,7 +35,6 @@ from sphshell_pin.shell import Shell
 
 Array = npt.NDArray[np.float64]
 
-GRAVITY = 9.81
 UP = np.array([0.0, 0.0, 1.0])
 
 # Of a tip at the start, as a part of its radius; of a body that falls, and of feet.
@@ -55,28 +55,6 @@ RAMP = 0.25
 TIP_RATE, TIP_LAG = 20.0, 0.2
 # Sag of a standing robot's joints under its weight [rad].
 SAG = 0.05
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Law and friction of a tip, as the scenario states them."""
-
-    material: Material
-    against: Material
-    restitution: float
-    speed: float
-    """At which the restitution holds: of the first touch [m/s]."""
-    mu_static: float
-    mu_dynamic: float
-    v_static: float
-    """Slip speed [m/s] at which friction is full."""
-    bristle: tuple[float, float] | None = None
-    """Stiffness [N/m] and damping [N s/m] of bristles, for what has to stand."""
-
-    @property
-    def note(self) -> str:
-        """Where the values are from."""
-        return materials_note(self.material, self.against)
 
 
 @dataclass(frozen=True)
@@ -160,19 +138,6 @@ class Plan:
     """What was changed of a draft that failed; "" of the first draft."""
 
 
-def chosen_materials(asked: Asked, tips: Sequence[Tip], load: float) -> tuple[Material, Material]:
-    """Return what sphere and surface are made of; `load` [kg] rests on each, 0: it falls."""
-    other = find_material(asked.against)
-    if asked.material is not None:
-        return find_material(asked.material), other
-    if not load:
-        return find_material("steel"), other
-    # A tip is of rubber, unless the mass behind it would press rubber in too far.
-    rubber, radius = find_material("rubber"), min(tip.radius for tip in tips)
-    bears = bearable(radius, rubber, other) >= load * GRAVITY
-    return rubber if bears else find_material("plastic"), other
-
-
 def press_force(
     stance: Stance, tip: Tip, materials: tuple[Material, Material], press: float | None
 ) -> float:
@@ -223,7 +188,7 @@ def press_plan(
     """
     stance, path = place.stance, way.points
     rate = rounded(PATH_RATE * tip.radius)
-    contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
+    contact = contact_of(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
     softest = contact.mu_static * force / (TIP_LAG * tip.radius)
     stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
     mass = math.sqrt(stance.mass * stance.slide_mass)
@@ -295,7 +260,7 @@ def plan_fall(
         f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
         f"it falls {mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
     )
-    contact = _contact(materials, speed, 0.005)
+    contact = contact_of(materials, speed, 0.005)
     return Plan((tip,), contact, None, 1.0, gap, pin.SE3.Identity(), start, why)
 
 
@@ -333,49 +298,8 @@ def plan_stand(
     return Plan(tips, contact, control, 2.0, gap, place, None, tuple(why))
 
 
-def materials_note(one: Material, other: Material) -> str:
-    """Return the sentence that says where law and friction are from."""
-    return (
-        f"law and friction of {one.name} on {other.name}, typical values: --law and --against "
-        "name others"
-    )
-
-
-def hertz_stiffness(radius: float, one: Material, other: Material) -> float:
-    """Return Hertz's stiffness [N/m^1.5] of a sphere of `radius` [m] on a plane."""
-    softness = (1 - one.poisson**2) / one.young + (1 - other.poisson**2) / other.young
-    return 4 / 3 * math.sqrt(radius) / softness
-
-
-def bearable(radius: float, one: Material, other: Material) -> float:
-    """Return the load [N] that presses a sphere of `radius` [m] in by a fifteenth of it."""
-    return float(hertz_stiffness(radius, one, other) * (radius / 15) ** 1.5)
-
-
-def sticking(
-    materials: tuple[Material, Material], radius: float, speed: float, load: float, mass: float
-) -> Contact:
-    """Return a contact whose friction sticks under a `load` [N], that of a `mass` [kg]."""
-    slope = 1.5 * hertz_stiffness(radius, *materials) ** (2 / 3) * load ** (1 / 3)
-    bristle = (rounded(slope), rounded(0.2 * math.sqrt(slope * mass)))
-    return replace(_contact(materials, speed, 0.005), bristle=bristle)
-
-
 def _direction(direction: Array) -> str:
     return axis_name(direction) or listed(direction, ".2f")
-
-
-def _contact(materials: tuple[Material, Material], speed: float, slip: float) -> Contact:
-    static, dynamic = friction_between(*materials)
-    return Contact(
-        materials[0],
-        materials[1],
-        restitution_between(*materials),
-        rounded(speed),
-        round(static, 3),
-        round(dynamic, 3),
-        rounded(slip),
-    )
 
 
 def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Material]) -> float:

@@ -25,7 +25,6 @@ from sphshell_pin.scenario.drafting.plan import (
     TIP_GAP,
     Plan,
     Press,
-    chosen_materials,
     plan_fall,
     plan_stand,
     press_force,
@@ -34,6 +33,7 @@ from sphshell_pin.scenario.drafting.plan import (
 )
 from sphshell_pin.scenario.drafting.poses import home_approach, joints_aside
 from sphshell_pin.scenario.drafting.refusals import Tried, cannot_stand, refusal
+from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
 from sphshell_pin.scenario.drafting.trial import Fault, try_out
 from sphshell_pin.scenario.drafting.wording import rounded
