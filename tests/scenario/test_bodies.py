@@ -11,7 +11,7 @@ from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.format.reading import read_scenario
-from tests.scenario.files import write
+from tests.scenario.files import pose_of, write
 
 TWO = """
 title = "a finger and a ball"
@@ -80,21 +80,16 @@ def test_a_robot_may_be_mounted_on_another(tmp_path):
     assembly = assembled(tmp_path, MOUNTED)
     model = assembly.model
 
-    def pose(model, q, frame):
-        data = model.createData()
-        pin.framesForwardKinematics(model, data, q)
-        return data.oMf[model.getFrameId(frame)]
-
     finger = robots.load("three_link_finger").model
     stand = pin.SE3(pin.rpy.rpyToMatrix(0, 0, np.pi / 2), np.array([0.1, 0.2, 0.3]))
     expected = (
-        pose(model, assembly.q0, "turntable/disc")
+        pose_of(model, assembly.q0, "turntable/disc")
         * stand
-        * pose(finger, np.array([0.3, 0.4, 0.5]), "tip")
+        * pose_of(finger, np.array([0.3, 0.4, 0.5]), "tip")
     )
-    found = pose(model, assembly.q0, "three_link_finger/tip")
+    found = pose_of(model, assembly.q0, "three_link_finger/tip")
     assert found.isApprox(expected, 1e-12)
-    assert np.allclose(pose(model, assembly.q0, "ball/root_joint").translation, [1, 2, 3])
+    assert np.allclose(pose_of(model, assembly.q0, "ball/root_joint").translation, [1, 2, 3])
     # The disc carries the finger's weight too.
     single = robots.load("turntable").model
     both = pin.computeTotalMass(single) + pin.computeTotalMass(finger)
