@@ -155,8 +155,7 @@ def _written(asked: Asked) -> NewScenario:
         section = section.model_copy(update={"base": shaped})
         bare = _build_bare(section, file)
     loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
-    too_large = radius and radius_fault(bare.assembly.model, radius)
-    if radius and too_large:
+    if radius is not None and (too_large := radius_fault(bare.assembly.model, radius)):
         raise InvalidParameter("radius", radius, too_large)
     if in_hand:
         tips = every_tip(loaded, asked)
