@@ -35,6 +35,7 @@ NEEDED = (
     "view/live/page/*.js",
     "robots/urdf/*.urdf",
     "robots/meshes/*.stl",
+    "scenario/drafting/*.template",
     "scenarios/*.toml",
     "scenarios/surfaces/*.LICENSE.txt",
     "benchmarks/*.py",

@@ -40,7 +40,7 @@ HEAVY = (
     "imageio_ffmpeg",
 )
 
-EXTRAS = [name for name in HEAVY if name not in ("trimesh", "pydantic", "typer", "rich")]
+EXTRAS = [name for name in HEAVY if name not in ("trimesh", "pydantic", "typer", "rich", "scipy")]
 
 
 @pytest.fixture(scope="module")

@@ -219,6 +219,7 @@ GOOD = {
             "sphshell_pin/view/live/page/page.js",
             "sphshell_pin/robots/urdf/ball.urdf",
             "sphshell_pin/robots/meshes/gear_20.stl",
+            "sphshell_pin/scenario/drafting/draft.template",
             "sphshell_pin/scenarios/sphere_on_shell.toml",
             "sphshell_pin/scenarios/surfaces/bladex_upper.LICENSE.txt",
             "sphshell_pin/benchmarks/__init__.py",

@@ -3,6 +3,12 @@
 from pathlib import Path
 from unittest.mock import patch
 
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.scenario import judge
+from sphshell_pin.scenario.running.run import simulate
+
 DROP = """
 title = "a ball falls on a box"
 
@@ -70,6 +76,28 @@ def write(folder: Path, text: str = DROP, name: str = "drop.toml") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def run_well(built):
+    """Run a scenario; it comes to its end, and to all figures that it expects."""
+    result, stopped = simulate(built)
+    assert stopped is None
+    assert [one.figure for one in judge(built, result) if not one.met] == []
+    return result
+
+
+def pose_of(model, q, frame):
+    """Return where a frame is at q (nq,), a pin.SE3."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId(frame)]
+
+
+def center_of(built, q):
+    """Return the center (3,) [m] of the only pair's sphere at q (nq,), in its shell's frame."""
+    (pair,) = built.scene.pairs
+    pose = pose_of(built.scene.model, q, pair.sphere.frame)
+    return pair.placement.actInv(pose.act(np.array(pair.sphere.offset)))
 
 
 def without_pictures():

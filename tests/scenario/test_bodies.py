@@ -11,7 +11,7 @@ from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.format.reading import read_scenario
-from tests.scenario.files import write
+from tests.scenario.files import pose_of, write
 
 TWO = """
 title = "a finger and a ball"
@@ -54,22 +54,6 @@ def test_names_carry_the_robot_and_the_values_their_joint(tmp_path):
     np.testing.assert_allclose(assembly.v0, [1.5, 0, 0, 1, 2, 3, 4, 5, 6])
 
 
-def test_each_robot_moves_as_it_would_alone(tmp_path):
-    from sphshell_pin import robots
-
-    assembly = assembled(tmp_path)
-    alone = robots.load("three_link_finger").model
-    data, data_alone = assembly.model.createData(), alone.createData()
-    pin.framesForwardKinematics(assembly.model, data, assembly.q0)
-    pin.framesForwardKinematics(alone, data_alone, np.array([0.3, 0.4, 0.0]))
-    stand = pin.SE3(pin.rpy.rpyToMatrix(0, 0, np.pi / 2), np.array([0.1, 0.2, 0.3]))
-    tip = data.oMf[assembly.model.getFrameId("three_link_finger/tip")]
-    expected = stand * data_alone.oMf[alone.getFrameId("tip")]
-    assert tip.isApprox(expected, 1e-12)
-    masses = [inertia.mass for inertia in assembly.model.inertias][1:4]
-    np.testing.assert_allclose(masses, [inertia.mass for inertia in alone.inertias][1:])
-
-
 MOUNTED = """
 title = "a finger on a turntable, and a ball"
 
@@ -96,21 +80,16 @@ def test_a_robot_may_be_mounted_on_another(tmp_path):
     assembly = assembled(tmp_path, MOUNTED)
     model = assembly.model
 
-    def pose(model, q, frame):
-        data = model.createData()
-        pin.framesForwardKinematics(model, data, q)
-        return data.oMf[model.getFrameId(frame)]
-
     finger = robots.load("three_link_finger").model
     stand = pin.SE3(pin.rpy.rpyToMatrix(0, 0, np.pi / 2), np.array([0.1, 0.2, 0.3]))
     expected = (
-        pose(model, assembly.q0, "turntable/disc")
+        pose_of(model, assembly.q0, "turntable/disc")
         * stand
-        * pose(finger, np.array([0.3, 0.4, 0.5]), "tip")
+        * pose_of(finger, np.array([0.3, 0.4, 0.5]), "tip")
     )
-    found = pose(model, assembly.q0, "three_link_finger/tip")
+    found = pose_of(model, assembly.q0, "three_link_finger/tip")
     assert found.isApprox(expected, 1e-12)
-    assert np.allclose(pose(model, assembly.q0, "ball/root_joint").translation, [1, 2, 3])
+    assert np.allclose(pose_of(model, assembly.q0, "ball/root_joint").translation, [1, 2, 3])
     # The disc carries the finger's weight too.
     single = robots.load("turntable").model
     both = pin.computeTotalMass(single) + pin.computeTotalMass(finger)
@@ -131,14 +110,11 @@ def test_locking_keeps_the_other_joints_values(tmp_path):
     assert max(g.parentJoint for g in visual.geometryObjects) == reduced.njoints - 1
 
 
-def test_one_robot_keeps_its_names(tmp_path):
-    assembly = assembled(tmp_path, 'title = "x"\nrobot.name = "turntable"\nrun.duration = 1\n')
-    assert list(assembly.model.names) == ["universe", "axle"]
-
-
-def test_a_continuous_joint_takes_an_angle(tmp_path):
+def test_one_robot_keeps_its_names_and_a_continuous_joint_takes_an_angle(tmp_path):
     text = 'title = "x"\nrobot.name = "turntable"\nrobot.start = { axle = 0.7 }\nrun.duration = 1\n'
-    np.testing.assert_allclose(assembled(tmp_path, text).q0, [np.cos(0.7), np.sin(0.7)])
+    assembly = assembled(tmp_path, text)
+    assert list(assembly.model.names) == ["universe", "axle"]
+    np.testing.assert_allclose(assembly.q0, [np.cos(0.7), np.sin(0.7)])
 
 
 FAULTS = {

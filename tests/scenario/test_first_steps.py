@@ -1,5 +1,8 @@
 """What a first user meets: surfaces before the tip, parts of a file, names nearly right, Ctrl-C."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -105,6 +108,15 @@ def test_noise_is_no_stl(tmp_path):
     code, output = told("check", path, "--unit", "mm")
     assert code == 2
     assert "No module" not in output
+
+
+def test_a_new_scenario_needs_no_extra_package(tmp_path):
+    program = "import sys; sys.modules |= {'scipy': None, 'scipy.spatial': None}\n"
+    program += "from sphshell_pin.scenario.drafting.new import new_scenario as new\n"
+    program += "new(sys.argv[1], radius=0.01, out=sys.argv[2])"
+    command = [sys.executable, "-c", program, arm_urdf(tmp_path), tmp_path / "a.toml"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("cause", [KeyboardInterrupt, ValueError])

@@ -186,14 +186,12 @@ def test_the_users_functions_are_loaded_once(tmp_path):
     assert len(built.functions) > 1
 
 
-KNOB = '\n[[knob]]\nkey = "contact.ball-plate.law.damping"\n'
-
-
 def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
-    path = write(tmp_path, DROP + KNOB)
-    (knob,) = live_parameters(build(path, {"contact.ball-plate.law.damping": "0"}))
-    assert (knob.value, knob.log) == (0.0, False)
-    assert knob.low <= 0.0 < knob.high
+    key = "contact.ball-plate.law.damping"
+    path = write(tmp_path, DROP + knob(key))
+    (found,) = live_parameters(build(path, {key: "0"}))
+    assert (found.value, found.log) == (0.0, False)
+    assert found.low <= 0.0 < found.high
     live = LiveRun(build(path))
     (before,) = live.parameters
     live.change(before.key, 0.0)

@@ -1,13 +1,12 @@
 """A scenario that goes on while it is changed: what a page relies on."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
-from tests.scenario.files import DROP, write
+from tests.scenario.files import DROP, pose_of, write
 
 LAW = "contact.ball-plate.law"
 G = 9.81
@@ -181,11 +180,8 @@ def test_what_changes_add_is_booked(live: LiveRun) -> None:
 
 def tip_of(live: LiveRun) -> np.ndarray:
     """Return where the point that follows the path is [m]."""
-    model = live.scene.model
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, live.q)
     controller = live.built.controller
-    return data.oMf[model.getFrameId(controller.frame)].act(np.asarray(controller.offset))
+    return pose_of(live.scene.model, live.q, controller.frame).act(np.asarray(controller.offset))
 
 
 @pytest.mark.robots

@@ -19,10 +19,11 @@ from sphshell_pin.errors import (
     SphshellError,
     UnitMissing,
 )
-from sphshell_pin.scenario import build, judge, live_parameters, rebuild, shipped_scenarios
+from sphshell_pin.scenario import build, live_parameters, rebuild, shipped_scenarios
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
 from tests.command import call
+from tests.scenario.files import pose_of, run_well
 from tests.shell.surfaces import surface_file
 from tests.studies import mostly_studies
 
@@ -94,11 +95,8 @@ def test_what_is_written_works(robot, surface, options, tmp_path):
     name = arm_urdf(tmp_path) if robot == "arm" else robot
     made = new_scenario(name, surface, out=tmp_path / "made.toml", **options)
     built = build(made.path)  # what stands in the file, read again
-    result, stopped = simulate(built)
-    assert stopped is None
-    verdicts = list(judge(built, result))
-    assert len(verdicts) >= 2
-    assert [v.figure for v in verdicts if not v.met] == []
+    assert len(built.scenario.expect) >= 2
+    run_well(built)
     assert made.explanation.warnings == ()
     gaps = [pair.gap for pair in built.scene.explain(built.q0, built.v0).pairs]
     radius = built.scene.pairs[0].sphere.radius
@@ -111,9 +109,7 @@ def test_a_cad_file_works_without_a_unit(robot, tmp_path):
     step = surface_file("trimesh_featuretype.STEP")
     name = arm_urdf(tmp_path) if robot == "arm" else robot
     built = new_scenario(name, step, radius=0.012, out=tmp_path / "a.toml").built
-    result, stopped = simulate(built)
-    assert stopped is None
-    assert [v.figure for v in judge(built, result) if not v.met] == []
+    run_well(built)
     # The part measures 5 inches; its file says so.
     sizes = np.ptp(built.shells["trimesh_featuretype"].box, axis=0)
     assert sizes.max() == pytest.approx(5 * 0.0254, rel=1e-3)
@@ -140,11 +136,8 @@ def test_the_force_is_the_one_asked_for(tmp_path):
     # It came to the end of its way across the surface.
     way = np.array(built.scenario.controller.path)
     assert np.linalg.norm(way[-1] - way[0]) > 5 * 0.012
-    data = built.scene.model.createData()
-    ends = []
-    for q in (result.q[0], result.q[-1]):
-        pin.framesForwardKinematics(built.scene.model, data, q)
-        ends.append(data.oMf[built.scene.model.getFrameId("tool0")].translation.copy())
+    model = built.scene.model
+    ends = [pose_of(model, q, "tool0").translation for q in (result.q[0], result.q[-1])]
     assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(
         np.linalg.norm(way[-1] - way[0]), rel=0.05
     )
@@ -156,9 +149,7 @@ def test_the_surface_stands_where_it_was_asked_for(place, tmp_path):
         arm_urdf(tmp_path), "plane", radius=0.01, place=place, out=tmp_path / "a.toml"
     ).built
     (pair,) = built.scene.pairs
-    data = built.scene.model.createData()
-    pin.framesForwardKinematics(built.scene.model, data, built.q0)
-    tip = data.oMf[built.scene.model.getFrameId("link_5")].translation
+    tip = pose_of(built.scene.model, built.q0, "link_5").translation
     k = {"below": 2, "above": 2}.get(place, "xyz".find(place[-1]))
     sign = -1 if place in ("below", "-x", "-y") else 1
     away = pair.placement.translation - tip
@@ -269,6 +260,7 @@ def test_its_knobs_turn(tmp_path):
         (("ball",), {"frame": "bal"}, FrameNotFound, "no frame 'bal'"),
         (("ball",), {"radius": -1.0}, InvalidParameter, "must be positive"),
         (("ball",), {"press": 3.0}, SphshellError, "leave out --press"),
+        (("ball",), {"at": (0.0, 0.0, 0.0)}, SphshellError, "leave out --press, --place, --at and"),
         (("ball",), {"material": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"against": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"base": "fixed"}, SphshellError, "no joint: .* --base floating"),

@@ -16,6 +16,7 @@ from sphshell_pin.errors import InvalidParameter, SphshellError
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.touch_points import sides
 from sphshell_pin.scenario.running.run import simulate
+from tests.scenario.files import center_of
 from tests.scenario.test_new import arm_urdf
 
 PLATE = (0.3, 0.24, 0.04)
@@ -82,12 +83,7 @@ def test_an_open_scan_is_touched_from_outside(up, arm, tmp_path):
     file = dome(tmp_path, up=up)
     np.testing.assert_array_equal(sides(sp.Shell.from_file(file))[0], [0, 0, 1 if up else -1])
     built = new_scenario(arm, file, radius=0.01, out=tmp_path / "a.toml").built
-    (pair,) = built.scene.pairs
-    data = built.scene.model.createData()
-    pin.framesForwardKinematics(built.scene.model, data, built.q0)
-    frame = built.scene.model.getFrameId(pair.sphere.frame)
-    center = pair.placement.actInv(data.oMf[frame].act(np.array(pair.sphere.offset)))
-    assert np.linalg.norm(center) > 0.1
+    assert np.linalg.norm(center_of(built, built.q0)) > 0.1
     # It lies on its rim.
     assert placed(built)[0][:, 2].min() == pytest.approx(0.0, abs=1e-5)
 
@@ -180,11 +176,7 @@ def test_the_points_of_a_path_are_taken_over(arm, plate, tmp_path):
         ).built
         np.testing.assert_allclose(way(built), points, atol=1e-5)
     result, _ = simulate(built)
-    data = built.scene.model.createData()
-    pin.framesForwardKinematics(built.scene.model, data, result.q[-1])
-    (pair,) = built.scene.pairs
-    frame = built.scene.model.getFrameId(pair.sphere.frame)
-    center = pair.placement.actInv(data.oMf[frame].act(np.array(pair.sphere.offset)))
+    center = center_of(built, result.q[-1])
     np.testing.assert_allclose(center[:2], points[-1][:2], atol=0.003)
 
 
@@ -205,11 +197,6 @@ def test_what_cannot_be_asked(options, error, match, arm, plate, tmp_path):
         new_scenario(arm, plate, radius=0.01, out=tmp_path / "a.toml", **options)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "a.toml").exists()
-
-
-def test_a_body_that_falls_takes_no_place(tmp_path):
-    with pytest.raises(SphshellError, match="leave out --press, --place, --at and --path"):
-        new_scenario("ball", "plane", at=(0.0, 0.0, 0.0), out=tmp_path / "a.toml")
 
 
 def test_what_fails_is_told_while_others_are_tried(tmp_path):

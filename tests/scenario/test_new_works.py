@@ -13,11 +13,12 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario import build, judge, shipped_scenarios
+from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
+from tests.scenario.files import center_of, run_well
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
@@ -37,18 +38,15 @@ def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, tmp_pa
     """The tip's sphere is 80 mm before its frame."""
     made = new_scenario(PROBE, BLADE, unit="mm", place=place, out=tmp_path / "a.toml")
     built = build(made.path)
-    result, stopped = simulate(built)
-    assert stopped is None
-    assert [v.figure for v in judge(built, result) if not v.met] == []
+    result = run_well(built)
     control = built.scenario.controller
     assert held(built, result) == pytest.approx(control.normal_force, rel=0.05)
-    (pair,), model = built.scene.pairs, built.scene.model
-    np.testing.assert_allclose(control.offset, [0, 0, 0.08])
+    (pair,) = built.scene.pairs
+    assert pair.sphere.frame == "link_5"
+    for offset in (control.offset, pair.sphere.offset):
+        np.testing.assert_allclose(offset, [0, 0, 0.08])
     # The sphere's center ends over the path's last point.
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, result.q[-1])
-    center = pair.placement.actInv(data.oMf[model.getFrameId("link_5")].act(np.array([0, 0, 0.08])))
-    away = center - control.path[-1]
+    away = center_of(built, result.q[-1]) - control.path[-1]
     normal = pair.shell.closest_points([control.path[-1]]).normals[0]
     assert abs(away @ normal) == pytest.approx(pair.sphere.radius, rel=0.03)
     assert np.linalg.norm(away - normal * (away @ normal)) < 0.25 * pair.sphere.radius
@@ -138,9 +136,7 @@ def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(tmp_pa
     built = build(made.path)
     # Three joints of the leg are left, of which none is the base.
     assert built.scene.model.nv == built.scene.model.njoints - 1 == 3
-    result, stopped = simulate(built)
-    assert stopped is None
-    assert [v.figure for v in judge(built, result) if not v.met] == []
+    result = run_well(built)
     assert held(built, result) == pytest.approx(built.scenario.controller.normal_force, rel=0.05)
 
 
@@ -175,9 +171,7 @@ def test_an_arm_whose_collection_lets_it_float_is_fixed(tmp_path):
     assert 'name = "so101"\nbase = "fixed"' in made.text
     built = build(made.path)
     assert built.scene.model.nq == 6
-    result, stopped = simulate(built)
-    assert stopped is None
-    assert [v.figure for v in judge(built, result) if not v.met] == []
+    run_well(built)
 
 
 def test_links_in_a_part_are_found():

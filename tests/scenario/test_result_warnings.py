@@ -4,7 +4,6 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
@@ -13,7 +12,7 @@ from sphshell_pin.scenario import build, explain_built
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
 from tests.command import call
-from tests.scenario.files import DROP, write
+from tests.scenario.files import DROP, pose_of, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
@@ -80,10 +79,8 @@ def test_a_press_on_nothing_and_a_target_out_of_reach(scenario):
     nothing, far = built.controller._result_warnings(result)
     assert nothing.startswith("nothing was touched, though the controller presses with")
     # Across the normal, as the force acts along it.
-    (pair,), model = built.scene.pairs, built.scene.model
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, built.q0)
-    tip = pair.placement.actInv(data.oMf[model.getFrameId("tip")].translation)
+    (pair,) = built.scene.pairs
+    tip = pair.placement.actInv(pose_of(built.scene.model, built.q0, "tip").translation)
     at = pair.shell.closest_points(built.scenario.controller.path[:1])
     away, normal = tip - at.points[0], at.normals[0]
     expected = np.linalg.norm(away - normal * (normal @ away))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
+from tests.scenario import files
 from tests.scenario.test_new import arm_urdf
 
 SCENARIO = """
@@ -42,10 +42,7 @@ def scenario(folder, start, more="", sphere="link_5"):
 
 
 def pose_of(built, frame="link_5"):
-    model = built.scene.model
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, built.q0)
-    return data.oMf[model.getFrameId(frame)]
+    return files.pose_of(built.scene.model, built.q0, frame)
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,7 @@ class Links:
     ) -> None:
         self._model, self._geometry = model, geometry
         self._data, self._geometry_data = model.createData(), pin.GeometryData(geometry)
-        self._shell, self._tips = shell, tuple(tips)
+        self.shell, self._tips = shell, tuple(tips)
         self._surface = _tree(shell)
         self._box = shell.box
         frames = [model.frames[find_frame(model, tip.frame)] for tip in tips]
@@ -105,14 +105,14 @@ class Links:
 
     def _inside(self, one: pin.GeometryObject, pose: pin.SE3, placement: pin.SE3) -> bool:
         """Whether a point of a geometry is behind the surface, where that is closed."""
-        if not self._shell.is_closed:
+        if not self.shell.is_closed:
             return False
         mesh = isinstance(one.geometry, coal.BVHModelBase)
         point = np.array(one.geometry.vertices()[0]) if mesh else np.zeros(3)
         at = placement.actInv(pose.act(point))
         if (at < self._box[0]).any() or (at > self._box[1]).any():
             return False
-        return bool(self._shell.closest_points(at[None], method="facets").distances[0] < 0)
+        return bool(self.shell.closest_points(at[None], method="facets").distances[0] < 0)
 
 
 def _tree(shell: Shell) -> coal.BVHModelOBBRSS:

@@ -42,6 +42,8 @@ def least_friction(
 
 def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: float) -> Array | None:
     """Return forces (k, 3) in the pyramids of `mu` that balance `wrench`; None if none do."""
+    from scipy.optimize import nnls
+
     count = len(points)
     angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
     edges = np.empty((count, _SIDES, 3))
@@ -69,41 +71,9 @@ def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: floa
     about = wrench[3:] - np.cross(middle, wrench[:3])
     least = np.full(count, _LEAST * total / count)
     goal = np.concatenate([-wrench[:3], -about / size, [total], least])
-    shares, residual = nonnegative(matrix, goal)
+    shares, residual = nnls(matrix, goal)
     if residual > _BALANCED * max(total, float(np.linalg.norm(wrench[:3]))):
         return None
     shares = shares[: count * _SIDES].reshape(count, _SIDES, 1)
     forces: Array = (shares * edges).sum(axis=1)
     return forces
-
-
-def nonnegative(matrix: Array, goal: Array) -> tuple[Array, float]:
-    """Return x >= 0 with the least |matrix x - goal|, and that.
-
-    Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
-    """
-    columns = matrix.shape[1]
-    x, free = np.zeros(columns), np.zeros(columns, dtype=bool)
-    tolerance = 1e-12 * float(np.abs(matrix).max()) * max(float(np.abs(goal).max()), 1e-300)
-    for _ in range(3 * columns):
-        slope = matrix.T @ (goal - matrix @ x)
-        slope[free] = -np.inf
-        entering = int(np.argmax(slope))
-        if slope[entering] <= tolerance:
-            break
-        free[entering] = True
-        while True:
-            trial = np.zeros(columns)
-            trial[free] = np.linalg.lstsq(matrix[:, free], goal, rcond=None)[0]
-            low = free & (trial <= 0)
-            if not low.any():
-                break
-            share = float((x[low] / (x[low] - trial[low])).min())
-            x = np.maximum(x + share * (trial - x), 0.0)
-            free &= x > 1e-14 * max(float(x.max()), 1e-300)
-            x[~free] = 0.0
-            if not free.any():
-                trial = x
-                break
-        x = trial
-    return x, float(np.linalg.norm(matrix @ x - goal))

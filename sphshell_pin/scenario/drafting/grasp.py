@@ -98,57 +98,38 @@ class Hand:
     def centers(self, q: Array) -> Array:
         """Return the centers (k, 3) [m] of the tips' spheres."""
         pin.framesForwardKinematics(self.model, self._data, q)
-        return np.array(
-            [
-                self._data.oMf[frame].act(tip.offset)
-                for frame, tip in zip(self._frames, self.tips, strict=True)
-            ]
-        )
+        return self._placed()
+
+    def _placed(self) -> Array:
+        poses = [self._data.oMf[frame] for frame in self._frames]
+        return np.array([pose.act(tip.offset) for pose, tip in zip(poses, self.tips, strict=True)])
 
     def limbs(self) -> Array:
         """Return unit vectors (k, 3) from the last joints to the `centers` that were asked last."""
-        data, parents = (
-            self._data,
-            [int(self.model.frames[one].parentJoint) for one in self._frames],
-        )
-        out = np.array(
-            [
-                data.oMf[frame].act(tip.offset) - data.oMi[parent].translation
-                for frame, parent, tip in zip(self._frames, parents, self.tips, strict=True)
-            ]
-        )
+        out = self._placed() - [self._data.oMi[joint].translation for joint in self._ends]
         unit: Array = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
         return unit
 
-    def jacobians(self, q: Array) -> Array:
-        """Return (k, 3, nv): velocities of the centers from those of the joints."""
+    def jacobians(self, q: Array, beside: Array | float = 0.0) -> Array:
+        """Return (k, 3, nv): velocities of the centers from those of the joints.
+
+        With `beside` (k, 3) [m], in the world, those of points beside them that move with the tips.
+        """
         pin.computeJointJacobians(self.model, self._data, q)
         pin.updateFramePlacements(self.model, self._data)
         out = np.empty((len(self.tips), 3, self.model.nv))
+        offsets = np.broadcast_to(beside, (len(self.tips), 3))
         for k, (frame, tip) in enumerate(zip(self._frames, self.tips, strict=True)):
             local = pin.getFrameJacobian(self.model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
-            arm = self._data.oMf[frame].rotation @ tip.offset
+            arm = self._data.oMf[frame].rotation @ tip.offset + offsets[k]
             out[k] = local[:3] - pin.skew(arm) @ local[3:]
         return out
 
     def torques(self, grasp: Grasp) -> Array:
         """Return the joint torques (nv,) [N m], beside those against gravity, of its forces."""
-        torques: Array = np.einsum("kij,ki->j", self._point_jacobians(grasp), grasp.forces)
+        touching = self.jacobians(grasp.q, -self.radii[:, None] * grasp.normals)
+        torques: Array = np.einsum("kij,ki->j", touching, grasp.forces)
         return torques
-
-    def _point_jacobians(self, grasp: Grasp) -> Array:
-        """Return (k, 3, nv) of the points of the tips that touch the part."""
-        jacobians = self.jacobians(grasp.q)
-        for k, frame in enumerate(self._frames):
-            local = pin.getFrameJacobian(self.model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
-            arm = -self.radii[k] * grasp.normals[k]
-            jacobians[k] -= pin.skew(arm) @ local[3:]
-        return jacobians
-
-    def clipped(self, q: Array) -> Array:
-        """Return q within the limits."""
-        inside: Array = np.clip(q, self.low, self.high)
-        return inside
 
     def close_on(
         self, q: Array, shell: Shell, placement: pin.SE3, gap: float | Array
@@ -171,7 +152,7 @@ class Hand:
             square = rows @ rows.T + _DAMPING * np.eye(len(rows))
             step = -rows.T @ np.linalg.solve(square, error)
             step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-12))
-            q = self.clipped(pin.integrate(model, q, step))
+            q = np.clip(pin.integrate(model, q, step), self.low, self.high)
         return None
 
 

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.contact.materials import Material, friction_between
+from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, end_spheres, floats
+from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.drafting.hand_text import DURATION, GAP, HandDraft
 from sphshell_pin.scenario.drafting.part import Part, part_file
-from sphshell_pin.scenario.drafting.plan import GRAVITY
-from sphshell_pin.scenario.drafting.pose_search import stated_kinds
+from sphshell_pin.scenario.drafting.pose_search import Working, stated_kinds
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
+from sphshell_pin.scenario.drafting.trial import figure_fault
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
-from sphshell_pin.scenario.format.schema import RobotSection, ShellSection
-from sphshell_pin.scenario.running.figures import judge
+from sphshell_pin.scenario.format.schema import RobotSection
 from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.shell.shell import Shell
 
@@ -37,26 +38,14 @@ _SAFETY = 3.0
 _MOST_RUNS, _SETTLED, _MOVED = 6, 0.4, 0.2
 
 
-@dataclass(frozen=True)
-class Held:
-    """A scenario that works: its text, the part's URDF, and why it is as it is."""
-
-    text: str
-    urdf: str
-    built: Built
-    why: tuple[str, ...]
-
-
-def every_tip(
-    robot: LoadedRobot, frame: str | None, radius: float | None, place: str | None
-) -> list[Tip]:
+def every_tip(robot: LoadedRobot, asked: Asked) -> list[Tip]:
     """Return all fingertips of `robot`.
 
     SphshellError for fewer than two, and for options that belong to a single one.
     """
-    for option, value in (("--frame", frame), ("--radius", radius), ("--place", place)):
-        if value is not None:
-            raise SphshellError(f"{option} belongs to a single tip: leave it out with --tips all")
+    for option in ("frame", "radius", "place"):
+        if getattr(asked, option) is not None:
+            raise SphshellError(f"--{option} belongs to a single tip: leave it out with --tips all")
     spheres = end_spheres(robot)
     if len(spheres) < 2:
         raise SphshellError(
@@ -70,25 +59,20 @@ def every_tip(
 
 
 def hold_in_hand(
-    section: RobotSection,
-    shell_section: ShellSection,
-    built: Built,
-    tips: Sequence[Tip],
-    materials: tuple[Material, Material],
-    press: float | None,
-    name: str,
-    make: Callable[[str, Built], Built],
-) -> Held:
+    asked: Asked, built: Built, tips: Sequence[Tip], name: str, make: Callable[[str, Built], Built]
+) -> Working:
     """Return a scenario `name` in which the `tips` of a robot hold the surface of `built`.
 
-    `materials` are those of tips and part, `press` [N] the largest normal force of a tip;
-    `make(text, reuse)` builds a text. Each draft is run; the first that holds the part is taken.
+    The largest normal force of a tip is what is asked for; `make(text, reuse)` builds a text. Each
+    draft is run; the first that holds the part is taken.
 
     Raises
     ------
     SphshellError
         None does; the text says why, and what to change.
     """
+    materials = find_material(asked.material or "rubber"), find_material(asked.against)
+    press = asked.press
     model = built.assembly.model
     if floats(model):
         raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
@@ -124,12 +108,12 @@ def hold_in_hand(
     )
     if not found:
         raise _no_grasp(shell, len(tips), blocked)
-    reuse = _with_part(built, section, part, name)
+    reuse = _with_part(built, part, name)
     kinds = stated_kinds(model, lock)
     fault = ""
     for one in found[:_MOST_RUNS]:
         grasp = _pressed(one, part, press, mu)
-        draft = HandDraft(section, shell_section, shell, hand, grasp, part, materials, lock, name)
+        draft = HandDraft(built, hand, grasp, part, materials, lock, name)
         fault = draft.fault()
         if fault:
             continue
@@ -138,7 +122,7 @@ def hold_in_hand(
             made = make(text, reuse)
             fault = _try(made, draft, links)
             if not fault:
-                return Held(text, part.urdf(), made, draft.why(kinds, joints))
+                return Working(text, made, draft.why(kinds, joints), part.urdf())
     raise SphshellError(
         f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {fault}; a lighter "
         "--against, another --press, or a smaller part"
@@ -160,15 +144,12 @@ def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> SphshellError
     )
 
 
-def _with_part(built: Built, section: RobotSection, part: Part, name: str) -> Built:
+def _with_part(built: Built, part: Part, name: str) -> Built:
     """Return `built` with the part as a second robot, so that neither is read from files."""
     loaded = (built.assembly.loaded[0], part.loaded())
-    scenario = built.scenario.model_copy(update={"robot": [section, _part_section(name)]})
+    section = RobotSection(urdf=part_file(name), free_flyer=True, label="part")
+    scenario = built.scenario.model_copy(update={"robot": [*built.scenario.robot, section]})
     return replace(built, scenario=scenario, assembly=replace(built.assembly, loaded=loaded))
-
-
-def _part_section(name: str) -> RobotSection:
-    return RobotSection(urdf=part_file(name), free_flyer=True, label="part")
 
 
 def _pressed(grasp: Grasp, part: Part, press: float | None, mu: float) -> Grasp:
@@ -201,16 +182,13 @@ def _try(built: Built, draft: HandDraft, links: Links) -> str:
     if moved > _MOVED * float(draft.hand.radii.min()):
         return f"the part moves by {1e3 * moved:.2g} mm in the hand"
     q = draft.grasp.q.copy()
+    names = [draft.hand.model.names[j] for j in draft.hand.joints]
+    to_q = np.concatenate([np.r_[joint_spans(draft.hand.model, one)[0]] for one in names])
+    from_q = np.concatenate([np.r_[joint_spans(model, f"hand/{one}")[0]] for one in names])
     for row in result.q[:: max(1, len(result.q) // 60)]:
-        for j in draft.hand.joints:
-            name = draft.hand.model.names[j]
-            to_q, _ = joint_spans(draft.hand.model, name)
-            from_q, _ = joint_spans(model, f"hand/{name}")
-            q[to_q] = row[from_q]
+        q[to_q] = row[from_q]
         found = links.within(q, pin.XYZQUATToSE3(row[span]))
         if found is not None:
             return f"link '{found.link}' is in the part"
-    for one in judge(built, result):
-        if not one.met:
-            return f"{one.figure} is {one.measured:.3g}, not {one.expected}"
-    return ""
+    unmet = figure_fault(built, result)
+    return "" if unmet is None else unmet.text

@@ -6,19 +6,26 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.contact.materials import Material, friction_between, restitution_between
+from sphshell_pin.contact.materials import Material, friction_between
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.part import Part, part_file
-from sphshell_pin.scenario.drafting.plan import bearable, hertz_stiffness
+from sphshell_pin.scenario.drafting.tip_contact import (
+    Contact,
+    bearable,
+    hertz_stiffness,
+    sticking,
+)
+from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import joint_spans
-from sphshell_pin.scenario.format.schema import RobotSection, ShellSection
-from sphshell_pin.shell.shell import Shell
+from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.scenario.format.schema import ShellSection
 
 Array = npt.NDArray[np.float64]
 
@@ -28,6 +35,7 @@ GAP = 1e-4
 DURATION, HELD = 1.5, 0.05
 """Of the run [s], and how well the largest force is held in it."""
 
+_TEMPLATE = Path(__file__).with_name("hand.template").read_text("utf-8")
 # How far the joints' springs are drawn by the largest torque [rad].
 _DRAWN = 0.1
 _NO_LIMIT = 1e9
@@ -39,9 +47,8 @@ _BRAKES = ("friction", "damping")
 class HandDraft:
     """A grasp that becomes a scenario `name`."""
 
-    section: RobotSection
-    shell: ShellSection
-    surface: Shell
+    built: Built
+    """The robot and the surface, without contacts."""
     hand: Hand
     grasp: Grasp
     part: Part
@@ -50,14 +57,20 @@ class HandDraft:
     name: str
 
     @property
+    def shell(self) -> ShellSection:
+        """The table of the surface."""
+        return self.built.scenario.shell[0]
+
+    @property
+    def contact(self) -> Contact:
+        """Of its tips with the part."""
+        radius, share = float(self.hand.radii.min()), self.part.mass / len(self.hand.tips)
+        return sticking(self.materials, radius, 0.1, self.press, share)
+
+    @property
     def press(self) -> float:
         """Largest normal force [N]."""
         return float(self.grasp.normal_forces().max())
-
-    @property
-    def strongest(self) -> int:
-        """The tip that presses hardest."""
-        return int(np.argmax(self.grasp.normal_forces()))
 
     def fault(self) -> str:
         """Say what is wrong before anything is run."""
@@ -81,17 +94,18 @@ class HandDraft:
         """Return stiffness [N m/rad] and damping [N m s/rad] of the joints."""
         model = self.hand.model
         torque = float(np.abs(self.hand.torques(self.grasp)).max())
-        kp = _round(torque / _DRAWN)
+        kp = rounded(torque / _DRAWN)
         inertia = np.diag(pin.crba(model, model.createData(), self.grasp.q))
         moved = [model.joints[j].idx_v for j in self.hand.joints]
-        return kp, _round(1.4 * math.sqrt(kp * float(np.median(inertia[moved]))))
+        return kp, rounded(1.4 * math.sqrt(kp * float(np.median(inertia[moved]))))
 
     def pressed_in(self) -> Array:
         """Return the configuration (nq,) in which the tips are as deep in the part as pressed."""
+        (surface,) = self.built.shells.values()
         radii = self.hand.radii
         stiffness = [hertz_stiffness(float(radius), *self.materials) for radius in radii]
         depths = (self.grasp.normal_forces() / stiffness) ** (2 / 3)
-        found = self.hand.close_on(self.grasp.q, self.surface, self.grasp.placement, -depths)
+        found = self.hand.close_on(self.grasp.q, surface, self.grasp.placement, -depths)
         return self.grasp.q if found is None else found[0]
 
     def choices(self, kinds: list[str]) -> list[list[str]]:
@@ -108,13 +122,9 @@ class HandDraft:
         kp, kd = self.gains()
         drawn = pin.integrate(model, self.pressed_in(), hand.torques(grasp) / kp)
         one, other = self.materials
-        static, dynamic = friction_between(one, other)
-        radius, load = float(hand.radii.min()), self.press
-        slope = 1.5 * hertz_stiffness(radius, one, other) ** (2 / 3) * load ** (1 / 3)
-        damping = 0.2 * math.sqrt(slope * self.part.mass / len(hand.tips))
         place = grasp.placement
         root = [*place.translation.tolist(), *pin.Quaternion(place.rotation).coeffs().tolist()]
-        stated = self.section.model_dump(exclude_defaults=True)
+        stated = self.built.scenario.robot[0].model_dump(exclude_defaults=True)
         keys = ("name", "urdf", "file", "package_dirs", "xacro_args")
         source = "\n".join(f"{key} = {_toml(stated[key])}" for key in keys if key in stated)
         if self.lock:
@@ -125,100 +135,34 @@ class HandDraft:
             f"offset = {_toml(tip.offset.tolist())} }},"
             for tip in hand.tips
         )
-        strongest = f"tips/hand/{hand.tips[self.strongest].frame}"
-        return f"""\
-# {len(hand.tips)} fingertips hold {self.shell.name}.
-#
-#   sphshell-pin run {self.name}.toml
-#   sphshell-pin view {self.name}.toml
-#
-# Units are SI (m, kg, s, N, rad) unless a key says otherwise.
-
-title = {_toml(f"{len(hand.tips)} fingertips hold {self.shell.name}")}
-
-[[robot]]
-{source}
-label = "hand"
-joints = {_toml(joints)}
-
-# All fingertips are {1e3 * GAP:g} mm away from the part.
-[robot.start]
-{_joints(model, grasp.q, hand.joints, "")}
-
-# {self.part.mass:.3g} kg, {other.name} all through: {other.density:g} kg/m^3.
-[[robot]]
-urdf = {_toml(part_file(self.name))}
-free_flyer = true
-label = "part"
-
-[robot.start]
-# x y z [m] and the quaternion x y z w
-root_joint = {_toml([round(x, 9) for x in root])}
-
-[[shell]]
-{chr(10).join(f"{key} = {_toml(value)}" for key, value in surface.items())}
-frame = "part/part"
-
-# Hertz: {one.name} balls on {other.name}; friction that sticks.
-[[contact]]
-name = "tips"
-spheres = [
-{spheres}
-]
-shell = {_toml(self.shell.name)}
-
-[contact.law]
-type = "hertz"
-radius = {radius!r}
-young = {_toml(one.young)}
-poisson = {one.poisson}
-young_2 = {_toml(other.young)}
-poisson_2 = {other.poisson}
-restitution = {restitution_between(one, other)}
-speed = 0.1
-
-[contact.friction]
-type = "bristle"
-mu_static = {round(static, 3)}
-mu_dynamic = {round(dynamic, 3)}
-stiffness = {_toml(_round(slope))} # [N/m] as stiff as the law under the load
-damping = {_toml(_round(damping))} # [N s/m] a tenth of critical
-torsional = true # a fingertip is soft
-
-[controller]
-type = "joint-pd"
-kp = {_toml(kp)} # [N m/rad]
-kd = {_toml(kd)} # [N m s/rad]
-
-# Where the springs would take the fingers if the part were not there: {self.press:.3g} N at most.
-[controller.q_ref]
-{_joints(model, drawn, hand.joints, "hand/")}
-
-[run]
-duration = {DURATION}
-integrator = "implicit"
-rtol = 1e-5
-record_dt = 5e-3
-
-[[knob]]
-key = "controller.kp"
-
-[[knob]]
-key = "contact.tips.friction.mu_static"
-min = {round(dynamic, 3)}
-max = 1.5
-
-[[knob]]
-key = "gravity.2"
-min = -20.0
-max = 0.0
-
-# What the run is checked against.
-[expect]
-{_toml(f"pairs.{strongest}.mean_force")} = {{ value = {_round(self.press, 3)}, rtol = {HELD} }}
-{_toml(f"pairs.{strongest}.touches")} = {{ min = 1 }}
-"energy.relative_residual" = {{ max = 1e-3 }}
-"""
+        strongest = f"tips/hand/{hand.tips[int(np.argmax(grasp.normal_forces()))].frame}"
+        title = f"{len(hand.tips)} fingertips hold {self.shell.name}"
+        return _TEMPLATE.format(
+            draft=self,
+            tip=one,
+            part=other,
+            contact=self.contact,
+            title=title,
+            title_text=_toml(title),
+            source=source,
+            joints=_toml(joints),
+            gap=1e3 * GAP,
+            start=_joints(model, grasp.q, hand.joints, ""),
+            urdf=_toml(part_file(self.name)),
+            root=_toml([round(x, 9) for x in root]),
+            surface="\n".join(f"{key} = {_toml(value)}" for key, value in surface.items()),
+            spheres=spheres,
+            shell=_toml(self.shell.name),
+            radius=float(hand.radii.min()),
+            kp=kp,
+            kd=kd,
+            drawn=_joints(model, drawn, hand.joints, "hand/"),
+            duration=DURATION,
+            mean_force=_toml(f"pairs.{strongest}.mean_force"),
+            touches=_toml(f"pairs.{strongest}.touches"),
+            force=rounded(self.press, 3),
+            held=HELD,
+        )
 
     def why(self, kinds: list[str], joints: list[str]) -> tuple[str, ...]:
         """Return one sentence for each choice that was made."""
@@ -233,8 +177,7 @@ max = 0.0
             f"the part is {other.name} all through and weighs {self.part.mass:.3g} kg",
             f"the fingertips press with {self.press:.3g} N at most; its weight and their forces "
             f"use {100 * used:.0f} % of the friction",
-            f"law and friction of {one.name} on {other.name}, typical values: --law and --against "
-            "name others",
+            self.contact.note,
             *notes,
         )
 
@@ -247,10 +190,6 @@ def _joints(model: pin.Model, q: Array, joints: Sequence[int], prefix: str) -> s
         stated = values[0] if len(values) == 1 else values
         lines.append(f"{_toml(prefix + model.names[j])} = {_toml(stated)}")
     return "\n".join(lines)
-
-
-def _round(x: float, digits: int = 2) -> float:
-    return float(f"{x:.{digits}g}")
 
 
 def _toml(value: object) -> str:

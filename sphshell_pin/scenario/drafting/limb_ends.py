@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
-from sphshell_pin.errors import import_extra
 from sphshell_pin.robots import LoadedRobot
+from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
 
 Array = npt.NDArray[np.float64]
@@ -52,10 +52,11 @@ class LinkGeometry:
 
     def depth(self, center: Array) -> float:
         """Return how far `center` (3,) [m] is inside the convex hull [m]; negative outside."""
-        spatial = import_extra("scipy.spatial", "robots", "whether a sphere is inside its link")
+        from scipy.spatial import ConvexHull, QhullError
+
         try:
-            hull = spatial.ConvexHull(self.corners)
-        except (spatial.QhullError, ValueError):  # flat, or nothing
+            hull = ConvexHull(self.corners)
+        except (QhullError, ValueError):  # flat, or nothing
             return -math.inf
         return float(-(hull.equations[:, :3] @ center + hull.equations[:, 3]).max())
 
@@ -66,7 +67,7 @@ class LinkGeometry:
         fingertip's own sphere. On a flat end it is a smaller ball in the middle of it.
         """
         if not len(self.corners):
-            ball = radius or _rounded(_OF_REACH * model_reach(self._model))
+            ball = radius or rounded(_OF_REACH * model_reach(self._model))
             return End(np.zeros(3), ball, "a ball on its origin, as its link has no geometry")
         ahead = self._ahead()
         along = self.corners @ ahead
@@ -78,8 +79,8 @@ class LinkGeometry:
                 break
         before = float(along.max() - center @ ahead)
         if radius is None and covers - before < _STANDS_OUT * covers:
-            return End(center, _rounded(covers), f"it covers the end of link '{self.link}'")
-        ball = _rounded(_BALL * covers) if radius is None else radius
+            return End(center, rounded(covers), f"it covers the end of link '{self.link}'")
+        ball = rounded(_BALL * covers) if radius is None else radius
         front = center + (before + ball) * ahead
         return End(front, ball, f"a ball on the end of link '{self.link}'")
 
@@ -126,10 +127,6 @@ class LinkGeometry:
             if found:
                 return np.concatenate(found)
         return np.zeros((0, 3))
-
-
-def _rounded(x: float) -> float:
-    return float(f"{x:.2g}")
 
 
 def _moved(place: pin.SE3, points: Array) -> Array:

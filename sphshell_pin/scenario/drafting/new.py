@@ -14,8 +14,6 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.atomic import atomic_file
-from sphshell_pin.checks import check_positive, check_vector
-from sphshell_pin.contact.materials import Material, find_material
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import floats, is_path
@@ -25,7 +23,7 @@ from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
 from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
-from sphshell_pin.scenario.drafting.pose_search import PLACES, Request, find_working, sphere_centers
+from sphshell_pin.scenario.drafting.pose_search import find_working, sphere_centers
 from sphshell_pin.scenario.drafting.refusals import CannotStand
 from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.format.reading import parse_scenario
@@ -35,9 +33,6 @@ from sphshell_pin.scenario.format.sliders import check_knobs
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.explain import Explanation
-    from sphshell_pin.shell.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
@@ -139,193 +134,127 @@ def new_scenario(
         What cannot be found out and is not given, a file that cannot be read or written, or that no
         draft works: the text says what fails in it and what to change.
     """
-    _check_asked(radius, press, place, (material, against))
-    asked = Asked.checked(at, path, length)
-    file = _free_path(out, robot, surface, force=force)
-    section = _robot_section(
-        robot,
-        file,
-        base=base,
-        package_dirs=package_dirs,
-        xacro_args=xacro_args or {},
-    )
-    bare = _build_bare(section, file)
-    shaped = None if base is not None else _base(bare.assembly.model)
-    if shaped is not None:
-        section = section.model_copy(update={"base": shaped})
-        bare = _build_bare(section, file)
-    loaded = bare.assembly.loaded[0]
-    too_large = radius and radius_fault(bare.assembly.model, radius)
-    if radius and too_large:
-        raise InvalidParameter("radius", radius, too_large)
-    center = None if offset is None else check_vector("offset", offset, 3, " [m]")
-    if tips == "all":
-        found = every_tip(loaded, frame, radius, place)
-    else:
-        found = find_tips(loaded, shipped=section.name, frame=frame, radius=radius, offset=center)
-    shell_section, word = _shell_section(surface, unit, (bodies, faces), file, bare, found)
-    if word is not None and tips == "all":
-        held = word_primitive(word, max(one.radius for one in found))
-        shell_section = shell_section.model_copy(update={"primitive": held})
-    with_shell = _build_bare(section, file, shell_section, reuse=bare)
-    _check_size(with_shell.shells[shell_section.name], found)
-    shell_section, with_shell = _sided(shell_section, with_shell, word)
-    if tips == "all":
-        pair = find_material(material or "rubber"), find_material(against)
-        return _held(section, shell_section, with_shell, found, pair, press, file, force=force)
-    request = Request(material, against, press, place, word, asked, tell)
-    title = f"{loaded.name} {{}} {shell_section.name}"
-
-    def draft(section: RobotSection, plan: Plan) -> tuple[str, Built]:
-        does = title.format(_DOES[type(plan.control)])
-        text = draft_text(file.stem, does, section, shell_section, plan, _run(plan))
-        return text, _build_text(text, file, with_shell)
-
-    # What is written is what was built, and tried.
+    asked = Asked.checked(**locals())
     try:
-        text, built, plan = find_working(section, with_shell, found, request, draft)
+        return _written(asked)
     except CannotStand as error:
         if base is not None:
             raise
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
-        fixed = new_scenario(
-            robot,
-            surface,
-            frame=frame,
-            radius=radius,
-            offset=offset,
-            unit=unit,
-            bodies=bodies,
-            faces=faces,
-            material=material,
-            against=against,
-            base="fixed",
-            package_dirs=package_dirs,
-            xacro_args=xacro_args,
-            out=out,
-            force=force,
-            tell=tell,
+    fixed = _written(replace(asked, base="fixed"))
+    return replace(fixed, why=(note, *fixed.why))
+
+
+def _written(asked: Asked) -> NewScenario:
+    """Write the scenario that is asked for; CannotStand as `find_working` raises it."""
+    file = _free_path(asked)
+    section = _robot_section(asked, file)
+    bare = _build_bare(section, file)
+    shaped = None if asked.base is not None else _base(bare.assembly.model)
+    if shaped is not None:
+        section = section.model_copy(update={"base": shaped})
+        bare = _build_bare(section, file)
+    loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
+    if radius is not None and (too_large := radius_fault(bare.assembly.model, radius)):
+        raise InvalidParameter("radius", radius, too_large)
+    if in_hand:
+        tips = every_tip(loaded, asked)
+    else:
+        tips = find_tips(
+            loaded, shipped=section.name, frame=asked.frame, radius=radius, offset=asked.offset
         )
-        return replace(fixed, why=(note, *fixed.why))
+    shell = _shell_section(asked, file, bare, tips)
+    built = _build_bare(section, file, shell, reuse=bare)
+    built = _sided(built, tips, inside=asked.inside)
+    (shell,) = built.scenario.shell
+
+    def read(text: str, reuse: Built) -> Built:
+        scenario = parse_scenario(text, file)
+        check_knobs(scenario, file, ranges=True)
+        return build_scenario(scenario, file, reuse)
+
+    def draft(section: RobotSection, plan: Plan) -> tuple[str, Built]:
+        title = f"{loaded.name} {_DOES[type(plan.control)]} {shell.name}"
+        text = draft_text(file.stem, title, section, shell, plan)
+        return text, read(text, built)
+
+    # What is written is what was built, and tried.
+    try:
+        if in_hand:
+            made = hold_in_hand(asked, built, tips, file.stem, read)
+        else:
+            made = find_working(asked, built, tips, draft)
+    except CannotStand:
+        raise
     except SphshellError as error:
-        if shaped != "fixed":
+        if shaped != "fixed" or in_hand:
             raise
         raise SphshellError(f"{error}; or let it float, --base floating") from None
-    _write(file, text)
-    of_base = () if shaped is None else (f"the base is {shaped}, by the robot's shape: or --base",)
-    why = (*of_base, *plan.why, _materials_note(plan))
-    return NewScenario(file, text, built, explain_built(built), why)
+    if made.part:
+        part = file.with_name(part_file(file.stem))
+        _check_free(part, force=asked.force)
+        _write(part, made.part)
+    _write(file, made.text)
+    why = made.why
+    if shaped is not None and not in_hand:
+        why = (f"the base is {shaped}, by the robot's shape: or --base", *why)
+    return NewScenario(file, made.text, made.built, explain_built(made.built), why)
 
 
-def _check_asked(
-    radius: float | None, press: float | None, place: str | None, materials: Sequence[str | None]
-) -> None:
-    if radius is not None:
-        check_positive("radius", radius, "m")
-    if press is not None:
-        check_positive("press", press, "N")
-    if place is not None and place not in PLACES:
-        raise NameNotFound("place", place, "a surface", PLACES)
-    for one in materials:
-        if one is not None:
-            find_material(one)
+def _sided(built: Built, tips: Sequence[Tip], *, inside: bool) -> Built:
+    """Return `built` with the side of its surface that spheres may touch.
 
-
-def _held(
-    section: RobotSection,
-    shell: ShellSection,
-    built: Built,
-    tips: Sequence[Tip],
-    materials: tuple[Material, Material],
-    press: float | None,
-    file: Path,
-    *,
-    force: bool,
-) -> NewScenario:
-    """Write the scenario in which the fingertips hold the surface, and its part's URDF."""
-    grasp = hold_in_hand(
-        section,
-        shell,
-        built,
-        tips,
-        materials,
-        press,
-        file.stem,
-        lambda text, reuse: _build_text(text, file, reuse),
-    )
-    part = file.with_name(part_file(file.stem))
-    if part.exists() and not force:
-        raise ScenarioError(part, "", "is there already: give another --out, or --force")
-    _write(part, grasp.urdf)
-    _write(file, grasp.text)
-    return NewScenario(file, grasp.text, grasp.built, explain_built(grasp.built), grasp.why)
-
-
-def _sided(shell: ShellSection, built: Built, word: str | None) -> tuple[ShellSection, Built]:
-    """Return the surface's table with the side that spheres may touch, and what is built of it."""
-    made = built.shells[shell.name]
+    SphshellError for a surface smaller than the sphere.
+    """
+    (section,), (made,) = built.scenario.shell, built.shells.values()
+    radius = min(tip.radius for tip in tips)
+    if made.size < radius:
+        raise SphshellError(
+            f"the surface measures {made.size:.3g} m, less than the sphere's radius {radius:g} m: "
+            f"state its --unit, or a smaller sphere, --radius {500 * made.size:.2g}mm"
+        )
     if not made.is_closed:
-        return shell, built
-    side: Literal["inside", "outside"] = "inside" if word == "bowl" else "outside"
-    section = shell.model_copy(update={"side": side})
+        return built
+    side = "inside" if inside else "outside"
     # The surface is not read again.
     turned = made.from_surface(made.surface(), **{**made.options, "side": side})
-    scenario = built.scenario.model_copy(update={"shell": [section]})
-    return section, replace(built, scenario=scenario, shells={shell.name: turned})
-
-
-def _materials_note(plan: Plan) -> str:
-    one, other = plan.contact.material.name, plan.contact.against.name
-    return f"law and friction of {one} on {other}, typical values: --law and --against name others"
-
-
-def _build_text(text: str, path: Path, reuse: Built) -> Built:
-    scenario = parse_scenario(text, path)
-    check_knobs(scenario, path, ranges=True)
-    return build_scenario(scenario, path, reuse)
-
-
-def _free_path(
-    out: str | PathLike[str] | None,
-    robot: str | PathLike[str],
-    surface: str | PathLike[str],
-    *,
-    force: bool,
-) -> Path:
-    path = Path(
-        f"{Path(robot).name.partition('.')[0]}_on_{Path(surface).stem}.toml" if out is None else out
+    scenario = built.scenario.model_copy(
+        update={"shell": [section.model_copy(update={"side": side})]}
     )
-    if path.suffix != ".toml":
-        raise ScenarioError(path, "", "a scenario's file must end in .toml")
+    return replace(built, scenario=scenario, shells={section.name: turned})
+
+
+def _check_free(path: Path, *, force: bool) -> None:
     if path.is_dir() or (path.exists() and not force):
         raise ScenarioError(path, "", "is there already: give another --out, or --force")
+
+
+def _free_path(asked: Asked) -> Path:
+    robot, surface = Path(asked.robot).name.partition(".")[0], Path(asked.surface).stem
+    path = Path(f"{robot}_on_{surface}.toml" if asked.out is None else asked.out)
+    if path.suffix != ".toml":
+        raise ScenarioError(path, "", "a scenario's file must end in .toml")
+    _check_free(path, force=asked.force)
     if not path.parent.is_dir():
         raise ScenarioError(path, "", f"the folder {path.parent} does not exist")
     return path
 
 
-def _robot_section(
-    robot: str | PathLike[str],
-    path: Path,
-    *,
-    base: Literal["fixed", "floating"] | None,
-    package_dirs: Sequence[str | PathLike[str]],
-    xacro_args: Mapping[str, str],
-) -> RobotSection:
-    file = Path(robot)
+def _robot_section(asked: Asked, path: Path) -> RobotSection:
+    robot, file = asked.robot, Path(asked.robot)
     if not is_path(robot):
-        if package_dirs or xacro_args:
+        if asked.package_dirs or asked.xacro_args:
             raise SphshellError(
                 f"mesh folders and xacro arguments belong to a file, not to {robot}"
             )
-        return RobotSection(name=str(robot), base=base)
+        return RobotSection(name=str(robot), base=asked.base)
     place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
     return RobotSection(
         urdf=place if is_urdf else None,
         file=None if is_urdf else place,
-        package_dirs=[_relative(Path(one), path) for one in package_dirs],
-        xacro_args=dict(xacro_args),
-        base=base,
+        package_dirs=[_relative(Path(one), path) for one in asked.package_dirs],
+        xacro_args=dict(asked.xacro_args or {}),
+        base=asked.base,
     )
 
 
@@ -368,39 +297,30 @@ def _build_bare(
         raise
 
 
-def _shell_section(
-    surface: str | PathLike[str],
-    unit: str | None,
-    parts: tuple[Sequence[str] | None, Sequence[str | int] | None],
-    path: Path,
-    built: Built,
-    tips: Sequence[Tip],
-) -> tuple[ShellSection, str | None]:
-    """Return the surface's table, and the word that stood for it."""
-    file = Path(surface)
-    if file.is_file():
-        name = file.stem.replace(".", "-")
-        bodies, faces = parts
-        section = ShellSection(
-            name=name,
+def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) -> ShellSection:
+    """Return the surface's table."""
+    file, word, parts = Path(asked.surface), asked.word, (asked.bodies, asked.faces)
+    if word is None:
+        return ShellSection(
+            name=file.stem.replace(".", "-"),
             file=_relative(file, path),
-            unit=unit,
-            bodies=None if bodies is None else list(bodies),
-            faces=None if faces is None else list(faces),
+            unit=asked.unit,
+            bodies=None if asked.bodies is None else list(asked.bodies),
+            faces=None if asked.faces is None else list(asked.faces),
         )
-        return section, None
-    word = str(surface)
     if word not in WORDS:
         if file.suffix:
             raise SphshellError(f"no such surface file: {file}")
         raise NameNotFound("surface", word, "the command (beside files)", WORDS)
-    if unit is not None:
+    if asked.unit is not None:
         raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in meters")
     if parts != (None, None):
         raise SphshellError(f"bodies and faces belong to a CAD file, not to the {word}")
-    centers = sphere_centers(built, tips)
-    spread = float(np.linalg.norm(np.ptp(centers, axis=0)))
-    size = _round_up(max(_SIZE * max(tip.radius for tip in tips), spread))
+    largest = max(tip.radius for tip in tips)
+    if asked.tips == "all":
+        return ShellSection(name=word, primitive=word_primitive(word, largest))
+    spread = float(np.linalg.norm(np.ptp(sphere_centers(built, tips), axis=0)))
+    size = _round_up(max(_SIZE * largest, spread))
     ball = Ball(size)
     primitives: dict[str, Primitive] = {
         "plane": HalfSpace(2 * size),
@@ -409,35 +329,13 @@ def _shell_section(
         "bowl": ball,
         "cylinder": Cylinder(radius=size, length=2 * size),
     }
-    return ShellSection(name=word, primitive=primitives[word]), word
-
-
-def _check_size(shell: Shell, tips: Sequence[Tip]) -> None:
-    radius = min(tip.radius for tip in tips)
-    if shell.size < radius:
-        raise SphshellError(
-            f"the surface measures {shell.size:.3g} m, less than the sphere's radius {radius:g} m: "
-            f"state its --unit, or a smaller sphere, --radius {500 * shell.size:.2g}mm"
-        )
+    return ShellSection(name=word, primitive=primitives[word])
 
 
 def _round_up(x: float) -> float:
     """Round to the next higher number of two digits."""
     rounded = float(f"{x:.2g}")
     return rounded if rounded >= x else float(f"{1.05 * x:.2g}")
-
-
-def _run(plan: Plan) -> RunSection:
-    # Measured on balls, arms, hands and legs: the implicit integrator is never much slower than
-    # others, and ten times faster than fixed steps that resolve the contact.
-    falls = plan.control is None
-    return RunSection(
-        duration=plan.duration,
-        integrator="implicit",
-        rtol=1e-5,
-        record_dt=1e-3 if falls else 5e-3,
-        recording_speed=0.5 if falls else 1.0,
-    )
 
 
 def _write(path: Path, text: str) -> None:

@@ -14,7 +14,7 @@ import trimesh
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, load_file
-from sphshell_pin.scenario.drafting.plan import GRAVITY
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
 from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, Primitive
 from sphshell_pin.shell.shell import Shell
 

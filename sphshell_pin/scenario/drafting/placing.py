@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.poses import Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
-from sphshell_pin.shell.shell import Shell
+from sphshell_pin.scenario.drafting.wording import axis_name
+from sphshell_pin.scenario.format.build import Built
 
 Array = npt.NDArray[np.float64]
 
@@ -24,6 +26,8 @@ _STEEP = 0.8
 # Places and turns at which links are held against the part, and places of one posture that are
 # offered.
 _MOST_TRIED, _MOST_OF_STANCE = 160, 2
+# How far joints may be under the floor [m]: not at all, but for rounding.
+_AT_FLOOR = 1e-6
 
 
 @dataclass(frozen=True)
@@ -55,9 +59,9 @@ class Place:
     def told(self) -> str:
         """A sentence that says how the part stands."""
         up = self.placement.rotation[:, 2] @ np.eye(3)[2]
-        stands = "upright, as in its file" if up > 0.999 else f"with its {_side(self.side)} "
-        if up <= 0.999:
-            stands += "towards the tip"
+        name = axis_name(self.side)
+        side = f"{name} side" if name else "touched place"
+        stands = "upright, as in its file" if up > 0.999 else f"with its {side} towards the tip"
         if abs(self.raised) < 1e-4:
             return f"the surface stands {stands}, on the floor of the robot's base"
         how = "above" if self.raised > 0 else "below"
@@ -76,63 +80,62 @@ class Searched:
     blocked: list[str] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
 class Bench:
-    """A robot and a part that is put before its tip; `floor` [m] is the height under the base."""
+    """The robot of `built` and a part that is put before its `tip`, on the floor of its base.
 
-    model: pin.Model
-    q: Array
-    """The posture to start from (nq,)."""
-    tip: Tip
-    shell: Shell
-    floor: float
-    depth: float
-    """How deep the sphere may come into the part [m]."""
-    usable: Callable[[Array, float | None], bool]
-    """Whether links are free of each other and above a height, at a configuration."""
-    blocked: Callable[[Stance, pin.SE3], str | None]
-    """The link that is in the part at a placement."""
-    searched: Searched
+    `links` are held against the part; q (nq,) is the posture to start from; the sphere may come
+    into the part by `depth` [m].
+    """
+
+    def __init__(
+        self, built: Built, tip: Tip, links: Links, q: Array, depth: float, searched: Searched
+    ) -> None:
+        self._model, self._geometry = built.assembly.model, built.assembly.loaded[0].collision_model
+        self._data, self._at = self._model.createData(), pin.GeometryData(self._geometry)
+        self._q, self._tip, self._links, self._shell = q, tip, links, links.shell
+        self._depth, self._searched = depth, searched
+        self._touching = SelfContact(self._model, self._geometry, q)
+        self._floor = _floor(self._geometry)
 
     def places(
         self,
         side: Array,
-        touches: Iterable[TouchPoint],
+        spots: Sequence[TouchPoint],
         approach: Array,
         *,
         lift: float | None,
+        room: float,
     ) -> Iterator[Place]:
         """Yield places where the part has `side` (3,) to a tip that presses along `approach` (3,).
 
-        It stands `lift` [m] above the floor, or wherever the posture has the tip. First those of
-        each posture where the sphere touches one face.
+        It stands `lift` [m] above the floor, or wherever the posture has the tip, `room` [m] before
+        the links. First those of each posture where the sphere touches one face.
         """
-        spots = list(touches)
         facing = turned_to(side, -approach)
-        lowest = float((self.shell.vertices @ facing.T)[:, 2].min())
+        lowest = float((self._shell.vertices @ facing.T)[:, 2].min())
         uneven: list[Place] = []
         tried = 0
 
         def height(spot: TouchPoint) -> float | None:
             if lift is None:
                 return None
-            return self.floor + lift - lowest + float(facing[2] @ spot.center)
+            return self._floor + lift - lowest + float(facing[2] @ spot.center)
 
-        limit = self.floor if lift is not None else None
+        limit = self._floor if lift is not None else None
         postures = stances(
-            self.model,
-            self.q,
-            self.tip,
+            self._model,
+            self._q,
+            self._tip,
             approach,
             height(spots[0]),
-            lambda q: self.usable(q, limit),
+            lambda q: self._usable(q, limit),
         )
         for posture in postures:
-            self.searched.postures += 1
+            self._searched.postures += 1
             offered = 0
             for spot in spots:
                 on_face = bool(spot.normal @ side > _STEEP) and touches_once(
-                    self.shell, spot, spot.point[None], self.tip.radius, self.depth
+                    self._shell, spot, spot.point[None], self._tip.radius, self._depth
                 )
                 z = height(spot)
                 at = posture.center if z is None else np.array([*posture.center[:2], z])
@@ -143,13 +146,15 @@ class Bench:
                     turned = pin.AngleAxis(angle, approach).toRotationMatrix() @ facing
                     placement = pin.SE3(turned, stance.center - turned @ spot.center)
                     tried += 1
-                    self.searched.places += 1
-                    link = self.blocked(stance, placement)
-                    if link is not None:
-                        self.searched.blocked.append(link)
+                    self._searched.places += 1
+                    # With a little room, as the tip yields when it is pressed on and slides.
+                    part = nearer(placement, room * stance.approach)
+                    found = self._links.within(stance.q, part, whole=True)
+                    if found is not None:
+                        self._searched.blocked.append(found.link)
                         continue
-                    bottom = float((self.shell.vertices @ turned.T)[:, 2].min())
-                    raised = bottom + float(placement.translation[2]) - self.floor
+                    bottom = float((self._shell.vertices @ turned.T)[:, 2].min())
+                    raised = bottom + float(placement.translation[2]) - self._floor
                     place = Place(stance, spot, placement, on_face, raised, side)
                     if on_face:
                         yield place
@@ -162,6 +167,37 @@ class Bench:
             if tried >= _MOST_TRIED:
                 break
         yield from uneven
+
+    def _usable(self, q: Array, floor: float | None) -> bool:
+        """Whether links are free of each other and above the `floor` [m] at q (nq,)."""
+        if self._touching.found(q):
+            return False
+        pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._at, q)
+        heights = [
+            pose.act(one.geometry.aabb_center)[2]
+            for one, pose in zip(self._geometry.geometryObjects, self._at.oMg, strict=True)
+            if one.parentJoint
+        ]
+        heights += [joint.translation[2] for joint in list(self._data.oMi)[1:]]
+        return floor is None or min(heights) > floor - _AT_FLOOR
+
+
+def _floor(geometry: pin.GeometryModel) -> float:
+    """Return the height [m] under what of the robot is fixed to the world, 0 at most."""
+    lowest = 0.0
+    for one in geometry.geometryObjects:
+        one.geometry.computeLocalAABB()
+        if not one.parentJoint:
+            box = one.geometry.aabb_local
+            corners = np.array(np.meshgrid(*zip(box.min_, box.max_, strict=True))).reshape(3, -1).T
+            heights = corners @ one.placement.rotation[2] + one.placement.translation[2]
+            lowest = min(lowest, float(heights.min()))
+    return lowest
+
+
+def nearer(placement: pin.SE3, way: Array) -> pin.SE3:
+    """Return the placement of a part that stands nearer to a tip, moved against the `way` (3,)."""
+    return pin.SE3(placement.rotation, placement.translation - way)
 
 
 def nearest_side(normal: Array) -> Array:
@@ -183,10 +219,3 @@ def turned_to(side: Array, target: Array) -> Array:
     rotation = pin.Quaternion.FromTwoVectors(side, target).toRotationMatrix()
     rounded = np.round(rotation)
     return rounded + 0.0 if np.abs(rotation - rounded).max() < 1e-9 else rotation
-
-
-def _side(side: Array) -> str:
-    k = int(np.argmax(np.abs(side)))
-    if abs(side[k]) > 0.999:
-        return f"{'-' if side[k] < 0 else '+'}{'xyz'[k]} side"
-    return "touched place"

@@ -2,27 +2,39 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.contact.materials import Material, friction_between, restitution_between
+from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.placing import Place
 from sphshell_pin.scenario.drafting.poses import Stance
-from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point, touches_once
+from sphshell_pin.scenario.drafting.tip_contact import (
+    GRAVITY,
+    Contact,
+    bearable,
+    contact_of,
+    hertz_stiffness,
+    sticking,
+)
+from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
+from sphshell_pin.scenario.drafting.wording import (
+    axis_name,
+    counted,
+    listed,
+    mm,
+    rounded,
+)
 from sphshell_pin.shell import Shell
 
 Array = npt.NDArray[np.float64]
 
-GRAVITY = 9.81
 UP = np.array([0.0, 0.0, 1.0])
 
 # Of a tip at the start, as a part of its radius; of a body that falls, and of feet.
@@ -33,10 +45,8 @@ FALL_BESIDE = 0.1
 TIP_TURN = 0.02
 # Largest normal force by default [N], and in weights of the tip's effective mass.
 MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
-# The path across a surface: radii long at most, and this part of the reach; radii a second. It is
-# a path from this number of radii on, and no longer one is looked for from this part of it on.
-PATH_RADII, PATH_REACH, PATH_RATE = 10.0, 0.15, 3.0
-SHORTEST_PATH, ENOUGH = 1.0, 0.8
+# Of the path across a surface: radii a second.
+PATH_RATE = 3.0
 LEAD_IN = 0.5
 # Of the target's speed and acceleration, each [s].
 RAMP = 0.25
@@ -45,23 +55,6 @@ RAMP = 0.25
 TIP_RATE, TIP_LAG = 20.0, 0.2
 # Sag of a standing robot's joints under its weight [rad].
 SAG = 0.05
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Law and friction of a tip, as the scenario states them."""
-
-    material: Material
-    against: Material
-    restitution: float
-    speed: float
-    """At which the restitution holds: of the first touch [m/s]."""
-    mu_static: float
-    mu_dynamic: float
-    v_static: float
-    """Slip speed [m/s] at which friction is full."""
-    bristle: tuple[float, float] | None = None
-    """Stiffness [N/m] and damping [N s/m] of bristles, for what has to stand."""
 
 
 @dataclass(frozen=True)
@@ -95,25 +88,25 @@ class Press:
         """Return it with four times the damping: friction shakes the tip less."""
         return replace(
             self,
-            damping=_round(4.0 * self.damping),
-            rotational_damping=_round(4.0 * self.rotational_damping),
+            damping=rounded(4.0 * self.damping),
+            rotational_damping=rounded(4.0 * self.rotational_damping),
             damped=4.0 * self.damped,
         )
 
     @property
-    def decoupled(self) -> bool:
-        """Whether the robot's inertia is to be kept from the surface, as it moves."""
+    def slides(self) -> bool:
+        """Whether the tip moves; then the robot's inertia is to be kept from the surface."""
         return len(self.path) > 1
 
     @property
     def acceleration(self) -> float | None:
         """Limit of the target's acceleration [m/s2], where it moves."""
-        return _round(self.speed / RAMP) if len(self.path) > 1 else None
+        return rounded(self.speed / RAMP) if self.slides else None
 
     @property
     def jerk(self) -> float | None:
         """Limit of the target's jerk [m/s3], where it moves."""
-        return _round(self.speed / RAMP**2) if len(self.path) > 1 else None
+        return rounded(self.speed / RAMP**2) if self.slides else None
 
 
 @dataclass(frozen=True)
@@ -137,101 +130,12 @@ class Plan:
     """Of the shell in the world."""
     root: Array | None
     """Where the free root starts: x y z and quaternion x y z w."""
-    why: tuple[str, ...] = field(default=())
+    why: tuple[str, ...] = ()
     """One sentence for each choice that was made for the user."""
     left_out: tuple[str, ...] = ()
     """Of what the robot's file states of its joints."""
     repair: str = ""
     """What was changed of a draft that failed; "" of the first draft."""
-
-
-@dataclass(frozen=True)
-class Way:
-    """A path of the tip on the surface; why it is none, where it is a single point."""
-
-    points: Array
-    """(k, 3) [m] in the shell's frame."""
-    smooth: bool = True
-    why: str = ""
-    even: bool = True
-    """Whether the sphere touches one face all along."""
-
-    @property
-    def length(self) -> float:
-        """Of the way [m]."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
-
-
-def find_way(
-    shell: Shell,
-    place: Place,
-    radius: float,
-    gap: float,
-    asked: Asked,
-    free: Callable[[Array], bool],
-) -> Way:
-    """Return the longest path that surface and joints allow from a `place`, of those tried.
-
-    The sphere of `radius` [m], whose `gap` [m] to the surface is that of the start, touches one
-    face along it, and the tip keeps its orientation unless that follows from its place. `free(q)`
-    says whether links are off the part.
-    """
-    stance, touch = place.stance, place.touch
-    stays = touch.point[None]
-    if not place.on_face:
-        why = "the sphere touches edges or several sides at once, wherever it was tried"
-        return Way(stays, why=why, even=False)
-    if stance.slide is None:
-        return Way(stays, why="its joints cannot move it across the surface")
-    length = min(PATH_RADII * radius, PATH_REACH * stance.reach)
-    best, most_on_surface, reason = Way(stays), 0.0, ""
-    direction = place.placement.rotation.T @ stance.slide
-    for points, smooth in asked.paths(shell, touch, direction, radius, length):
-        fine = points if smooth else _fine(points, 0.5 * radius)
-        count = _even_part(shell, place, fine, radius, gap)
-        most_on_surface = max(most_on_surface, Way(fine[:count]).length)
-        normals = shell.closest_points(fine[:count]).normals
-        signs = np.sign(normals @ touch.normal)
-        centers = fine[:count] + (radius + gap) * normals * np.where(signs, signs, 1.0)[:, None]
-        world = np.array([place.placement.act(one) for one in centers])
-        count, why = stance.follows(world, free)
-        reason = why or reason
-        if asked.whole and count < len(fine):
-            continue
-        way = Way(points if count == len(fine) else fine[:count], smooth)
-        if way.length > best.length:
-            best = way
-        if best.length >= ENOUGH * (asked.length or length):
-            return best
-    if asked.path is None and best.length >= SHORTEST_PATH * radius:
-        return best
-    needed = SHORTEST_PATH * radius if asked.path is None else ENOUGH * (asked.length or 0.0)
-    if most_on_surface <= needed:
-        why = f"the surface has no room: an edge or another side is within {_mm(most_on_surface)}"
-    else:
-        why = reason
-    return Way(stays, why=why)
-
-
-def _fine(points: Array, spacing: float) -> Array:
-    """Return `points` (k, 3) with more between them, at most `spacing` [m] apart."""
-    parts = [points[:1]]
-    for one, other in itertools.pairwise(points):
-        steps = max(1, math.ceil(float(np.linalg.norm(other - one)) / spacing))
-        parts.append(one + np.arange(1, steps + 1)[:, None] / steps * (other - one))
-    return np.concatenate(parts)
-
-
-def _even_part(shell: Shell, place: Place, points: Array, radius: float, gap: float) -> int:
-    """Return how many of `points` (k, 3) the sphere touches one after the other, each once."""
-    if touches_once(shell, place.touch, points, radius, 2 * gap):
-        return len(points)
-    low, high = 1, len(points)
-    while high - low > 1:
-        middle = (low + high) // 2
-        fits = touches_once(shell, place.touch, points[:middle], radius, 2 * gap)
-        low, high = (middle, high) if fits else (low, middle)
-    return low
 
 
 def press_force(
@@ -245,16 +149,16 @@ def press_force(
                 "the joints' effort limits do not carry the robot's own weight in this posture: "
                 "correct them in its file"
             )
-        return _round(force)
+        return rounded(force)
     if press > stance.force:
         raise SphshellError(
-            f"the joints' effort limits allow a push of {_round(stance.force, 3):g} N along "
-            f"{_axis(stance.approach)}, not {press:g} N"
+            f"the joints' effort limits allow a push of {rounded(stance.force, 3):g} N along "
+            f"{_direction(stance.approach)}, not {press:g} N"
         )
     deepest = hertz_stiffness(tip.radius, *materials) * (0.5 * tip.radius) ** 1.5
     if press > deepest:
         raise SphshellError(
-            f"{press:g} N would press a {materials[0].name} sphere of radius {_mm(tip.radius)} in "
+            f"{press:g} N would press a {materials[0].name} sphere of radius {mm(tip.radius)} in "
             "by more than half of it: a smaller --press, a larger --radius, or a harder --law"
         )
     return press
@@ -283,8 +187,8 @@ def press_plan(
     The sphere begins with the `gap` [m] at the first point of the `way`.
     """
     stance, path = place.stance, way.points
-    rate = _round(PATH_RATE * tip.radius)
-    contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
+    rate = rounded(PATH_RATE * tip.radius)
+    contact = contact_of(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
     softest = contact.mu_static * force / (TIP_LAG * tip.radius)
     stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
     mass = math.sqrt(stance.mass * stance.slide_mass)
@@ -301,23 +205,23 @@ def press_plan(
         even=way.even,
         speed=rate,
         lead_in=LEAD_IN,
-        stiffness=_round(stiffness),
-        damping=_round(1.4 * math.sqrt(stiffness * mass)),
-        rotational_stiffness=_round(turning),
-        rotational_damping=_round(1.4 * math.sqrt(turning * stance.inertia)),
-        posture_stiffness=tuple(_round(pull * one) for one in stance.joint_inertia),
-        joint_damping=tuple(_round(0.7 * math.sqrt(pull) * one) for one in stance.joint_inertia),
+        stiffness=rounded(stiffness),
+        damping=rounded(1.4 * math.sqrt(stiffness * mass)),
+        rotational_stiffness=rounded(turning),
+        rotational_damping=rounded(1.4 * math.sqrt(turning * stance.inertia)),
+        posture_stiffness=tuple(rounded(pull * one) for one in stance.joint_inertia),
+        joint_damping=tuple(rounded(0.7 * math.sqrt(pull) * one) for one in stance.joint_inertia),
         smooth=way.smooth,
     )
-    why = [f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"]
+    why = [f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}"]
     why.append(
-        f"the surface is {_mm(gap)} in front of the sphere, which presses along "
-        f"{_axis(stance.approach)}"
+        f"the surface is {mm(gap)} in front of the sphere, which presses along "
+        f"{_direction(stance.approach)}"
     )
     why.append("the joints are bent to a posture in which the tip moves well and can press")
     why.append(place.told)
     if stance.lock:
-        why.append(f"{_count(len(stance.lock), 'joint')} that do not move the tip are locked")
+        why.append(f"{counted(len(stance.lock), 'joint')} that do not move the tip are locked")
     why.append(
         f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
     )
@@ -326,7 +230,7 @@ def press_plan(
     if len(path) < 2:
         why.append(f"the tip presses in one place and does not slide: {way.why}")
     else:
-        why.append(f"the tip slides over {_mm(way.length)}")
+        why.append(f"the tip slides over {mm(way.length)}")
     corners = 0 if len(path) < 2 else 1 if control.spline else len(path) - 1
     duration = math.ceil(10 * (LEAD_IN + way.length / rate + 2 * RAMP * corners + 0.5)) / 10
     return Plan((tip,), contact, control, duration, gap, place.placement, None, tuple(why))
@@ -353,10 +257,10 @@ def plan_fall(
     start[:3] += touch.center - center
     speed = math.sqrt(2 * GRAVITY * gap)
     why = (
-        f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
-        f"it falls {_mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
+        f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
+        f"it falls {mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
     )
-    contact = _contact(materials, speed, 0.005)
+    contact = contact_of(materials, speed, 0.005)
     return Plan((tip,), contact, None, 1.0, gap, pin.SE3.Identity(), start, why)
 
 
@@ -380,45 +284,22 @@ def plan_stand(
     kp = load * 0.5 * leg / SAG
     # A leg turns the body above it as much as itself.
     inertia = float(np.median(joint_inertia)) + mass / len(tips) * (0.5 * leg) ** 2
-    base = _contact(materials, math.sqrt(2 * GRAVITY * gap), 0.005)
-    radius = tips[0].radius
-    slope = 1.5 * hertz_stiffness(radius, *materials) ** (2 / 3) * load ** (1 / 3)
-    bristle = (_round(slope), _round(0.2 * math.sqrt(slope * mass / len(tips))))
-    contact = replace(base, bristle=bristle)
+    speed, share = math.sqrt(2 * GRAVITY * gap), mass / len(tips)
+    contact = sticking(materials, tips[0].radius, speed, load, share)
     why = [
-        f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"
+        f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}"
         for tip in tips
     ]
-    why.append(f"the robot floats, {_mm(gap)} above the surface, and its joints hold the posture")
+    why.append(f"the robot floats, {mm(gap)} above the surface, and its joints hold the posture")
     if len(tips) < 3:
         why.append("it will fall over: nothing but its sphere touches")
     why.append("friction sticks, so that it can stand")
-    control = Hold(_round(kp), _round(1.4 * math.sqrt(kp * inertia)))
+    control = Hold(rounded(kp), rounded(1.4 * math.sqrt(kp * inertia)))
     return Plan(tips, contact, control, 2.0, gap, place, None, tuple(why))
 
 
-def hertz_stiffness(radius: float, one: Material, other: Material) -> float:
-    """Return Hertz's stiffness [N/m^1.5] of a sphere of `radius` [m] on a plane."""
-    softness = (1 - one.poisson**2) / one.young + (1 - other.poisson**2) / other.young
-    return 4 / 3 * math.sqrt(radius) / softness
-
-
-def bearable(radius: float, one: Material, other: Material) -> float:
-    """Return the load [N] that presses a sphere of `radius` [m] in by a fifteenth of it."""
-    return float(hertz_stiffness(radius, one, other) * (radius / 15) ** 1.5)
-
-
-def _contact(materials: tuple[Material, Material], speed: float, slip: float) -> Contact:
-    static, dynamic = friction_between(*materials)
-    return Contact(
-        materials[0],
-        materials[1],
-        restitution_between(*materials),
-        _round(speed),
-        round(static, 3),
-        round(dynamic, 3),
-        _round(slip),
-    )
+def _direction(direction: Array) -> str:
+    return axis_name(direction) or listed(direction, ".2f")
 
 
 def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Material]) -> float:
@@ -445,22 +326,3 @@ def _under(shell: Shell, centers: Array, radii: Array, gap: float) -> pin.SE3:
         if heights:
             return pin.SE3(np.eye(3), np.array([aside[0], aside[1], min(heights)]))
     raise SphshellError("no sphere lands on the surface: it is too small")
-
-
-def _round(x: float, digits: int = 2) -> float:
-    return float(f"{x:.{digits}g}")
-
-
-def _mm(x: float) -> str:
-    return f"{x * 1e3:.3g} mm"
-
-
-def _axis(direction: Array) -> str:
-    k = int(np.argmax(np.abs(direction)))
-    if abs(direction[k]) > 0.999:
-        return f"{'-' if direction[k] < 0 else '+'}{'xyz'[k]}"
-    return f"[{', '.join(f'{one:.2f}' for one in direction)}]"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -6,9 +6,11 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.placing import Searched
 from sphshell_pin.scenario.drafting.plan import Plan
 from sphshell_pin.scenario.drafting.trial import Fault
+from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.schema import RobotSection
 
 _ADVICE = {
@@ -69,13 +71,13 @@ def cannot_stand(tried: Tried) -> CannotStand:
 def _failed(tried: Tried) -> str:
     fault = tried.faults[-1]
     when = f" at t = {fault.t:.2g} s" if fault.link else ""
-    return f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}"
+    return f"no draft works ({counted(tried.runs, 'run')}): {fault.text}{when}"
 
 
-def refusal(frame: str, place: str | None, word: str | None, tried: Tried) -> SphshellError:
+def refusal(frame: str, asked: Asked, tried: Tried) -> SphshellError:
     """Return the error that says why no draft works, and what to change."""
     if not tried.postures:
-        way = f"along {place}" if place else "along any axis"
+        way = f"along {asked.place}" if asked.place else "along any axis"
         return SphshellError(
             f"the tip on frame '{frame}' cannot move {way} in any posture that was tried: its "
             "joints do not allow it; take another --place or --frame"
@@ -91,14 +93,10 @@ def refusal(frame: str, place: str | None, word: str | None, tried: Tried) -> Sp
         )
     if tried.blocked:
         ((link, _),) = Counter(tried.blocked).most_common(1)
-        advice = _ADVICE_BOWL if word == "bowl" else _ADVICE["links"]
+        advice = _ADVICE_BOWL if asked.inside else _ADVICE["links"]
         return SphshellError(
             f"link '{link}' would be in the part, or another one: in each of "
-            f"{_count(tried.postures, 'posture')} and {_count(tried.places, 'place')} on the part "
-            f"that were tried; {advice}"
+            f"{counted(tried.postures, 'posture')} and {counted(tried.places, 'place')} on the "
+            f"part that were tried; {advice}"
         )
     return SphshellError("the surface has no point to touch")
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -12,7 +12,8 @@ import pinocchio as pin
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.draft_text import HELD
-from sphshell_pin.scenario.drafting.plan import GRAVITY, Hold, Plan, Press
+from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
 from sphshell_pin.scenario.format.bodies import joint_spans, to_se3
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.reach import Reach
@@ -56,7 +57,7 @@ def try_out(built: Built, plan: Plan, links: Links) -> Fault | None:
         or _link_fault(built, result, links)
         or _force_fault(built, plan, result)
         or _path_fault(built, plan, result)
-        or _figure_fault(built, result)
+        or figure_fault(built, result)
     )
 
 
@@ -142,7 +143,8 @@ def _forces(result: Result) -> Array:
     return sizes
 
 
-def _figure_fault(built: Built, result: Result) -> Fault | None:
+def figure_fault(built: Built, result: Result) -> Fault | None:
+    """Say which of the scenario's expected figures is not met, if one is not."""
     for one in judge(built, result):
         if not one.met:
             return Fault("figure", f"{one.figure} is {one.measured:.3g}, not {one.expected}")

@@ -97,7 +97,6 @@ def assemble(
     base, visual = pin.Model(), pin.GeometryModel()
     starts: list[tuple[str, Array, Array, Array]] = []
     lock: list[str] = []
-    labels: set[str] = set()
     taken: list[LoadedRobot] = []
     prefixes: list[str] = []
     for i, section in enumerate(scenario.robot):
@@ -112,12 +111,10 @@ def assemble(
                 joint_spans(model, joint)
         prefix = ""
         if several:
-            prefix = _prefix(section, robot)
-            if prefix in labels:
-                raise ScenarioError(
-                    path, f"{key}.label", "two robots share this label", prefix.rstrip("/")
-                )
-            labels.add(prefix)
+            label = section.label or robot.name
+            prefix = f"{label}/"
+            if prefix in prefixes:
+                raise ScenarioError(path, f"{key}.label", "two robots share this label", label)
             _rename(model, geometry, prefix)
         prefixes.append(prefix)
         lock += [prefix + joint for joint in section.lock]
@@ -218,10 +215,6 @@ def _tip_frame(
         if sphere is not None and moves:
             return sphere.frame, sphere.offset
     raise SphshellError("no contact has a sphere on this robot: name the frame of the tip")
-
-
-def _prefix(section: RobotSection, robot: LoadedRobot) -> str:
-    return f"{section.label or robot.name}/"
 
 
 def origin(section: RobotSection) -> tuple[object, ...]:

@@ -173,15 +173,14 @@ def build_scenario(
         q_lock = assembly.q0 if assembly.lock else None
         joints = joint_components(scenario, assembly, path)
         scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
-    shells = {
-        section.name: (
+    shells: dict[str, ShellPlace] = {}
+    for i, section in enumerate(scenario.shell):
+        shell = (
             (surfaces or {}).get(section.name)
             or _kept_shell(section, reuse)
-            or _build_shell(section, path, item_key("shell", scenario.shell, i)),
-            section,
+            or _build_shell(section, path, item_key("shell", scenario.shell, i))
         )
-        for i, section in enumerate(scenario.shell)
-    }
+        shells[section.name] = shell, section.frame, to_se3(section.placement)
     if len(shells) < len(scenario.shell):
         raise ScenarioError(path, "shell", "two shells share a name")
     for i, contact in enumerate(scenario.contact):
@@ -217,7 +216,7 @@ def build_scenario(
         simulation,
         visual,
         assembly,
-        {name: shell for name, (shell, _) in shells.items()},
+        {name: shell for name, (shell, *_) in shells.items()},
         functions,
         figures,
     )
@@ -262,33 +261,20 @@ def explain_built(built: Built) -> Explanation:
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
-    crease_angle = float(np.deg2rad(section.crease_angle_deg))
+    options: dict[str, Any] = {
+        name: getattr(section, name) for name in ("chord_error", "side", "name")
+    }
+    options["crease_angle"] = float(np.deg2rad(section.crease_angle_deg))
     with blamed_on(path, key):
         if section.primitive is not None:
-            shell = section.primitive.shell(
-                chord_error=section.chord_error,
-                segments=section.segments,
-                side=section.side,
-                crease_angle=crease_angle,
-                name=section.name,
-            )
+            shell = section.primitive.shell(segments=section.segments, **options)
         else:
             file = path.parent / str(section.file)
             if not os.path.isfile(file):
                 raise SphshellError(f"no such surface file: {file}")
-            shell = sp.Shell.from_file(
-                file,
-                unit=section.unit,
-                scale=section.scale,
-                chord_error=section.chord_error,
-                bodies=section.bodies,
-                faces=section.faces,
-                time_limit=section.time_limit,
-                memory_limit=section.memory_limit,
-                side=section.side,
-                crease_angle=crease_angle,
-                name=section.name,
-            )
+            of_files = ("unit", "scale", "bodies", "faces", "time_limit", "memory_limit")
+            options |= {name: getattr(section, name) for name in of_files}
+            shell = sp.Shell.from_file(file, **options)
         return shell if section.magnify == 1.0 else shell.transformed(scale=section.magnify)
 
 
@@ -298,61 +284,54 @@ def _build_laws(
     key: str,
     load: Callable[[str, str], Function],
 ) -> tuple[NormalLaw, Friction | None]:
-    def loader(name: str) -> Callable[[str, str], Function]:
-        return lambda where, field: load(where, f"{key}.{name}.{field}")
+    def built(part: str) -> Any:
+        law = getattr(stated, part)
+        if isinstance(law, FunctionFile | FunctionFrictionFile):
+            return law.loaded(lambda where, field: load(where, f"{key}.{part}.{field}"))
+        return law._build(path.parent)
 
-    folder, law, friction = path.parent, stated.law, stated.friction
     with blamed_on(path, key):
-        return (
-            law.loaded(loader("law")) if isinstance(law, FunctionFile) else law._build(folder),
-            friction.loaded(loader("friction"))
-            if isinstance(friction, FunctionFrictionFile)
-            else friction._build(folder),
-        )
+        return built("law"), built("friction")
+
+
+def _find_shell(shells: Mapping[str, ShellPlace], name: str, path: Path, key: str) -> ShellPlace:
+    with blamed_on(path, f"{key}.shell"):
+        if name not in shells:
+            raise NameNotFound("shell", name, "the scenario", shells)
+    return shells[name]
 
 
 def _add_contact(
     scene: sp.Scene,
     contact: schema.ContactSection,
     laws: tuple[NormalLaw, Friction | None],
-    shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
+    shells: Mapping[str, ShellPlace],
     assembly: Assembly,
     path: Path,
     key: str,
 ) -> None:
-    shell: sp.Shell | sp.Sphere
+    touched: tuple[Any, ...]
     if contact.other_sphere is not None:
-        shell, frame, placement = to_sphere(contact.other_sphere), "universe", None
-        carrier = shell.frame
+        touched, carrier = (to_sphere(contact.other_sphere),), contact.other_sphere.frame
     else:
-        with blamed_on(path, f"{key}.shell"):
-            name = contact.shell or ""
-            if name not in shells:
-                raise NameNotFound("shell", name, "the scenario", shells)
-        shell, section = shells[name]
-        frame, placement = section.frame, to_se3(section.placement)
-        carrier = frame
+        touched = _find_shell(shells, contact.shell or "", path, key)
+        carrier = touched[1]
     with blamed_on(path, f"{key}.spheres"):
         several = spheres_of(contact, assembly, carrier)
     with blamed_on(path, key), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
         law, friction = laws
+        how: dict[str, Any] = {
+            "law": law,
+            "friction": friction,
+            "method": contact.method,
+            "name": contact.name,
+        }
         one = contact.sphere or contact.plane
         if one is not None:
-            scene.add_contact(
-                to_end(one), shell, frame, placement, law, friction, contact.method, contact.name
-            )
+            scene.add_contact(to_end(one), *touched, **how)
         else:
-            scene.add_contacts(
-                several,
-                shell,
-                frame,
-                placement,
-                law=law,
-                friction=friction,
-                method=contact.method,
-                name=contact.name,
-            )
+            scene.add_contacts(several, *touched, **how)
 
 
 def _build_sensors(stated: Sequence[Component], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
@@ -369,17 +348,10 @@ def _build_controller(
     stated: Component,
     scene: sp.Scene,
     q0: Array,
-    shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
+    shells: Mapping[str, ShellPlace],
     path: Path,
     load: Callable[[str, str], Function],
 ) -> Controller | Function | None:
-    def find_shell(name: str) -> ShellPlace:
-        with blamed_on(path, "controller.shell"):
-            if name not in shells:
-                raise NameNotFound("shell", name, "the scenario", shells)
-        shell, section = shells[name]
-        return shell, section.frame, to_se3(section.placement)
-
     with blamed_on(path, "controller"):
         if isinstance(stated, PythonFunction):
             function = load(stated.function, "controller.function")
@@ -388,7 +360,9 @@ def _build_controller(
         controller: Controller | None = stated._build(path.parent)
         if controller is None:
             return None
-        controller = controller.in_scenario(find_shell)
+        controller = controller.in_scenario(
+            lambda name: _find_shell(shells, name, path, "controller")
+        )
         try:
             # A wrong frame, joint or size is reported now, not when the run starts.
             controller._bind(scene, q0)

@@ -13,7 +13,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
@@ -200,8 +200,9 @@ def owner_of(scenario: Scenario, parts: Iterable[str]) -> object:
 def child_of(owner: object, part: str) -> object:
     """Return what `owner`, a table, list or object, has under a name; None if it has not."""
     if isinstance(owner, list):
-        names = [getattr(one, "label", None) or getattr(one, "name", None) for one in owner]
-        at = names.index(part) if part in names else int(part) if part.isdecimal() else None
+        names = [_name_of(one) for one in owner]
+        at = int(part) if part.isdecimal() else None
+        at = names.index(part) if part and part in names else at
         return None if at is None else owner[at]
     return owner.get(part) if isinstance(owner, Mapping) else getattr(owner, part, None)
 
@@ -236,11 +237,7 @@ def _taken_for_numbers(
 
 def item_key(table: str, items: Sequence[Toml], index: int) -> str:
     """Return the dotted key of an item of a list: by its label or name, else by its index."""
-    entries = [
-        dict(one) if isinstance(one, BaseModel | Mapping) else getattr(one, "__dict__", {})
-        for one in items
-    ]
-    names = [str(one.get("label") or one.get("name") or "") for one in entries]
+    names = [_name_of(one) for one in items]
     name = names[index]
     return f"{table}.{name}" if name and names.count(name) == 1 else f"{table}[{index}]"
 
@@ -340,7 +337,13 @@ def _keys_of(table: str) -> Iterable[str]:
 
 
 def _item_name(item: Mapping[str, object]) -> str:
-    return str(item.get("label") or item.get("name") or item.get("urdf") or "")
+    return _name_of(item) or str(item.get("urdf") or "")
+
+
+def _name_of(item: object) -> str:
+    """Return the label or the name of a table, as data or as an object; "" if it has none."""
+    get = item.get if isinstance(item, Mapping) else functools.partial(getattr, item)
+    return str(get("label", "") or get("name", "") or "")
 
 
 def _explain(

@@ -155,6 +155,13 @@ class RobotSection(Section):
         return True if self.free_flyer else None if self.base is None else self.base == "floating"
 
 
+_OF_FILES = {
+    ("unit", "scale"): "a file; a primitive's sizes are in meters",
+    ("bodies", "faces"): "a CAD file, not to a primitive",
+    ("time_limit", "memory_limit"): "a CAD file, not to a primitive",
+}
+
+
 class ShellSection(Section):
     """A surface: a file beside the scenario, or a primitive."""
 
@@ -180,12 +187,9 @@ class ShellSection(Section):
         """Refuse a shell with no surface or two, and keys that its kind does not read."""
         if (self.file is None) == (self.primitive is None):
             raise ValueError("give either file or primitive, not both")
-        if self.file is None and (self.unit is not None or self.scale is not None):
-            raise ValueError("unit and scale belong to a file; a primitive's sizes are in meters")
-        if self.file is None and (self.bodies is not None or self.faces is not None):
-            raise ValueError("bodies and faces belong to a CAD file, not to a primitive")
-        if self.file is None and (self.time_limit is not None or self.memory_limit is not None):
-            raise ValueError("time_limit and memory_limit belong to a CAD file, not to a primitive")
+        for keys, why in _OF_FILES.items():
+            if self.file is None and any(getattr(self, key) is not None for key in keys):
+                raise ValueError(f"{' and '.join(keys)} belong to {why}")
         if self.file is not None and self.segments is not None:
             raise ValueError("segments belong to a primitive, not to a file")
         return self

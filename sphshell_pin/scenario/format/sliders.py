@@ -70,7 +70,7 @@ def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
         if _choices(scenario, found):
             _check_choice(section, found, path, where)
             continue
-        value = float(_found(section, scenario, path).value)
+        value = _number(found, section.key, path)
         low, high, log = _range(section, value, meaning(scenario, found))
         if low is None or high is None:
             if not ranges:
@@ -91,12 +91,11 @@ def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
             )
 
 
-def _found(section: KnobSection, scenario: Scenario, path: Path) -> Found:
-    found = look_up(scenario, section.key, path)
+def _number(found: Found, key: str, path: Path) -> float:
     if isinstance(found.value, bool) or not isinstance(found.value, int | float):
         shown = None if isinstance(found.value, dict | list) else found.value
-        raise ScenarioError(path, section.key, "is not a number, so it cannot be a knob", shown)
-    return found
+        raise ScenarioError(path, key, "is not a number, so it cannot be a knob", shown)
+    return float(found.value)
 
 
 def _range(
@@ -135,16 +134,14 @@ def _check_choice(section: KnobSection, found: Found, path: Path, where: str) ->
 
 
 def _knob(section: KnobSection, scenario: Scenario, path: Path) -> LiveParameter:
-    at = look_up(scenario, section.key, path)
-    choices = _choices(scenario, at)
+    key, found = section.key, look_up(scenario, section.key, path)
+    about, restart = meaning(scenario, found), found.parts[0] in _FROM_THE_START
+    label = about.label if section.label is None else section.label
+    choices = _choices(scenario, found)
     if choices:
-        label = meaning(scenario, at).label if section.label is None else section.label
-        restart = at.parts[0] in _FROM_THE_START
-        return LiveParameter(
-            section.key, label, "", 0.0, 0.0, False, str(at.value), restart, choices
-        )
-    found = _found(section, scenario, path)
-    value, about = float(found.value), meaning(scenario, found)
+        return LiveParameter(key, label, "", 0.0, 0.0, False, str(found.value), restart, choices)
+    value = _number(found, key, path)
+    unit = about.unit if section.unit is None else section.unit
     low, high, log = _range(section, value, about)
     # A missing end, and a value that is not positive any more.
     if low is None:
@@ -152,16 +149,7 @@ def _knob(section: KnobSection, scenario: Scenario, path: Path) -> LiveParameter
     if high is None:
         high = value / DECADE if value < 0.0 else 1.0
     low, high = min(low, value), max(high, value)
-    return LiveParameter(
-        key=section.key,
-        label=about.label if section.label is None else section.label,
-        unit=about.unit if section.unit is None else section.unit,
-        low=low,
-        high=high,
-        log=log and low > 0,
-        value=value,
-        restart=found.parts[0] in _FROM_THE_START,
-    )
+    return LiveParameter(key, label, unit, low, high, log and low > 0, value, restart)
 
 
 def meaning(scenario: Scenario, found: Found) -> Parameter:

@@ -26,14 +26,7 @@ from sphshell_pin.scenario.format.sliders import LiveParameter, live_parameters
 from sphshell_pin.scenario.live.drag import Drag, Dragged, movable_bodies
 from sphshell_pin.scenario.live.joint_targets import Target, aimed, check_aim, targets_of
 from sphshell_pin.scenario.running.player import Rows
-from sphshell_pin.scenario.running.series import (
-    RESIDUAL,
-    Series,
-    force_series,
-    held,
-    motion_series,
-    sensor_series,
-)
+from sphshell_pin.scenario.running.series import Series, held, series_of
 
 Array = npt.NDArray[np.float64]
 
@@ -55,6 +48,7 @@ class LiveRun:
     """
 
     duration: float | None = None
+    can_record_patches = True
 
     def __init__(self, built: Built) -> None:
         self.built = built
@@ -159,20 +153,11 @@ class LiveRun:
         return None if self._drag is None else self._drag.at(self.scene.model, self.q, self.v)
 
     @property
-    def can_record_patches(self) -> bool:
-        """Whether the patches of contacts can be switched on."""
-        return True
-
-    @property
     def series(self) -> tuple[Series, ...]:
         """What charts can show of the run."""
         sensors = {one.name: one.columns(self.scene) for one in self.built.simulation.sensors}
-        return (
-            *force_series([pair.name for pair in self.scene.pairs]),
-            *motion_series(self.scene.model, torque=self.built.controller is not None),
-            *sensor_series(sensors),
-            RESIDUAL,
-        )
+        pairs, torque = [pair.name for pair in self.scene.pairs], self.built.controller is not None
+        return series_of(pairs, self.scene.model, sensors, torque=torque)
 
     @property
     def now(self) -> Rows:

@@ -125,12 +125,9 @@ def check_expectations(built: Built) -> None:
 def measure(built: Built, result: Result, name: str) -> float:
     """Return the figure `name` of `result`, in SI units; see PAIR_FIGURES and those after it."""
     kind, _, rest = name.partition(".")
-    if kind == "pairs":
-        pair, _, figure = rest.rpartition(".")
-        return float(getattr(result.stats.pairs[pair], figure))
-    if kind == "joints":
-        joint, _, figure = rest.rpartition(".")
-        return float(getattr(result.stats.joints[joint], figure))
+    if kind in ("pairs", "joints"):
+        owner, _, figure = rest.rpartition(".")
+        return float(getattr(getattr(result.stats, kind)[owner], figure))
     if kind == "sensors":
         return _of_sensor(result, rest)
     if kind == "figures":

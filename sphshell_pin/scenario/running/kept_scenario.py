@@ -25,7 +25,12 @@ from sphshell_pin.parameters import Component
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.robots.kept_robot import ALONE, load_kept, meshes_of, text_of, without_references
 from sphshell_pin.scenario.format.bodies import origin
-from sphshell_pin.scenario.format.schema import RobotSection, Scenario
+from sphshell_pin.scenario.format.schema import (
+    ContactSection,
+    RobotSection,
+    Scenario,
+    SourceSection,
+)
 from sphshell_pin.shell.kept_shell import arrays_of, shell_of
 from sphshell_pin.shell.shell import Shell
 
@@ -112,15 +117,10 @@ def keep(
         if one.file is not None:
             shell = shells[one.name]
             arrays |= {f"shell.{one.name}.{k}": array for k, array in arrays_of(shell).items()}
-            surfaces[one.name] = _Surface(
-                side=shell.side,
-                crease_angle=shell.crease_angle,
-                rounding=shell.rounding,
-                finds_faces=shell.finds_faces,
-                face_names=list(shell.face_names),
-            )
-    laws = [law for one in scenario.contact for law in (one.law, one.friction)]
-    laws += [law for other in scenario.source for law in (other.law, other.friction)]
+            about = {name: getattr(shell, name) for name in _Surface.model_fields}
+            surfaces[one.name] = _Surface(**about | {"face_names": list(shell.face_names)})
+    with_laws: list[ContactSection | SourceSection] = [*scenario.contact, *scenario.source]
+    laws = [law for one in with_laws for law in (one.law, one.friction)]
     named = [name for law in laws for name in law.files if not name.endswith(".py")]  # no code
     tables = {name: kept(folder / name) for name in named}
     contents = _Contents(robots=held, surfaces=surfaces, tables=tables)
@@ -159,13 +159,14 @@ def restore(scenario: Scenario, kept: Kept) -> Restored:
         arrays = {k.removeprefix(begin): v for k, v in kept.arrays.items() if k.startswith(begin)}
         surfaces[one.name] = shell_of(arrays, name=one.name, **about)
     tables = {name: _place(kept, digest, ".csv") for name, digest in contents.tables.items()}
-
-    def at_hand(law: Component, friction: Component) -> dict[str, Component]:
-        return {"law": _at_hand(law, tables), "friction": _at_hand(friction, tables)}
-
     sections = {
-        "contact": [c.model_copy(update=at_hand(c.law, c.friction)) for c in scenario.contact],
-        "source": [c.model_copy(update=at_hand(c.law, c.friction)) for c in scenario.source],
+        table: [
+            one.model_copy(
+                update={kind: _at_hand(getattr(one, kind), tables) for kind in ("law", "friction")}
+            )
+            for one in getattr(scenario, table)
+        ]
+        for table in ("contact", "source")
     }
     return Restored(scenario.model_copy(update=sections), robots, surfaces)
 

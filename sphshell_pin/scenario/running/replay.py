@@ -24,14 +24,7 @@ from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import LiveParameter
 from sphshell_pin.scenario.running.kept_scenario import restore
 from sphshell_pin.scenario.running.player import Rows
-from sphshell_pin.scenario.running.series import (
-    RESIDUAL,
-    Series,
-    force_series,
-    held,
-    motion_series,
-    sensor_series,
-)
+from sphshell_pin.scenario.running.series import Series, held, series_of
 
 Array = npt.NDArray[np.float64]
 
@@ -151,12 +144,8 @@ class Replay:
     def series(self) -> tuple[Series, ...]:
         """What charts can show of the run: torques where it recorded them."""
         sensors = {name: log.columns for name, log in self.result.sensors.items()}
-        return (
-            *force_series(self.result.pairs),
-            *motion_series(self.scene.model, torque=self.result.torque is not None),
-            *sensor_series(sensors),
-            RESIDUAL,
-        )
+        torque = self.result.torque is not None
+        return series_of(self.result.pairs, self.scene.model, sensors, torque=torque)
 
     @property
     def now(self) -> Rows:

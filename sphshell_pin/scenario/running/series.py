@@ -65,40 +65,18 @@ def force_series(pairs: Sequence[str]) -> tuple[Series, ...]:
     """
     kinds = {"normal": "normal_force", "friction": "friction_force"}
     several = len(pairs) > 1
-    found = [
-        Series(
-            kind,
-            "Force",
-            f"{kind}, all pairs" if several else kind,
-            "N",
-            source,
-            lambda block: block.sum(axis=1),
-            color=kind,
-            from_zero=True,
-        )
-        for kind, source in kinds.items()
-    ]
-    if several:
-        found += [
-            Series(
-                f"{kind}.{pair}",
-                "Force",
-                f"{kind}, {pair}",
-                "N",
-                source,
-                _column(k),
-                from_zero=True,
-            )
-            for k, pair in enumerate(pairs)
-            for kind, source in kinds.items()
-        ]
-    return (
-        *found,
-        *(
-            Series(f"depth.{pair}", "Depth", pair, "mm", "depth", _column(k, 1e3), from_zero=True)
-            for k, pair in enumerate(pairs)
-        ),
-    )
+    found = []
+    for kind, source in kinds.items():
+        name = f"{kind}, all pairs" if several else kind
+        found.append(Series(kind, "Force", name, "N", source, _sum, kind, from_zero=True))
+    for k, pair in enumerate(pairs if several else ()):
+        for kind, source in kinds.items():
+            key, name = f"{kind}.{pair}", f"{kind}, {pair}"
+            found.append(Series(key, "Force", name, "N", source, _column(k), from_zero=True))
+    for k, pair in enumerate(pairs):
+        read = _column(k, 1e3)
+        found.append(Series(f"depth.{pair}", "Depth", pair, "mm", "depth", read, from_zero=True))
+    return tuple(found)
 
 
 def motion_series(model: pin.Model, *, torque: bool) -> tuple[Series, ...]:
@@ -126,20 +104,25 @@ def motion_series(model: pin.Model, *, torque: bool) -> tuple[Series, ...]:
     return tuple(one for one in found if one.name)
 
 
-def sensor_series(columns: Mapping[str, Sequence[str]]) -> tuple[Series, ...]:
+def _sensor_series(columns: Mapping[str, Sequence[str]]) -> tuple[Series, ...]:
     """Return the curves of the sensors whose columns, with their units, these are."""
-    found = []
-    for sensor, names in columns.items():
-        for k, (name, unit) in enumerate(map(_unit, names)):
-            source = f"sensor.{sensor}"
-            found.append(
-                Series(f"{source}.{name}", f"Sensor {sensor}", name, unit, source, _column(k))
-            )
-    return tuple(found)
+    return tuple(
+        Series(f"sensor.{one}.{name}", f"Sensor {one}", name, unit, f"sensor.{one}", _column(k))
+        for one, names in columns.items()
+        for k, (name, unit) in enumerate(map(_unit, names))
+    )
 
 
-RESIDUAL = Series("residual", "Energy residual", "residual", "J", "residual", lambda b: b[:, 0])
-"""The curve of the energy residual."""
+def series_of(
+    pairs: Sequence[str], model: pin.Model, sensors: Mapping[str, Sequence[str]], *, torque: bool
+) -> tuple[Series, ...]:
+    """Return all curves: forces, joints, the columns of `sensors`, and the energy residual."""
+    return (
+        *force_series(pairs),
+        *motion_series(model, torque=torque),
+        *_sensor_series(sensors),
+        Series("residual", "Energy residual", "residual", "J", "residual", _column(0)),
+    )
 
 
 def held(log: SensorLog, t: Array, before: Array | None) -> Array:
@@ -150,6 +133,11 @@ def held(log: SensorLog, t: Array, before: Array | None) -> Array:
     first = np.full(len(log.columns), np.nan) if before is None else before
     values: Array = np.vstack((first, log.values))[np.searchsorted(log.t, t, side="right")]
     return values
+
+
+def _sum(block: Array) -> Array:
+    total: Array = block.sum(axis=1)
+    return total
 
 
 def _column(k: int, factor: float = 1.0) -> Callable[[Array], Array]:

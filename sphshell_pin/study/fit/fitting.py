@@ -68,8 +68,6 @@ def fit(
         A key, a value or a name that is wrong.
     SphshellError
         The run at the start values fails: why.
-    MissingExtra
-        scipy is not installed.
     """
     if not 0.0 < level < 1.0:
         raise InvalidParameter("level", level, "must lie between 0 and 1")

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.errors import import_extra
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.remarks import remarks_on
 from sphshell_pin.study.fit.report import Fit, Fitted, Series
@@ -227,7 +226,8 @@ class Search:
 
     def _minimize(self, use: Array | float = 1.0) -> None:
         """Make the residuals least, each times `use`."""
-        optimize = import_extra("scipy.optimize", "fit", "a fit")
+        from scipy import optimize
+
         tolerance = self.runs.tolerance
         # A value at its bound would hold the search there.
         inner = np.clip(self.x, self.low + _inset(self.low), self.high - _inset(self.high))

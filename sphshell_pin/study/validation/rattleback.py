@@ -16,7 +16,6 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.cases.contents import Finding
-from sphshell_pin.errors import import_extra
 from sphshell_pin.study.validation.cases import Array, Outcome, case
 from sphshell_pin.study.validation.pictures import Panel, draw
 
@@ -49,9 +48,11 @@ def roll(spin: float, duration: float) -> tuple[Array, Array, Array]:
     def about_vertical(_: float, y: Array) -> float:
         return float(y[:3] @ y[3:])
 
+    from scipy.integrate import solve_ivp
+
     start = np.concatenate((START[2], [0.0, 0.0, spin]))
     t = np.arange(0.0, duration, 0.001)
-    found = import_extra("scipy.integrate", "fit", "rigid rolling").solve_ivp(
+    found = solve_ivp(
         rates, (0.0, duration), start, "DOP853", t, events=about_vertical, rtol=1e-10, atol=1e-12
     )
     return found.t, np.sum(found.y[:3] * found.y[3:], axis=0), found.t_events[0]

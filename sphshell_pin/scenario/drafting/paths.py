@@ -1,0 +1,141 @@
+"""The path of a tip on the surface: the one asked for, or the longest that joints allow."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from bisect import bisect_left
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sphshell_pin.scenario.drafting.asked import Asked
+from sphshell_pin.scenario.drafting.clearance import Links
+from sphshell_pin.scenario.drafting.placing import Place, nearer
+from sphshell_pin.scenario.drafting.touch_points import (
+    TouchPoint,
+    paths_on_surface,
+    tangents,
+    touches_once,
+)
+from sphshell_pin.scenario.drafting.wording import mm
+from sphshell_pin.shell.shell import Shell
+
+Array = npt.NDArray[np.float64]
+
+# The path across a surface: radii long at most, and this part of the reach. It is a path from this
+# number of radii on, and no longer one is looked for from this part of it on.
+PATH_RADII, PATH_REACH = 10.0, 0.15
+SHORTEST_PATH, ENOUGH = 1.0, 0.8
+# Strokes of a raster, and points of a circle.
+_STROKES, _AROUND = 5, 24
+
+
+@dataclass(frozen=True)
+class Way:
+    """A path of the tip on the surface; why it is none, where it is a single point."""
+
+    points: Array
+    """(k, 3) [m] in the shell's frame."""
+    smooth: bool = True
+    why: str = ""
+    even: bool = True
+    """Whether the sphere touches one face all along."""
+
+    @property
+    def length(self) -> float:
+        """Of the way [m]."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+def find_way(
+    asked: Asked, place: Place, links: Links, radius: float, gap: float, room: float
+) -> Way:
+    """Return the longest path that surface and joints allow from a `place`, of those tried.
+
+    The sphere of `radius` [m], whose `gap` [m] to the surface is that of the start, touches one
+    face along it, and the tip keeps its orientation unless that follows from its place. Links stay
+    `room` [m] off the part.
+    """
+    shell, stance, touch = links.shell, place.stance, place.touch
+    stays = touch.point[None]
+    if not place.on_face:
+        why = "the sphere touches edges or several sides at once, wherever it was tried"
+        return Way(stays, why=why, even=False)
+    if stance.slide is None:
+        return Way(stays, why="its joints cannot move it across the surface")
+    part = nearer(place.placement, room * stance.approach)
+    length = min(PATH_RADII * radius, PATH_REACH * stance.reach)
+    best, most_on_surface, reason = Way(stays), 0.0, ""
+    direction = place.placement.rotation.T @ stance.slide
+    for points, smooth in _tried(asked, shell, touch, direction, radius, length):
+        fine = points if smooth else _fine(points, 0.5 * radius)
+        count = _even_part(shell, place, fine, radius, gap)
+        most_on_surface = max(most_on_surface, Way(fine[:count]).length)
+        normals = shell.closest_points(fine[:count]).normals
+        signs = np.sign(normals @ touch.normal)
+        centers = fine[:count] + (radius + gap) * normals * np.where(signs, signs, 1.0)[:, None]
+        world = np.array([place.placement.act(one) for one in centers])
+        count, why = stance.follows(world, lambda q: links.within(q, part) is None)
+        reason = why or reason
+        if asked.whole and count < len(fine):
+            continue
+        way = Way(points if count == len(fine) else fine[:count], smooth)
+        if way.length > best.length:
+            best = way
+        if best.length >= ENOUGH * (asked.length or length):
+            return best
+    if asked.path is None and best.length >= SHORTEST_PATH * radius:
+        return best
+    needed = SHORTEST_PATH * radius if asked.path is None else ENOUGH * (asked.length or 0.0)
+    if most_on_surface <= needed:
+        within = mm(most_on_surface)
+        reason = f"the surface has no room: an edge or another side is within {within}"
+    return Way(stays, why=reason)
+
+
+def _tried(
+    asked: Asked, shell: Shell, touch: TouchPoint, direction: Array, radius: float, length: float
+) -> Iterator[tuple[Array, bool]]:
+    """Yield paths (k, 3) on the surface, and whether they are smooth; `length` by default."""
+    size = length if asked.length is None else asked.length
+    if isinstance(asked.path, np.ndarray):
+        yield shell.closest_points(asked.path).points, False
+        return
+    if asked.path is None or asked.path == "line":
+        for path in paths_on_surface(shell, touch, direction, size, 0.5 * radius):
+            yield path, True
+        return
+    first, second = tangents(touch.normal, direction)
+    if asked.path == "circle":
+        turns = np.linspace(0.0, 2.0 * np.pi, _AROUND + 1)
+        plane = size / (2 * np.pi) * np.array([np.cos(turns) - 1.0, np.sin(turns)]).T
+    else:
+        edge = size / (_STROKES + 1)
+        along = np.tile([0.0, edge, edge, 0.0], _STROKES)[: 2 * _STROKES]
+        plane = np.array([along, np.repeat(np.linspace(0.0, edge, _STROKES), 2)]).T
+    for axes in ((first, second), (-first, -second), (second, -first), (-second, first)):
+        flat = touch.point + plane @ np.array(axes)
+        yield shell.closest_points(flat).points, asked.path == "circle"
+
+
+def _fine(points: Array, spacing: float) -> Array:
+    """Return `points` (k, 3) with more between them, at most `spacing` [m] apart."""
+    parts = [points[:1]]
+    for one, other in itertools.pairwise(points):
+        steps = max(1, math.ceil(float(np.linalg.norm(other - one)) / spacing))
+        parts.append(one + np.arange(1, steps + 1)[:, None] / steps * (other - one))
+    return np.concatenate(parts)
+
+
+def _even_part(shell: Shell, place: Place, points: Array, radius: float, gap: float) -> int:
+    """Return how many of `points` (k, 3) the sphere touches one after the other, each once."""
+
+    def fails(count: int) -> bool:
+        return not touches_once(shell, place.touch, points[:count], radius, 2 * gap)
+
+    if not fails(len(points)):
+        return len(points)
+    return bisect_left(range(len(points)), True, lo=2, key=fails) - 1
