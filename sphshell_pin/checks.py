@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -134,6 +135,24 @@ def check_names(name: str, value: object) -> tuple[str, ...]:
         if one in names[:k]:
             raise InvalidParameter(f"{name}[{k}]", one, "must not be listed twice")
     return names
+
+
+def stated_pairs(
+    name: str, stated: Mapping[str, T] | Iterable[str], must: str
+) -> list[tuple[str, T | str]]:
+    """Return keys and values of a mapping, of texts KEY=VALUE, or of a single one.
+
+    InvalidParameter says what `name` `must` be where a text has no key or no "=".
+    """
+    if isinstance(stated, Mapping):
+        return list(stated.items())
+    pairs: list[tuple[str, T | str]] = []
+    for text in [stated] if isinstance(stated, str) else stated:
+        key, equals, value = (one.strip() for one in text.partition("="))
+        if not (key and equals):
+            raise InvalidParameter(name, text, must)
+        pairs.append((key, value))
+    return pairs
 
 
 def check_placement(name: str, value: object) -> pin.SE3:

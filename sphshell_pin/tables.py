@@ -6,9 +6,12 @@ import csv
 import io
 import math
 from collections.abc import Mapping
+from typing import IO
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from sphshell_pin.errors import import_extra
 
 Table = Mapping[str, ArrayLike]
 """Columns of equal length by their names, such as "depth [m]"."""
@@ -37,3 +40,21 @@ def csv_text(table: Table) -> str:
     for row in zip(*columns, strict=True):
         writer.writerow(["" if isinstance(x, float) and math.isnan(x) else x for x in row])
     return text.getvalue()
+
+
+def write_parquet(file: IO[bytes], table: Table, metadata: Mapping[str, str]) -> None:
+    """Write `table` as .parquet with `metadata`; numbers are read back exactly.
+
+    Lists, and arrays of objects, are texts. Raises MissingExtra without pyarrow.
+    """
+    arrow, parquet = (
+        import_extra(name, "sweep", "a .parquet file") for name in ("pyarrow", "pyarrow.parquet")
+    )
+    columns = {}
+    for name, values in table.items():
+        array = np.asarray(values)
+        text = isinstance(values, list) or array.dtype == object
+        # Of an empty list the type would be unknown.
+        columns[name] = arrow.array(array.tolist(), arrow.string()) if text else values
+    whole = arrow.table(columns).replace_schema_metadata(metadata)
+    parquet.write_table(whole, file, compression="zstd")

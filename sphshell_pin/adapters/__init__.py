@@ -1,4 +1,19 @@
-"""Scenes in the programs of others: `adapters.crocoddyl`, `adapters.casadi`, `adapters.mujoco`.
+"""Scenes in other packages: CasADi, Crocoddyl, MuJoCo."""
 
-Each module imports its package, which the extra of the same name installs.
-"""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sphshell_pin.errors import MissingExtra
+
+
+@contextmanager
+def imports_of(package: str) -> Iterator[None]:
+    """Import `package` inside; MissingExtra names the extra, which is called the same."""
+    try:
+        yield
+    except ModuleNotFoundError as missing:
+        if missing.name != package:
+            raise
+        raise MissingExtra(package, package, f"sphshell_pin.adapters.{package}") from missing

@@ -16,19 +16,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin.adapters.evaluator import check_without_history
+from sphshell_pin.adapters import imports_of
+from sphshell_pin.adapters.evaluator import check_fixed_step, check_without_history
 from sphshell_pin.checks import check_names, check_type
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.dynamics.scene.variations import Variations
-from sphshell_pin.errors import MissingExtra
 from sphshell_pin.named_numbers import find_name, names_of_pairs
 
-try:
+with imports_of("casadi"):
     import casadi
-except ModuleNotFoundError as missing:
-    if missing.name != "casadi":
-        raise
-    raise MissingExtra("casadi", "casadi", "sphshell_pin.adapters.casadi") from missing
 
 __all__ = ["ForwardDynamics", "Step"]
 
@@ -144,11 +140,7 @@ class _SceneFunction(_Callback):
         return True
 
     def get_jacobian(
-        self,
-        name: str,
-        inames: Sequence[str],
-        onames: Sequence[str],
-        opts: dict[str, object],
+        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: dict[str, object]
     ) -> casadi.Function:
         """Return the function of all derivatives."""
         jacobian = _Jacobian(self, name, inames, onames, opts)
@@ -233,8 +225,7 @@ class Step(_SceneFunction):
     ) -> None:
         check_type("simulation", simulation, Simulation, "must be a sphshell_pin.Simulation")
         self._integrator = simulation.integrator
-        q, v = simulation.scene.check_state(simulation.scene.neutral)
-        simulation.step_derivatives(q, v)  # refuses an integrator without fixed steps
+        check_fixed_step(simulation)
         super().__init__(
             simulation.scene, q0, parameters=parameters, without_history=without_history
         )

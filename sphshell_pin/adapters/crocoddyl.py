@@ -21,6 +21,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.adapters import imports_of
 from sphshell_pin.adapters.evaluator import (
     FORCES,
     Evaluator,
@@ -30,14 +31,10 @@ from sphshell_pin.adapters.evaluator import (
 )
 from sphshell_pin.checks import check_placement, check_type, check_vector
 from sphshell_pin.dynamics import Scene, Simulation
-from sphshell_pin.errors import InvalidParameter, MissingExtra
+from sphshell_pin.errors import InvalidParameter
 
-try:
+with imports_of("crocoddyl"):
     import crocoddyl
-except ModuleNotFoundError as missing:
-    if missing.name != "crocoddyl":
-        raise
-    raise MissingExtra("crocoddyl", "crocoddyl", "sphshell_pin.adapters.crocoddyl") from missing
 
 __all__ = ["ContactDynamics", "ContactForceResidual", "ContactStep", "FrameResidual"]
 
@@ -63,19 +60,30 @@ class _Model:
         # Torques are the controls.
         self._full = isinstance(actuation, crocoddyl.ActuationModelFull)
 
-    def _evaluate(self, data: _Data, x: Array, u: Array, out: Array) -> None:
-        """Compute forces, costs, and the acceleration or the next state into `out`."""
-        if not self._full:
-            self.actuation.calc(data.actuation, x, u)
-        tau = u if self._full else data.tau
-        data.evaluator.calc(x[: self._nq], x[self._nq :], tau, out, data.forces)
-        self.costs.calc(data.costs, x, u)
+    def calc(self, data: _Data, x: Array, u: Array | None = None) -> None:
+        """Compute forces, costs, and where it leads; without u, as of a last node, no motion."""
+        q, v = x[: self._nq], x[self._nq :]
+        if u is None:
+            data.last.calc(q, v, data.no_torque, data.unused, data.forces)
+            self.costs.calc(data.costs, x)
+        else:
+            if not self._full:
+                self.actuation.calc(data.actuation, x, u)
+            tau = u if self._full else data.tau
+            data.evaluator.calc(q, v, tau, data.motion, data.forces)
+            self.costs.calc(data.costs, x, u)
+        data.cost = data.costs.cost
 
-    def _differentiate(self, data: _Data, x: Array, u: Array) -> None:
-        """Compute the derivatives of what `_evaluate` has computed last."""
+    def calcDiff(self, data: _Data, x: Array, u: Array | None = None) -> None:
+        """Compute the derivatives of what `calc` has computed last."""
+        q, v = x[: self._nq], x[self._nq :]
+        if u is None:
+            derivatives = *data.last_derivatives, data.forces_by_state
+            data.last.calc_diff(q, v, data.no_torque, *derivatives)
+            self.costs.calcDiff(data.costs, x)
+            return
         tau = u if self._full else data.tau
-        derivatives = data.by_state, data.by_tau, data.forces_by_state
-        data.evaluator.calc_diff(x[: self._nq], x[self._nq :], tau, *derivatives)
+        data.evaluator.calc_diff(q, v, tau, data.by_state, data.by_tau, data.forces_by_state)
         if not self._full:
             self.actuation.calcDiff(data.actuation, x, u)
             data.Fx[:] = data.by_state + data.by_tau @ data.actuation.dtau_dx
@@ -118,26 +126,6 @@ class ContactDynamics(_Model, crocoddyl.DifferentialActionModelAbstract):
         """Return the memory of one node."""
         return _DynamicsData(self)
 
-    def calc(self, data: _DynamicsData, x: Array, u: Array | None = None) -> None:
-        """Compute acceleration, forces and costs; without u, as of a last node, no acceleration."""
-        if u is None:
-            q, v = x[: self._nq], x[self._nq :]
-            data.evaluator.calc(q, v, data.no_torque, data.unused, data.forces)
-            self.costs.calc(data.costs, x)
-        else:
-            self._evaluate(data, x, u, data.acceleration)
-        data.cost = data.costs.cost
-
-    def calcDiff(self, data: _DynamicsData, x: Array, u: Array | None = None) -> None:
-        """Compute the derivatives of what `calc` has computed last."""
-        if u is None:
-            q, v = x[: self._nq], x[self._nq :]
-            derivatives = data.by_state, data.by_tau, data.forces_by_state
-            data.evaluator.calc_diff(q, v, data.no_torque, *derivatives)
-            self.costs.calcDiff(data.costs, x)
-        else:
-            self._differentiate(data, x, u)
-
 
 class ContactStep(_Model, crocoddyl.ActionModelAbstract):
     """A step of a simulation under held torques, with Crocoddyl's costs: a node by itself.
@@ -170,35 +158,33 @@ class ContactStep(_Model, crocoddyl.ActionModelAbstract):
         """Return the memory of one node."""
         return _StepData(self)
 
-    def calc(self, data: _StepData, x: Array, u: Array | None = None) -> None:
+    def calc(self, data: _Data, x: Array, u: Array | None = None) -> None:
         """Compute the next state, forces and costs; without u, as of a last node, it stays."""
+        super().calc(data, x, u)
         if u is None:
-            q, v = x[: self._nq], x[self._nq :]
-            data.last.calc(q, v, data.no_torque, data.unused, data.forces)
-            data.following[:] = x
-            self.costs.calc(data.costs, x)
-            data.cost = data.costs.cost
+            data.motion[:] = x
         else:
-            self._evaluate(data, x, u, data.following)
-            data.cost = self.dt * data.costs.cost
+            data.cost *= self.dt
 
-    def calcDiff(self, data: _StepData, x: Array, u: Array | None = None) -> None:
+    def calcDiff(self, data: _Data, x: Array, u: Array | None = None) -> None:
         """Compute the derivatives of what `calc` has computed last."""
-        if u is None:
-            q, v = x[: self._nq], x[self._nq :]
-            derivatives = (*data.last_derivatives, data.forces_by_state)
-            data.last.calc_diff(q, v, data.no_torque, *derivatives)
-            self.costs.calcDiff(data.costs, x)
-            return
-        self._differentiate(data, x, u)
-        for one in (data.Lx, data.Lu, data.Lxx, data.Lxu, data.Luu):
-            np.multiply(one, self.dt, out=one)
+        super().calcDiff(data, x, u)
+        if u is not None:
+            for name in ("Lx", "Lu", "Lxx", "Lxu", "Luu"):
+                derivative = getattr(data, name)
+                np.multiply(derivative, self.dt, out=derivative)
 
 
 class _Data:
     """The memory of one node: actuation, costs, and the forces that their residuals read."""
 
     evaluator: Evaluator | StepEvaluator
+    last: Evaluator
+    """Of a last node, which has no controls."""
+    last_derivatives: tuple[Array, Array]
+    motion: Array
+    """The acceleration, or the next state."""
+    cost: float
     Fx: Array
     Fu: Array
 
@@ -226,9 +212,10 @@ class _DynamicsData(crocoddyl.DifferentialActionDataAbstract, _Data):
 
     def __init__(self, model: ContactDynamics) -> None:
         super().__init__(model)
-        self.evaluator = Evaluator(model.scene)
-        self.acceleration = self.xout
+        self.evaluator = self.last = Evaluator(model.scene)
+        self.motion = self.xout
         self._share(model, model.state.nv)
+        self.last_derivatives = self.by_state, self.by_tau
 
 
 class _StepData(crocoddyl.ActionDataAbstract, _Data):
@@ -239,7 +226,7 @@ class _StepData(crocoddyl.ActionDataAbstract, _Data):
         nv = model.state.nv
         self.evaluator, self.last = StepEvaluator(model.simulation), Evaluator(model.scene)
         self.last_derivatives = np.zeros((nv, 2 * nv), order="F"), np.zeros((nv, nv), order="F")
-        self.following = self.xnext
+        self.motion = self.xnext
         self._share(model, 2 * nv)
 
 

@@ -21,6 +21,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.adapters import imports_of
 from sphshell_pin.checks import check_names, check_placement, check_type
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.normal_law import NormalLaw
@@ -28,15 +29,11 @@ from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.result.result_parts import ContactLog
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts, columns
-from sphshell_pin.errors import InvalidParameter, MissingExtra, SetupWarning, SphshellError
+from sphshell_pin.errors import InvalidParameter, SetupWarning, SphshellError
 from sphshell_pin.shell import Shell
 
-try:
+with imports_of("mujoco"):
     import mujoco
-except ModuleNotFoundError as missing:
-    if missing.name != "mujoco":
-        raise
-    raise MissingExtra("mujoco", "mujoco", "sphshell_pin.adapters.mujoco") from missing
 
 __all__ = ["MujocoContacts", "attach"]
 
@@ -190,6 +187,8 @@ def attach(
         raise InvalidParameter("spheres", spheres, "must name at least one sphere geom or site")
     ends = [_end(model, name) for name in names]
     home = 0 if body is None else _id(model, "body", body)
+    if home < 0:
+        raise InvalidParameter("body", body, "must be the name of a body of the model")
     bodies = sorted(({end.body for end in ends} | {home}) - {0})
     if not model.nv:
         raise InvalidParameter("model", model, "must have a joint: no force can move it")
@@ -215,15 +214,13 @@ def attach(
 
 
 def _id(model: mujoco.MjModel, kind: str, name: str) -> int:
-    found = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
-    if found < 0:
-        raise InvalidParameter(kind, name, f"must be the name of a {kind} of the model")
-    return int(found)
+    """Return the number of a body, geom or site; -1 where there is none of that name."""
+    return int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
 
 
 def _end(model: mujoco.MjModel, name: str) -> _End:
     for kind in ("geom", "site"):
-        k = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
+        k = _id(model, kind, name)
         if k < 0:
             continue
         if getattr(model, f"{kind}_type")[k] != mujoco.mjtGeom.mjGEOM_SPHERE:

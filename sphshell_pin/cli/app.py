@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import contextlib
+import contextvars
+import functools
 import os
 import re
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec
 
 import typer
 
+from sphshell_pin import errors
 from sphshell_pin._interrupts import interrupts_heard
+from sphshell_pin.checks import stated_pairs
+from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress, ProgressColumn
     from rich.table import Table
+    from rich.text import Text
+
+P = ParamSpec("P")
+_debug = contextvars.ContextVar("debug", default=False)
 
 app = typer.Typer(
     name="sphshell-pin",
@@ -29,16 +37,35 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+
+def option(help: str, *names: str, **more: Any) -> Any:
+    """Return an option with its help; `names` are by default that of the parameter."""
+    return typer.Option(*names, help=help, **more)
+
+
+def argument(help: str, **more: Any) -> Any:
+    """Return an argument with its help."""
+    return typer.Argument(help=help, **more)
+
+
 # Exit codes: 1 an expectation was missed, 2 an error, 130 interrupted (as shells have it).
 MISSED, ERROR, INTERRUPTED = 1, 2, 130
-ScenarioArgument = Annotated[
-    str, typer.Argument(help="Name of a shipped scenario, or path of a .toml file.")
-]
+PERCENT = "{task.percentage:>3.0f} %"  # a column of progress_bar
+ScenarioArgument = Annotated[str, argument("Name of a shipped scenario, or path of a .toml file.")]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a value; may be given several times."),
+    option("Change a value; may be given several times.", "--set", metavar="KEY=VALUE"),
 ]
-DtOption = Annotated[float | None, typer.Option(help="Time step \\[s] in place of run.dt.")]
+DtOption = Annotated[float | None, option("Time step \\[s] in place of run.dt.")]
+DurationOption = Annotated[float | None, option("Time to simulate \\[s] in place of run.duration.")]
+OfOption = Annotated[
+    str | None,
+    option("Scenario that a finished run is from, if it holds none, or another one.", "--scenario"),
+]
+RadiusOption = Annotated[
+    str | None, option("Of the sphere: 0.012 \\[m] or 12mm.", metavar="LENGTH")
+]
+RunArgument = Annotated[Path, argument("A finished run: its run.npz or results folder.")]
 
 
 def _search_in(folders: list[Path] | None) -> list[Path] | None:
@@ -55,19 +82,19 @@ def _search_in(folders: list[Path] | None) -> list[Path] | None:
 
 PackageDirOption = Annotated[
     list[Path] | None,
-    typer.Option(
+    option(
+        "Folder above the packages of the robot's meshes; may be given several times.",
         "--package-dir",
         metavar="FOLDER",
         callback=_search_in,
-        help="Folder above the packages of the robot's meshes; may be given several times.",
     ),
 ]
 XacroArgOption = Annotated[
     list[str] | None,
-    typer.Option(
+    option(
+        "Argument of a xacro file, which is code; may be given several times.",
         "--xacro-arg",
         metavar="NAME=VALUE",
-        help="Argument of a xacro file, which is code; may be given several times.",
     ),
 ]
 
@@ -86,15 +113,14 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
-    context: typer.Context,
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    debug: Annotated[bool, option("Show the traceback of an error.", "--debug")] = False,
     version: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Print the versions of this package, Pinocchio and Coal.",
             "--version",
             callback=_print_version,
             is_eager=True,
-            help="Print the versions of this package, Pinocchio and Coal.",
         ),
     ] = False,
 ) -> None:
@@ -102,7 +128,7 @@ def options(
 
     Example: sphshell-pin run fingertip_on_blade
     """
-    context.obj = debug
+    _debug.set(debug)
 
 
 def main() -> None:
@@ -110,10 +136,23 @@ def main() -> None:
     app()
 
 
+def command(name: str | None = None) -> Callable[[Callable[P, None]], Callable[P, None]]:
+    """Add a command to the application, with its faults as `_faults` reports them."""
+
+    def add(function: Callable[P, None]) -> Callable[P, None]:
+        @functools.wraps(function)
+        def called(*args: P.args, **options: P.kwargs) -> None:
+            with _faults():
+                function(*args, **options)
+
+        return app.command(name)(called)
+
+    return add
+
+
 @contextlib.contextmanager
-def faults(context: typer.Context) -> Iterator[None]:
+def _faults() -> Iterator[None]:
     """Turn faults into one sentence on stderr and an exit code, unless --debug asks for more."""
-    debug = bool(context.find_root().obj)
     try:
         with interrupts_heard(), _plain_warnings():
             yield
@@ -123,12 +162,10 @@ def faults(context: typer.Context) -> Iterator[None]:
         typer.echo(f"interrupted{f': {error}' if str(error) else ''}", err=True)
         raise typer.Exit(INTERRUPTED) from None
     except Exception as error:
-        from sphshell_pin.errors import SphshellError
-
         if _comes_from_ctrl_c(error):
             typer.echo("interrupted", err=True)
             raise typer.Exit(INTERRUPTED) from None
-        if debug:
+        if _debug.get():
             raise
         known = isinstance(error, SphshellError)
         # Any other fault is a defect, or comes from the user's routines: say where to look.
@@ -141,20 +178,11 @@ def faults(context: typer.Context) -> Iterator[None]:
 @contextlib.contextmanager
 def _plain_warnings() -> Iterator[None]:
     """Print each warning of this package once, as a sentence without its place in the code."""
-    from sphshell_pin import errors
-
     shown: set[str] = set()
 
-    def show(
-        message: Warning | str,
-        category: type[Warning],
-        filename: str,
-        lineno: int,
-        file: TextIO | None = None,
-        line: str | None = None,
-    ) -> None:
+    def show(message: Warning | str, *place: Any, **more: Any) -> None:
         if getattr(errors, type(message).__name__, None) is not type(message):
-            usual(message, category, filename, lineno, file, line)
+            usual(message, *place, **more)
         elif str(message) not in shown:
             shown.add(str(message))
             typer.echo(f"warning: {message}", err=True)
@@ -176,34 +204,50 @@ def _comes_from_ctrl_c(error: BaseException | None) -> bool:
     return error is not None
 
 
-def changes_of(set_: list[str] | None, dt: float | None, duration: float | None) -> dict[str, str]:
+def changes_of(
+    set_: list[str] | None, dt: float | None = None, duration: float | None = None
+) -> dict[str, str]:
     """Return the values that --set, --dt and --duration change, by dotted key."""
-    from sphshell_pin.errors import InvalidParameter
-
-    changes: dict[str, str] = {}
-    for one in set_ or []:
-        key, equals, value = one.partition("=")
-        if not equals or not key:
-            raise InvalidParameter("--set", one, "must be KEY=VALUE, for instance run.dt=1e-4")
-        changes[key.strip()] = value.strip()
-    if dt is not None:
-        changes["run.dt"] = repr(dt)
-    if duration is not None:
-        changes["run.duration"] = repr(duration)
+    must = "must be KEY=VALUE, for instance run.dt=1e-4"
+    changes = dict(stated_pairs("--set", set_ or [], must))
+    for key, value in (("run.dt", dt), ("run.duration", duration)):
+        changes |= {} if value is None else {key: repr(value)}
     return changes
 
 
 def xacro_args_of(stated: list[str] | None) -> dict[str, str]:
     """Return the arguments of a xacro file that --xacro-arg states."""
-    from sphshell_pin.errors import InvalidParameter
+    return dict(stated_pairs("--xacro-arg", stated or [], "must be NAME=VALUE"))
 
-    found = {}
-    for one in stated or []:
-        name, equals, value = one.partition("=")
-        if not equals or not name:
-            raise InvalidParameter("--xacro-arg", one, "must be NAME=VALUE")
-        found[name.strip()] = value.strip()
-    return found
+
+@contextlib.contextmanager
+def if_installed() -> Iterator[None]:
+    """Run what needs an optional package; where that is missing, say so and go on after it."""
+    try:
+        yield
+    except MissingExtra as missing:
+        typer.echo(str(missing), err=True)
+
+
+def say(text: str, *, bold: str = "") -> None:
+    """Print a line as it is, after the words `bold`."""
+    terminal().print(f"[bold]{plain(bold)}[/bold]{plain(text)}", highlight=False)
+
+
+def colored(text: str, color: str) -> Text:
+    """Return a cell of a table in `color`."""
+    from rich.text import Text
+
+    return Text(text, color)
+
+
+def print_table(columns: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:
+    """Print the table that `make_table` begins, unless it has no rows."""
+    table = make_table(*columns)
+    for row in rows:
+        table.add_row(*(plain(cell) if isinstance(cell, str) else cell for cell in row))
+    if table.row_count:
+        terminal().print(table)
 
 
 def make_table(*columns: str) -> Table:
@@ -215,7 +259,7 @@ def make_table(*columns: str) -> Table:
     for i, column in enumerate(columns):
         # In a narrow terminal, lines are broken between words, those of the first column first.
         table.add_column(
-            column,
+            plain(column),
             overflow="fold",
             justify="left" if i == 0 else "right",
             min_width=max(map(len, column.split()), default=0),
@@ -232,18 +276,21 @@ def terminal(*, err: bool = False) -> Console:
     return Console(stderr=err, soft_wrap=not err, width=None if stream.isatty() else 120)
 
 
-def progress_bar(*columns: ProgressColumn) -> Progress:
-    """Return a bar on stderr of the description, a bar and `columns`; on a pipe it is silent."""
-    from rich.progress import BarColumn, Progress, TextColumn
+@contextlib.contextmanager
+def progress_bar(title: str, *columns: str, **task: Any) -> Iterator[Callable[..., None]]:
+    """Show a bar on stderr, with `columns`; yield what updates its `task`. On a pipe it is silent.
 
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        *columns,
-        console=terminal(err=True),
-        transient=True,
-        disable=not sys.stderr.isatty(),
+    Columns are texts, as TextColumn has them, or names of other classes of rich.progress.
+    """
+    from rich import progress
+
+    made = (
+        getattr(progress, one)() if one.isidentifier() else progress.TextColumn(one)
+        for one in ("{task.description}", "BarColumn", *columns)
     )
+    console, silent = terminal(err=True), not sys.stderr.isatty()
+    with progress.Progress(*made, console=console, transient=True, disable=silent) as bar:
+        yield functools.partial(bar.update, bar.add_task(title, **task))
 
 
 def plain(text: str) -> str:
@@ -257,7 +304,6 @@ def length_of(option: str, text: str | None) -> float | None:
     """Return a length [m] written as a number, or as a number with its unit."""
     if text is None:
         return None
-    from sphshell_pin.errors import InvalidParameter
     from sphshell_pin.units import metres_per_unit
 
     found = re.fullmatch(r"\s*([0-9.+eE-]*[0-9.])\s*([a-zA-Zµ]*)\s*", text)

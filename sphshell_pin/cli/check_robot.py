@@ -16,16 +16,21 @@ from sphshell_pin.cli.app import (
     INTERRUPTED,
     MISSED,
     PackageDirOption,
+    RadiusOption,
     XacroArgOption,
-    app,
-    faults,
+    argument,
+    colored,
+    command,
     length_of,
     make_table,
+    option,
     plain,
     progress_bar,
+    say,
     terminal,
     xacro_args_of,
 )
+from sphshell_pin.errors import FrameNotFound, SphshellError
 
 if TYPE_CHECKING:
     from sphshell_pin.study.robot_check import RobotReport
@@ -34,39 +39,36 @@ if TYPE_CHECKING:
 _PIPE_WIDTH, _WIDE = 170, 125
 
 
-@app.command("check-robot")
+@command("check-robot")
 def check_robot_(
-    context: typer.Context,
     robot: Annotated[
         list[str] | None,
-        typer.Argument(
-            help="Names of shipped robots (sphshell-pin list), or URDF, xacro (which is code) or "
+        argument(
+            "Names of shipped robots (sphshell-pin list), or URDF, xacro (which is code) or "
             "MJCF files."
         ),
     ] = None,
-    every: Annotated[bool, typer.Option("--all", help="Check every robot there is.")] = False,
+    every: Annotated[bool, option("Check every robot there is.", "--all")] = False,
     frame: Annotated[
         str | None,
-        typer.Option(
-            help="Frame that carries the sphere; by default a known tip, or the end of the "
+        option(
+            "Frame that carries the sphere; by default a known tip, or the end of the "
             "longest limb and the outermost sphere inside its collision mesh."
         ),
     ] = None,
-    radius: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
-    ] = None,
+    radius: RadiusOption = None,
     free_flyer: Annotated[
-        bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
+        bool, option("The root link of the URDF floats.", "--free-flyer")
     ] = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer postures and runs.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random postures.")] = 0,
+    quick: Annotated[bool, option("Fewer postures and runs.", "--quick")] = False,
+    seed: Annotated[int, option("Seed of the random postures.", min=0)] = 0,
     json: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures to this file.")
+        Path | None, option("Write all figures to this file.", "--json", metavar="FILE")
     ] = None,
     write: Annotated[
-        Path | None, typer.Option("--write", metavar="FILE", help="Write the table as Markdown.")
+        Path | None, option("Write the table as Markdown.", "--write", metavar="FILE")
     ] = None,
 ) -> None:
     """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.
@@ -77,55 +79,52 @@ def check_robot_(
 
     Example: sphshell-pin check-robot panda my_robot.urdf
     """
-    with faults(context):
-        from sphshell_pin.atomic import write_whole
-        from sphshell_pin.errors import SphshellError
-        from sphshell_pin.study import robot_check as study
+    from sphshell_pin.atomic import write_whole
+    from sphshell_pin.study import robot_check as study
+    from sphshell_pin.study.robot_check import models, report
 
-        if every and robot:
-            raise SphshellError("give robots or --all, not both")
-        if not every and not robot:
-            raise SphshellError("say which robots: names, files, or --all")
-        names = study.all_names() if every else list(robot or [])
-        study.check_known(names)
-        for path in (json, write):
-            if path is not None:
-                _check_writable(path)
-        sizes = study.QUICK if quick else study.Sizes()
-        check = partial(
-            study.check_robot,
-            frame=frame,
-            radius=length_of("--radius", radius),
-            free_flyer=free_flyer,
-            package_dirs=package_dir or (),
-            xacro_args=xacro_args_of(xacro_arg),
-            seed=seed,
-            sizes=sizes,
-        )
-        reports, stopped = _check(names, check)
-        _print(reports)
-        if stopped:
-            left = len(names) - len(reports)
-            typer.echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
-            raise typer.Exit(INTERRUPTED)
-        command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
-        if json is not None:
-            text = study.as_json(reports, f"{command} --json {json}", seed, sizes)
-            write_whole(json, text.encode())
-        if write is not None:
-            page = study.as_markdown(reports, f"{command} --write {write}")
-            write_whole(write, page.encode())
-        verdicts = [one.verdict for one in reports]
-        # A robot that was asked for by name and cannot be checked is wrong input, and so is what
-        # no robot there is can be checked with.
-        unread = study.NOT_CHECKED in verdicts and (not every or len(set(verdicts)) == 1)
-        raise typer.Exit(MISSED if study.FAILED in verdicts else ERROR if unread else 0)
+    if every and robot:
+        raise SphshellError("give robots or --all, not both")
+    if not every and not robot:
+        raise SphshellError("say which robots: names, files, or --all")
+    names = models.all_names() if every else list(robot or [])
+    models.check_known(names)
+    for path in (json, write):
+        if path is not None:
+            _check_writable(path)
+    sizes = study.QUICK if quick else study.Sizes()
+    check = partial(
+        study.check_robot,
+        frame=frame,
+        radius=length_of("--radius", radius),
+        free_flyer=free_flyer,
+        package_dirs=package_dir or (),
+        xacro_args=xacro_args_of(xacro_arg),
+        seed=seed,
+        sizes=sizes,
+    )
+    reports, stopped = _check(names, check)
+    _print(reports)
+    if stopped:
+        left = len(names) - len(reports)
+        typer.echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
+        raise typer.Exit(INTERRUPTED)
+    command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
+    if json is not None:
+        text = report.as_json(reports, f"{command} --json {json}", seed, sizes)
+        write_whole(json, text.encode())
+    if write is not None:
+        page = report.as_markdown(reports, f"{command} --write {write}")
+        write_whole(write, page.encode())
+    verdicts = [one.verdict for one in reports]
+    # A robot that was asked for by name and cannot be checked is wrong input, and so is what
+    # no robot there is can be checked with.
+    unread = report.NOT_CHECKED in verdicts and (not every or len(set(verdicts)) == 1)
+    raise typer.Exit(MISSED if report.FAILED in verdicts else ERROR if unread else 0)
 
 
 def _check_writable(path: Path) -> None:
     """Raise SphshellError if no file can be written there, before minutes go into its content."""
-    from sphshell_pin.errors import SphshellError
-
     if not path.parent.is_dir():
         raise SphshellError(f"{path}: there is no folder {path.parent} to write to")
     if path.is_dir():
@@ -138,20 +137,15 @@ def _check(
     names: Sequence[str], check: Callable[..., RobotReport]
 ) -> tuple[list[RobotReport], bool]:
     """Return the reports that `check` gives, and whether Ctrl-C came before the last."""
-    from rich.progress import MofNCompleteColumn
-
-    from sphshell_pin.errors import FrameNotFound
     from sphshell_pin.study.robot_check import RobotReport
 
-    bar = progress_bar(MofNCompleteColumn())
     reports: list[RobotReport] = []
-    with bar:
-        task = bar.add_task("", total=len(names))
+    with progress_bar("", "MofNCompleteColumn", total=len(names)) as update:
         try:
             for name in names:
 
                 def show(title: str, name: str = name) -> None:
-                    bar.update(task, description=f"{Path(name).name}: {title}")
+                    update(description=f"{Path(name).name}: {title}")
 
                 try:
                     report = check(name, progress=show)
@@ -161,14 +155,15 @@ def _check(
                     # The others may have it.
                     report = RobotReport(name, reason=str(error))
                 reports.append(report)
-                bar.advance(task)
+                update(advance=1)
         except KeyboardInterrupt:
             return reports, True
     return reports, False
 
 
 def _print(reports: Sequence[RobotReport]) -> None:
-    from sphshell_pin.study.robot_check import CHECKS, PASS, as_table, remarks
+    from sphshell_pin.study.robot_check.checks import CHECKS
+    from sphshell_pin.study.robot_check.report import PASS, as_table, remarks
 
     console = terminal()
     if not sys.stdout.isatty():
@@ -176,20 +171,20 @@ def _print(reports: Sequence[RobotReport]) -> None:
     # On a narrow terminal without the frame and the size, and with short titles: a figure that is
     # folded cannot be read.
     narrow = console.width < _WIDE
-    titles = [check.title[: 6 if narrow else None] for check in CHECKS.values()]
+    titles = [key[: 6 if narrow else None] for key in CHECKS]
     table = make_table("robot", *([] if narrow else ["frame", "nq/nv"]), *titles, "verdict")
     for column in table.columns[1 if narrow else 2 :]:
         column.no_wrap = True
     for one, (name, frame, size, *figures, verdict) in zip(reports, as_table(reports), strict=True):
         shown = [
-            f"[red]{text}[/red]" if text and not one.met(key) else text
+            colored(text, "red" if text and not one.met(key) else "")
             for key, text in zip(CHECKS, figures, strict=True)
         ]
         color = "green" if verdict == PASS else "red"
         where = [] if narrow else [plain(frame), size]
-        table.add_row(plain(name), *where, *shown, f"[{color}]{verdict}[/{color}]")
+        table.add_row(plain(name), *where, *shown, colored(verdict, color))
     console.print(table)
     for sentence in remarks(reports):
-        console.print(sentence, markup=False, highlight=False)
+        say(sentence)
     passed = sum(one.verdict == PASS for one in reports)
-    console.print(f"{passed} of {len(reports)} robots pass", highlight=False)
+    say(f"{passed} of {len(reports)} robots pass")

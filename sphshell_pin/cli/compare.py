@@ -6,32 +6,25 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from sphshell_pin.cli.app import app, faults, make_table, plain, terminal
+from sphshell_pin.cli.app import argument, command, if_installed, option, print_table, say
 from sphshell_pin.cli.export import file_of, with_scene
+from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
-    from sphshell_pin.study.compare import Comparison, Difference
+    from sphshell_pin.study.compare import Difference
 
 # Rows of each printed table.
 MOST_ROWS = 24
 
 
-@app.command()
+@command()
 def compare(
     *,
-    context: typer.Context,
-    runs: Annotated[
-        list[Path],
-        typer.Argument(help="Two or more finished runs: run.npz or results folders."),
-    ],
-    out: Annotated[
-        Path, typer.Option(help="Folder of figures.csv, curves.csv and compare.png.")
-    ] = Path("results/compare"),
-    picture: Annotated[
-        bool, typer.Option("--picture/--no-picture", help="Draw compare.png.")
-    ] = True,
+    runs: Annotated[list[Path], argument("Two or more finished runs: run.npz or results folders.")],
+    out: Annotated[Path, option("Folder of figures.csv, curves.csv and compare.png.")] = Path(
+        "results/compare"
+    ),
+    picture: Annotated[bool, option("Draw compare.png.", "--picture/--no-picture")] = True,
 ) -> None:
     """Lay finished runs over each other: figures and curves, with their differences from the first.
 
@@ -40,26 +33,27 @@ def compare(
 
     Example: sphshell-pin compare results/soft results/stiff
     """
-    with faults(context):
-        from sphshell_pin.atomic.files import write_folder
-        from sphshell_pin.study.compare import compare as compare_runs
-        from sphshell_pin.study.compare import measured, tables_of
-        from sphshell_pin.tables import csv_text
+    from sphshell_pin.atomic.files import write_folder
+    from sphshell_pin.plot.compare import plot_compare
+    from sphshell_pin.plot.figure import png
+    from sphshell_pin.study.compare import compare as compare_runs
+    from sphshell_pin.study.compare import measured, tables_of
+    from sphshell_pin.tables import csv_text
 
-        labels = labels_of(runs)
-        comparison = compare_runs(
-            [measured(label, *with_scene(run)) for label, run in zip(labels, runs, strict=True)]
-        )
-        files = {
-            f"{name}.csv": csv_text(table).encode() for name, table in tables_of(comparison).items()
-        }
-        if picture:
-            files |= _picture(comparison)
-        written = write_folder(out, files, ("figures.csv", "curves.csv", "compare.png"))
-        for other in comparison.others:
-            _print(comparison.runs[0].label, other)
-        names = ", ".join(path.name for path in written)
-        terminal().print(f"files in {out}: {names}", markup=False, highlight=False)
+    labels = labels_of(runs)
+    comparison = compare_runs(
+        [measured(label, *with_scene(run)) for label, run in zip(labels, runs, strict=True)]
+    )
+    files = {
+        f"{name}.csv": csv_text(table).encode() for name, table in tables_of(comparison).items()
+    }
+    if picture:
+        with if_installed():
+            files["compare.png"] = png(plot_compare(comparison))
+    written = write_folder(out, files, ("figures.csv", "curves.csv", "compare.png"))
+    for other in comparison.others:
+        _print(comparison.runs[0].label, other)
+    say(f"files in {out}: {', '.join(path.name for path in written)}")
 
 
 def labels_of(runs: list[Path]) -> list[str]:
@@ -72,62 +66,48 @@ def labels_of(runs: list[Path]) -> list[str]:
     return [name if name not in named[:k] else f"{name} ({k + 1})" for k, name in enumerate(named)]
 
 
-def _picture(comparison: Comparison) -> dict[str, bytes]:
-    from sphshell_pin.errors import MissingExtra
-    from sphshell_pin.plot.compare import plot_compare
-    from sphshell_pin.plot.figure import png
-
-    try:
-        return {"compare.png": png(plot_compare(comparison))}
-    except MissingExtra as missing:
-        typer.echo(str(missing), err=True)
-        return {}
-
-
 def _print(first: str, other: Difference) -> None:
     """Print what of `other` is not as in the run `first`."""
-    console = terminal()
-    console.print(f"[bold]{plain(other.label)}[/bold] beside {plain(first)}", highlight=False)
-    if other.settings:
-        table = make_table("setting", first, other.label)
-        for key, mine, yours in other.settings[:MOST_ROWS]:
-            table.add_row(plain(key), plain(_shown(mine)), plain(_shown(yours)))
-        console.print(table)
-    figures = [one for one in other.figures if not one.same]
-    table = make_table("figure", first, other.label, "difference", "relative")
-    for one in figures[:MOST_ROWS]:
-        table.add_row(
-            plain(f"{one.name} [{one.unit}]" if one.unit else one.name),
+    say(f" beside {first}", bold=other.label)
+    settings = [(key, _shown(mine), _shown(yours)) for key, mine, yours in other.settings]
+    print_table(("setting", first, other.label), settings[:MOST_ROWS])
+    figures = [
+        (
+            column(one.name, one.unit),
             f"{one.first:.6g}",
             f"{one.other:.6g}",
             f"{one.absolute:+.3g}",
             "-" if math.isnan(one.relative) else f"{100 * one.relative:+.3g} %",
         )
-    if figures:
-        console.print(table)
-    curves = [one for one in other.curves if one.values.any()]
-    table = make_table("curve", "largest difference", "at", "rms", "of its range")
-    for curve in curves[:MOST_ROWS]:
-        table.add_row(
-            plain(curve.name),
-            f"{curve.largest:.4g} {curve.unit}",
-            f"{curve.at:.4g} s",
-            f"{curve.rms:.3g} {curve.unit}",
-            "-" if math.isnan(curve.of_range) else f"{100 * curve.of_range:.3g} %",
+        for one in other.figures
+        if not one.same
+    ]
+    titles = ("figure", first, other.label, "difference", "relative")
+    print_table(titles, figures[:MOST_ROWS])
+    curves = [
+        (
+            one.name,
+            f"{one.largest:.4g} {one.unit}",
+            f"{one.at:.4g} s",
+            f"{one.rms:.3g} {one.unit}",
+            "-" if math.isnan(one.of_range) else f"{100 * one.of_range:.3g} %",
         )
-    if curves:
-        console.print(table)
-    for title, rows in (("settings", other.settings), ("figures", figures), ("curves", curves)):
+        for one in other.curves
+        if one.values.any()
+    ]
+    titles = ("curve", "largest difference", "at", "rms", "of its range")
+    print_table(titles, curves[:MOST_ROWS])
+    for title, rows in (("settings", settings), ("figures", figures), ("curves", curves)):
         if len(rows) > MOST_ROWS:
-            more = f"{len(rows) - MOST_ROWS} more {title} differ"
-            console.print(f"{more}: see the tables" if title != "settings" else more)
+            see = "" if title == "settings" else ": see the tables"
+            say(f"{len(rows) - MOST_ROWS} more {title} differ{see}")
     same = len(other.figures) - len(figures), len(other.curves) - len(curves)
-    console.print(f"equal to the last bit: {same[0]} figures, {same[1]} curves", highlight=False)
+    say(f"equal to the last bit: {same[0]} figures, {same[1]} curves")
     if other.span is None:
-        console.print("no curves are compared: the runs have no time in common", highlight=False)
+        say("no curves are compared: the runs have no time in common")
     for label, parts in ((first, other.only_first), (other.label, other.only_other)):
         if parts:
-            console.print(f"in {plain(label)} alone: {plain(', '.join(parts))}", highlight=False)
+            say(f"in {label} alone: {', '.join(parts)}")
 
 
 def _shown(value: object) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import app, faults, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, option, progress_bar
+from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
@@ -18,34 +20,26 @@ if TYPE_CHECKING:
 FORMATS = ("mcap", "csv", "parquet")
 
 
-@app.command()
+@command()
 def export(
     *,
-    context: typer.Context,
-    run: Annotated[Path, typer.Argument(help="A finished run: its run.npz or results folder.")],
-    to: Annotated[
-        str, typer.Option(metavar="FORMAT", help="mcap (ROS 2 messages), csv or parquet (tables).")
-    ],
+    run: RunArgument,
+    to: Annotated[str, option("mcap (ROS 2 messages), csv or parquet (tables).", metavar="FORMAT")],
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="The .mcap file, or the folder of the tables; by default beside the run: "
+        option(
+            "The .mcap file, or the folder of the tables; by default beside the run: "
             "RUN.mcap, RUN_csv, RUN_parquet."
         ),
     ] = None,
     start: Annotated[
         str,
-        typer.Option(
+        option(
+            "Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.",
             metavar="TIME",
-            help="Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.",
         ),
     ] = "0",
-    of: Annotated[
-        str | None,
-        typer.Option(
-            "--scenario", help="Scenario that the run is from, if it holds no robots and surfaces."
-        ),
-    ] = None,
+    of: OfOption = None,
 ) -> None:
     """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.
 
@@ -54,36 +48,32 @@ def export(
 
     Example: sphshell-pin export results/fingertip_on_blade --to mcap
     """
-    with faults(context):
-        from sphshell_pin.errors import InvalidParameter
-        from sphshell_pin.scenario.running.replay import Replay
+    from sphshell_pin.scenario.running.replay import Replay
 
-        if to not in FORMATS:
-            must = f"must be one of {', '.join(FORMATS)}"
-            if to == "rrd":
-                must += "; Rerun's viewer opens .mcap files"
-            raise InvalidParameter("--to", to, must)
-        begin = nanoseconds(start)
-        if begin and to != "mcap":
-            raise InvalidParameter(
-                "--start", start, "is for --to mcap: tables have the run's own t"
-            )
-        words = ["export", str(run), "--to", to]
-        words += [] if out is None else ["--out", str(out)]
-        words += ["--start", start] if begin else []
-        words += [] if of is None else ["--scenario", of]
-        command = shlex.join(["sphshell-pin", *words])
-        if to == "mcap":
-            replay = Replay(file_of(run), of)
-            files = [_write_mcap(out or beside(run, ".mcap"), replay, begin, command)]
-        else:
-            from sphshell_pin.export.tables import write_tables
+    if to not in FORMATS:
+        must = f"must be one of {', '.join(FORMATS)}"
+        if to == "rrd":
+            must += "; Rerun's viewer opens .mcap files"
+        raise InvalidParameter("--to", to, must)
+    begin = nanoseconds(start)
+    if begin and to != "mcap":
+        raise InvalidParameter("--start", start, "is for --to mcap: tables have the run's own t")
+    words = ["export", str(run), "--to", to]
+    words += [] if out is None else ["--out", str(out)]
+    words += ["--start", start] if begin else []
+    words += [] if of is None else ["--scenario", of]
+    command = shlex.join(["sphshell-pin", *words])
+    if to == "mcap":
+        replay = Replay(file_of(run), of)
+        files = [_write_mcap(out or beside(run, ".mcap"), replay, begin, command)]
+    else:
+        from sphshell_pin.export.tables import write_tables
 
-            result, scene = with_scene(run, of)
-            place = out or beside(run, f"_{to}")
-            files = write_tables(place, result, scene, format=to, command=command)  # type: ignore[arg-type]
-        for file in files:
-            typer.echo(file)
+        result, scene = with_scene(run, of)
+        place = out or beside(run, f"_{to}")
+        files = write_tables(place, result, scene, format=to, command=command)  # type: ignore[arg-type]
+    for file in files:
+        typer.echo(file)
 
 
 def file_of(run: Path) -> Path:
@@ -105,18 +95,13 @@ def nanoseconds(text: str) -> int:
     from datetime import UTC, datetime, timedelta
     from decimal import Decimal, InvalidOperation
 
-    from sphshell_pin.errors import InvalidParameter
-
     must = "must be seconds since 1970, or a date such as 2026-11-22T21:00:00Z"
-    try:
+    with contextlib.suppress(InvalidOperation):
         seconds = Decimal(text)
-        if seconds.is_finite() and seconds.adjusted() > 12:  # before it is written out in digits
+        # Larger ones are not written out in digits.
+        if not seconds.is_finite() or seconds.adjusted() > 12:
             raise InvalidParameter("--start", text, must)
         return round(seconds * 10**9)
-    except InvalidParameter:
-        raise
-    except (InvalidOperation, OverflowError, ValueError):
-        pass
     try:
         time = datetime.fromisoformat(text)
     except ValueError:
@@ -128,7 +113,6 @@ def nanoseconds(text: str) -> int:
 def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | None]:
     """Return a run and its scene; without one, say that joints have numbers instead of names."""
     from sphshell_pin.dynamics.result.result import Result
-    from sphshell_pin.errors import ResultError
     from sphshell_pin.scenario.running.replay import Replay
 
     try:
@@ -145,13 +129,12 @@ def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | 
 def _write_mcap(place: Path, replay: Replay, start: int, command: str) -> Path:
     from sphshell_pin.export.mcap import write_mcap
 
-    with progress_bar() as bar:
-        task = bar.add_task(place.name, total=1.0)
+    with progress_bar(place.name, total=1.0) as update:
         return write_mcap(
             place,
             replay.result,
             replay.scene,
             start=start,
             command=command,
-            progress=lambda share: bar.update(task, completed=share),
+            progress=lambda share: update(completed=share),
         )

@@ -3,54 +3,41 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, cast, get_args
+from typing import Annotated
 
-import typer
+from sphshell_pin.cli.app import argument, command, option, print_table, say
+from sphshell_pin.errors import SphshellError, UnitMissing
 
-from sphshell_pin.cli.app import app, faults, make_table, plain, terminal
-
-Side = Literal["both", "outside", "inside"]
 FORMATS = ".stl .obj .ply .off .shl, .step .iges .brep"
 
 ChordErrorOption = Annotated[
-    float | None,
-    typer.Option(help="Of CAD: largest distance of the elements from the exact surface \\[m]."),
+    float | None, option("Of CAD: largest distance of the elements from the exact surface \\[m].")
 ]
 BodyOption = Annotated[
-    list[str] | None,
-    typer.Option(metavar="NAME", help="Of CAD: take this body; may be given several times."),
+    list[str] | None, option("Of CAD: take this body; may be given several times.", metavar="NAME")
 ]
 FaceOption = Annotated[
     list[str] | None,
-    typer.Option(
-        metavar="NAME",
-        help="Of CAD: take this face, by name or number; may be given several times.",
+    option(
+        "Of CAD: take this face, by name or number; may be given several times.", metavar="NAME"
     ),
 ]
 
 TimeLimitOption = Annotated[
-    float | None,
-    typer.Option(help="Of CAD: end OpenCASCADE after this time \\[s], 600 unless given."),
+    float | None, option("Of CAD: end OpenCASCADE after this time \\[s], 600 unless given.")
 ]
 MemoryLimitOption = Annotated[
-    float | None,
-    typer.Option(help="Of CAD: let OpenCASCADE take so much memory \\[bytes], 8e9 unless given."),
+    float | None, option("Of CAD: let OpenCASCADE take so much memory \\[bytes], 8e9 unless given.")
 ]
 
 
-@app.command()
+@command()
 def check(
-    context: typer.Context,
-    file: Annotated[Path, typer.Argument(help=f"A surface file: {FORMATS}")],
-    unit: Annotated[
-        str | None, typer.Option(help="Length unit of the file: mm, cm, m, inch, ...")
-    ] = None,
-    side: Annotated[
-        str, typer.Option(help="Where spheres may be: both, outside, inside.")
-    ] = "both",
+    file: Annotated[Path, argument(f"A surface file: {FORMATS}")],
+    unit: Annotated[str | None, option("Length unit of the file: mm, cm, m, inch, ...")] = None,
+    side: Annotated[str, option("Where spheres may be: both, outside, inside.")] = "both",
     scale: Annotated[
-        str | None,
-        typer.Option(help="Use of the SCALE of a .shl file: apply, ignore, or a number instead."),
+        str | None, option("Use of the SCALE of a .shl file: apply, ignore, or a number instead.")
     ] = None,
     chord_error: ChordErrorOption = None,
     body: BodyOption = None,
@@ -62,38 +49,35 @@ def check(
 
     Example: sphshell-pin check blade.stl --unit mm
     """
-    with faults(context):
-        from sphshell_pin import Shell
-        from sphshell_pin.errors import SphshellError, UnitMissing
+    from sphshell_pin import Shell
 
-        try:
-            shell = Shell.from_file(
-                file,
-                unit,
-                _number_or_word(scale),
-                chord_error=chord_error,
-                bodies=body,
-                faces=faces_of(face),
-                time_limit=time_limit,
-                memory_limit=memory_limit,
-                side=_side(side),
-            )
-        except UnitMissing as error:
-            raise SphshellError(f"the unit {error.must('--unit {}')}") from error
-        shell.curvature_report()
-        terminal().print(str(shell.health), markup=False, highlight=False)
+    try:
+        shell = Shell.from_file(
+            file,
+            unit,
+            _number_or_word(scale),
+            chord_error=chord_error,
+            bodies=body,
+            faces=faces_of(face),
+            time_limit=time_limit,
+            memory_limit=memory_limit,
+            side=side,
+        )
+    except UnitMissing as error:
+        raise SphshellError(f"the unit {error.must('--unit {}')}") from error
+    shell.curvature_report()
+    say(str(shell.health))
 
 
-@app.command()
+@command()
 def convert(
-    context: typer.Context,
-    source: Annotated[Path, typer.Argument(help=f"The file to read: {FORMATS}")],
-    target: Annotated[Path, typer.Argument(help="The file to write; its suffix names the format.")],
+    source: Annotated[Path, argument(f"The file to read: {FORMATS}")],
+    target: Annotated[Path, argument("The file to write; its suffix names the format.")],
     unit_in: Annotated[
-        str | None, typer.Option(help="Length unit of the file to read; STEP and IGES state it.")
+        str | None, option("Length unit of the file to read; STEP and IGES state it.")
     ] = None,
     unit_out: Annotated[
-        str | None, typer.Option(help="Length unit of the file to write; the same unless given.")
+        str | None, option("Length unit of the file to write; the same unless given.")
     ] = None,
     chord_error: ChordErrorOption = None,
     body: BodyOption = None,
@@ -108,41 +92,33 @@ def convert(
 
     Example: sphshell-pin convert blade.step blade.stl --chord-error 1e-4
     """
-    with faults(context):
-        from sphshell_pin.errors import SphshellError, UnitMissing
-        from sphshell_pin.shell.converting import convert as convert_file
+    from sphshell_pin.shell.converting import convert as convert_file
 
-        try:
-            done = convert_file(
-                source,
-                target,
-                unit_in,
-                unit_out,
-                chord_error=chord_error,
-                bodies=body,
-                faces=faces_of(face),
-                time_limit=time_limit,
-                memory_limit=memory_limit,
-            )
-        except UnitMissing as error:
-            raise SphshellError(f"the unit {error.must('--unit-in {}')}") from error
-        rows = make_table("file", "unit", "holds", "size", "area")
-        for held in (done.source, done.target):
-            rows.add_row(
-                plain(str(held.path)),
-                held.unit,
-                f"{held.count} {held.kind}",
-                f"{held.size:.6g} m",
-                f"{held.area:.6g} m^2",
-            )
-        terminal().print(rows)
-        terminal().print(
-            f"deviation measured at {len(done.forth) + len(done.back)} points: "
-            f"largest {done.largest:.3g} m, root mean square {done.rms:.3g} m",
-            highlight=False,
+    try:
+        done = convert_file(
+            source,
+            target,
+            unit_in,
+            unit_out,
+            chord_error=chord_error,
+            bodies=body,
+            faces=faces_of(face),
+            time_limit=time_limit,
+            memory_limit=memory_limit,
         )
-        for note in done.notes:
-            terminal().print(f"note: {note}", markup=False, highlight=False)
+    except UnitMissing as error:
+        raise SphshellError(f"the unit {error.must('--unit-in {}')}") from error
+    rows = []
+    for held in (done.source, done.target):
+        size, area = f"{held.size:.6g} m", f"{held.area:.6g} m^2"
+        rows.append((str(held.path), held.unit, f"{held.count} {held.kind}", size, area))
+    print_table(("file", "unit", "holds", "size", "area"), rows)
+    say(
+        f"deviation measured at {len(done.forth) + len(done.back)} points: "
+        f"largest {done.largest:.3g} m, root mean square {done.rms:.3g} m"
+    )
+    for note in done.notes:
+        say(f"note: {note}")
 
 
 def faces_of(names: list[str] | None) -> list[str | int] | None:
@@ -155,11 +131,3 @@ def _number_or_word(text: str | None) -> str | float | None:
         return text if text is None else float(text)
     except ValueError:
         return text
-
-
-def _side(side: str) -> Side:
-    from sphshell_pin.errors import InvalidParameter
-
-    if side not in get_args(Side):
-        raise InvalidParameter("--side", side, "must be both, outside or inside")
-    return cast(Side, side)

@@ -2,76 +2,70 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import shlex
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sphshell_pin.checks import stated_pairs
 from sphshell_pin.cli.app import (
     MISSED,
     PackageDirOption,
     ScenarioArgument,
     SetOption,
-    app,
+    argument,
     changes_of,
-    faults,
-    make_table,
-    plain,
+    command,
+    if_installed,
+    option,
+    print_table,
     progress_bar,
-    terminal,
+    say,
 )
+from sphshell_pin.errors import InvalidParameter, ScenarioError
 
 if TYPE_CHECKING:
     from sphshell_pin.study.fit import Experiment, Fit
 
 
-@app.command()
+@command()
 def fit(
     *,
-    context: typer.Context,
     data: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="DATA.csv", help="Measured data: columns by name and unit."),
+        list[Path] | None, argument("Measured data: columns by name and unit.", metavar="DATA.csv")
     ] = None,
     scenario: ScenarioArgument,
     param: Annotated[
         list[str],
-        typer.Option(
+        option(
+            "What is fitted, in this range if it is given; may be given several times. "
+            "KEY+KEY: one value for both.",
             "--param",
             metavar="KEY[=LO:HI]",
-            help="What is fitted, in this range if it is given; may be given several times. "
-            "KEY+KEY: one value for both.",
         ),
     ],
     experiment: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="'DATA.csv KEY=VALUE...'",
-            help="Data of an experiment with other values than the scenario; may be given several "
+        option(
+            "Data of an experiment with other values than the scenario; may be given several "
             "times.",
+            metavar="'DATA.csv KEY=VALUE...'",
         ),
     ] = None,
     column: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="Use this column; by default all; several times."),
+        list[str] | None, option("Use this column; by default all; several times.", metavar="NAME")
     ] = None,
     sigma: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "Standard deviation of a column, in SI; by default from the residuals.",
             metavar="NAME=VALUE",
-            help="Standard deviation of a column, in SI; by default from the residuals.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of the files; by default results/SCENARIO.")
-    ] = None,
-    picture: Annotated[
-        bool, typer.Option("--picture/--no-picture", help="Draw fit and residuals.")
-    ] = True,
+    out: Annotated[Path | None, option("Folder of the files; by default results/SCENARIO.")] = None,
+    picture: Annotated[bool, option("Draw fit and residuals.", "--picture/--no-picture")] = True,
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
 ) -> None:
@@ -82,41 +76,46 @@ def fit(
 
     Example: sphshell-pin fit drop.csv ball.toml --param contact.tip.law.stiffness
     """
-    with faults(context):
-        from sphshell_pin.scenario.format.reading import find_scenario, read_scenario
-        from sphshell_pin.study.fit import Experiment
-        from sphshell_pin.study.fit import fit as fit_scenario
-        from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
-        from sphshell_pin.study.fit.writing import scenario_text
+    from sphshell_pin.scenario.format.reading import find_scenario, read_scenario
+    from sphshell_pin.study.fit import Experiment
+    from sphshell_pin.study.fit import fit as fit_scenario
+    from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
+    from sphshell_pin.study.fit.writing import scenario_text
 
-        changes = changes_of(set_, None, None)
-        wanted = parse_wanted(param)
-        given = [Experiment(path) for path in data or []]
-        given += [_experiment(text) for text in experiment or []]
-        path = find_scenario(scenario)
-        # Where no value can be written, it is said before the runs.
-        free = free_parameters(wanted, read_scenario(path, changes), path)
-        starts = {key: repr(one.start) for one in free for key in one.keys}
-        scenario_text(path, {**changes, **starts}, path.parent)
-        with _bar() as progress:
-            found = fit_scenario(
-                scenario,
-                given,
-                wanted,
-                changes=changes,
-                columns=column,
-                sigma=_deviations(sigma),
-                progress=progress,
-            )
-        files = _write(found, path, out or Path("results") / path.stem, changes, picture=picture)
-        _print_report(found, files)
+    changes = changes_of(set_)
+    wanted = parse_wanted(param)
+    given = [Experiment(path) for path in data or []]
+    given += [_experiment(text) for text in experiment or []]
+    path = find_scenario(scenario)
+    # Where no value can be written, it is said before the runs.
+    free = free_parameters(wanted, read_scenario(path, changes), path)
+    starts = {key: repr(one.start) for one in free for key in one.keys}
+    scenario_text(path, {**changes, **starts}, path.parent)
+    status = "{task.completed} runs, misfit {task.fields[misfit]}"
+    columns = "SpinnerColumn", status, "TimeElapsedColumn"
+    with progress_bar("fit", *columns, total=None, misfit="-") as update:
+
+        def progress(runs: int, misfit: float) -> None:
+            shown = "-" if math.isnan(misfit) else f"{misfit:.4g} sigma"
+            update(completed=runs, misfit=shown)
+
+        found = fit_scenario(
+            scenario,
+            given,
+            wanted,
+            changes=changes,
+            columns=column,
+            sigma=_deviations(sigma),
+            progress=progress,
+        )
+    files = _write(found, path, out or Path("results") / path.stem, changes, picture=picture)
+    _print_report(found, files)
     if not found.determined:
         raise typer.Exit(MISSED)
 
 
 def _experiment(text: str) -> Experiment:
     """Return the experiment that "DATA.csv KEY=VALUE ..." states."""
-    from sphshell_pin.errors import InvalidParameter
     from sphshell_pin.study.fit import Experiment
 
     try:
@@ -125,44 +124,24 @@ def _experiment(text: str) -> Experiment:
         file, changes = "", []
     if not file or not all("=" in one for one in changes):
         raise InvalidParameter("--experiment", text, "must be 'DATA.csv KEY=VALUE ...'")
-    return Experiment(file, changes_of(changes, None, None), " ".join([Path(file).stem, *changes]))
+    return Experiment(file, changes_of(changes), " ".join([Path(file).stem, *changes]))
 
 
 def _deviations(stated: list[str] | None) -> dict[str, float]:
-    from sphshell_pin.errors import InvalidParameter
-
+    must = "must be NAME=VALUE, in SI units"
     found = {}
-    for one in stated or []:
-        name, _, value = one.partition("=")
+    for name, value in stated_pairs("--sigma", stated or [], must):
         try:
-            found[name.strip()] = float(value)
+            found[name] = float(value)
         except ValueError:
-            raise InvalidParameter("--sigma", one, "must be NAME=VALUE, in SI units") from None
+            raise InvalidParameter("--sigma", f"{name}={value}", must) from None
     return found
-
-
-@contextlib.contextmanager
-def _bar() -> Iterator[Callable[[int, float], object]]:
-    """Show on a terminal how many runs were made, and how far they are from the data."""
-    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    status = TextColumn("{task.completed} runs, misfit {task.fields[misfit]}")
-    bar = progress_bar(SpinnerColumn(), status, TimeElapsedColumn())
-    with bar:
-        task = bar.add_task("fit", total=None, misfit="-")
-
-        def progress(runs: int, misfit: float) -> None:
-            shown = "-" if math.isnan(misfit) else f"{misfit:.4g} sigma"
-            bar.update(task, completed=runs, misfit=shown)
-
-        yield progress
 
 
 def _write(
     found: Fit, path: Path, folder: Path, changes: dict[str, str], *, picture: bool
 ) -> list[Path]:
     from sphshell_pin.atomic.files import write_folder
-    from sphshell_pin.errors import MissingExtra, ScenarioError
     from sphshell_pin.scenario.format.reading import read_scenario
     from sphshell_pin.scenario.format.sliders import check_knobs
 
@@ -171,10 +150,8 @@ def _write(
     if picture:
         from sphshell_pin.plot.figure import png
 
-        try:
+        with if_installed():
             made["fit.png"] = png(found.plot())
-        except MissingExtra as missing:
-            typer.echo(str(missing), err=True)
     name = f"{path.stem}.fitted.toml"
     made = {name: found.scenario_text(folder, changes).encode(), **made}
     # Never new values beside an old report.
@@ -190,37 +167,29 @@ def _write(
 def _print_report(found: Fit, files: list[Path]) -> None:
     from sphshell_pin.study.fit.report import interval_text
 
-    console = terminal()
     count = sum(len(one.t) for one in found.series)
-    console.print(
-        f"[bold]{plain(found.scenario)}[/bold]: {count} values of "
-        f"{len({one.experiment for one in found.series})} experiments, {found.runs} runs",
-        highlight=False,
+    experiments = len({one.experiment for one in found.series})
+    text = f": {count} values of {experiments} experiments, {found.runs} runs"
+    say(text, bold=found.scenario)
+    print_table(
+        ("parameter", "start", "value", f"{found.level:.0%} interval", "unit"),
+        (
+            (one.key, f"{one.start:.6g}", f"{one.value:.6g}", interval_text(one), one.unit)
+            for one in found.parameters
+        ),
     )
-    table = make_table("parameter", "start", "value", f"{found.level:.0%} interval", "unit")
-    for one in found.parameters:
-        table.add_row(
-            plain(one.key), f"{one.start:.6g}", f"{one.value:.6g}", interval_text(one), one.unit
-        )
-    console.print(table)
     if len(found.parameters) > 1:
-        rows = make_table("correlation", *(str(k + 1) for k in range(len(found.parameters))))
-        for k, (one, row) in enumerate(zip(found.parameters, found.correlation, strict=True)):
-            cells = ["-" if math.isnan(r) else f"{r:+.3f}" for r in row[: k + 1].tolist()]
-            rows.add_row(f"{k + 1} {plain(one.key)}", *cells)
-        console.print(rows)
-    columns = make_table("data", "values", "rms residual", "sigma", "unit")
+        rows = []
+        for k, (one, row) in enumerate(zip(found.parameters, found.correlation, strict=True), 1):
+            cells = ["-" if math.isnan(r) else f"{r:+.3f}" for r in row[:k].tolist()]
+            rows.append((f"{k} {one.key}", *cells))
+        print_table(("correlation", *(str(k + 1) for k in range(len(rows)))), rows)
+    rows = []
     for series in found.series:
-        sigma = f"{math.sqrt(float((series.sigma**2).mean())):.4g}"
-        columns.add_row(
-            plain(f"{series.name} of {series.experiment}"),
-            f"{len(series.t)}",
-            f"{series.rms:.4g}",
-            f"{sigma} given" if series.given else sigma,
-            series.unit,
-        )
-    console.print(columns)
+        sigma = f"{math.sqrt(float((series.sigma**2).mean())):.4g}{' given' * series.given}"
+        called = f"{series.name} of {series.experiment}"
+        rows.append((called, f"{len(series.t)}", f"{series.rms:.4g}", sigma, series.unit))
+    print_table(("data", "values", "rms residual", "sigma", "unit"), rows)
     for remark in found.remarks:
         typer.echo(f"note: {remark}", err=True)
-    names = ", ".join(str(file) for file in files)
-    console.print(f"files: {names}", markup=False, highlight=False)
+    say(f"files: {', '.join(map(str, files))}")

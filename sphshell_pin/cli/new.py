@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -9,106 +10,95 @@ import typer
 
 from sphshell_pin.cli.app import (
     PackageDirOption,
+    RadiusOption,
     XacroArgOption,
-    app,
-    faults,
+    command,
     length_of,
-    terminal,
+    option,
+    say,
     xacro_args_of,
 )
 from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
+from sphshell_pin.errors import SphshellError, UnitMissing
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario.drafting.new import NewScenario
 
 
-@app.command()
+@command()
 def new(
-    context: typer.Context,
     robot: Annotated[
         str,
-        typer.Option(
-            help="A shipped robot (sphshell-pin list), or a URDF, xacro (which is code) or MJCF "
-            "file."
+        option(
+            "A shipped robot (sphshell-pin list), or a URDF, xacro (which is code) or MJCF file."
         ),
     ],
     surface: Annotated[
-        str,
-        typer.Option(help="A surface file, or one of: plane, box, sphere, cylinder, bowl."),
+        str, option("A surface file, or one of: plane, box, sphere, cylinder, bowl.")
     ] = "plane",
     frame: Annotated[
         str | None,
-        typer.Option(
-            help="Frame that carries the sphere; by default a known tip or the end of a limb."
-        ),
+        option("Frame that carries the sphere; by default a known tip or the end of a limb."),
     ] = None,
-    radius: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
-    ] = None,
+    radius: RadiusOption = None,
     offset: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(
+        option(
+            "Center of the sphere in the frame \\[m]; by default the end of its link.",
             metavar="X Y Z",
-            help="Center of the sphere in the frame \\[m]; by default the end of its link.",
         ),
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="Length unit of the surface file: mm, cm, m, inch, ...")
+        str | None, option("Length unit of the surface file: mm, cm, m, inch, ...")
     ] = None,
     body: BodyOption = None,
     face: FaceOption = None,
     law: Annotated[
         str | None,
-        typer.Option(
-            help="Material of the sphere: steel, aluminium, plastic, wood, rubber, silicone."
-        ),
+        option("Material of the sphere: steel, aluminium, plastic, wood, rubber, silicone."),
     ] = None,
-    against: Annotated[str, typer.Option(help="Material of the surface.")] = "steel",
-    press: Annotated[float | None, typer.Option(metavar="N", help="Normal force \\[N].")] = None,
+    against: Annotated[str, option("Material of the surface.")] = "steel",
+    press: Annotated[float | None, option("Normal force \\[N].", metavar="N")] = None,
     place: Annotated[
         str | None,
-        typer.Option(
-            help="Where the surface is, seen from the tip: below, above, +x, -x, +y, -y; by "
+        option(
+            "Where the surface is, seen from the tip: below, above, +x, -x, +y, -y; by "
             "default below, if the joints allow it."
         ),
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option(
-            metavar="X,Y,Z|FACE",
-            help="Where to touch: a point of the part \\[m], or a face as check lists them: plane, "
+        option(
+            "Where to touch: a point of the part \\[m], or a face as check lists them: plane, "
             "'cylinder 5.5 mm'; the largest one.",
+            metavar="X,Y,Z|FACE",
         ),
     ] = None,
     path: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "Of the tip: points of the part \\[m], 'x,y,z; x,y,z', or line, circle, raster.",
             metavar="POINTS|SHAPE",
-            help="Of the tip: points of the part \\[m], 'x,y,z; x,y,z', or line, circle, raster.",
         ),
     ] = None,
     length: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of a path: 0.06 \\[m] or 60mm.")
+        str | None, option("Of a path: 0.06 \\[m] or 60mm.", metavar="LENGTH")
     ] = None,
     tips: Annotated[
         Literal["one", "all"],
-        typer.Option(help="all: the fingertips of a hand hold the surface, as a free part."),
+        option("all: the fingertips of a hand hold the surface, as a free part."),
     ] = "one",
     base: Annotated[
         Literal["fixed", "floating"] | None,
-        typer.Option(help="Of the robot; by default as its file and its shape say."),
+        option("Of the robot; by default as its file and its shape say."),
     ] = None,
-    free_flyer: Annotated[
-        bool, typer.Option("--free-flyer", help="The same as --base floating.")
-    ] = False,
+    free_flyer: Annotated[bool, option("The same as --base floating.", "--free-flyer")] = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
     out: Annotated[
-        Path | None, typer.Option(help="The file to write; default: ROBOT_on_SURFACE.toml.")
+        Path | None, option("The file to write; default: ROBOT_on_SURFACE.toml.")
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace the file if it is there already.")
-    ] = False,
+    force: Annotated[bool, option("Replace the file if it is there already.", "--force")] = False,
 ) -> None:
     """Write a scenario: this robot, this surface, and values that work for their size.
 
@@ -117,65 +107,48 @@ def new(
 
     Example: sphshell-pin new --robot panda --surface blade.stl --unit mm
     """
-    with faults(context):
-        from sphshell_pin.errors import SphshellError, UnitMissing
-        from sphshell_pin.scenario.drafting.new import new_scenario
+    from sphshell_pin.scenario.drafting.new import new_scenario
 
-        try:
-            made = new_scenario(
-                robot,
-                surface,
-                frame=frame,
-                radius=length_of("--radius", radius),
-                offset=offset,
-                unit=unit,
-                bodies=body,
-                faces=faces_of(face),
-                material=law,
-                against=against,
-                press=press,
-                place=place,
-                at=at,
-                path=path,
-                length=length_of("--length", length),
-                tips=tips,
-                base="floating" if free_flyer else base,
-                package_dirs=package_dir or (),
-                xacro_args=xacro_args_of(xacro_arg),
-                out=out,
-                force=force,
-                tell=_tell,
-            )
-        except UnitMissing as error:
-            raise SphshellError(f"the unit {error.must('--unit {}')}") from error
-        _show(made)
-
-
-def _tell(what: str) -> None:
-    """Show what was tried, on the error stream: the answer goes to the other."""
-    typer.echo(what, err=True)
+    try:
+        made = new_scenario(
+            robot,
+            surface,
+            frame=frame,
+            radius=length_of("--radius", radius),
+            offset=offset,
+            unit=unit,
+            bodies=body,
+            faces=faces_of(face),
+            material=law,
+            against=against,
+            press=press,
+            place=place,
+            at=at,
+            path=path,
+            length=length_of("--length", length),
+            tips=tips,
+            base="floating" if free_flyer else base,
+            package_dirs=package_dir or (),
+            xacro_args=xacro_args_of(xacro_arg),
+            out=out,
+            force=force,
+            # What was tried goes to the error stream, the answer to the other.
+            tell=lambda what: typer.echo(what, err=True),
+        )
+    except UnitMissing as error:
+        raise SphshellError(f"the unit {error.must('--unit {}')}") from error
+    _show(made)
 
 
 def _show(made: NewScenario) -> None:
-    console = terminal()
-
-    def show(text: str) -> None:
-        console.print(text, markup=False, highlight=False)
-
     for section in made.built.scenario.shell:
         if section.file is not None:
-            show(f"{made.built.shells[section.name].health}\n")
-    show(f"{made.explanation}\n")
-    show("Chosen:")
+            say(f"{made.built.shells[section.name].health}\n")
+    say(f"{made.explanation}\n")
+    say("Chosen:")
     for one in made.why:
-        show(f"  {one}")
-    show(f"\nWritten: {made.path}")
-    show("Next:")
-    for command in ("run", "view"):
-        show(f"  sphshell-pin {command} {_quoted(made.path)}")
-
-
-def _quoted(path: Path) -> str:
-    import shlex
-
-    return shlex.quote(str(path))
+        say(f"  {one}")
+    say(f"\nWritten: {made.path}")
+    say("Next:")
+    for way in ("run", "view"):
+        say(f"  sphshell-pin {way} {shlex.quote(str(made.path))}")

@@ -2,52 +2,42 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import app, faults, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, option, progress_bar
+from sphshell_pin.errors import InvalidParameter, SphshellError
 
 
-@app.command()
+@command()
 def render(
-    context: typer.Context,
-    run: Annotated[Path, typer.Argument(help="A finished run: its results folder or run.npz.")],
+    run: RunArgument,
     out: Annotated[
-        Path,
-        typer.Option(
-            help="A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures."
-        ),
+        Path, option("A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures.")
     ],
     time: Annotated[
-        float | None, typer.Option(help="Of a picture: time of the run \\[s]; by default its end.")
+        float | None, option("Of a picture: time of the run \\[s]; by default its end.")
     ] = None,
     from_: Annotated[
-        float | None, typer.Option("--from", help="Of a film: time at which it begins \\[s].")
+        float | None, option("Of a film: time at which it begins \\[s].", "--from")
     ] = None,
-    to: Annotated[
-        float | None, typer.Option("--to", help="Of a film: time at which it ends \\[s].")
-    ] = None,
-    size: Annotated[str, typer.Option(help="Width and height in pixels.")] = "1280x720",
+    to: Annotated[float | None, option("Of a film: time at which it ends \\[s].", "--to")] = None,
+    size: Annotated[str, option("Width and height in pixels.")] = "1280x720",
     fps: Annotated[
-        float | None, typer.Option(help="Pictures per second; by default 30, of a .gif 20.")
+        float | None, option("Pictures per second; by default 30, of a .gif 20.")
     ] = None,
     speed: Annotated[
-        float | None,
-        typer.Option(help="Simulated seconds per second; by default as the scenario has it."),
+        float | None, option("Simulated seconds per second; by default as the scenario has it.")
     ] = None,
-    camera: Annotated[
-        str, typer.Option(help="From where: fit, front, side, top, follow, contact.")
-    ] = "fit",
+    camera: Annotated[str, option("From where: fit, front, side, top, follow, contact.")] = "fit",
     chart: Annotated[
-        bool, typer.Option("--chart/--no-chart", help="Forces and depth under the scene.")
+        bool, option("Forces and depth under the scene.", "--chart/--no-chart")
     ] = True,
-    dark: Annotated[bool, typer.Option("--dark", help="Dark background.")] = False,
-    of: Annotated[
-        str | None,
-        typer.Option("--scenario", help="Scenario that the run is drawn in, if not its own."),
-    ] = None,
+    dark: Annotated[bool, option("Dark background.", "--dark")] = False,
+    of: OfOption = None,
 ) -> None:
     """Draw a finished run: one picture, a film, or a folder of pictures for slides.
 
@@ -55,40 +45,35 @@ def render(
 
     Example: sphshell-pin render results/fingertip_on_blade --out blade.mp4 --camera follow
     """
-    with faults(context):
-        import re
+    from sphshell_pin.scenario.running.replay import Replay
+    from sphshell_pin.view.film import render_film
+    from sphshell_pin.view.live.opening import result_file
 
-        from sphshell_pin.errors import InvalidParameter, SphshellError
-        from sphshell_pin.scenario.running.replay import Replay
-        from sphshell_pin.view.film import render_film
-        from sphshell_pin.view.live.opening import result_file
-
-        pixels = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
-        if pixels is None:
-            raise InvalidParameter("--size", size, "must be WIDTHxHEIGHT, for instance 1280x720")
-        file = result_file(run)
-        if file is None:
-            raise SphshellError(
-                f"{run} is no finished run: give its results folder or run.npz, which "
-                "sphshell-pin run writes"
-            )
-        replay = Replay(file, of)
-        with progress_bar() as bar:
-            task = bar.add_task(str(out), total=None)
-            drawn = render_film(
-                out,
-                replay.result,
-                replay.scene,
-                replay.visual_model,
-                time=time,
-                span=(from_, to),
-                size=(int(pixels[1]), int(pixels[2])),
-                fps=fps,
-                speed=speed if speed is not None or out.suffix == ".png" else replay.speed,
-                camera=camera,  # type: ignore[arg-type]
-                chart=chart,
-                dark=dark,
-                title=replay.title,
-                told=lambda done, count: bar.update(task, completed=done, total=count),
-            )
-        typer.echo(drawn)
+    pixels = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
+    if pixels is None:
+        raise InvalidParameter("--size", size, "must be WIDTHxHEIGHT, for instance 1280x720")
+    file = result_file(run)
+    if file is None:
+        raise SphshellError(
+            f"{run} is no finished run: give its results folder or run.npz, which "
+            "sphshell-pin run writes"
+        )
+    replay = Replay(file, of)
+    with progress_bar(str(out), total=None) as update:
+        drawn = render_film(
+            out,
+            replay.result,
+            replay.scene,
+            replay.visual_model,
+            time=time,
+            span=(from_, to),
+            size=(int(pixels[1]), int(pixels[2])),
+            fps=fps,
+            speed=speed if speed is not None or out.suffix == ".png" else replay.speed,
+            camera=camera,  # type: ignore[arg-type]
+            chart=chart,
+            dark=dark,
+            title=replay.title,
+            told=lambda done, count: update(completed=done, total=count),
+        )
+    typer.echo(drawn)

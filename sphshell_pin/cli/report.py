@@ -8,31 +8,34 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import MISSED, app, faults, make_table, plain, progress_bar, terminal
+from sphshell_pin.cli.app import (
+    MISSED,
+    PERCENT,
+    colored,
+    command,
+    option,
+    print_table,
+    progress_bar,
+    say,
+)
+from sphshell_pin.errors import SphshellError
 
 if TYPE_CHECKING:
     from sphshell_pin.study.report import Report
 
 
-@app.command()
+@command()
 def report(
-    context: typer.Context,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Some four minutes: fewer rounds and sizes.")
-    ] = False,
-    peers: Annotated[
-        bool, typer.Option("--peers", help="The same scenes in other engines, too.")
-    ] = False,
+    quick: Annotated[bool, option("Some four minutes: fewer rounds and sizes.", "--quick")] = False,
+    peers: Annotated[bool, option("The same scenes in other engines, too.", "--peers")] = False,
     validation: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Against published experiments instead; --quick leaves out the slow cases.",
             "--validation",
-            help="Against published experiments instead; --quick leaves out the slow cases.",
         ),
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder of the page and its tables.")] = Path(
-        "results/report"
-    ),
+    out: Annotated[Path, option("Folder of the page and its tables.")] = Path("results/report"),
 ) -> None:
     """Measure speed against error on this machine and write a page of it.
 
@@ -43,40 +46,34 @@ def report(
     Example: sphshell-pin report --quick
     """
     if validation and peers:
-        raise typer.BadParameter("--validation runs no other engines: leave out --peers")
-    with faults(context):
-        from rich.progress import TextColumn, TimeElapsedColumn
+        raise SphshellError("--validation runs no other engines: leave out --peers")
+    from sphshell_pin.study.report import PAGE, make_report
+    from sphshell_pin.study.validation import make_validation
 
-        from sphshell_pin.study.report import PAGE, make_report
-        from sphshell_pin.study.validation import make_validation
-
-        # Without --out: the folder is no part of what was measured.
-        flags = {"--quick": quick, "--peers": peers, "--validation": validation}
-        command = " ".join(["sphshell-pin report", *(name for name, on in flags.items() if on)])
-        make = make_validation if validation else functools.partial(make_report, with_peers=peers)
-        bar = progress_bar(TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
-        with bar:
-            task = bar.add_task("report", total=1.0)
-            made = make(
-                out,
-                quick=quick,
-                command=command,
-                tell=lambda title, share: bar.update(task, description=title, completed=share),
-            )
-        _print(made)
-        terminal().print(f"page: {out / PAGE}", markup=False, highlight=False)
+    # Without --out: the folder is no part of what was measured.
+    flags = {"--quick": quick, "--peers": peers, "--validation": validation}
+    command = " ".join(["sphshell-pin report", *(name for name, on in flags.items() if on)])
+    make = make_validation if validation else functools.partial(make_report, with_peers=peers)
+    with progress_bar("report", PERCENT, "TimeElapsedColumn", total=1.0) as update:
+        made = make(
+            out,
+            quick=quick,
+            command=command,
+            tell=lambda title, share: update(description=title, completed=share),
+        )
+    _print(made)
+    say(f"page: {out / PAGE}")
     raise typer.Exit(MISSED if made.failed else 0)
 
 
 def _print(made: Report) -> None:
-    table = make_table("figure", "median", "quartiles", "aim", "verdict")
-    for section in made.sections:
-        for finding in section.findings:
-            word = {True: "[green]met[/green]", False: "[red]missed[/red]", None: ""}[finding.met]
-            word = "[red]not measured[/red]" if finding.unmeasured else word
-            texts = (finding.what, finding.text, finding.spread_text, finding.aim_text)
-            table.add_row(*(plain(text) for text in texts), word)
-    terminal().print(table)
+    rows = []
+    for one in [one for section in made.sections for one in section.findings]:
+        word = {True: "met", False: "missed", None: ""}[one.met]
+        word = "not measured" if one.unmeasured else word
+        cell = colored(word, "green" if word == "met" else "red")
+        rows.append((one.what, one.text, one.spread_text, one.aim_text, cell))
+    print_table(("figure", "median", "quartiles", "aim", "verdict"), rows)
     for line in [line for section in made.sections for line in section.unmeasured]:
         typer.echo(f"not measured: {line}", err=True)
     if made.caution:

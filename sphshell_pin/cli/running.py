@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,18 +12,21 @@ from sphshell_pin.cli.app import (
     ERROR,
     INTERRUPTED,
     MISSED,
+    PERCENT,
     DtOption,
+    DurationOption,
     PackageDirOption,
     ScenarioArgument,
     SetOption,
-    app,
     changes_of,
-    faults,
-    make_table,
-    plain,
+    colored,
+    command,
+    option,
+    print_table,
     progress_bar,
-    terminal,
+    say,
 )
+from sphshell_pin.errors import Interrupted, SimulationDiverged
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario import RunReport
@@ -33,26 +37,20 @@ SUSPICIOUS_RESIDUAL = 0.05
 MOST_PAIRS = 16
 
 
-@app.command()
+@command()
 def run(
     *,
-    context: typer.Context,
     scenario: ScenarioArgument,
-    out: Annotated[
-        Path | None, typer.Option(help="Results folder; by default results/SCENARIO.")
-    ] = None,
+    out: Annotated[Path | None, option("Results folder; by default results/SCENARIO.")] = None,
     dt: DtOption = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Time to simulate \\[s] in place of run.duration.")
-    ] = None,
+    duration: DurationOption = None,
     recording: Annotated[
-        bool, typer.Option("--recording/--no-recording", help="Write recording.html.")
+        bool, option("Write recording.html.", "--recording/--no-recording")
     ] = True,
     audit_cad: Annotated[
         bool,
-        typer.Option(
-            "--audit-cad",
-            help="Compare every contact with that on the exact faces of the CAD file.",
+        option(
+            "Compare every contact with that on the exact faces of the CAD file.", "--audit-cad"
         ),
     ] = False,
     set_: SetOption = None,
@@ -62,33 +60,27 @@ def run(
 
     Example: sphshell-pin run fingertip_on_blade --duration 2 --set controller.normal_force=8
     """
-    with faults(context):
-        from rich.progress import TextColumn, TimeRemainingColumn
+    from sphshell_pin.scenario import build, explain_built, run_built
 
-        from sphshell_pin.scenario import build, explain_built, run_built
-
-        changes = changes_of(set_, dt, duration)
-        built = build(scenario, changes)
-        bar = progress_bar(TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn())
-        for warning in explain_built(built).warnings:
-            typer.echo(f"warning: {warning}", err=True)
-        with bar:
-            task = bar.add_task(built.name, total=1.0)
-            report = run_built(
-                built,
-                out,
-                recording=recording,
-                audit_cad=audit_cad,
-                progress=lambda fraction: bar.update(task, completed=fraction),
-            )
-        _print_report(report)
-        code = _exit_code(report, changed=bool(changes))
+    changes = changes_of(set_, dt, duration)
+    built = build(scenario, changes)
+    for warning in explain_built(built).warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    with progress_bar(built.name, PERCENT, "TimeRemainingColumn", total=1.0) as update:
+        report = run_built(
+            built,
+            out,
+            recording=recording,
+            audit_cad=audit_cad,
+            progress=lambda fraction: update(completed=fraction),
+        )
+    _print_report(report)
+    code = _exit_code(report, changed=bool(changes))
     raise typer.Exit(code)
 
 
-@app.command()
+@command()
 def explain(
-    context: typer.Context,
     scenario: ScenarioArgument,
     dt: DtOption = None,
     set_: SetOption = None,
@@ -98,18 +90,14 @@ def explain(
 
     Example: sphshell-pin explain fingertip_on_blade --dt 1e-3
     """
-    with faults(context):
-        from sphshell_pin.scenario import build, explain_built
+    from sphshell_pin.scenario import build, explain_built
 
-        built = build(scenario, changes_of(set_, dt, None))
-        console = terminal()
-        console.print(f"[bold]{built.name}[/bold]: {plain(built.scenario.title)}")
-        console.print(str(explain_built(built)), markup=False, highlight=False)
+    built = build(scenario, changes_of(set_, dt))
+    say(f": {built.scenario.title}", bold=built.name)
+    say(str(explain_built(built)))
 
 
 def _exit_code(report: RunReport, *, changed: bool) -> int:
-    from sphshell_pin.errors import Interrupted, SimulationDiverged
-
     if report.stopped is not None:
         hint = ""
         if isinstance(report.stopped, SimulationDiverged):
@@ -124,9 +112,8 @@ def _exit_code(report: RunReport, *, changed: bool) -> int:
     return MISSED
 
 
-def _print_joints(report: RunReport) -> None:
-    """Print the joints that came to a stop, or beyond a limit; nothing where none did."""
-    table = make_table("joint", "stops", "stop time", "torque cut", "peak speed")
+def _joint_rows(report: RunReport) -> Iterator[tuple[str, ...]]:
+    """Yield the joints that came to a stop, or beyond a limit."""
     for name, joint in report.result.stats.joints.items():
         cut = fast = ""
         if joint.first_cut is not None:
@@ -134,64 +121,52 @@ def _print_joints(report: RunReport) -> None:
         if joint.first_too_fast is not None:
             fast = f"{joint.peak_speed:.4g}, too fast at {joint.first_too_fast:.4g} s"
         if joint.stops or cut or fast:
-            table.add_row(
-                plain(name), f"{joint.stops}", f"{joint.stop_time:.4g} s", cut or "-", fast or "-"
-            )
-    if table.row_count:
-        terminal().print(table)
+            yield name, f"{joint.stops}", f"{joint.stop_time:.4g} s", cut or "-", fast or "-"
 
 
 def _print_report(report: RunReport) -> None:
     from sphshell_pin.scenario.running.figures import measure_energy
 
-    console = terminal()
-    stats, title = report.result.stats, report.built.scenario.title
-    console.print(f"[bold]{report.built.name}[/bold]: {plain(title)}", highlight=False)
-    table = make_table(
-        "contact", "duration", "touches", "peak force", "mean force", "largest depth"
-    )
+    stats = report.result.stats
+    say(f": {report.built.scenario.title}", bold=report.built.name)
     shown = sorted(stats.pairs, key=lambda name: -stats.pairs[name].peak_force)[:MOST_PAIRS]
-    for name, pair in stats.pairs.items():
-        if name not in shown:
-            continue
-        table.add_row(
-            plain(name),
+    rows = [
+        (
+            name,
             f"{pair.contact_time:.4g} s",
             f"{pair.touches}",
             f"{pair.peak_force:.4g} N",
             f"{pair.mean_force:.4g} N",
             f"{pair.max_depth * 1e3:.4g} mm",
         )
-    if stats.pairs:
-        console.print(table)
+        for name, pair in stats.pairs.items()
+        if name in shown
+    ]
+    titles = ("contact", "duration", "touches", "peak force", "mean force", "largest depth")
+    print_table(titles, rows)
     others = [pair for name, pair in stats.pairs.items() if name not in shown]
     if others:
         touched = sum(1 for pair in others if pair.touches)
-        console.print(
+        say(
             f"{len(others)} more contacts with smaller peak forces, of which {touched} touched: "
-            f"all are in summary.json",
-            highlight=False,
+            "all are in summary.json"
         )
-    _print_joints(report)
+    print_table(("joint", "stops", "stop time", "torque cut", "peak speed"), _joint_rows(report))
     energy = measure_energy(report.result)
-    console.print(
+    say(
         f"energy residual   {energy['residual']:.3g} J, {energy['relative_residual']:.2g} of the "
         f"{energy['exchanged']:.3g} J exchanged\n"
         f"real-time factor  {stats.real_time_factor:.3g} ({stats.duration:.4g} s simulated "
-        f"in {stats.wall_time:.3g} s, {stats.steps} steps of {stats.dt:g} s)",
-        highlight=False,
+        f"in {stats.wall_time:.3g} s, {stats.steps} steps of {stats.dt:g} s)"
     )
     if energy["relative_residual"] > SUSPICIOUS_RESIDUAL:
         typer.echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
     for warning in report.warnings:
         typer.echo(f"warning: {warning}", err=True)
     if report.audit is not None:
-        audited = make_table(
-            "contact", "recorded", "on no face", "depth off", "rms", "normal off", "rms"
-        )
-        for one in report.audit.pairs:
-            audited.add_row(
-                plain(one.name),
+        audited = [
+            (
+                one.name,
                 f"{one.contacts}",
                 f"{one.unmatched}",
                 f"{one.depth_largest:.3g} m",
@@ -199,16 +174,14 @@ def _print_report(report: RunReport) -> None:
                 f"{one.normal_largest:.3g} rad",
                 f"{one.normal_rms:.3g} rad",
             )
-        console.print("contacts beside those on the exact CAD faces, largest and rms difference")
-        console.print(audited)
-    if report.verdicts:
-        expected = make_table("figure", "expected", "measured", "verdict")
-        for verdict in report.verdicts:
-            mark = "[green]as expected[/green]" if verdict.met else "[red]missed[/red]"
-            measured = f"{verdict.measured:.6g}"
-            expected.add_row(plain(verdict.figure), verdict.expected, measured, mark)
-        console.print(expected)
-    names = ", ".join(file.name for file in report.files)
-    console.print(f"files in {report.folder}: {names}", markup=False, highlight=False)
+            for one in report.audit.pairs
+        ]
+        say("contacts beside those on the exact CAD faces, largest and rms difference")
+        heads = ("contact", "recorded", "on no face", "depth off", "rms", "normal off", "rms")
+        print_table(heads, audited)
+    marks = {True: colored("as expected", "green"), False: colored("missed", "red")}
+    judged = [(v.figure, v.expected, f"{v.measured:.6g}", marks[v.met]) for v in report.verdicts]
+    print_table(("figure", "expected", "measured", "verdict"), judged)
+    say(f"files in {report.folder}: {', '.join(file.name for file in report.files)}")
     for note in report.notes:
         typer.echo(note, err=True)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,104 +13,89 @@ import typer
 from sphshell_pin.cli.app import (
     ERROR,
     DtOption,
+    DurationOption,
     PackageDirOption,
     ScenarioArgument,
     SetOption,
-    app,
     changes_of,
-    faults,
-    make_table,
-    plain,
+    command,
+    option,
+    print_table,
     progress_bar,
-    terminal,
+    say,
 )
+from sphshell_pin.cli.sampling import draw, report_sample
+from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from sphshell_pin.study.sweep import Plan, SweepReport
 
 # So many failed runs are listed one by one.
 _MOST_FAILURES = 5
 
 
-@app.command()
+@command()
 def sweep(
     *,
-    context: typer.Context,
     scenario: ScenarioArgument,
     vary: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.",
             metavar="KEY=VALUES",
-            help="What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.",
         ),
     ] = None,
     together: Annotated[
-        bool, typer.Option("--together", help="Take the values of all keys in step: no grid.")
+        bool, option("Take the values of all keys in step: no grid.", "--together")
     ] = False,
     dist: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="'KEY=DISTRIBUTION'",
-            help="An uncertain input: normal(mean, deviation), uniform(low, high) or "
+        option(
+            "An uncertain input: normal(mean, deviation), uniform(low, high) or "
             "lognormal(median, factor): 68 % from median / factor to median * factor.",
+            metavar="'KEY=DISTRIBUTION'",
         ),
     ] = None,
     sample: Annotated[
         str | None,
-        typer.Option(
-            metavar="KIND", help="Points: sobol (a Sobol sequence) or lhs (a Latin hypercube)."
-        ),
+        option("Points: sobol (a Sobol sequence) or lhs (a Latin hypercube).", metavar="KIND"),
     ] = None,
-    n: Annotated[
-        int | None, typer.Option("--n", help="Number of points; a power of 2 for sobol.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the points.")] = 0,
+    n: Annotated[int | None, option("Number of points; a power of 2 for sobol.", "--n")] = None,
+    seed: Annotated[int, option("Seed of the points.")] = 0,
     indices: Annotated[
-        bool,
-        typer.Option("--indices", help="Sobol indices: n (d + 2) runs for d uncertain inputs."),
+        bool, option("Sobol indices: n (d + 2) runs for d uncertain inputs.", "--indices")
     ] = False,
     tornado: Annotated[
-        bool,
-        typer.Option("--tornado", help="2 d + 1 runs more: each input alone at 5 and at 95 %."),
+        bool, option("2 d + 1 runs more: each input alone at 5 and at 95 %.", "--tornado")
     ] = False,
     bands: Annotated[
         list[str] | None,
-        typer.Option(metavar="CURVE", help="Record a curve of each run; draw quantiles over time."),
+        option("Record a curve of each run; draw quantiles over time.", metavar="CURVE"),
     ] = None,
-    band_steps: Annotated[
-        int | None, typer.Option(help="Equal steps of the curves; by default 200.")
-    ] = None,
+    band_steps: Annotated[int | None, option("Equal steps of the curves; by default 200.")] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO."),
+        Path | None, option("Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO.")
     ] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(help="Processes; by default one per processor; 0: this one alone."),
+        int | None, option("Processes; by default one per processor; 0: this one alone.")
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler whose workers do the runs.")
+        str | None, option("Address of a Dask scheduler whose workers do the runs.")
     ] = None,
     plot: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FIGURE", help="Figure to draw; may be given several times."),
+        list[str] | None, option("Figure to draw; may be given several times.", metavar="FIGURE")
     ] = None,
     pictures: Annotated[
-        bool,
-        typer.Option("--pictures/--no-pictures", help="Draw curves or maps of the table."),
+        bool, option("Draw curves or maps of the table.", "--pictures/--no-pictures")
     ] = True,
     verdicts: Annotated[
-        bool, typer.Option("--verdicts", help="A column for each expectation: met or not.")
+        bool, option("A column for each expectation: met or not.", "--verdicts")
     ] = False,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Do failed runs of an earlier call again.")
+        bool, option("Do failed runs of an earlier call again.", "--retry-failed")
     ] = False,
     dt: DtOption = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Time to simulate \\[s] in place of run.duration.")
-    ] = None,
+    duration: DurationOption = None,
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
 ) -> None:
@@ -123,93 +107,76 @@ def sweep(
 
     Example: sphshell-pin sweep sphere_on_shell --vary contact.law.k=1e3:1e5:log:20
     """
-    with faults(context):
-        from sphshell_pin.study.sweep import plan_sweep, run_plan
+    from sphshell_pin.plot.sweep import plot_sweep
+    from sphshell_pin.study.sweep import plan_sweep, run_plan
 
-        changes = changes_of(set_, dt, duration)
-        plan = plan_sweep(
-            scenario,
-            vary,
-            changes=changes,
-            together=together,
-            verdicts=verdicts,
-            dist=dist,
-            sample=sample,
-            n=n,
-            seed=seed,
-            indices=indices,
-            tornado=tornado,
-            bands=bands or (),
-            band_steps=band_steps,
-        )
-        figures = _drawn(plan, plot or [], wanted=pictures)
-        file = out or Path("results") / str(plan.head["scenario"]) / "sweep.parquet"
-        try:
-            with _bar() as (progress, note):
-                report = run_plan(
-                    plan,
-                    workers=workers,
-                    scheduler=scheduler,
-                    out=file,
-                    retry_failed=retry_failed,
-                    progress=progress,
-                    note=note,
-                )
-        except KeyboardInterrupt as stop:
-            again = shlex.join(["sphshell-pin", *sys.argv[1:]])
-            raise KeyboardInterrupt(f"{stop}; to go on: {again}" if str(stop) else "") from None
-        _print_head(plan, report)
-        if plan.design is None:
-            files = [file, *_draw(report.table, figures, file, all_=bool(plot))]
-            _print_ranges(plan, report)
-        else:
-            from sphshell_pin.cli.sampling import report_sample
+    changes = changes_of(set_, dt, duration)
+    plan = plan_sweep(
+        scenario,
+        vary,
+        changes=changes,
+        together=together,
+        verdicts=verdicts,
+        dist=dist,
+        sample=sample,
+        n=n,
+        seed=seed,
+        indices=indices,
+        tornado=tornado,
+        bands=bands or (),
+        band_steps=band_steps,
+    )
+    figures = _drawn(plan, plot or [], wanted=pictures)
+    file = out or Path("results") / str(plan.head["scenario"]) / "sweep.parquet"
+    columns = "MofNCompleteColumn", "[red]{task.fields[failures]}[/red]", "TimeRemainingColumn"
+    try:
+        with progress_bar("runs", *columns, total=None, failures="") as update:
 
-            files = [file, *([] if report.curves_out is None else [report.curves_out])]
-            files += report_sample(plan, report, figures, all_=bool(plot), pictures=pictures)
-        _print_failures(plan, report)
-        names = ", ".join(map(str, files))
-        terminal().print(
-            f"files: {names}; journal with wall times: {report.journal}",
-            markup=False,
-            highlight=False,
-        )
+            def progress(done: int, failed: int, total: int) -> None:
+                failures = f"{failed} failed" if failed else ""
+                update(completed=done, total=total, failures=failures)
+
+            report = run_plan(
+                plan,
+                workers=workers,
+                scheduler=scheduler,
+                out=file,
+                retry_failed=retry_failed,
+                progress=progress,
+                note=lambda sentence: typer.echo(sentence, err=True),
+            )
+    except KeyboardInterrupt as stop:
+        again = shlex.join(["sphshell-pin", *sys.argv[1:]])
+        raise KeyboardInterrupt(f"{stop}; to go on: {again}" if str(stop) else "") from None
+    _print_head(plan, report)
+    files = [file, *([] if report.curves_out is None else [report.curves_out])]
+    if plan.design is None:
+        if not plot:
+            figures = [name for name in figures if report.table[name].notna().any()][:1]
+        files += draw(file, [(one, partial(plot_sweep, report.table, one)) for one in figures])
+        _print_ranges(plan, report)
+    else:
+        files += report_sample(plan, report, figures, all_=bool(plot), pictures=pictures)
+    _print_failures(plan, report)
+    names = ", ".join(map(str, files))
+    say(f"files: {names}; journal with wall times: {report.journal}")
     if report.failed == len(plan.runs):
         raise typer.Exit(ERROR)
 
 
-@contextlib.contextmanager
-def _bar() -> Iterator[tuple[Callable[[int, int, int], object], Callable[[str], object]]]:
-    """Show a bar on a terminal; yield what moves it and what prints a sentence beside it."""
-    from rich.progress import MofNCompleteColumn, TextColumn, TimeRemainingColumn
-
-    failures = TextColumn("[red]{task.fields[failures]}[/red]")
-    bar = progress_bar(MofNCompleteColumn(), failures, TimeRemainingColumn())
-    with bar:
-        task = bar.add_task("runs", total=None, failures="")
-
-        def progress(done: int, failed: int, total: int) -> None:
-            failures = f"{failed} failed" if failed else ""
-            bar.update(task, completed=done, total=total, failures=failures)
-
-        yield progress, lambda sentence: typer.echo(sentence, err=True)
-
-
 def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
     """Return the figures that may be drawn; refuse wrong ones before anything runs."""
-    from sphshell_pin.errors import InvalidParameter, NameNotFound
+    from sphshell_pin.plot.sweep import drawable_keys
+    from sphshell_pin.study.sweep.table import main_figures
 
     for name in plot:
         if name not in plan.figures:
             raise NameNotFound("figure", name, "a run of this scenario", plan.figures)
-    own = [name for name in plan.figures if name.startswith("figures.")]
-    own += [name for name in plan.figures if name.endswith(".peak_force")]
+    own = main_figures(plan.figures)
     if plan.design is not None:
         return plot or own
     if not wanted:
         return []
-    from sphshell_pin.plot.sweep import drawable_keys
-
     try:
         drawable_keys(plan.varied)
     except InvalidParameter as fault:
@@ -220,53 +187,24 @@ def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
     return plot or own
 
 
-def _draw(table: pd.DataFrame, figures: list[str], file: Path, *, all_: bool) -> list[Path]:
-    """Write pictures of the figures beside the table's `file`; return their paths.
-
-    Unless `all_` are wanted, only the first that any run has is drawn.
-    """
-    from sphshell_pin.errors import MissingExtra
-    from sphshell_pin.plot.figure import write_figure
-    from sphshell_pin.plot.sweep import plot_sweep
-
-    paths: list[Path] = []
-    if not all_:
-        figures = [name for name in figures if table[name].notna().any()][:1]
-    for name in figures:
-        path = file.with_name(f"{file.stem}.{name.replace('/', '_')}.png")
-        try:
-            write_figure(path, plot_sweep(table, name))
-        except MissingExtra as missing:
-            typer.echo(str(missing), err=True)
-            break
-        paths.append(path)
-    return paths
-
-
 def _print_head(plan: Plan, report: SweepReport) -> None:
     total = len(plan.runs)
-    terminal().print(
-        f"[bold]{plan.head['scenario']}[/bold]: {total} runs, {total - report.failed} done, "
-        f"{report.failed} failed"
-        + (f"; {report.resumed} were done before" if report.resumed else ""),
-        highlight=False,
-    )
+    before = f"; {report.resumed} were done before" if report.resumed else ""
+    done = f"{total - report.failed} done, {report.failed} failed{before}"
+    say(f": {total} runs, {done}", bold=str(plan.head["scenario"]))
     if report.deaths:
         typer.echo(f"{report.deaths} workers died; their runs were done again", err=True)
 
 
 def _print_ranges(plan: Plan, report: SweepReport) -> None:
-    ranges = make_table("figure", "smallest", "in run", "largest", "in run")
+    rows = []
     for name in plan.figures:
         column = report.table[name]
         if name.startswith("final.") or column.nunique() < 2:
             continue
         low, high = column.idxmin(), column.idxmax()
-        ranges.add_row(
-            plain(name), f"{column[low]:.6g}", f"{low}", f"{column[high]:.6g}", f"{high}"
-        )
-    if ranges.row_count:
-        terminal().print(ranges)
+        rows.append((name, f"{column[low]:.6g}", f"{low}", f"{column[high]:.6g}", f"{high}"))
+    print_table(("figure", "smallest", "in run", "largest", "in run"), rows)
 
 
 def _print_failures(plan: Plan, report: SweepReport) -> None:

@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import app, faults
+from sphshell_pin.cli.app import RunArgument, command, if_installed, option
+from sphshell_pin.cli.export import file_of
 
 
-@app.command()
+@command()
 def taxels(
-    context: typer.Context,
-    run: Annotated[Path, typer.Argument(help="A finished run: its run.npz or results folder.")],
-    contact: Annotated[str, typer.Option(help="Contact whose sphere has the taxels.")],
-    shape: Annotated[tuple[int, int], typer.Option(help="Numbers of taxels: rows and columns.")] = (
-        16,
-        16,
-    ),
+    run: RunArgument,
+    contact: Annotated[str, option("Contact whose sphere has the taxels.")],
+    shape: Annotated[tuple[int, int], option("Numbers of taxels: rows and columns.")] = (16, 16),
     axis: Annotated[
         tuple[float, float, float],
-        typer.Option(help="From the sphere's center to the middle of the grid, in its frame."),
+        option("From the sphere's center to the middle of the grid, in its frame."),
     ] = (0.0, 0.0, 1.0),
     up: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(help="Direction of the columns, in the same frame; by default any."),
+        option("Direction of the columns, in the same frame; by default any."),
     ] = None,
     extent_deg: Annotated[
-        tuple[float, float], typer.Option(help="Angles over which rows and columns reach.")
+        tuple[float, float], option("Angles over which rows and columns reach.")
     ] = (90.0, 90.0),
-    speed: Annotated[float, typer.Option(help="Simulated seconds in a second of the film.")] = 1.0,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder to write into; by default that of the run.")
-    ] = None,
+    speed: Annotated[float, option("Simulated seconds in a second of the film.")] = 1.0,
+    out: Annotated[Path | None, option("Folder to write into; by default that of the run.")] = None,
 ) -> None:
     """Write what a grid of tactile sensors on a sphere felt: taxels.npz, and a film of it.
 
@@ -41,24 +37,18 @@ def taxels(
 
     Example: sphshell-pin taxels results/polished_valve --contact tool --axis 0 0 1
     """
-    with faults(context):
-        import math
+    from sphshell_pin.patches import TaxelGrid
+    from sphshell_pin.scenario.running.replay import Replay
 
-        from sphshell_pin.errors import MissingExtra
-        from sphshell_pin.patches import TaxelGrid
-        from sphshell_pin.scenario.running.replay import Replay
-
-        height, width = map(math.radians, extent_deg)
-        grid = TaxelGrid(contact, shape, axis=axis, up=up, extent=(height, width))
-        file = run / "run.npz" if run.is_dir() else run
-        replay = Replay(file)
-        images = grid.images(replay.result, replay.scene)
-        folder = file.parent if out is None else out
-        folder.mkdir(parents=True, exist_ok=True)
-        typer.echo(images.save(folder / "taxels.npz"))
-        try:
-            typer.echo(images.save_film(folder / "taxels.gif", speed=speed))
-        except MissingExtra as missing:
-            typer.echo(str(missing), err=True)
-        felt, missed = float(images.forces.max()), float(abs(images.outside).max())
-        typer.echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")
+    height, width = map(math.radians, extent_deg)
+    grid = TaxelGrid(contact, shape, axis=axis, up=up, extent=(height, width))
+    file = file_of(run)
+    replay = Replay(file)
+    images = grid.images(replay.result, replay.scene)
+    folder = file.parent if out is None else out
+    folder.mkdir(parents=True, exist_ok=True)
+    typer.echo(images.save(folder / "taxels.npz"))
+    with if_installed():
+        typer.echo(images.save_film(folder / "taxels.gif", speed=speed))
+    felt, missed = float(images.forces.max()), float(abs(images.outside).max())
+    typer.echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")

@@ -22,14 +22,7 @@ A message within another one that has equal numbers only, such as a point, may b
 these, and an array of such messages an array (n, k).
 """
 
-_CODES = {
-    "bool": "?",
-    "uint8": "B",
-    "int32": "i",
-    "uint32": "I",
-    "float32": "f",
-    "float64": "d",
-}
+_CODES = {"bool": "?", "uint8": "B", "int32": "i", "uint32": "I", "float32": "f", "float64": "d"}
 _HEADER = b"\x00\x01\x00\x00"  # CDR, little-endian, no options
 
 

@@ -83,22 +83,22 @@ class Frames:
         # A joint that carries nothing itself may carry other joints.
         for joint in range(1, model.njoints):
             if joint not in moving:
-                name = _free(model.names[joint], taken)
+                name = free_name(model.names[joint], taken)
                 moving[joint] = Moving(name, joint, pin.SE3.Identity())
         spheres: dict[str, str] = {}
         others: dict[str, str] = {}
         contacts: dict[str, str] = {}
         shells: dict[tuple[int, int, bytes], str] = {}
         for pair in scene.pairs:
-            contacts[pair.name] = _free(f"contact/{pair.name}", taken)
+            contacts[pair.name] = free_name(f"contact/{pair.name}", taken)
             if pair.sphere is not None:
-                name = spheres[pair.name] = _free(f"sphere/{pair.name}", taken)
+                name = spheres[pair.name] = free_name(f"sphere/{pair.name}", taken)
                 fixed.append(_hung(name, pair.joint_i, pair.placement_i, moving))
             if pair.other_sphere is not None:
-                name = others[pair.name] = _free(f"sphere/{pair.name}/other", taken)
+                name = others[pair.name] = free_name(f"sphere/{pair.name}/other", taken)
                 fixed.append(_hung(name, pair.joint_j, pair.placement_j, moving))
             if pair.shell is not None and shell_key(pair) not in shells:
-                name = shells[shell_key(pair)] = _free(f"shell/{pair.shell.name}", taken)
+                name = shells[shell_key(pair)] = free_name(f"shell/{pair.shell.name}", taken)
                 fixed.append(_hung(name, pair.joint_j, pair.placement_j, moving))
         return cls(tuple(moving.values()), tuple(fixed), spheres, others, contacts, shells)
 
@@ -120,10 +120,10 @@ def _hung(name: str, joint: int, place: pin.SE3, moving: dict[int, Moving]) -> F
     return Fixed(name, moving[joint].name, moving[joint].placement.actInv(place))
 
 
-def _free(wanted: str, taken: set[str]) -> str:
-    """Return the name `wanted`, with a number if it is taken."""
+def free_name(wanted: str, taken: set[str], mark: str = "-") -> str:
+    """Return the name `wanted`, with `mark` and a number if it is taken; take it."""
     name, k = wanted, 2
     while name in taken:
-        name, k = f"{wanted}-{k}", k + 1
+        name, k = f"{wanted}{mark}{k}", k + 1
     taken.add(name)
     return name

@@ -25,7 +25,7 @@ from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
 from sphshell_pin.errors import ResultError, import_extra
 from sphshell_pin.export.cdr import Message, encode
-from sphshell_pin.export.frames import WORLD, Frames, quaternion
+from sphshell_pin.export.frames import WORLD, Frames, free_name, quaternion
 from sphshell_pin.export.markers import (
     ROD,
     body_markers,
@@ -351,14 +351,8 @@ def _stated_frames(result: Result, scene: Scene) -> dict[str, str]:
 
 def _topics(above: str, names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
     """Return a topic of its own for each of `names`: ROS 2 allows letters, digits, underscores."""
-    used, topics = set(taken), {}
-    for name in names:
-        token, k = _token(name), 2
-        while token in used:
-            token, k = f"{_token(name)}_{k}", k + 1
-        used.add(token)
-        topics[name] = f"/{above}/{token}"
-    return topics
+    used = set(taken)
+    return {name: f"/{above}/{free_name(_token(name), used, '_')}" for name in names}
 
 
 def _token(name: str) -> str:

@@ -11,8 +11,7 @@ from typing import Literal
 from sphshell_pin.atomic.files import write_folder
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.scene import Scene
-from sphshell_pin.errors import import_extra
-from sphshell_pin.tables import Table, csv_text
+from sphshell_pin.tables import Table, csv_text, write_parquet
 
 Format = Literal["csv", "parquet"]
 
@@ -57,19 +56,9 @@ def write_tables(
     else:
         scenario = "" if result.origin is None else result.origin.scenario
         about = {"scenario": scenario, "command": command}
-        data = {f"{name}.parquet": _parquet(table, about) for name, table in tables.items()}
+        data = {}
+        for name, table in tables.items():
+            stream = io.BytesIO()
+            write_parquet(stream, table, {"sphshell_pin": json.dumps(about)})
+            data[f"{name}.parquet"] = stream.getvalue()
     return write_folder(folder, data, [f"{name}.{format}" for name in KINDS])
-
-
-def _parquet(table: Table, about: dict[str, str]) -> bytes:
-    pyarrow = import_extra("pyarrow", "sweep", "a .parquet file")
-    parquet = import_extra("pyarrow.parquet", "sweep", "a .parquet file")
-    text = pyarrow.string()  # of an empty list it would be unknown
-    columns = {
-        name: pyarrow.array(one, text if isinstance(one, list) else None)
-        for name, one in table.items()
-    }
-    whole = pyarrow.table(columns).replace_schema_metadata({"sphshell_pin": json.dumps(about)})
-    stream = io.BytesIO()
-    parquet.write_table(whole, stream, compression="zstd")
-    return stream.getvalue()

@@ -107,13 +107,17 @@ def dynamics(scene: sp.Scene, actuation: str = "Full", frame: str = "tip") -> Co
     return ContactDynamics(scene, *parts(scene, actuation, frame))
 
 
+def bare(scene: sp.Scene, actuation: str = "Full"):
+    """Return state, actuation, and no costs."""
+    state = crocoddyl.StateMultibody(scene.model)
+    actuated = getattr(crocoddyl, f"ActuationModel{actuation}")(state)
+    return state, actuated, crocoddyl.CostModelSum(state, actuated.nu)
+
+
 def parts(scene: sp.Scene, actuation: str = "Full", frame: str = "tip"):
     """Return state, actuation, and costs with every residual of the adapter."""
-    state = crocoddyl.StateMultibody(scene.model)
-    kind = getattr(crocoddyl, f"ActuationModel{actuation}")
-    actuated = kind(state)
+    state, actuated, costs = bare(scene, actuation)
     nu = actuated.nu
-    costs = crocoddyl.CostModelSum(state, nu)
     placement = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([0.1, 0.2, 0.1]))
     residuals = {
         "normal": ContactForceResidual(scene, state, "touch", 3.0, nu),
@@ -199,23 +203,6 @@ def test_derivatives_are_those_of_differences(case, kind):
     close(data.Lx, differences(lambda x: at(lambda d: [d.cost], x), model.state, x)[0])
 
 
-def test_forces_are_those_of_the_scene():
-    scene, x = arm_on_moving_plate()
-    model = dynamics(scene)
-    data = model.createData()
-    model.calc(data, x, np.zeros(model.nu))
-    contacts = scene.contacts(x[: scene.model.nq], x[scene.model.nq :])
-    costs = data.costs.costs
-    np.testing.assert_allclose(costs["normal"].residual.r, contacts.normal_force.sum() - 3.0)
-    wanted = contacts.force_world.sum(axis=0) - [1.0, 0.5, 2.0]
-    np.testing.assert_allclose(costs["world"].residual.r, wanted)
-    # As of a last node.
-    last = model.createData()
-    model.calc(last, x)
-    model.calcDiff(last, x)
-    np.testing.assert_array_equal(last.costs.costs["world"].residual.r, wanted)
-
-
 @pytest.mark.parametrize("joints", [None, sp.JointComponents(damping={"slides": 7.0})])
 def test_forces_of_several_pairs_and_of_joints(joints):
     """Each pair has its own force; the acceleration is ABA's with the scene's forces."""
@@ -235,6 +222,12 @@ def test_forces_of_several_pairs_and_of_joints(joints):
         residual = data.costs.costs["world" if name == "touch" else name].residual
         reference = np.array([1.0, 0.5, 2.0]) if name == "touch" else np.zeros(3)
         np.testing.assert_allclose(residual.r, row - reference, rtol=1e-14)
+    last = model.createData()  # of a last node
+    model.calc(last, x)
+    model.calcDiff(last, x)
+    for name in ("wall", "normal", "world"):
+        found = (one.costs.costs[name].residual.r for one in (last, data))
+        np.testing.assert_array_equal(*found)
     total = tau + scene.joint_forces(q, v)
     fext = scene.external_forces(q, v)
     expected = pin.aba(scene.model, scene.model.createData(), q, v, total, fext)
@@ -319,8 +312,7 @@ def test_a_solver_presses_with_a_force_within_bounds_of_its_motor():
     scene = sp.Scene(model)
     law = sp.ImpactLaw(2e5, 1.5, damping=30.0, full_damping_depth=1e-4)
     scene.add_contact(sp.Sphere(0.02, "ball"), plate(), law=law, name="touch")
-    state = crocoddyl.StateMultibody(scene.model)
-    actuation = crocoddyl.ActuationModelFull(state)
+    state, actuation, _ = bare(scene)
     x0, dt, steps = np.array([0.02 + 1e-4, 0.0]), 1e-3, 60
 
     def node(last):
@@ -385,10 +377,7 @@ def test_bristles_are_refused_unless_told_otherwise():
     scene.replace_pair("touch", friction=sp.BristleFriction(0.4, 0.3, 0.01))
     with pytest.raises(InvalidParameter, match=r"bristles in the friction of touch.*Coulomb"):
         dynamics(scene, "Full", "ball")
-    state = crocoddyl.StateMultibody(scene.model)
-    actuation = crocoddyl.ActuationModelFull(state)
-    costs = crocoddyl.CostModelSum(state)
-    model = ContactDynamics(scene, state, actuation, costs, without_history=True)
+    model = ContactDynamics(scene, *bare(scene), without_history=True)
     data = model.createData()
     u = np.zeros(model.nu)
     model.calc(data, x, u)
@@ -401,9 +390,7 @@ def test_bristles_are_refused_unless_told_otherwise():
 def test_wrong_arguments_get_a_sentence():
     scene, _ = free_ball()
     other, _ = arm_on_moving_plate()
-    state = crocoddyl.StateMultibody(scene.model)
-    actuation = crocoddyl.ActuationModelFull(state)
-    costs = crocoddyl.CostModelSum(state)
+    state, actuation, costs = bare(scene)
     with pytest.raises(InvalidParameter, match=r"crocoddyl.StateMultibody\(scene.model\)"):
         ContactDynamics(other, state, actuation, costs)
     with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Scene"):
@@ -414,21 +401,15 @@ def test_wrong_arguments_get_a_sentence():
         FrameResidual(scene, state, "bal", [0.0, 0.0, 0.0])
     residual = crocoddyl.ResidualModelFrameTranslation(state, 1, np.zeros(3))
     costs.addCost("place", crocoddyl.CostModelResidual(state, residual), 1.0)
-    with pytest.raises(
-        InvalidParameter, match=r"place.*ResidualModelFrameTranslation.*FrameResidual"
-    ):
+    words = r"place.*ResidualModelFrameTranslation.*FrameResidual"
+    with pytest.raises(InvalidParameter, match=words):
         ContactDynamics(scene, state, actuation, costs)
-
-
-def test_a_force_of_another_scene_is_refused():
-    scene, _ = free_ball()
-    other, _ = free_ball()
-    state = crocoddyl.StateMultibody(scene.model)
-    costs = crocoddyl.CostModelSum(state)
-    force = ContactForceResidual(other, state, "touch", 1.0)
+    # A force of another scene.
+    state, actuation, costs = bare(scene)
+    force = ContactForceResidual(free_ball()[0], state, "touch", 1.0)
     costs.addCost("force", crocoddyl.CostModelResidual(state, force), 1.0)
     with pytest.raises(InvalidParameter, match=r"'force'.*same scene"):
-        ContactDynamics(scene, state, crocoddyl.ActuationModelFull(state), costs)
+        ContactDynamics(scene, state, actuation, costs)
 
 
 @pytest.mark.parametrize("package", ["crocoddyl", "casadi"])

@@ -13,7 +13,7 @@ from sphshell_pin.errors import DataError, InvalidParameter, InvalidShell, Resul
 from sphshell_pin.patches import ShellTaxels
 from sphshell_pin.study.fit import Experiment
 from sphshell_pin.study.fit.data import read_experiment
-from sphshell_pin.study.fit.quantities import Quantity
+from sphshell_pin.study.quantities import Quantity
 from tests.models import LAW, ball, free_q, on_plate
 
 Q = free_q([0.0, 0.0, 0.049])

@@ -22,6 +22,14 @@ from tests.export.runs import finger_run, linkless_run, turntable_run
 START = 1_800_000_000_123_456_789
 
 
+def xyz(one):
+    return [one.x, one.y, one.z]
+
+
+def stamp(message):
+    return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+
+
 class Read:
     """A file as the library's own reader has it: messages and log times by topic."""
 
@@ -47,8 +55,13 @@ class Read:
         for value in self.topics[topic]:
             for field in fields:
                 value = getattr(value, field)  # noqa: PLW2901
-            found.append([value.x, value.y, value.z] if hasattr(value, "x") else value)
+            found.append(xyz(value) if hasattr(value, "x") else value)
         return np.array(found)
+
+    def transforms(self, frame):
+        """The transforms of a frame that moves, in order of time."""
+        every = (one for message in self.topics["/tf"] for one in message.transforms)
+        return [one for one in every if one.child_frame_id == frame]
 
 
 @pytest.fixture(scope="module")
@@ -93,16 +106,10 @@ def test_wrenches_are_about_the_center_of_the_sphere_in_the_axes_of_the_world(fi
     assert {one.header.frame_id for one in read.topics[topic]} == {"contact/tip-wall"}
     torque = read.numbers(topic, "wrench", "torque")
     slips = read.numbers("/contacts/tip_wall/slip", "data")
-    place = {
-        one.header.stamp.sec * 10**9 + one.header.stamp.nanosec: one.transform
-        for message in read.topics["/tf"]
-        for one in message.transforms
-        if one.child_frame_id == "contact/tip-wall"
-    }
+    place = {stamp(one): one.transform for one in read.transforms("contact/tip-wall")}
     for row, t in enumerate(read.times[topic]):
         contacts = result.contacts.at_row(row)
-        at = place[t].translation
-        arms = contacts.point_world - [at.x, at.y, at.z]
+        arms = contacts.point_world - xyz(place[t].translation)
         own = np.cross(arms, contacts.force_world).sum(axis=0)
         np.testing.assert_allclose(torque[row], own, rtol=0, atol=1e-15)
         r = place[t].rotation
@@ -120,7 +127,7 @@ def test_markers_are_at_the_contacts_and_disappear_with_them(finger):
         assert message.markers[0].action == 3  # all that was drawn before goes
         for one in message.markers[1:]:
             assert one.header.frame_id == "universe"
-            where = [[p.x, p.y, p.z] for p in one.points]
+            where = list(map(xyz, one.points))
             if one.type == 7:
                 points += where
             else:
@@ -147,10 +154,7 @@ def test_times_are_whole_nanoseconds_in_order(finger):
     wanted = nanoseconds(result.t)
     for topic in ("/joint_states", "/tf", "/energy/kinetic"):
         assert read.times[topic] == wanted
-    assert [
-        one.header.stamp.sec * 10**9 + one.header.stamp.nanosec
-        for one in read.topics["/joint_states"]
-    ] == wanted
+    assert list(map(stamp, read.topics["/joint_states"])) == wanted
     assert read.order == sorted(read.order)
     assert read.summary.statistics.message_start_time == wanted[0]
     for topic in ("/tf_static", "/shells", "/bodies"):
@@ -194,8 +198,7 @@ def poses(read, row):
             return pin.SE3.Identity()
         parent, at = stated[name]
         turn = pin.Quaternion(at.rotation.w, at.rotation.x, at.rotation.y, at.rotation.z)
-        move = np.array([at.translation.x, at.translation.y, at.translation.z])
-        return pose(parent) * pin.SE3(turn.matrix(), move)
+        return pose(parent) * pin.SE3(turn.matrix(), np.array(xyz(at.translation)))
 
     return {name: pose(name) for name in stated}
 
@@ -234,12 +237,7 @@ def test_joints_without_end_and_free_bodies(table):
     np.testing.assert_array_equal(read.numbers("/twists/ball", "twist", "linear"), result.v[:, 1:4])
     angular = read.numbers("/twists/ball", "twist", "angular")
     np.testing.assert_array_equal(angular, result.v[:, 4:])
-    ball = [
-        [one.transform.translation.x, one.transform.translation.y, one.transform.translation.z]
-        for message in read.topics["/tf"]
-        for one in message.transforms
-        if one.child_frame_id == "ball"
-    ]
+    ball = [xyz(one.transform.translation) for one in read.transforms("ball")]
     np.testing.assert_array_equal(ball, result.q[:, 2:5])
     assert "/contacts/_1st_ball_disc/wrench" in read.topics
     assert read.metadata["sphshell_pin"]["contact 1st ball/disc"] == "/contacts/_1st_ball_disc"
@@ -258,12 +256,11 @@ def test_a_joint_without_a_link_has_its_own_frame(tmp_path):
         read.numbers("/twists/moves_2", "twist", "linear"), result.v[:, :3]
     )
     twist = read.topics["/twists/moves"][-1].twist
-    angular = [twist.angular.x, twist.angular.y, twist.angular.z]
-    np.testing.assert_array_equal(angular, data.v[2].angular)
+    np.testing.assert_array_equal(xyz(twist.angular), data.v[2].angular)
     rods = [one for one in read.topics["/bodies"][0].markers if one.type == 5]
     (rod,) = rods  # none from the world to a body that flies
     assert rod.header.frame_id == "moves-2"
-    ends = [[p.x, p.y, p.z] for p in rod.points]
+    ends = list(map(xyz, rod.points))
     np.testing.assert_array_equal(ends, [np.zeros(3), model.jointPlacements[2].translation])
     assert "/contacts/markers" not in read.topics
 
@@ -272,14 +269,14 @@ def test_shells_and_spheres_are_drawn_once(table):
     _, read = table
     (shells,), (bodies,) = read.topics["/shells"], read.topics["/bodies"]
     (shell,) = shells.markers
-    corners = np.array([[p.x, p.y, p.z] for p in shell.points]).reshape(-1, 3, 3)
+    corners = np.array(list(map(xyz, shell.points))).reshape(-1, 3, 3)
     edges = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum()
     assert area == pytest.approx(0.04, rel=1e-12)
     assert (shell.type, shell.frame_locked, shell.header.frame_id) == (11, True, "shell/disc")
     ball = bodies.markers[0]
     assert (ball.header.frame_id, ball.type) == ("sphere/1st ball/disc", 2)
-    assert (ball.scale.x, ball.scale.y, ball.scale.z) == (0.04, 0.04, 0.04)
+    assert xyz(ball.scale) == [0.04, 0.04, 0.04]
     latched = {"/tf_static", "/shells", "/bodies"}
     channels = read.summary.channels.values()
     assert {one.topic for one in channels if "offered_qos_profiles" in one.metadata} == latched

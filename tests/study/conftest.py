@@ -11,3 +11,11 @@ def bounce(tmp_path):
     path = tmp_path / "bounce.toml"
     path.write_text(SCENARIO, encoding="utf-8")
     return path
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    """The file of a scenario whose ball settles on a plate, for sweeps."""
+    from tests.study.resting import write
+
+    return write(tmp_path_factory.mktemp("sweep"))

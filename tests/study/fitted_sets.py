@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sphshell_pin.cases.machine import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.study.fit import fit
-from sphshell_pin.study.fit.quantities import quantities_of
+from sphshell_pin.study.quantities import quantities_of
 
 Array = NDArray[np.float64]
 
@@ -52,11 +52,7 @@ duration = 0.25
 rtol = 1e-7
 """
 LAW = "contact.tip.law."
-TRUTH = {
-    f"{LAW}stiffness": 1e5,
-    f"{LAW}dissipation": 0.3,
-    "contact.tip.friction.mu_dynamic": 0.2,
-}
+TRUTH = {f"{LAW}stiffness": 1e5, f"{LAW}dissipation": 0.3, "contact.tip.friction.mu_dynamic": 0.2}
 COLUMNS = {"pairs.tip.normal_force": "N", "pairs.tip.force_x": "N"}
 
 

@@ -45,11 +45,6 @@ SOBOL = {"dist": DIST, "sample": "sobol"}
 DEPTH = "pairs.ball-plate.depth"
 
 
-@pytest.fixture(scope="module")
-def scenario(tmp_path_factory):
-    return write(tmp_path_factory.mktemp("sampling"))
-
-
 def test_texts_are_distributions():
     found = distributions_of(["a = normal(1e5, 2e3)", "b=Uniform(-1,2)", "c=lognormal(3,1.5)"])
     assert found == {"a": Normal(1e5, 2e3), "b": Uniform(-1, 2), "c": LogNormal(3, 1.5)}
@@ -76,7 +71,7 @@ def test_quantiles_are_those_of_the_textbook():
     [
         ({}, "must say what is uncertain"),
         (["a"], "must be KEY=DISTRIBUTION, one of normal"),
-        (["a="], "must be KEY=DISTRIBUTION"),
+        (["a="], "must be one of normal"),
         (["a=normal"], r"must be one of normal\(mean,deviation\), uniform"),
         (["a=gauss(1,2)"], "names no distribution that is known: normal"),
         (["a=normal(1)"], r"must have 2 numbers: normal\(mean,deviation\)"),
@@ -356,14 +351,3 @@ def test_failed_runs_are_left_out_of_quantiles_and_refused_by_indices(scenario):
         "Sobol indices of the others would be wrong",
     ):
         sobol_indices(table, "figures.depth")
-
-
-def test_curves_are_read_back_from_hdf5(scenario):
-    h5py = pytest.importorskip("h5py")
-    plan = plan_sweep(scenario, **SOBOL, n=2, bands=[DEPTH])
-    report = run_plan(plan, workers=0, out=scenario.parent / "curves.h5")
-    with h5py.File(report.curves_out) as file:
-        rows = file["sweep"][()]
-    for name in report.curves.columns:
-        np.testing.assert_array_equal(rows[name], report.curves[name])
-    assert len(rows) == 2 * 11

@@ -29,20 +29,6 @@ def test_the_indices_of_ishigamis_function():
     ).all(axis=None)
 
 
-def test_a_product_of_independent_inputs():
-    """Y = X Z with means 1: V_X = c_X^2, V = (1 + c_X^2) (1 + c_Z^2) - 1."""
-    design = design_of(
-        {"x": "uniform(0.5,1.5)", "z": "uniform(0.8,1.2)"}, "sobol", 4096, indices=True
-    )
-    found = sobol_indices(table_of(design, design.values.prod(axis=1)), "f")
-    x, z = 1 / 12, 0.16 / 12
-    variance = (1 + x) * (1 + z) - 1
-    np.testing.assert_allclose(found["first"], [x / variance, z / variance], atol=2e-3)
-    np.testing.assert_allclose(
-        found["total"], [(x + x * z) / variance, (z + x * z) / variance], atol=2e-3
-    )
-
-
 def test_the_order_of_the_rows_does_not_matter_and_the_intervals_are_repeatable():
     table = ishigami_table(64)
     found = sobol_indices(table, "f")

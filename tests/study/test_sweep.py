@@ -32,17 +32,10 @@ SMALL = {STIFFNESS: [1e4, 2e4, 3e4, 4e4]}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    path = tmp_path_factory.mktemp("sweep")
-    write(path)
-    return path
-
-
-@pytest.fixture(scope="module")
-def serial(folder):
+def serial(scenario):
     """The file that the runs leave when they are done in turn in this process."""
-    path = folder / "serial.parquet"
-    sweep(folder / "resting.toml", VARY, workers=0, out=path)
+    path = scenario.parent / "serial.parquet"
+    sweep(scenario, VARY, workers=0, out=path)
     return path
 
 
@@ -64,31 +57,23 @@ def test_the_depth_of_rest_follows_its_closed_form(serial):
     assert not [name for name in table.columns if "wall" in name or "real_time" in name]
 
 
-def test_two_workers_leave_the_same_bytes(folder, serial):
-    table = folder / "two.parquet"
-    sweep(folder / "resting.toml", VARY, workers=2, out=table)
-    check_once(table, 60)
-    assert len({one["worker"] for one in entries(table)}) in (1, 2)
-    assert table.read_bytes() == serial.read_bytes()
-
-
-def test_a_killed_worker_costs_nothing(folder, serial):
-    table = folder / "killed.parquet"
+def test_a_killed_worker_costs_nothing(scenario, serial):
+    table = scenario.parent / "killed.parquet"
 
     def progress(done, failed, total):
         if done in (10, 35):
             kill_worker(table)
 
-    sweep(folder / "resting.toml", VARY, workers=2, out=table, progress=progress)
+    sweep(scenario, VARY, workers=2, out=table, progress=progress)
     check_once(table, 60)
     assert len({one["worker"] for one in entries(table)}) >= 3
     assert table.read_bytes() == serial.read_bytes()
 
 
-def test_values_are_read_back_exactly_from_either_kind_of_file(folder, serial):
+def test_values_are_read_back_exactly_from_either_kind_of_file(scenario, serial):
     h5py = pytest.importorskip("h5py")
-    table = folder / "same.h5"
-    returned = sweep(folder / "resting.toml", VARY, workers=0, out=table)
+    table = scenario.parent / "same.h5"
+    returned = sweep(scenario, VARY, workers=0, out=table)
     pd.testing.assert_frame_equal(returned, pd.read_parquet(serial), check_dtype=False)
     with h5py.File(table) as file:
         rows = file["sweep"][()]
@@ -98,24 +83,24 @@ def test_values_are_read_back_exactly_from_either_kind_of_file(folder, serial):
             np.testing.assert_array_equal(rows[name], returned[name].to_numpy())
         elif rows.dtype[name].kind == "S":
             assert [one.decode() for one in rows[name]] == returned[name].tolist()
-    again = folder / "again.h5"
-    sweep(folder / "resting.toml", VARY, workers=0, out=again)
+    again = scenario.parent / "again.h5"
+    sweep(scenario, VARY, workers=0, out=again)
     assert again.read_bytes() == table.read_bytes()
 
 
-def test_a_failed_run_is_a_row_that_says_why(folder):
+def test_a_failed_run_is_a_row_that_says_why(scenario):
     vary = {"contact.sphere.radius": [0.012, 0.03, 0.0125]}
-    table = sweep(folder / "resting.toml", vary, workers=0)
+    table = sweep(scenario, vary, workers=0)
     assert table["status"].tolist() == ["done", "failed", "done"]
     assert "starts at depth" in table["error"][1]
-    assert str(folder) not in table["error"][1]
+    assert str(scenario.parent) not in table["error"][1]
     assert table["figures.depth"].isna().tolist() == [False, True, False]
 
 
-def test_units_stay_with_the_table(folder, tmp_path):
+def test_units_stay_with_the_table(scenario, tmp_path):
     stiffness, exponent = "contact.law.stiffness", "contact.law.exponent"
     changes = {"run.duration": "0.1"}
-    plan = plan_sweep(folder / "resting.toml", {stiffness: [1e4, 2e4]}, changes=changes)
+    plan = plan_sweep(scenario, {stiffness: [1e4, 2e4]}, changes=changes)
     report = run_plan(plan, workers=0, out=tmp_path / "units.parquet")
     units = report.table.attrs["units"]
     assert units[stiffness] == "N/m^1.5"
@@ -129,11 +114,11 @@ def test_units_stay_with_the_table(folder, tmp_path):
     assert "2 runs, 0 failed, varied 'contact.law.stiffness [N/m^1.5]'" in repr(report)
     assert "pairs.ball-plate.peak_force [N]" in report._repr_html_()
     start = "robot.start.root_joint.2"
-    moved = plan_sweep(folder / "resting.toml", {start: [0.012, 0.013]}, changes=changes)
+    moved = plan_sweep(scenario, {start: [0.012, 0.013]}, changes=changes)
     assert moved.units[start] == "m"
     # Where the exponent varies, too, the unit of the stiffness does.
     both = {stiffness: [1e4], exponent: [1.5, 2.0]}
-    varied = plan_sweep(folder / "resting.toml", both, changes=changes)
+    varied = plan_sweep(scenario, both, changes=changes)
     assert stiffness not in varied.units
 
 
@@ -163,15 +148,15 @@ def test_routines_forget_between_runs(tmp_path):
     assert sweep(path, SMALL, workers=0)["figures.count"].tolist() == [1.0] * 4
 
 
-def test_expectations_become_columns(folder):
-    table = sweep(folder / "resting.toml", {STIFFNESS: [1e4, 1e6]}, workers=0, verdicts=True)
+def test_expectations_become_columns(scenario):
+    table = sweep(scenario, {STIFFNESS: [1e4, 1e6]}, workers=0, verdicts=True)
     assert table["met.figures.depth"].tolist() == [0.0, 1.0]
     assert (table["figures.depth"] <= 1e-4).tolist() == [False, True]
 
 
-def test_words_lists_and_values_in_step(folder):
+def test_words_lists_and_values_in_step(scenario):
     vary = {"contact.method": "smooth,facets", "gravity": "[0,0,-9.81],[0,0,-1.62]"}
-    table = sweep(folder / "resting.toml", vary, workers=0, together=True)
+    table = sweep(scenario, vary, workers=0, together=True)
     assert table["contact.method"].tolist() == ["smooth", "facets"]
     assert table["gravity"].tolist() == ["[0, 0, -9.81]", "[0, 0, -1.62]"]
     deep, shallow = table["figures.depth"]
@@ -179,9 +164,9 @@ def test_words_lists_and_values_in_step(folder):
 
 
 @pytest.fixture
-def finished(folder, tmp_path):
+def finished(scenario, tmp_path):
     """A finished sweep: its scenario, its table, its journal."""
-    path, out = folder / "resting.toml", tmp_path / "table.parquet"
+    path, out = scenario, tmp_path / "table.parquet"
     sweep(path, SMALL, workers=0, out=out)
     return path, out, out.with_name(out.name + ".journal")
 
@@ -270,8 +255,8 @@ def test_a_view_in_the_place_of_a_table_is_refused(finished):
         Journal(journal, plan_sweep(path, SMALL).head, 4)
 
 
-def test_done_runs_are_not_done_again(folder):
-    path, out = folder / "resting.toml", folder / "done.parquet"
+def test_done_runs_are_not_done_again(scenario):
+    path, out = scenario, scenario.parent / "done.parquet"
     sweep(path, SMALL, workers=0, out=out)
     before = entries(out)
     calls = []
@@ -280,8 +265,8 @@ def test_done_runs_are_not_done_again(folder):
     assert entries(out) == before
 
 
-def test_failed_runs_are_done_again_on_demand(folder):
-    path, out = folder / "resting.toml", folder / "retry.parquet"
+def test_failed_runs_are_done_again_on_demand(scenario):
+    path, out = scenario, scenario.parent / "retry.parquet"
     vary = {"contact.sphere.radius": [0.012, 0.03]}
     first = sweep(path, vary, workers=0, out=out)
     second = sweep(path, vary, workers=0, out=out, retry_failed=True)
@@ -310,20 +295,20 @@ def test_the_journal_of_another_sweep_is_refused(tmp_path):
     assert out.read_bytes() == kept
 
 
-def test_only_one_sweep_writes_a_journal(folder):
-    out = folder / "locked.parquet"
+def test_only_one_sweep_writes_a_journal(scenario):
+    out = scenario.parent / "locked.parquet"
 
     def progress(done, failed, total):
         if done == 1:
             with pytest.raises(SweepError, match="another sweep is writing it"):
-                sweep(folder / "resting.toml", SMALL, workers=0, out=out)
+                sweep(scenario, SMALL, workers=0, out=out)
 
-    sweep(folder / "resting.toml", SMALL, workers=0, out=out, progress=progress)
+    sweep(scenario, SMALL, workers=0, out=out, progress=progress)
     check_once(out, 4)
 
 
-def test_a_worker_with_other_files_or_versions_is_told(folder, tmp_path):
-    job = plan_sweep(folder / "resting.toml", SMALL).job
+def test_a_worker_with_other_files_or_versions_is_told(scenario, tmp_path):
+    job = plan_sweep(scenario, SMALL).job
     with pytest.raises(SweepError, match=r"has numpy .*; the sweep was started with .*numpy 1\.0"):
         prepare(replace(job, versions={**job.versions, "numpy": "1.0"}))
     with pytest.raises(SweepError, match=r"has another file .*figures\.py"):
@@ -339,20 +324,20 @@ def test_a_shipped_scenario_is_found_by_its_name_on_any_machine():
     prepare(job)
 
 
-def test_a_missing_extra_is_told_before_anything_runs(folder, monkeypatch):
-    path, out = folder / "resting.toml", folder / "extra.parquet"
+def test_a_missing_extra_is_told_before_anything_runs(scenario, monkeypatch):
+    path, out = scenario, scenario.parent / "extra.parquet"
     for package in ("pandas", "pyarrow"):
         with monkeypatch.context() as patch:
             patch.setitem(sys.modules, package, None)
             with pytest.raises(MissingExtra, match=rf"{package}.*sphshell-pin\[sweep\]"):
                 sweep(path, SMALL, workers=0, out=out)
-    assert not list(folder.glob("extra*"))
+    assert not list(scenario.parent.glob("extra*"))
 
 
-def test_wrong_arguments_are_told_and_leave_nothing(folder):
-    path = folder / "resting.toml"
+def test_wrong_arguments_are_told_and_leave_nothing(scenario):
+    path = scenario
     with pytest.raises(InvalidParameter, match=r"\.parquet or \.h5"):
-        sweep(path, SMALL, out=folder / "table.csv")
+        sweep(path, SMALL, out=scenario.parent / "table.csv")
     with pytest.raises(InvalidParameter, match="0 or more"):
         sweep(path, SMALL, workers=-1)
     for wrong in (1.5, "2", True):
@@ -361,15 +346,15 @@ def test_wrong_arguments_are_told_and_leave_nothing(folder):
     with pytest.raises(InvalidParameter, match="scheduler"):
         sweep(path, SMALL, workers=2, scheduler="tcp://127.0.0.1:8786")
     with pytest.raises(InvalidParameter, match="tcp://host:8786"):
-        sweep(path, SMALL, scheduler="nowhere", out=folder / "nothing.parquet")
+        sweep(path, SMALL, scheduler="nowhere", out=scenario.parent / "nothing.parquet")
     with pytest.raises(ResultError, match="cannot be written"):
         sweep(path, SMALL, out=path / "below_a_file" / "table.parquet")
-    assert not list(folder.glob("nothing*"))
+    assert not list(scenario.parent.glob("nothing*"))
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".h5"])
-def test_only_a_table_of_a_sweep_is_replaced(folder, suffix):
-    path, out = folder / "resting.toml", folder / f"place{suffix}"
+def test_only_a_table_of_a_sweep_is_replaced(scenario, suffix):
+    path, out = scenario, scenario.parent / f"place{suffix}"
     journal = out.with_name(f"{out.name}.journal")
     if suffix == ".h5":
         with pytest.importorskip("h5py").File(out, "w") as file:

@@ -19,9 +19,13 @@ pytest.importorskip("pyarrow")
 VARY = {"contact.law.stiffness": "1e4:1e6:log:30", "contact.law.exponent": [1.5, 2.0]}
 
 
-def test_a_killed_worker_of_a_cluster_costs_nothing(tmp_path, request):
-    cluster = Cluster(tmp_path)
-    request.addfinalizer(cluster.close)
+@pytest.fixture
+def cluster(tmp_path):
+    with contextlib.closing(Cluster(tmp_path)) as one:
+        yield one
+
+
+def test_a_killed_worker_of_a_cluster_costs_nothing(tmp_path, cluster):
     path = write(tmp_path / "scenario")
     for _ in range(2):
         cluster.start_worker("--no-nanny")
@@ -43,9 +47,7 @@ def test_a_killed_worker_of_a_cluster_costs_nothing(tmp_path, request):
 
 
 @pytest.mark.study
-def test_a_sample_is_the_same_on_a_cluster(tmp_path, request):
-    cluster = Cluster(tmp_path)
-    request.addfinalizer(cluster.close)
+def test_a_sample_is_the_same_on_a_cluster(tmp_path, cluster):
     path = write(tmp_path / "scenario")
     cluster.start_worker("--no-nanny")
     sample = {
@@ -78,12 +80,10 @@ def test_a_run_that_kills_the_workers_of_a_cluster_is_given_up(tmp_path, request
 
 
 def test_a_scheduler_without_workers_is_waited_for_and_one_that_dies_is_told(
-    tmp_path, request, monkeypatch
+    tmp_path, cluster, monkeypatch
 ):
     monkeypatch.setattr("sphshell_pin.study.sweep.cluster._PATIENCE", 0.2)
     path = write(tmp_path / "scenario")
-    cluster = Cluster(tmp_path)
-    request.addfinalizer(cluster.close)
     table = tmp_path / "table.parquet"
     notes = []
 

@@ -183,6 +183,14 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
     return Found(value, ".".join([*trail, last]), [*trail, last])
 
 
+def full_name(scenario: Scenario, key: str, path: str | PathLike[str]) -> str:
+    """Return the key with all names spelled out; one that is not in the scenario as it is."""
+    try:
+        return look_up(scenario, key, path).key
+    except ScenarioError:
+        return key
+
+
 def owner_of(scenario: Scenario, parts: Iterable[str]) -> object:
     """Return the table or object of `scenario` at the names `parts`; None if there is none."""
     whole: object = scenario

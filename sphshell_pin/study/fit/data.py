@@ -5,17 +5,18 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound
-from sphshell_pin.study.fit.quantities import Quantity
 from sphshell_pin.study.fit.units import factor_to_si
+from sphshell_pin.study.quantities import Quantity
 
 Array = NDArray[np.float64]
 Source = str | PathLike[str] | Mapping[str, ArrayLike]
@@ -74,24 +75,45 @@ class Measured:
 
 @dataclass(frozen=True)
 class _Table:
-    """Columns by header; `lines` (n,) of the file, None where there is none."""
+    """Header, unit and values (n,) of columns by name; `lines` (n,) of the file, if it is one."""
 
     source: str
-    columns: dict[str, Array]
+    columns: dict[str, tuple[str, str | None, Array]]
     lines: Sequence[int] | None
 
-    def values(self, header: str) -> Array:
-        """Return the values (n,) of a column; DataError for one that is infinite."""
-        values = self.columns[header]
+    @classmethod
+    def of(
+        cls, source: str, columns: Iterable[tuple[str, Array]], lines: list[int] | None = None
+    ) -> Self:
+        """Return the table of headers and columns; DataError where two have one name."""
+        table = cls(source, {}, lines)
+        for header, values in columns:
+            found = _HEADER.fullmatch(header)
+            assert found is not None
+            name = found[1].strip()
+            if name in table.columns:
+                raise table.fault(f"two columns are called '{name}'")
+            table.columns[name] = header, found[2], values
+        return table
+
+    def values(self, name: str, unit: str) -> Array:
+        """Return the values (n,) of a column in the SI `unit`.
+
+        DataError for one that is infinite or too large, and for a unit of another kind.
+        """
+        header, given, values = self.columns[name]
         for row in np.flatnonzero(np.isinf(values)):
             reason = f"'{values[row]}' in column '{header}' is not a finite number"
-            if header.partition(" ")[0] != TIME:
+            if name != TIME:
                 reason += "; put nan where nothing was measured"
             raise self.fault(reason, int(row))
         for row in np.flatnonzero(np.abs(values) > _LARGEST):
             reason = f"{values[row]:g} in column '{header}' is too large to compute with"
             raise self.fault(reason, int(row))
-        return values
+        try:
+            return values * factor_to_si(name, given, unit)
+        except InvalidParameter as fault:
+            raise self.fault(str(fault)) from None
 
     def fault(self, reason: str, row: int | None = None) -> DataError:
         if row is None:
@@ -127,89 +149,64 @@ def read_experiment(
     else:
         name = experiment.name or f"experiment {number}"
         table = _take_columns(given, name)
-    units: dict[str, tuple[str, str | None]] = {}
-    for header in table.columns:
-        found = _HEADER.fullmatch(header)
-        assert found is not None
-        label = found[1].strip()
-        if label in units:
-            raise table.fault(f"two columns are called '{label}'")
-        units[label] = header, found[2]
-    t = _times(table, units, duration)
+    t = _times(table, duration)
+    measured = [label for label in table.columns if label != TIME]
     for label in only or ():
-        if label not in units:
-            has = [one for one in units if one != TIME]
-            raise NameNotFound("column", label, table.source, has)
+        if label not in table.columns:
+            raise NameNotFound("column", label, table.source, measured)
     columns = []
-    for label in units:
-        if label == TIME or (label.endswith(SIGMA) and label not in known):
-            base = label.removesuffix(SIGMA)
-            if label != TIME and base not in units:
+    for label in measured:
+        base = label.removesuffix(SIGMA)
+        if base != label and label not in known:
+            if base not in table.columns:
                 raise table.fault(f"column '{label}' has no column '{base}' to belong to")
-            continue
-        if only is not None and label not in only:
-            continue
-        if label not in known:
-            unknown = NameNotFound("quantity", label, "a run of this scenario", known)
-            raise table.fault(str(unknown))
-        columns.append(_column(table, units, known[label], (sigma or {}).get(label)))
+        elif only is None or label in only:
+            if label not in known:
+                unknown = NameNotFound("quantity", label, "a run of this scenario", known)
+                raise table.fault(str(unknown))
+            columns.append(_column(table, known[label], (sigma or {}).get(label)))
     if not columns:
         raise table.fault(f"has no column of data beside the time, as in '{_EXAMPLE}'")
     return Measured(name, t, tuple(columns), _gaps(name, t))
 
 
-def _times(table: _Table, units: Mapping[str, tuple[str, str | None]], duration: float) -> Array:
+def _times(table: _Table, duration: float) -> Array:
     """Return the times [s], checked."""
-    if TIME not in units:
-        raise table.fault(
-            f"has no column '{TIME} [s]'; its columns are: {', '.join(units) or 'none'}"
-        )
-    header, unit = units[TIME]
-    t = table.values(header) * _factor(table, TIME, unit, "s")
+    if TIME not in table.columns:
+        named = ", ".join(table.columns) or "none"
+        raise table.fault(f"has no column '{TIME} [s]'; its columns are: {named}")
+    t = table.values(TIME, "s")
     if not len(t):
         raise table.fault("has no rows of data")
-    for row in np.flatnonzero(np.isnan(t)):
-        raise table.fault("the time is missing", int(row))
-    for row in np.flatnonzero(np.diff(t) <= 0.0) + 1:
-        how = "is the same as" if t[row] == t[row - 1] else "is before"
-        raise table.fault(
-            f"time {t[row]:.9g} s {how} that of the row above, {t[row - 1]:.9g} s: times must "
-            "increase",
-            int(row),
-        )
-    for row in np.flatnonzero(t < 0.0):
-        raise table.fault(
-            f"time {t[row]:.9g} s is before the start of the run, which is at 0", int(row)
-        )
-    for row in np.flatnonzero(t > duration * (1 + _ROUNDED)):
-        raise table.fault(
-            f"time {t[row]:.9g} s is after the end of the run, {duration:.9g} s: cut the data, or "
-            "set run.duration",
-            int(row),
-        )
+    steps, must = np.diff(t, prepend=-np.inf), "times must increase"
+    for wrong, reason in (
+        (np.isnan(t), "the time is missing"),
+        (steps == 0.0, "time {:.9g} s is the same as that of the row above, {:.9g} s: " + must),
+        (steps < 0.0, "time {:.9g} s is before that of the row above, {:.9g} s: " + must),
+        (t < 0.0, "time {:.9g} s is before the start of the run, which is at 0"),
+        (
+            t > duration * (1 + _ROUNDED),
+            f"time {{:.9g}} s is after the end of the run, {duration:.9g} s: cut the data, or set "
+            "run.duration",
+        ),
+    ):
+        for row in np.flatnonzero(wrong):
+            raise table.fault(reason.format(t[row], t[row - 1]), int(row))
     return np.minimum(t, duration)
 
 
-def _column(
-    table: _Table,
-    units: Mapping[str, tuple[str, str | None]],
-    quantity: Quantity,
-    sigma: float | None,
-) -> Column:
+def _column(table: _Table, quantity: Quantity, sigma: float | None) -> Column:
     name = quantity.name
-    header, unit = units[name]
-    values = table.values(header) * _factor(table, name, unit, quantity.unit)
+    values = table.values(name, quantity.unit)
     rows = np.flatnonzero(~np.isnan(values))
     if not len(rows):
         raise table.fault(f"column '{name}' has no value")
     given = None if sigma is None else np.full(len(rows), sigma)
-    if name + SIGMA in units:
-        header, unit = units[name + SIGMA]
-        deviations = table.values(header) * _factor(table, name + SIGMA, unit, quantity.unit)
+    if name + SIGMA in table.columns:
+        deviations = table.values(name + SIGMA, quantity.unit)
         for row in rows[~(deviations[rows] > 0.0)]:
-            raise table.fault(
-                f"'{name}{SIGMA}' must be positive wherever '{name}' has a value", int(row)
-            )
+            reason = f"'{name}{SIGMA}' must be positive wherever '{name}' has a value"
+            raise table.fault(reason, int(row))
         given = deviations[rows]
     if given is not None and not (given.min() >= 1 / _LARGEST and given.max() <= _LARGEST):
         raise table.fault(
@@ -217,13 +214,6 @@ def _column(
             f"{quantity.unit}, to compute with them".rstrip()
         )
     return Column(quantity, rows, values[rows], given)
-
-
-def _factor(table: _Table, name: str, given: str | None, unit: str) -> float:
-    try:
-        return factor_to_si(name, given, unit)
-    except InvalidParameter as fault:
-        raise table.fault(str(fault)) from None
 
 
 def _gaps(name: str, t: Array) -> tuple[str, ...]:
@@ -261,7 +251,7 @@ def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
     if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
         shown = ", ".join(f"'{key}' {shape}" for key, shape in lengths.items())
         raise DataError(name, f"columns must be of one length, of shape (n,): {shown}")
-    return _Table(name, columns, None)
+    return _Table.of(name, columns.items())
 
 
 def _read_csv(path: Path) -> _Table:
@@ -291,9 +281,6 @@ def _read_csv(path: Path) -> _Table:
     if all(_number(one) is not None for one in head):
         reason = f"the first line must be a header, as '{_EXAMPLE}'"
         raise DataError(source, reason, numbers[0])
-    for name in head:
-        if head.count(name) > 1:
-            raise DataError(source, f"two columns are called '{name}'", numbers[0])
     values = np.full((len(rows) - 1, len(head)), math.nan)
     for k, (number, row) in enumerate(zip(numbers[1:], rows[1:], strict=True)):
         if len(row) != len(head):
@@ -309,7 +296,7 @@ def _read_csv(path: Path) -> _Table:
                     reason += "; leave the cell empty where nothing was measured"
                 raise DataError(source, reason, number)
             values[k, i] = value
-    return _Table(source, dict(zip(head, values.T, strict=True)), numbers[1:])
+    return _Table.of(source, zip(head, values.T, strict=True), numbers[1:])
 
 
 def _number(text: str) -> float | None:

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
-from sphshell_pin.errors import InvalidParameter, ScenarioError
+from sphshell_pin.checks import check_positive
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.reading import (
     change_scenario,
     find_scenario,
-    look_up,
+    full_name,
     read_scenario,
 )
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import check_knobs
 from sphshell_pin.study.fit.data import Experiment, Source, read_experiment
 from sphshell_pin.study.fit.parameters import Free, Wanted, free_parameters
-from sphshell_pin.study.fit.quantities import quantities_of
 from sphshell_pin.study.fit.report import Fit
 from sphshell_pin.study.fit.runs import Trial
 from sphshell_pin.study.fit.search import Progress, Search
+from sphshell_pin.study.quantities import quantities_of
 
 Data = Source | Experiment | Sequence[Source | Experiment]
 
@@ -74,8 +74,7 @@ def fit(
     if not 0.0 < level < 1.0:
         raise InvalidParameter("level", level, "must lie between 0 and 1")
     for name, value in (sigma or {}).items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InvalidParameter(f"sigma of '{name}'", value, "must be positive")
+        check_positive(f"sigma of '{name}'", value)
     path = find_scenario(scenario)
     texts = {key: str(value) for key, value in (changes or {}).items()}
     base = read_scenario(path, texts)
@@ -84,14 +83,6 @@ def fit(
     search = Search(trials, free, progress)
     search.run()
     return search.report(str(scenario), level)
-
-
-def _full_name(key: str, scenario: Scenario, path: Path) -> str:
-    """Return the key with all names spelled out; one that is not in the scenario as it is."""
-    try:
-        return look_up(scenario, key, path).key
-    except ScenarioError:
-        return key
 
 
 def _trials(
@@ -113,7 +104,7 @@ def _trials(
         experiment = one if isinstance(one, Experiment) else Experiment(one)
         texts = {key: str(value) for key, value in experiment.changes.items()}
         for key, text in texts.items():
-            if any(_full_name(key, base, path) in one.keys for one in free):
+            if any(full_name(base, key, path) in one.keys for one in free):
                 raise InvalidParameter(key, text, "is fitted, so no experiment can set it")
         scenario = change_scenario(base, texts, path) if texts else base
         check_knobs(scenario, path, ranges=False)

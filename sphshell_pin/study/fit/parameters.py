@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -103,16 +102,14 @@ def parse_wanted(texts: Iterable[str]) -> dict[str, Range | None]:
         key = key.strip()
         if key in out:
             raise InvalidParameter("--param", text, "is given twice")
-        out[key] = _parse_range(text, span) if equals else None
+        out[key] = None
+        if equals:
+            try:
+                low, high = map(float, span.split(":"))
+            except ValueError:
+                raise InvalidParameter("--param", text, "must be KEY or KEY=LO:HI") from None
+            out[key] = low, high
     return out
-
-
-def _parse_range(text: str, span: str) -> Range:
-    try:
-        low, high = (float(one) for one in re.split(":", span))
-    except ValueError:
-        raise InvalidParameter("--param", text, "must be KEY or KEY=LO:HI") from None
-    return low, high
 
 
 def _tied(key: str, span: Range | None, scenario: Scenario, path: Path) -> Free:

@@ -174,16 +174,7 @@ class Fit(Summarized):
             "runs": self.runs,
             "converged": self.converged,
             "parameters": [
-                {
-                    "key": one.key,
-                    "unit": one.unit,
-                    "start": one.start,
-                    "value": one.value,
-                    "low": _finite(one.low),
-                    "high": _finite(one.high),
-                    "determined": one.determined,
-                    "at_bound": one.at_bound,
-                }
+                vars(one) | {"low": _finite(one.low), "high": _finite(one.high)}
                 for one in self.parameters
             ],
             "correlation": [[_finite(value) for value in row] for row in self.correlation.tolist()],

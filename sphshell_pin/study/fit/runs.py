@@ -25,7 +25,7 @@ from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.reading import change_scenario
 from sphshell_pin.study.fit.data import Measured
 from sphshell_pin.study.fit.parameters import Free
-from sphshell_pin.study.fit.quantities import row_step
+from sphshell_pin.study.quantities import row_step
 
 Array = NDArray[np.float64]
 

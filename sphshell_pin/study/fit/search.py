@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.errors import import_extra
-from sphshell_pin.study.fit.data import Column
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.remarks import remarks_on
 from sphshell_pin.study.fit.report import Fit, Fitted, Series
@@ -36,25 +36,12 @@ _FEW = 10
 _FIRST_STEP = 0.5
 
 
-@dataclass(frozen=True)
-class _Part:
-    """Where the values of one column of one experiment stand among all."""
+class _Part(NamedTuple):
+    """One column of one experiment, of which nothing is fitted yet, and where it is among all."""
 
     trial: Trial
-    column: Column
     at: slice
-
-    @property
-    def name(self) -> str:
-        return self.column.name
-
-    @property
-    def t(self) -> Array:
-        return self.trial.data.t[self.column.rows]
-
-    @property
-    def has_sigma(self) -> bool:
-        return self.column.sigma is not None
+    data: Series
 
 
 class Search:
@@ -76,13 +63,21 @@ class Search:
         for trial in trials:
             for column in trial.data.columns:
                 end = begin + len(column.values)
-                self.parts.append(_Part(trial, column, slice(begin, end)))
+                unknown, given = np.full(len(column.values), np.nan), column.sigma is not None
+                data = Series(
+                    trial.data.name,
+                    column.name,
+                    column.quantity.unit,
+                    trial.data.t[column.rows],
+                    column.values,
+                    fitted=unknown,
+                    sigma=unknown if column.sigma is None else column.sigma,
+                    given=given,
+                )
+                self.parts.append(_Part(trial, slice(begin, end), data))
                 begin = end
-        self.measured = np.concatenate([part.column.values for part in self.parts])
-        self.given = np.concatenate(
-            [np.full(len(part.column.values), part.has_sigma) for part in self.parts]
-        )
-        means = [np.full_like(one.column.values, one.column.values.mean()) for one in self.parts]
+        self.measured = np.concatenate([part.data.measured for part in self.parts])
+        means = [np.full_like(part.data.measured, part.data.measured.mean()) for part in self.parts]
         self.sigma = self._pooled(self.measured - np.concatenate(means), 1.0)
 
     def run(self) -> None:
@@ -105,9 +100,10 @@ class Search:
 
     def _settle(self) -> None:
         """Go to the least residuals from where the search is, with weights that fit them."""
-        names = {part.name for part in self.parts if not part.has_sigma}
+        names = {part.data.name for part in self.parts if not part.data.given}
+        some = any(part.data.given for part in self.parts)
         # The weight of all data together changes nothing.
-        rounds = _MOST_ROUNDS if len(names) > 1 or (names and self.given.any()) else 1
+        rounds = _MOST_ROUNDS if len(names) > 1 or (names and some) else 1
         for _ in range(rounds):
             self._minimize()
             before, self.sigma = self.sigma, self._estimated_sigma()
@@ -180,9 +176,9 @@ class Search:
         called: list[str] = []
         groups = np.zeros(len(self.measured), dtype=np.intp)
         for part in self.parts:
-            name = part.name
-            if part.at.stop - part.at.start >= _FEW:
-                name = f"{part.name} of {part.trial.data.name}"
+            name = part.data.name
+            if len(part.data.t) >= _FEW:
+                name = f"{name} of {part.data.experiment}"
             if name not in called:
                 called.append(name)
             groups[part.at] = called.index(name)
@@ -221,11 +217,12 @@ class Search:
         use = np.zeros(len(felt))
         for trial in self.runs.trials:
             parts = [part for part in self.parts if part.trial is trial]
-            times = np.concatenate([part.t[felt[part.at] > _FELT * felt.max()] for part in parts])
+            feels = [felt[part.at] > _FELT * felt.max() for part in parts]
+            times = np.concatenate([one.data.t[f] for one, f in zip(parts, feels, strict=True)])
             if len(times):
                 last = np.quantile(times, share)
                 for part in parts:
-                    use[part.at] = part.t <= last
+                    use[part.at] = part.data.t <= last
         return use
 
     def _minimize(self, use: Array | float = 1.0) -> None:
@@ -324,32 +321,22 @@ class Search:
     def _pooled(self, deviations: Array, factor: float) -> Array:
         """Return the given sigma, else the rms of `deviations` of all columns of one name."""
         out = np.zeros(len(self.measured))
-        for name in {part.name for part in self.parts}:
-            parts = [part for part in self.parts if part.name == name]
+        for name in {part.data.name for part in self.parts}:
+            parts = [part for part in self.parts if part.data.name == name]
             whole = np.concatenate([deviations[part.at] for part in parts])
             largest = max(float(np.abs(self.measured[part.at]).max()) for part in parts)
             # Data without noise are as exact as a run.
             least = self.runs.tolerance * largest
             pooled = max(math.sqrt(factor * float(np.mean(whole**2))), least) or 1.0
             for part in parts:
-                given = part.column.sigma
-                out[part.at] = pooled if given is None else given
+                out[part.at] = part.data.sigma if part.data.given else pooled
         return out
 
     def _series(self) -> tuple[Series, ...]:
         values = self.runs.predict(self.x)
         assert values is not None
         return tuple(
-            Series(
-                part.trial.data.name,
-                part.name,
-                part.column.quantity.unit,
-                part.t,
-                part.column.values,
-                values[part.at],
-                self.sigma[part.at],
-                part.has_sigma,
-            )
+            replace(part.data, fitted=values[part.at], sigma=self.sigma[part.at])
             for part in self.parts
         )
 

@@ -14,39 +14,13 @@ import pinocchio as pin
 
 from sphshell_pin.checks import check_finite, check_positive
 from sphshell_pin.errors import FrameNotFound, MissingExtra, NameNotFound, SphshellError
-from sphshell_pin.study.robot_check.checks import CHECKS, QUICK, SPEED, Check, Sizes, run_checks
-from sphshell_pin.study.robot_check.models import all_names, check_known, load_subject
-from sphshell_pin.study.robot_check.report import (
-    FAILED,
-    NOT_CHECKED,
-    PASS,
-    RobotReport,
-    as_json,
-    as_markdown,
-    as_table,
-    remarks,
-)
+from sphshell_pin.robots import RobotError
+from sphshell_pin.study.robot_check.checks import QUICK, SPEED, Sizes, run_checks
+from sphshell_pin.study.robot_check.models import load_subject
+from sphshell_pin.study.robot_check.report import RobotReport
 from sphshell_pin.study.robot_check.setting import Touch, fixed_touch, free_touch, setting_of
 
-__all__ = [
-    "CHECKS",
-    "FAILED",
-    "NOT_CHECKED",
-    "PASS",
-    "QUICK",
-    "Check",
-    "RobotReport",
-    "Sizes",
-    "Touch",
-    "all_names",
-    "as_json",
-    "as_markdown",
-    "as_table",
-    "check_known",
-    "check_robot",
-    "contact_scene",
-    "remarks",
-]
+__all__ = ["QUICK", "RobotReport", "Sizes", "Touch", "check_robot", "contact_scene"]
 
 
 def check_robot(
@@ -68,7 +42,7 @@ def check_robot(
     that end. A file is a URDF, xacro (`xacro_args` are its arguments) or MJCF; `free_flyer` frees
     the root link of a URDF, `package_dirs` are the folders that hold packages that it includes.
     Mimic joints are exact. Other meshes are not loaded. The same `seed` gives the same postures;
-    `sizes` says how many; `progress` is called with the title of each check before it starts. A
+    `sizes` says how many; `progress` is called with the key of each check before it starts. A
     model is a pinocchio.Model.
 
     A robot that cannot be loaded on this machine, or whose sphere nothing can move, is reported as
@@ -93,17 +67,15 @@ def check_robot(
         )
     except (MissingExtra, NameNotFound):
         raise
-    except _load_fault() as error:
+    except RobotError as error:
         return RobotReport(str(robot), reason=str(error).removeprefix(f"{robot}: "))
     rng = _random(seed, subject.name)
     try:
         setting = setting_of(subject, rng, frame, radius)
         findings = run_checks(setting, rng, sizes or Sizes(), progress or (lambda _: None))
-    except FrameNotFound:
+    except (FrameNotFound, KeyboardInterrupt):
         raise
     except SphshellError as error:
-        if isinstance(error, KeyboardInterrupt):
-            raise
         model = subject.robot.model
         return RobotReport(
             subject.name, nq=model.nq, nv=model.nv, notes=subject.notes, reason=str(error)
@@ -150,10 +122,3 @@ def contact_scene(
 def _random(seed: int, name: str) -> np.random.Generator:
     """Return random numbers that do not depend on which other robots are checked."""
     return np.random.default_rng([seed, zlib.crc32(name.encode())])
-
-
-def _load_fault() -> type[SphshellError]:
-    from sphshell_pin import robots
-
-    fault: type[SphshellError] = robots.RobotError
-    return fault

@@ -24,12 +24,7 @@ from sphshell_pin.study.robot_check.setting import (
     random_torques,
     stopping_law,
 )
-from sphshell_pin.testing.conservation import (
-    elastic_energy,
-    energy,
-    kinetic_energy,
-    momentum,
-)
+from sphshell_pin.testing.conservation import elastic_energy, energy, kinetic_energy, momentum
 from sphshell_pin.testing.differences import derivatives
 from sphshell_pin.testing.finding import Finding, worst
 from sphshell_pin.testing.forces import balance, reaction
@@ -48,41 +43,35 @@ _IMPACTS = 8
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that is checked: `title` of its column, what it compares, and what is allowed."""
+    """One thing that is checked: what it compares, and what is allowed."""
 
-    title: str
     compares: str
     tolerance: float
 
 
 CHECKS: dict[str, Check] = {
     "forces": Check(
-        "forces",
         "accelerations of ABA with `Scene.external_forces` against M^-1 (tau - nle + J^T f), with "
         "the forces f of `Scene.contacts` and the Jacobians J of their points by Pinocchio; "
         "relative to what the contacts add",
         1e-8,
     ),
     "reaction": Check(
-        "reaction",
         "sum of the wrenches on all bodies, robot and shell free to move; relative to the largest",
         1e-12,
     ),
     "momentum": Check(
-        "momentum",
         f"change of linear and angular momentum in a run of the same closed system, "
         f"`Adaptive({_RTOL:g})`; relative to the contact's impulse",
         1e-8,
     ),
     "energy": Check(
-        "energy",
         f"energy that is not accounted for in two runs under gravity, `Adaptive({_RTOL:g})`: one "
         "with damping and friction, by the run's audit, one without, by closed forms; relative to "
         "what changes form",
         1e-6,
     ),
     "derivatives": Check(
-        "derivatives",
         "analytic derivatives of contact forces by q and v, and of accelerations by q, v, torques "
         "and every number of law, friction, sphere and placement, against central differences on "
         'the tangent space, methods "smooth" and "facets", touching and not; relative to the '
@@ -90,13 +79,11 @@ CHECKS: dict[str, Check] = {
         1e-6,
     ),
     "contacts": Check(
-        "contacts",
         'method "facets" against the distances of all triangles: contact or none, depth, place, '
         "deep, barely touching, near and far; in radii",
         1e-9,
     ),
     "fast": Check(
-        "fast",
         "a sphere that crosses the shell by two radii within one step, were it not stopped: "
         "how often its center passes through (`Adaptive`, and `SemiImplicitEuler` with that step)",
         0.0,
@@ -122,7 +109,7 @@ def run_checks(
     """Return the worst finding of each check by its key in CHECKS.
 
     A check that ends in a fault of this package counts as failed, with the fault's sentence;
-    `progress` is called with the title of each check before it starts.
+    `progress` is called with the key of each check before it starts.
     """
     speed = SPEED * setting.radius
     touches: list[tuple[Touch, Array]] = []
@@ -146,13 +133,13 @@ def run_checks(
         "fast": lambda: runs(_fast),
     }
     found = {}
-    for key, check in CHECKS.items():
-        progress(check.title)
+    for key in CHECKS:
+        progress(key)
         try:
             found[key] = worst(ways[key](), "nothing was tried")
+        except KeyboardInterrupt:
+            raise
         except SphshellError as error:
-            if isinstance(error, KeyboardInterrupt):
-                raise
             found[key] = Finding(math.inf, str(error))
     return found
 

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.dynamics.scene.joint_components import joint_slides
 from sphshell_pin.dynamics.scene.models import reduced_model
 from sphshell_pin.testing.forces import joint_names, mass_matrix
 
@@ -25,14 +26,13 @@ def random_posture(model: pin.Model, rng: np.random.Generator) -> Array:
     limited: list[tuple[int, float]] = []
     for joint in list(model.joints)[1:]:
         span = slice(joint.idx_v, joint.idx_v + joint.nv)
-        slides = "Prismatic" in joint.shortname() or joint.shortname()[10:] in ("PX", "PY", "PZ")
         if joint.nq == joint.nv:
             for k in range(joint.nq):
                 low, high = (
                     float(limit[joint.idx_q + k])
                     for limit in (model.lowerPositionLimit, model.upperPositionLimit)
                 )
-                widest = 0.5 if slides else np.pi
+                widest = 0.5 if joint_slides(joint) else np.pi
                 low, high = max(low, -widest), min(high, widest)
                 # Limits that leave nothing within the widest range, or none at all, are as given.
                 value = rng.uniform(low, high) if low < high else 0.5 * (low + high)

@@ -7,7 +7,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.contact import Sphere
-from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
 from sphshell_pin.study.robot_check.models import Subject
@@ -35,7 +35,7 @@ def find_sphere(
     `model` is the robot's without the joints that are held.
     """
     robot, why = subject.robot, "no fingertip is known"
-    size = float(np.clip(0.02 * _reach(robot.model), *_RADII))
+    size = float(np.clip(0.02 * model_reach(robot.model), *_RADII))
     for r in (radius, size):
         try:
             tip = find_tips(robot, shipped=subject.shipped, frame=frame, radius=r)[0]
@@ -103,9 +103,7 @@ def _lever(model: pin.Model, sphere: Sphere, rng: np.random.Generator) -> float:
     data, longest = model.createData(), 0.0
     for _ in range(5):
         q = random_posture(model, rng)
-        joint, center = center_of(model, placed_data(model, q, data), sphere)
-        pin.computeJointJacobians(model, data, q)
-        columns = np.linalg.norm(point_jacobian(model, data, joint, center), axis=0)
+        columns = np.linalg.norm(center_jacobian(model, data, q, sphere), axis=0)
         longest = max(longest, float(columns.max(initial=0.0)))
     return longest
 
@@ -124,15 +122,6 @@ def _longest_limb(model: pin.Model) -> str:
 
     best = max(range(model.nframes), key=rank)
     return str(model.frames[best].name)
-
-
-def _reach(model: pin.Model) -> float:
-    """Return the length of the longest chain of joint placements [m]."""
-    reach = np.zeros(model.njoints)
-    for j in range(1, model.njoints):
-        step = float(np.linalg.norm(model.jointPlacements[j].translation))
-        reach[j] = reach[model.parents[j]] + step
-    return float(reach.max())
 
 
 def moved_sphere(model: pin.Model, tip: Tip, rng: np.random.Generator) -> tuple[Sphere, list[str]]:
@@ -154,6 +143,13 @@ def center_of(model: pin.Model, data: pin.Data, sphere: Sphere) -> tuple[int, Ar
     return int(model.frames[frame].parentJoint), np.array(
         data.oMf[frame].act(np.array(sphere.offset))
     )
+
+
+def center_jacobian(model: pin.Model, data: pin.Data, q: Array, sphere: Sphere) -> Array:
+    """Return the Jacobian (3, nv) of the sphere's center at q (nq,); `data` is set."""
+    joint, center = center_of(model, placed_data(model, q, data), sphere)
+    pin.computeJointJacobians(model, data, q)
+    return point_jacobian(model, data, joint, center)
 
 
 def placed_data(model: pin.Model, q: Array, data: pin.Data | None = None) -> pin.Data:

@@ -46,7 +46,7 @@ class RobotReport:
     def remarks(self) -> list[str]:
         """Sentences on what failed, what was not checked, and what was done differently."""
         failed = [
-            f"{CHECKS[key].title} failed: {self.findings[key].where} "
+            f"{key} failed: {self.findings[key].where} "
             f"({error_text(self.findings[key].error)}, allowed {CHECKS[key].tolerance:g})"
             for key in self.findings
             if not self.met(key)
@@ -96,13 +96,10 @@ def as_markdown(reports: Sequence[RobotReport], command: str) -> str:
             "",
             *_lines(
                 ["check", "what is compared", "allowed"],
-                [[one.title, one.compares, f"{one.tolerance:g}"] for one in CHECKS.values()],
+                [[key, one.compares, f"{one.tolerance:g}"] for key, one in CHECKS.items()],
             ),
             "",
-            *_lines(
-                ["robot", "frame", "nq/nv", *(one.title for one in CHECKS.values()), "verdict"],
-                rows,
-            ),
+            *_lines(["robot", "frame", "nq/nv", *CHECKS, "verdict"], rows),
             "",
             "## Remarks",
             "",
@@ -141,7 +138,7 @@ def as_json(reports: Sequence[RobotReport], command: str, seed: int, sizes: Size
         "command": command,
         "seed": seed,
         "sizes": vars(sizes),
-        "checks": {key: vars(check) for key, check in CHECKS.items()},
+        "checks": {key: {"title": key} | vars(check) for key, check in CHECKS.items()},
         "robots": robots,
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"

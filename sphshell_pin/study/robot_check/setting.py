@@ -17,6 +17,7 @@ from sphshell_pin.shell import Shell
 from sphshell_pin.study.robot_check.models import Subject, listed
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
 from sphshell_pin.study.robot_check.probe_spheres import (
+    center_jacobian,
     center_of,
     find_sphere,
     moved_sphere,
@@ -112,10 +113,8 @@ def fixed_touch(
     model = setting.model
     q, v, way = _motion(model, setting.sphere, rng, speed)
     if least:
-        data = placed_data(model, q)
-        joint, center = center_of(model, data, setting.sphere)
-        pin.computeJointJacobians(model, data, q)
-        v = np.linalg.pinv(point_jacobian(model, data, joint, center)) @ (speed * way)
+        jacobian = center_jacobian(model, model.createData(), q, setting.sphere)
+        v = np.linalg.pinv(jacobian) @ (speed * way)
     contact = _Contact.facing(way, rng, gap, setting)
     scene = Scene(model)
     data = placed_data(model, q)
@@ -230,10 +229,7 @@ def _motion(
     for wanted in (1e-3, 1e-4, 1e-9):
         for _ in range(_TRIES):
             q = random_posture(model, rng)
-            pin.framesForwardKinematics(model, data, q)
-            joint, center = center_of(model, data, sphere)
-            pin.computeJointJacobians(model, data, q)
-            jacobian = point_jacobian(model, data, joint, center)
+            jacobian = center_jacobian(model, data, q, sphere)
             v = rng.normal(size=model.nv)
             way = jacobian @ v
             fast = float(np.linalg.norm(way))
@@ -308,14 +304,12 @@ def _kinds(model: pin.Model) -> list[pin.JointModel]:
         j = model.getJointId(name)
         axis = np.array(data.joints[j].S).ravel() / rule.ratio
         continuous = model.joints[model.getJointId(rule.of)].nq == 2
-        turning = (
-            pin.JointModelRevoluteUnboundedUnaligned
-            if continuous
-            else (pin.JointModelRevoluteUnaligned)
-        )
-        kinds[j] = (
-            turning(axis[3:]) if axis[3:].any() else pin.JointModelPrismaticUnaligned(axis[:3])
-        )
+        if not axis[3:].any():
+            kinds[j] = pin.JointModelPrismaticUnaligned(axis[:3])
+        elif continuous:
+            kinds[j] = pin.JointModelRevoluteUnboundedUnaligned(axis[3:])
+        else:
+            kinds[j] = pin.JointModelRevoluteUnaligned(axis[3:])
     return kinds
 
 

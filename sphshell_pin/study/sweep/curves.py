@@ -9,17 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario import Built
-from sphshell_pin.scenario.format.bodies import joint_spans
+from sphshell_pin.study.quantities import quantities_of
 from sphshell_pin.study.sweep.job import Outcome
 from sphshell_pin.study.sweep.table import Columns
 
 FloatArray = NDArray[np.float64]
 
-PAIR_CURVES = {"normal_force": "normal", "friction_force": "friction", "depth": "depth"}
 STEPS = 200
 MOST_STEPS = 100_000
 MOST_VALUES = 200_000_000
@@ -47,8 +45,11 @@ class Curves:
         a pair are sums over its contacts, the depth [m] is the largest. A sensor's value is that
         of its last reading, NaN before the first.
         """
-        values = [_measure(built, result, name, self.times) for name in self.names]
-        return np.array(values, dtype="<f8").tobytes()
+        known = quantities_of(built, "sensors.")
+        values = np.array([known[name].at(result, self.times) for name in self.names], "<f8")
+        # The last row may miss the end of the grid by the rounding of its steps.
+        values[:, self.times > float(result.t[-1]) * (1 + 1e-9)] = np.nan
+        return values.tobytes()
 
 
 def curves_of(built: Built, names: Sequence[str], steps: int | None, runs: int) -> Curves | None:
@@ -68,7 +69,7 @@ def curves_of(built: Built, names: Sequence[str], steps: int | None, runs: int) 
         names = [names]
     if not names:
         return None
-    known = curve_names(built)
+    known = quantities_of(built, "sensors.")
     for name in names:
         if name not in known:
             raise NameNotFound("curve", name, "a run of this scenario", known)
@@ -98,17 +99,6 @@ def curves_of(built: Built, names: Sequence[str], steps: int | None, runs: int) 
     return Curves(tuple(names), duration, steps)
 
 
-def curve_names(built: Built) -> list[str]:
-    """Return the curves that a run of this scenario can record."""
-    names = [f"pairs.{pair.name}.{one}" for pair in built.scene.pairs for one in PAIR_CURVES]
-    names += [
-        f"sensors.{sensor.name}.{_label(column)}"
-        for sensor in built.simulation.sensors
-        for column in sensor.columns(built.scene)
-    ]
-    return names + list(_coordinates(built))
-
-
 def columns_of_curves(curves: Curves, outcomes: Mapping[int, Outcome]) -> Columns:
     """Return the curves of all runs that have them: `run`, `t` [s], one column for each curve.
 
@@ -124,50 +114,3 @@ def columns_of_curves(curves: Curves, outcomes: Mapping[int, Outcome]) -> Column
     for k, name in enumerate(curves.names):
         columns[name] = np.array([one[k] for one in values], dtype=np.float64).ravel()
     return columns
-
-
-def _measure(built: Built, result: Result, name: str, times: FloatArray) -> FloatArray:
-    kind, _, rest = name.partition(".")
-    if kind == "sensors":
-        return _of_sensor(result, rest, times)
-    if kind == "pairs":
-        pair, _, one = rest.rpartition(".")
-        series = PairSeries.of(result, list(result.pairs).index(pair))
-        values = getattr(series, PAIR_CURVES[one])
-    else:
-        letter, index = _coordinates(built)[name]
-        values = (result.q if letter == "q" else result.v)[:, index]
-    t = np.asarray(result.t, dtype=float)
-    # The last row may miss the end of the grid by the rounding of its steps.
-    ends = np.isclose(times, t[-1], rtol=1e-9, atol=0.0)
-    at = np.where(ends, t[-1], times)
-    return np.asarray(np.interp(at, t, values, left=np.nan, right=np.nan))
-
-
-def _coordinates(built: Built) -> dict[str, tuple[str, int]]:
-    """Return the coordinates of all joints, by the names that their last values have as figures."""
-    model = built.scene.model
-    found = {}
-    for joint in list(model.names)[1:]:
-        for letter, span in zip("qv", joint_spans(model, joint), strict=True):
-            count = span.stop - span.start
-            for i in range(count):
-                name = f"{letter}.{joint}" + (f".{i}" if count > 1 else "")
-                found[name] = letter, span.start + i
-    return found
-
-
-def _of_sensor(result: Result, rest: str, times: FloatArray) -> FloatArray:
-    name, _, label = rest.rpartition(".")
-    log = result.sensors[name]
-    values = np.asarray(log.values[:, [_label(one) for one in log.columns].index(label)], float)
-    last = np.searchsorted(np.asarray(log.t), times, side="right") - 1
-    found = np.full(len(times), np.nan)
-    found[last >= 0] = values[last[last >= 0]]
-    found[times > float(result.t[-1]) * (1 + 1e-9)] = np.nan
-    return found
-
-
-def _label(column: str) -> str:
-    """Return the name of a sensor's column without its unit."""
-    return column.partition(" ")[0]

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.checks import stated_pairs
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.study.sweep.job import need
@@ -113,23 +114,15 @@ def distributions_of(dist: Dist | Iterable[str]) -> dict[str, Distribution]:
     InvalidParameter
         A text that is no distribution, values that it cannot have, or a key given twice.
     """
-    if isinstance(dist, str):
-        dist = [dist]
     if not isinstance(dist, Iterable):
         raise InvalidParameter("dist", dist, "must map keys to distributions")
     found: dict[str, Distribution] = {}
-    for key, given in dist.items() if isinstance(dist, Mapping) else map(_split, dist):
+    must = f"must be KEY=DISTRIBUTION, one of {forms()}"
+    for key, given in stated_pairs("dist", dist, must):
         if key in found:
             raise InvalidParameter("dist", key, "is given twice: leave one of the two out")
         found[key] = given if isinstance(given, Distribution) else _parse(key, given)
     return found
-
-
-def _split(text: str) -> tuple[str, str]:
-    key, equals, given = text.partition("=")
-    if not equals or not key.strip() or not given.strip():
-        raise InvalidParameter("dist", text, f"must be KEY=DISTRIBUTION, one of {forms()}")
-    return key.strip(), given.strip()
 
 
 def _parse(key: str, text: object) -> Distribution:

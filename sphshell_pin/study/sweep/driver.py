@@ -26,6 +26,7 @@ from sphshell_pin.study.sweep.table import (
     check_suffix,
     columns_of,
     frame_of,
+    main_figures,
     varied_keys,
     write_table,
 )
@@ -80,9 +81,8 @@ class SweepReport(Summarized):
 
     def _rows(self) -> Detail:
         units = self.table.attrs.get("units", {})
-        own = [name for name in self.table if name.startswith("figures.")]
-        own += [name for name in self.table if name.endswith(".peak_force")]
-        shown = ["run", *varied_keys(self.table), "status", *own[:MOST_FIGURES]]
+        own = main_figures(self.table)[:MOST_FIGURES]
+        shown = ["run", *varied_keys(self.table), "status", *own]
         rows = self.table[shown].head(MOST_ROWS).to_numpy(dtype=object).tolist()
         return Detail([column(name, units.get(name, "")) for name in shown], rows, len(self.table))
 
@@ -305,11 +305,8 @@ def _count_workers(workers: int | None, scheduler: str | None) -> int:
     if scheduler is not None and workers is not None:
         raise InvalidParameter("workers", workers, "is for this machine: a scheduler has its own")
     if workers is None:
-        return (
-            len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else os.cpu_count() or 1
-        )
+        allowed = getattr(os, "sched_getaffinity", None)
+        return len(allowed(0)) if allowed else os.cpu_count() or 1
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 0:
         raise InvalidParameter("workers", workers, "must be a whole number, 0 or more")
     return workers

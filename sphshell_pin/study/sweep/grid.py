@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sphshell_pin.checks import stated_pairs
 from sphshell_pin.errors import InvalidParameter
 
 Value = bool | int | float | str
@@ -47,10 +48,8 @@ def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:
     InvalidParameter
         A text that says no values, a key or a value given twice, or nothing to vary.
     """
-    if isinstance(vary, str):
-        vary = [vary]
     axes: list[Axis] = []
-    for key, given in vary.items() if isinstance(vary, Mapping) else map(_split, vary):
+    for key, given in stated_pairs("--vary", vary, f"must be {HOW}"):
         if not isinstance(given, Iterable):
             raise InvalidParameter(f"vary {key}", given, "must be a list of values, or a text")
         values = _parse(key, given) if isinstance(given, str) else tuple(map(_plain, given))
@@ -105,13 +104,6 @@ def _as_number(value: Value) -> Value:
     """Return an int as the float of the same value, where there is one."""
     whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**53
     return float(value) if whole else value
-
-
-def _split(text: str) -> tuple[str, str]:
-    key, equals, values = text.partition("=")
-    if not equals or not key.strip() or not values.strip():
-        raise InvalidParameter("--vary", text, f"must be {HOW}")
-    return key.strip(), values.strip()
 
 
 def _parse(key: str, text: str) -> tuple[Value, ...]:

@@ -9,17 +9,8 @@ from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.study.sweep.job import need
-from sphshell_pin.study.sweep.sampling import (
-    DRAWN,
-    HIGH,
-    LOW,
-    MEDIAN,
-    A,
-    B,
-    at_quantile,
-    swapped,
-)
-from sphshell_pin.study.sweep.table import DESIGN
+from sphshell_pin.study.sweep.sampling import DRAWN, HIGH, LOW, MEDIAN, A, B, at_quantile, swapped
+from sphshell_pin.study.sweep.table import DESIGN, varied_keys
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,12 +37,6 @@ def drawn(table: pd.DataFrame) -> pd.DataFrame:
             "table", None, "no sample, only a tornado: make the sweep with sample = sobol", "has"
         )
     return rows
-
-
-def keys_of(table: pd.DataFrame) -> list[str]:
-    """Return the uncertain inputs of a table."""
-    names = [str(name) for name in table.columns]
-    return names[1 : names.index("status")]
 
 
 def figures_of(table: pd.DataFrame) -> list[str]:
@@ -120,7 +105,7 @@ def sobol_indices(
     if not isinstance(confidence, float) or not 0.0 < confidence < 1.0:
         raise InvalidParameter("confidence", confidence, "must lie between 0 and 1")
     table = table.sort_values("run")
-    keys = keys_of(table)
+    keys = varied_keys(table)
     wanted = [A, B, *map(swapped, keys)]
     if A not in set(table[DESIGN]):
         raise InvalidParameter(
@@ -152,15 +137,9 @@ def sobol_indices(
         )
         .confidence_interval
     )
-    first, total = _estimate(values)
-    columns = {
-        "first": first,
-        "first_low": low[0],
-        "first_high": high[0],
-        "total": total,
-        "total_low": low[1],
-        "total_high": high[1],
-    }
+    columns: dict[str, FloatArray] = {}
+    for kind, *three in zip(("first", "total"), _estimate(values), low, high, strict=True):
+        columns |= dict(zip((kind, f"{kind}_low", f"{kind}_high"), three, strict=True))
     return need("pandas").DataFrame(columns, index=keys)
 
 
@@ -181,7 +160,7 @@ def tornado(table: pd.DataFrame, figure: str) -> pd.DataFrame:
         The table is not that of a sweep with `tornado`, or one of its runs has no such figure.
     """
     _check_design(table)
-    keys = keys_of(table)
+    keys = varied_keys(table)
     parts = [MEDIAN, *(at_quantile(key, one) for key in keys for one in (LOW, HIGH))]
     rows = table[table[DESIGN].isin(parts)]
     if len(rows) != len(parts):

@@ -163,17 +163,11 @@ def _outcome(row: list[object]) -> Outcome | None:
         found = json.loads(figures) if isinstance(figures, str) else None
     except (ValueError, RecursionError):
         return None
-    if (
-        isinstance(number, int)
-        and status in (DONE, FAILED)
-        and isinstance(error, str)
-        and isinstance(found, dict)
-        and all(isinstance(one, int | float) for one in found.values())
-        and isinstance(wall_time, float)
-        and isinstance(worker, str)
-        and isinstance(curves, bytes)
-    ):
-        return Outcome(number, status, error, found, wall_time, worker, curves)
+    match number, error, found, wall_time, worker, curves:
+        case int(), str(), dict(), float(), str(), bytes() if status in (DONE, FAILED) and all(
+            isinstance(x, int | float) for x in found.values()
+        ):
+            return Outcome(number, status, error, found, wall_time, worker, curves)
     return None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,15 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError
-from sphshell_pin.scenario import (
-    Built,
-    Scenario,
-    find_scenario,
-    read_scenario,
-    shipped_scenarios,
-)
+from sphshell_pin.scenario import Built, Scenario, find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.build import build_scenario
-from sphshell_pin.scenario.format.reading import look_up
+from sphshell_pin.scenario.format.reading import full_name, look_up
 from sphshell_pin.scenario.format.sliders import meaning
 from sphshell_pin.scenario.running.figures import check_expectations, figure_units
 from sphshell_pin.study.sweep.curves import curves_of
@@ -230,8 +225,9 @@ def _check_runs(
             "take a distribution that does not reach it: lognormal(median,factor) is positive, "
             "uniform(low,high) has two ends"
         )
-        if _is_whole(scenario, faults[0].key, path):
-            advice = "give whole numbers by vary, a distribution has others"
+        with contextlib.suppress(ScenarioError):
+            if type(look_up(scenario, faults[0].key, path).value) is int:
+                advice = "give whole numbers by vary, a distribution has others"
         raise InvalidParameter(
             "dist",
             len(faults),
@@ -245,29 +241,15 @@ def _check_runs(
 def _check_keys(axes: Iterable[Axis], changes: Mapping[str, str], path: Path, word: str) -> None:
     """Refuse two keys for one value: which of them holds would be a matter of order."""
     scenario = read_scenario(path)
-
-    def full_name(key: str) -> str:
-        try:
-            return look_up(scenario, key, path)[1]
-        except ScenarioError:
-            return key  # not in the file; read_scenario raises if no file may have it
-
     more = "put all its values together" if word == "vary" else "leave one of the two out"
     keys = [axis.key for axis in axes]
-    meant = [full_name(key) for key in keys]
+    # What is not in the file: read_scenario raises if no file may have it.
+    meant, fixed = ([full_name(scenario, key, path) for key in some] for some in (keys, changes))
     for key, whole in zip(keys, meant, strict=True):
         if meant.count(whole) > 1:
             raise InvalidParameter(word, key, f"is given twice: {more}")
-        if whole in map(full_name, changes):
+        if whole in fixed:
             raise InvalidParameter(word, key, "is set as well: leave one of the two out")
-
-
-def _is_whole(scenario: Scenario, key: str, path: Path) -> bool:
-    try:
-        value = look_up(scenario, key, path).value
-    except ScenarioError:
-        return False
-    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _unit(scenario: Scenario, key: str, path: Path) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.study.sweep.grid import Axis, Value
 from sphshell_pin.study.sweep.job import Outcome, need
+from sphshell_pin.tables import write_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,6 +99,13 @@ def varied_keys(table: pd.DataFrame) -> list[str]:
     return names[1 : names.index("status")]
 
 
+def main_figures(figures: Iterable[str]) -> list[str]:
+    """Return those of `figures` that are shown first: the scenario's own, then the peak forces."""
+    names = [str(name) for name in figures]
+    own = [name for name in names if name.startswith("figures.")]
+    return own + [name for name in names if name.endswith(".peak_force")]
+
+
 def frame_of(columns: Columns, units: Mapping[str, str] | None = None) -> pd.DataFrame:
     """Return the table as a pandas.DataFrame; the `units` of columns are its attrs["units"]."""
     frame: pd.DataFrame = need("pandas").DataFrame(columns)
@@ -147,14 +155,8 @@ def _is_table(path: Path) -> bool:
 def _write_parquet(
     file: IO[bytes], columns: Columns, description: str, units: Mapping[str, str]
 ) -> None:
-    arrow, parquet = need("pyarrow"), need("pyarrow.parquet")
-    arrays = {
-        name: arrow.array(values.tolist(), arrow.string()) if _is_text(values) else values
-        for name, values in columns.items()
-    }
     metadata = {DATASET: description} | ({_ATTRS: json.dumps({"units": units})} if units else {})
-    table = arrow.table(arrays).replace_schema_metadata(metadata)
-    parquet.write_table(table, file, compression="zstd")
+    write_parquet(file, columns, metadata)
 
 
 def _write_hdf5(
@@ -162,20 +164,17 @@ def _write_hdf5(
 ) -> None:
     h5py = need("h5py")
     # One array of records: a column's name may hold the slash that would make it a folder.
-    fields: list[tuple[str, np.dtype[np.generic]]] = []
-    encoded: Columns = {}
-    for name, values in columns.items():
+    encoded: list[NDArray[np.generic]] = []
+    kinds = []
+    for values in columns.values():
         if _is_text(values):
             # Of fixed length: texts elsewhere in the file would leave gaps of unknown bytes.
-            encoded[name] = np.array([one.encode() for one in values], dtype=np.bytes_)
-            length = max(encoded[name].dtype.itemsize, 1)
-            fields.append((name, h5py.string_dtype("utf-8", length)))
+            encoded.append(np.array([one.encode() for one in values], dtype=np.bytes_))
+            kinds.append(h5py.string_dtype("utf-8", max(encoded[-1].dtype.itemsize, 1)))
         else:
-            encoded[name] = values
-            fields.append((name, values.dtype))
-    records = np.zeros(len(next(iter(columns.values()))), dtype=fields)
-    for name, values in encoded.items():
-        records[name] = values
+            encoded.append(values)
+            kinds.append(values.dtype)
+    records = np.rec.fromarrays(encoded, dtype=list(zip(columns, kinds, strict=True)))
     with h5py.File(file, "w") as table:
         dataset = table.create_dataset(DATASET, data=records, track_times=False)
         dataset.attrs["description"] = description

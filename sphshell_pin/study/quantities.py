@@ -9,12 +9,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.tables import quantity_of
 
 Array = NDArray[np.float64]
 
+# What of a pair has a field of PairSeries.
+_SERIES = {"normal_force": "normal", "friction_force": "friction", "depth": "depth"}
 # Times that differ by less than this part of the step between them are one.
 _SAME = 1e-6
 # Rows for each of the data's steps, where these do not lie on one grid.
@@ -37,17 +42,17 @@ class Quantity:
     """Its derivatives (n, p) by what the result has sensitivities of; None: by differences only."""
 
 
-def quantities_of(built: Built) -> dict[str, Quantity]:
+def quantities_of(built: Built, sensors: str = "") -> dict[str, Quantity]:
     """Return what can be measured of the runs of a scenario, by name.
 
     `q.JOINT`, `v.JOINT` (`q.JOINT.0`, ... where a joint has several), `pairs.PAIR.normal_force`,
-    `.force_x` and on, `.friction_force_x` and on, `.depth`, `SENSOR.COLUMN`; of each frame, along
-    the axes of the world, `frames.FRAME.x` (position), `.vx` (velocity), `.wx` (angular velocity).
+    `.friction_force` (its size), `.force_x` and on, `.friction_force_x` and on, `.depth`,
+    `SENSOR.COLUMN`, with `sensors` before it; of each frame, along the axes of the world,
+    `frames.FRAME.x` (position), `.vx` (velocity), `.wx` (angular velocity).
     """
-    return {
-        one.name: one
-        for one in (*_of_joints(built), *_of_pairs(built), *_of_sensors(built), *_of_frames(built))
-    }
+    of_robot = *_of_joints(built), *_of_pairs(built)
+    every = *of_robot, *_of_sensors(built, sensors), *_of_frames(built)
+    return {one.name: one for one in every if one.name}
 
 
 def row_step(t: Array) -> float:
@@ -72,40 +77,31 @@ def row_step(t: Array) -> float:
 
 
 def _at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
-    """Interpolate between rows, linearly; at the time of a row it is that row's value."""
+    """Interpolate rows (n,) or (n, p), linearly; at the time of a row it is that row's value."""
 
     def at(result: Result, t: Array) -> Array:
-        return np.interp(t, result.t, of(result))
+        def column_at(column: Array) -> Array:
+            return np.interp(t, result.t, column)
 
-    return at
-
-
-def _derivatives_at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
-    """Interpolate rows (n, p) as `_at_rows` does."""
-
-    def at(result: Result, t: Array) -> Array:
-        rows = of(result)
-        return np.column_stack([np.interp(t, result.t, rows[:, k]) for k in range(rows.shape[1])])
+        return np.asarray(np.apply_along_axis(column_at, 0, of(result)))
 
     return at
 
 
 def _of_joints(built: Built) -> list[Quantity]:
     model, out = built.scene.model, []
-    for k in range(1, model.njoints):
-        joint, name = model.joints[k], model.names[k]
-        for kind, first, count in (("q", joint.idx_q, joint.nq), ("v", joint.idx_v, joint.nv)):
-            for i in range(count):
-                label = f"{kind}.{name}.{i}" if count > 1 else f"{kind}.{name}"
-                unit = unit_of(joint.shortname(), kind, i)
-                # A coordinate whose rate is its speed has the derivatives of the tangent space.
-                plain = kind == "v" or joint.nq == joint.nv
-                moved = (
-                    _derivatives_at_rows(_state_derivatives(kind, joint.idx_v + i))
-                    if plain
-                    else None
-                )
-                out.append(Quantity(label, unit, _at_rows(_state(kind, first + i)), moved))
+    # A coordinate whose rate is its speed has the derivatives of the tangent space.
+    tangent = {
+        joint.idx_q + i: joint.idx_v + i
+        for joint in model.joints
+        if joint.nq == joint.nv
+        for i in range(joint.nq)
+    }
+    for kind, titles in zip("qv", coordinates(model), strict=True):
+        for k, title in enumerate(titles):
+            in_v = k if kind == "v" else tangent.get(k)
+            moved = None if in_v is None else _at_rows(_state_derivatives(kind, in_v))
+            out.append(Quantity(*quantity_of(title), _at_rows(_state(kind, k)), moved))
     return out
 
 
@@ -117,50 +113,32 @@ def _state_derivatives(kind: str, column: int) -> Callable[[Result], Array]:
     return lambda result: np.asarray(getattr(result.sensitivities, kind)[:, column])
 
 
-def unit_of(joint: str, kind: str, index: int) -> str:
-    """Return the unit of one coordinate (or speed) of a joint; `joint` is Pinocchio's name."""
-    plain = joint.removeprefix("JointModel")
-    slides = plain.startswith("P") and not plain.startswith("Planar")  # PX, PrismaticUnaligned
-    slides = slides or plain == "Translation" or (plain == "FreeFlyer" and index < 3)
-    slides = slides or (plain == "Planar" and index < 2)
-    if slides:
-        return "m" if kind == "q" else "m/s"
-    if kind == "v":
-        return "rad/s"
-    # Quaternions, and cosine and sine of joints without ends.
-    pure = plain in ("FreeFlyer", "Spherical", "Planar")
-    pure = pure or plain.startswith(("RU", "RevoluteUnbounded"))
-    return "1" if pure else "rad"
-
-
 def _of_pairs(built: Built) -> list[Quantity]:
-    out = []
-    for k, pair in enumerate(built.scene.pairs):
-        names = {"normal_force": "N", "depth": "m"}
-        names |= {f"{part}_{a}": "N" for part in ("force", "friction_force") for a in "xyz"}
-        for name, unit in names.items():
-            moved = _derivatives_at_rows(_pair_derivatives(k, name))
-            label = f"pairs.{pair.name}.{name}"
-            out.append(Quantity(label, unit, _at_rows(_of_pair(k, name)), moved))
-    return out
+    units = dict.fromkeys(_SERIES, "N") | {"depth": "m"}
+    units |= {f"{part}_{a}": "N" for part in ("force", "friction_force") for a in "xyz"}
+    return [
+        Quantity(
+            f"pairs.{pair.name}.{name}",
+            unit,
+            _at_rows(_of_pair(k, name)),
+            None if name == "friction_force" else _at_rows(_pair_derivatives(k, name)),
+        )
+        for k, pair in enumerate(built.scene.pairs)
+        for name, unit in units.items()
+    ]
 
 
 def _of_pair(pair: int, name: str) -> Callable[[Result], Array]:
     """Return the sum over the contacts of a pair, or the largest depth; 0 without contact."""
 
     def of(result: Result) -> Array:
+        if name in _SERIES:
+            return np.asarray(getattr(PairSeries.of(result, pair), _SERIES[name]))
         contacts = result.contacts.of_pair(pair)
+        part, axis = name[:-2], "xyz".index(name[-1])
+        forces = contacts.force_world if part == "force" else contacts.friction_force_world
         whole = np.zeros(len(result.t))
-        if name == "depth":
-            np.maximum.at(whole, contacts.row, contacts.depth)
-            return whole
-        if name == "normal_force":
-            values = contacts.normal_force
-        else:
-            part, axis = name[:-2], "xyz".index(name[-1])
-            forces = contacts.force_world if part == "force" else contacts.friction_force_world
-            values = forces[:, axis]
-        np.add.at(whole, contacts.row, values)
+        np.add.at(whole, contacts.row, forces[:, axis])
         return whole
 
     return of
@@ -194,12 +172,11 @@ def _pair_derivatives(pair: int, name: str) -> Callable[[Result], Array]:
     return of
 
 
-def _of_sensors(built: Built) -> list[Quantity]:
+def _of_sensors(built: Built, above: str) -> list[Quantity]:
     return [
-        Quantity(f"{sensor.name}.{label}", unit.rstrip("]"), _reading(sensor.name, i))
+        Quantity(f"{above}{sensor.name}.{label}", unit, _reading(sensor.name, i))
         for sensor in built.simulation.sensors
-        for i, column in enumerate(sensor.columns(built.scene))
-        for label, _, unit in [column.partition(" [")]
+        for i, (label, unit) in enumerate(map(quantity_of, sensor.columns(built.scene)))
     ]
 
 
