@@ -34,7 +34,7 @@ def check_not_negative(name: str, value: object, unit: str = "") -> float:
 
 def check_finite(name: str, value: object) -> float:
     """Return `value` as a float; raise InvalidParameter unless it is one finite number."""
-    array = _floats(name, value, "must be a number")
+    array = check_floats(name, value, "must be a number")
     if array.ndim:
         raise InvalidParameter(name, value, "must be one number")
     number = float(array)
@@ -45,7 +45,7 @@ def check_finite(name: str, value: object) -> float:
 
 def check_vector(name: str, value: object, size: int, what: str = "") -> Array:
     """Return a copy of `value` as an array (size,); raise InvalidParameter otherwise."""
-    array = _floats(name, value, f"must hold {size} numbers{what}")
+    array = check_floats(name, value, f"must hold {size} numbers{what}")
     if array.shape != (size,):
         raise _wrong_shape(name, array.shape, f"({size},){what}")
     if not np.isfinite(array).all():
@@ -55,7 +55,7 @@ def check_vector(name: str, value: object, size: int, what: str = "") -> Array:
 
 def check_points(name: str, value: object) -> Array:
     """Return a copy of `value` as an array (n, 3); raise InvalidParameter otherwise."""
-    array = _floats(name, value, "must be an array of shape (n, 3)")
+    array = check_floats(name, value, "must be an array of shape (n, 3)")
     if array.ndim != 2 or array.shape[1] != 3:
         raise _wrong_shape(name, array.shape, "(n, 3)")
     if not np.isfinite(array).all():
@@ -79,7 +79,8 @@ def check_each_positive(name: str, value: ArrayLike, count: int, unit: str = "")
     return array
 
 
-def _floats(name: str, value: object, must: str) -> Array:
+def check_floats(name: str, value: object, must: str) -> Array:
+    """Return a copy of `value` as an array of float64; InvalidParameter says what it `must` be."""
     try:
         return as_floats(value)
     except (TypeError, ValueError, OverflowError):

@@ -249,37 +249,39 @@ class DataError(SphshellError, ValueError):
         self.line = line
 
 
-class SimulationDiverged(SphshellError, ArithmeticError):
-    """The state stopped being finite at time `t` [s]; `result` holds all until then."""
+class _Stopped(SphshellError):
+    """A run that stopped at time `t` [s]; `result` holds all until then."""
 
     def __init__(self, t: float, why: str, result: Result) -> None:
         """Say when and why the run had to stop."""
-        super().__init__(
-            f"the simulation diverged at t = {t:.6g} s: {why}; reduce dt, or the stiffness and "
-            "damping, or take the integrator Implicit"
-        )
+        super().__init__(self._text.format(t=t, why=why))
         self.t = t
         self.result = result
 
+    _text = "interrupted at t = {t:.6g} s"
 
-class Interrupted(SphshellError, KeyboardInterrupt):
+
+class SimulationDiverged(_Stopped, ArithmeticError):
+    """The state stopped being finite at time `t` [s]; `result` holds all until then."""
+
+    _text = (
+        "the simulation diverged at t = {t:.6g} s: {why}; reduce dt, or the stiffness and "
+        "damping, or take the integrator Implicit"
+    )
+
+
+class Interrupted(_Stopped, KeyboardInterrupt):
     """Ctrl-C during a run at time `t` [s]; `result` holds all until then."""
 
     def __init__(self, t: float, result: Result) -> None:
         """Say when the run was interrupted."""
-        super().__init__(f"interrupted at t = {t:.6g} s")
-        self.t = t
-        self.result = result
+        super().__init__(t, "", result)
 
 
-class RunFailed(SphshellError, RuntimeError):
+class RunFailed(_Stopped, RuntimeError):
     """A user's routine that failed in a run at time `t` [s]; `result` holds all until then."""
 
-    def __init__(self, t: float, why: str, result: Result) -> None:
-        """Say when and what the routine raised."""
-        super().__init__(f"the run stopped at t = {t:.6g} s, its routine raised {why}")
-        self.t = t
-        self.result = result
+    _text = "the run stopped at t = {t:.6g} s, its routine raised {why}"
 
 
 class RolloutInterrupted(SphshellError, KeyboardInterrupt):

@@ -19,6 +19,10 @@ WIDTH = 88  # of a line of text
 MOST_NAMES = 4
 MOST_ROWS = 10
 """Detail of a table that a notebook shows."""
+# Styles of cells.
+SIDE = "text-align: left; padding: 0.1em 0.7em; border: 0"
+FAINT = "font-weight: normal; opacity: 0.7"
+UNDERLINED = "border: 0; border-bottom: 1px solid rgba(128, 128, 128, 0.4)"
 
 
 @dataclass(frozen=True)
@@ -90,27 +94,18 @@ class Summarized:
         """Return the same, and more, as a table; it takes its colors from the page around it."""
         from html import escape
 
-        side = "text-align: left; padding: 0.1em 0.7em; border: 0"
-        lines = "".join(
-            f'<tr style="background: none"><th style="{side}; font-weight: normal; opacity: 0.7">'
-            f'{escape(fact.label)}</th><td style="{side}">{escape(fact.shown)}</td></tr>'
-            for fact in self._facts()
-        )
+        def row(cells: Sequence[object], head: Sequence[str] = (), style: str = FAINT) -> str:
+            shown = [f'<th style="{SIDE}; {style}">{escape(one)}</th>' for one in head]
+            shown += [f'<td style="{SIDE}">{escape(show_value(one))}</td>' for one in cells]
+            return f'<tr style="background: none">{"".join(shown)}</tr>'
+
+        lines = "".join(row([fact.shown], [fact.label]) for fact in self._facts())
         html = f"<b>{escape(self._title)}</b>{_table(lines)}"
         rows = self._rows()
         if rows is None or not rows.rows:
             return f"<div>{html}</div>"
-        line = "border: 0; border-bottom: 1px solid rgba(128, 128, 128, 0.4)"
-        heads = "".join(
-            f'<th style="{side}; {line}">{escape(heading)}</th>' for heading in rows.headings
-        )
-        body = "".join(
-            '<tr style="background: none">'
-            + "".join(f'<td style="{side}">{escape(show_value(value))}</td>' for value in row)
-            + "</tr>"
-            for row in rows.rows[:MOST_ROWS]
-        )
-        html += _table(f'<tr style="background: none">{heads}</tr>{body}')
+        body = "".join(map(row, rows.rows[:MOST_ROWS]))
+        html += _table(row([], rows.headings, UNDERLINED) + body)
         if rows.count > MOST_ROWS:
             html += f'<div style="opacity: 0.7">and {rows.count - MOST_ROWS} more</div>'
         return f"<div>{html}</div>"

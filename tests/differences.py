@@ -8,8 +8,10 @@ tried, and the best counts: a kink nearby or rounding spoils one of them, a wron
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
@@ -23,6 +25,7 @@ __all__ = ["AHEAD", "PLACES", "changed", "columns_of", "is_place", "names_of", "
 
 Array = NDArray[np.float64]
 Function = Callable[[float], Array]
+State = tuple[sp.Scene, Array, Array, Array]
 
 SHARES = (1e-3, 1e-4, 1e-5)
 ROUNDING = 8.0 * float(np.finfo(float).eps)
@@ -51,33 +54,40 @@ def off(
         step = share * scale
         expected = derivative(f, step, ahead=ahead)
         assert got.shape == expected.shape
-        size = max(np.abs(expected).max(), floor, 10.0 / tolerance * known / step)
-        error = np.abs(got - expected).max()
+        size = max(np.abs(expected).max(initial=0.0), floor, 10.0 / tolerance * known / step)
+        error = np.abs(got - expected).max(initial=0.0)
         best = min(best, error / size if size > 0.0 else (0.0 if error == 0.0 else np.inf))
         if best <= 0.1 * tolerance:
             break
     return best
 
 
-def by_number(
-    got: Array,
-    f: Callable[[sp.Scene], Array],
-    scene: sp.Scene,
-    column: str,
-    depth: float,
-    tolerance: float = 1e-6,
-    floor: float = 0.0,
-) -> float:
-    """Return by how much `got` is not the derivative of f(scene) by one of the scene's numbers."""
-    scale, ahead = scale_of(scene, column, depth)
-    return off(
-        got,
-        lambda x: f(changed(scene, column, x)),
-        scale,
-        floor=floor,
-        tolerance=tolerance,
-        ahead=ahead,
-    )
+class Move(NamedTuple):
+    """How one number is changed by x, and on what length or value a function changes with it."""
+
+    moved: Callable[[float], State]
+    scale: float
+    ahead: bool = False
+    """Whether the number is at its bound, 0."""
+
+
+def moves(scene: sp.Scene, q: Array, v: Array, tau: Array | None = None) -> dict[str, Move]:
+    """Return the moves of q, v, tau and all numbers of the contacts, by the names of columns."""
+    model, found = scene.model, {}
+    tau = np.zeros(model.nv) if tau is None else tau
+    depth, fast = depth_of(scene, q, v), max(float(np.abs(v).max(initial=0.0)), 1e-2)
+    for k, e in enumerate(np.eye(model.nv)):
+        found |= {
+            f"q.{k}": Move(lambda x, e=e: (scene, pin.integrate(model, q, x * e), v, tau), depth),
+            f"v.{k}": Move(lambda x, e=e: (scene, q, v + x * e, tau), fast),
+            f"tau.{k}": Move(lambda x, e=e: (scene, q, v, tau + x * e), 1e3),
+        }
+    for column in (one for name in names_of(scene) for one in columns_of(name)):
+        found[column] = Move(
+            lambda x, column=column: (changed(scene, column, x), q, v, tau),
+            *scale_of(scene, column, depth),
+        )
+    return found
 
 
 def acceleration(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Mesh = tuple[NDArray[np.float64], NDArray[np.int32]]
 
@@ -94,23 +94,20 @@ def icosphere(subdivisions: int = 1, radius: float = 1.0) -> Mesh:
     return np.array(ball.vertices), np.array(ball.faces, dtype=np.int32)
 
 
-def ellipsoid(
-    cells: int, axes: tuple[float, float, float]
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
-    """A cube of cells^2 cells a side, blown up to semi-axes `axes`: with the normals there."""
-    plate, elements = grid_plate(cells, cells, 2.0)
-    u, v = np.tan(np.pi / 4 * plate[:, :2]).T
-    sides = [
-        np.roll(np.stack([np.full_like(u, sign), sign * u, v], axis=1), axis, axis=1)
-        for axis in range(3)
-        for sign in (1.0, -1.0)
-    ]
-    every = np.concatenate([elements + k * len(plate) for k in range(6)])
-    ball = trimesh.Trimesh(np.concatenate(sides), every)  # sides share their vertices
-    directions = ball.vertices / np.linalg.norm(ball.vertices, axis=1)[:, None]
-    normals = directions / axes
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return directions * axes, np.array(ball.faces, dtype=np.int32), normals
+def revolved(profile: ArrayLike, columns: int) -> Mesh:
+    """Surface of revolution round z through rows (k, 2) of radii and heights, rows of two triangles
+    a column; a radius of zero is one vertex. Wound outward where the heights rise."""
+    radius, height = np.transpose(profile)
+    turn = 2 * np.pi * np.arange(columns) / columns
+    ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    size = np.where(radius > 0, columns, 1)
+    points = [(r * ring + [0, 0, z])[:n] for r, z, n in zip(radius, height, size, strict=True)]
+    number = (np.cumsum(size) - size)[:, None] + np.arange(columns) % size[:, None]
+    a, d = number[:-1], number[1:]
+    b, c = np.roll(a, -1, axis=1), np.roll(d, -1, axis=1)
+    triangles = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+    return np.concatenate(points), triangles.astype(np.int32)
 
 
 def needles(count: int = 24, aspect: float = 1e4, seed: int = 0) -> Mesh:

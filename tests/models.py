@@ -20,6 +20,24 @@ JOINTS = {
 }
 
 
+def composite() -> pin.JointModelComposite:
+    """A hinge, and behind it three slides."""
+    joint = pin.JointModelComposite(2)
+    turn = pin.SE3(meshes.random_rotation(1), np.array([0.1, 0.2, 0.3]))
+    joint.addJoint(pin.JointModelRX(), turn)
+    joint.addJoint(pin.JointModelTranslation(), turn)
+    return joint
+
+
+# Their axes turn with the joint.
+TURNING = {
+    "spherical zyx": pin.JointModelSphericalZYX,
+    "universal": lambda: pin.JointModelUniversal(np.eye(3)[0], np.eye(3)[1]),
+    "composite": composite,
+    "planar": pin.JointModelPlanar,
+}
+
+
 def empty(gravity: float = 9.81) -> pin.Model:
     """Model without bodies; gravity along -z [m/s^2]."""
     model = pin.Model()
@@ -47,11 +65,16 @@ def add_body(
     return int(index)
 
 
-def ball(gravity: float = 9.81, mass: float = 1.0, radius: float = 0.05) -> pin.Model:
-    """Free ball whose center is the frame "ball"."""
+def ball(
+    gravity: float = 9.81,
+    mass: float = 1.0,
+    radius: float = 0.05,
+    joint: pin.JointModel | None = None,
+) -> pin.Model:
+    """Ball whose center is the frame "ball"; free unless a joint is given."""
     model = empty(gravity)
     inertia = pin.Inertia.FromSphere(mass, radius)
-    add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=inertia)
+    add_body(model, "ball", joint or pin.JointModelFreeFlyer(), inertia=inertia)
     return model
 
 

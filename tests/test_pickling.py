@@ -65,19 +65,6 @@ def in_child(simulation: sp.Simulation) -> tuple[bytes, sp.Result]:
     return run(simulation), simulation.run(START, None, 1e-3)
 
 
-@pytest.mark.parametrize("value", [*LAWS, *FRICTIONS], ids=lambda one: type(one).__name__)
-def test_laws_and_frictions(value: Any, trip: Trip) -> None:
-    if isinstance(value, sp.ImpactLaw | sp.HuntCrossleyLaw):
-        numbers = [value.normal_force(d, -0.01) for d in (1e-6, 1e-4, 3e-3)]
-        again = trip(value)
-        assert [again.normal_force(d, -0.01) for d in (1e-6, 1e-4, 3e-3)] == numbers
-    else:
-        numbers = [value.coefficient(s) for s in (0.0, 0.003, 0.05)]
-        again = trip(value)
-        assert [again.coefficient(s) for s in (0.0, 0.003, 0.05)] == numbers
-    assert again == value
-
-
 def test_scenes_simulations_and_results(trip: Trip) -> None:
     simulation = sp.Simulation(bumpy_scene(), sp.SemiImplicitEuler(1e-4))
     bits = run(simulation)  # after this there is a compiled twin

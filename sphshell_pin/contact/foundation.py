@@ -48,10 +48,7 @@ class FoundationLaw(NormalLaw, kind="foundation"):
         0.0, at_least=0, unit="s/m", help="b: 0 gives back all energy, as of `HuntCrossleyLaw`"
     )
 
-    @property
-    def needs_shape(self) -> bool:
-        """Whether the force depends on the shape of what is touched: yes."""
-        return True
+    needs_shape = True
 
     def on_plane(self, radius: float) -> NormalLaw:
         """Return the law of a sphere of `radius` [m] on a plane, by its depth alone."""
@@ -84,9 +81,7 @@ class _OnPlane(FoundationLaw):
 
     radius: float = 1.0
 
-    @property
-    def needs_shape(self) -> bool:
-        return False
+    needs_shape = False
 
     def on_plane(self, radius: float) -> NormalLaw:
         return self
@@ -116,11 +111,7 @@ class _OnPlane(FoundationLaw):
 
 
 def foundation_pressure(
-    shell: Shell,
-    center: npt.ArrayLike,
-    radius: float,
-    law: FoundationLaw,
-    method: str = "smooth",
+    shell: Shell, center: npt.ArrayLike, radius: float, law: FoundationLaw, method: str = "smooth"
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return where a FoundationLaw presses, by quadrature points on the shell.
 

@@ -85,12 +85,7 @@ class ImpactLaw(_PowerLaw, kind="impact"):
 
     @classmethod
     def from_adams(
-        cls,
-        k: float = 1e5,
-        e: float = 2.2,
-        c: float = 10.0,
-        d: float = 0.1,
-        units: str = "mm-N-s",
+        cls, k: float = 1e5, e: float = 2.2, c: float = 10.0, d: float = 0.1, units: str = "mm-N-s"
     ) -> ImpactLaw:
         """Build from ADAMS's numbers, by default its defaults, in the system `units`.
 
@@ -192,16 +187,24 @@ class AdamsImpact(Component, kind="adams", of=NormalLaw):
     """IMPACT as an ADAMS model states it; the defaults are ADAMS's own."""
 
     k: float = parameter(
-        1e5, above=0, unit="{0.force}/{0.length}^{0.e:g}", label="stiffness", help="stiffness"
+        1e5,
+        above=0,
+        unit="{0.symbols[force]}/{0.symbols[length]}^{0.e:g}",
+        label="stiffness",
+        help="stiffness",
     )
     e: float = parameter(2.2, above=0, label="exponent", help="exponent")
     c: float = parameter(
-        10.0, at_least=0, unit="{0.force} {0.time}/{0.length}", label="damping", help="damping"
+        10.0,
+        at_least=0,
+        unit="{0.symbols[force]} {0.symbols[time]}/{0.symbols[length]}",
+        label="damping",
+        help="damping",
     )
     d: float = parameter(
         0.1,
         above=0,
-        unit="{0.length}",
+        unit="{0.symbols[length]}",
         label="full damping depth",
         help="penetration for full damping",
     )
@@ -213,19 +216,9 @@ class AdamsImpact(Component, kind="adams", of=NormalLaw):
         adams_units(self.units)
 
     @property
-    def length(self) -> str:
-        """Unit of length."""
-        return self.units.split("-")[0]
-
-    @property
-    def force(self) -> str:
-        """Unit of force."""
-        return self.units.split("-")[1]
-
-    @property
-    def time(self) -> str:
-        """Unit of time."""
-        return self.units.split("-")[2]
+    def symbols(self) -> dict[str, str]:
+        """Units of length, force and time."""
+        return dict(zip(("length", "force", "time"), self.units.split("-"), strict=True))
 
     def _build(self, folder: Path = Path()) -> ImpactLaw:
         """Return the law in SI."""

@@ -174,8 +174,8 @@ def differences(
 
 
 def _compare(what: str, got: Array, expected: Array, rounding: float, names: list[str]) -> Finding:
-    sizes = np.abs(expected).max(axis=0) + 1e-2 * np.abs(expected).max()
-    sizes = np.maximum(sizes, _SEEN * rounding)
+    floor = max(1e-2 * float(np.abs(expected).max()), _SEEN * rounding)
+    sizes = np.maximum(np.abs(expected).max(axis=0), floor)
     off = np.abs(got - expected) / np.where(sizes > 0.0, sizes, 1.0)
     off = np.where(np.isfinite(off), off, np.inf)
     row, column = np.unravel_index(int(np.argmax(off)), off.shape)

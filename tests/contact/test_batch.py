@@ -37,13 +37,3 @@ def test_equals_single_queries(name: str, method: str) -> None:
 def test_empty_batch() -> None:
     depth, count = shell_of(meshes.cube()).contacts_batch(np.empty((0, 3)), np.empty(0))
     assert depth.shape == count.shape == (0,)
-
-
-def test_repeated_queries_are_identical() -> None:
-    shell = shell_of(MESHES["crumpled"])
-    center = np.array([0.1, 0.05, 0.05])
-    first = shell.contacts(center, 0.1, method="facets")
-    shell.contacts([0.3, -0.3, 0.0], 0.2, method="facets")
-    second = shell.contacts(center, 0.1, method="facets")
-    for column in ("point", "normal", "depth", "element", "feature"):
-        assert np.array_equal(getattr(first, column), getattr(second, column))

@@ -51,45 +51,6 @@ def test_against_plain_vectors(seed: int, friction) -> None:
     assert np.array_equal(on_i.vector, -on_j.vector)
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_a_common_motion_changes_nothing(seed: int) -> None:
-    """Only the relative motion counts: carry both bodies along any rigid motion."""
-    point, normal, depth, motion_i, motion_j = random_case(seed)
-    carried = pin.Motion(np.random.default_rng(seed + 99).normal(size=6) * 3.0)
-    a, _ = contact_wrench(point, normal, depth, motion_i, motion_j, LAW, FRICTION)
-    b, _ = contact_wrench(
-        point, normal, depth, motion_i + carried, motion_j + carried, LAW, FRICTION
-    )
-    assert b.vector == pytest.approx(a.vector, rel=1e-9, abs=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_exchanging_the_bodies_turns_the_normal(seed: int) -> None:
-    point, normal, depth, motion_i, motion_j = random_case(seed)
-    a = contact_wrench(point, normal, depth, motion_i, motion_j, LAW, FRICTION)
-    b = contact_wrench(point, -normal, depth, motion_j, motion_i, LAW, FRICTION)
-    assert b[0].vector == pytest.approx(a[1].vector, rel=1e-12, abs=1e-12)
-
-
-def test_turntable() -> None:
-    """1 rev/s at 0.2 m: slip 1.2566 m/s, past v_dynamic: 0.1 N along the rim for 1 N of load."""
-    table = pin.Motion(np.zeros(3), np.array([0.0, 0.0, 2 * np.pi]))
-    law = ImpactLaw(1.0, 1.0, 0.0, 1.0)
-    point, normal = np.array([0.2, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    # A friction whose knots bracket the slip speed tells it apart to seven digits.
-    slip = 0.2 * 2 * np.pi
-    assert slip == pytest.approx(1.2566, abs=5e-5)
-    ramp = CoulombFriction(0.3, 0.1, 0.5, 2.0)
-    for friction in (FRICTION, ramp):
-        on_ball, on_table = contact_wrench(
-            point, normal, 1.0, pin.Motion.Zero(), table, law, friction
-        )
-        mu = friction.coefficient(slip)
-        assert on_ball.linear == pytest.approx([0.0, mu, 1.0], abs=1e-14)
-        assert on_table.angular[2] == pytest.approx(-0.2 * mu, abs=1e-14)
-    assert FRICTION.coefficient(slip) == 0.1
-
-
 def test_creep_is_smooth_through_zero_slip() -> None:
     """No division by the slip speed: tiny slips give tiny, exact forces."""
     normal = np.array([0.0, 0.0, 1.0])

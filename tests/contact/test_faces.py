@@ -17,7 +17,10 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS_Compound
 
 import sphshell_pin as sp
+from tests.contact.helpers import directions, places_by_area
+from tests.contact.smooth.test_gradient import assert_gradient
 from tests.contact.walks import jumps, paths
+from tests.models import ball
 from tests.parts import occ
 from tests.shell.cad_shapes import parts
 
@@ -35,9 +38,12 @@ def block():
 
 @pytest.fixture(scope="module")
 def step(tmp_path_factory):
-    path = tmp_path_factory.mktemp("faces") / "block.step"
+    return written(block(), tmp_path_factory.mktemp("faces") / "block.step")
+
+
+def written(solid, path: Path) -> Path:
     writer = STEPControl_Writer()
-    writer.Transfer(block(), STEPControl_AsIs)
+    writer.Transfer(solid, STEPControl_AsIs)
     writer.Write(str(path))
     return path
 
@@ -57,15 +63,9 @@ def faces_in(path: Path):
 def spheres(shell: sp.Shell, count: int, radius: float, seed: int = 0):
     """Centers (count, 3) near a surface, deep and shallow, over its faces and beside its edges."""
     rng = np.random.default_rng(seed)
-    corners = shell.vertices[shell.triangles]
-    areas = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    which = rng.choice(len(areas), count, p=areas / areas.sum())
-    on = np.einsum("nk,nkx->nx", rng.dirichlet([1.0, 1.0, 1.0], count), corners[which])
+    which, on = places_by_area(shell.vertices, shell.triangles, rng, count)
     away = 0.9 * shell._binding.triangle_normals[which]
-    aside = rng.normal(size=(count, 3))
-    aside *= 0.6 / np.linalg.norm(aside, axis=1, keepdims=True)
+    aside = 0.6 * directions(rng, count)
     return on + radius * np.where(rng.random(count)[:, None] < 0.5, away, aside)
 
 
@@ -159,22 +159,10 @@ def test_a_ball_in_a_bore_touches_once(made, share, step):
 
 
 def test_normals_turn_as_the_faces_say(step):
-    """The derivative of weight * normal, against differences."""
-    core = sp.Shell.from_file(step).core_for("smooth")
-    shell = sp.Shell.from_file(step)
-    radius, move, compared = 2e-3, 1e-8, 0
-    for center in spheres(shell, 60, radius):
-        shown, terms = core.contacts(center, radius, 2, True)
-        if terms is not None or len(shown[2]) != 1 or shown[2][0] > 0.9 * radius:
-            continue
-        for k in range(3):
-            ends = [core.contacts(center + s * move * np.eye(3)[k], radius, 2)[0] for s in (1, -1)]
-            if any(len(one[2]) != 1 for one in ends):
-                continue
-            slope = (ends[0][1][0] - ends[1][1][0]) / (2 * move)
-            assert shown[6][0][:, k] == pytest.approx(slope, abs=1e-4 / radius)
-            compared += 1
-    assert compared > 60
+    """The derivative of the force, against differences."""
+    shell, radius = sp.Shell.from_file(step), 2e-3
+    met = assert_gradient(shell, spheres(shell, 60, radius), radius, step=1e-8)
+    assert {feature for feature, _ in met} >= {sp.Feature.FACE, sp.Feature.EDGE}
 
 
 def test_no_faces_no_closed_forms():
@@ -243,10 +231,8 @@ def test_the_closest_point_of_a_ring_is_one_of_its_points(height, distance, step
 def test_a_ring_that_a_border_cuts_is_none(tmp_path):
     """A groove along half of a cylinder: its axis is as far from all of it, and only from that."""
     solid = occ.cut(occ.box([0, 0, 0], [30, 40, 20]), occ.cylinder(5.0, 50.0, [15, 20, -1]))
-    writer = STEPControl_Writer()
-    writer.Transfer(occ.cut(solid, occ.box([-1, 20, -1], [40, 30, 30])), STEPControl_AsIs)
-    writer.Write(str(tmp_path / "groove.step"))
-    shell = sp.Shell.from_file(tmp_path / "groove.step")
+    groove = occ.cut(solid, occ.box([-1, 20, -1], [40, 30, 30]))
+    shell = sp.Shell.from_file(written(groove, tmp_path / "groove.step"))
     found = touch(shell, [15 * MM, 20 * MM, 10 * MM], 5.1 * MM)
     assert found.feature[0] != sp.Feature.RING
     assert np.isclose(np.linalg.norm(found.normal[0]), 1)
@@ -255,12 +241,7 @@ def test_a_ring_that_a_border_cuts_is_none(tmp_path):
 @pytest.mark.parametrize("friction", [None, sp.CoulombFriction()])
 def test_a_ball_that_falls_into_a_seat_rests_on_its_axis(friction, step):
     radius, shell = 6.0 * MM, sp.Shell.from_file(step)
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.05, radius), pin.SE3.Identity())
-    frame = pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
-    model.addFrame(frame)
-    scene = sp.Scene(model)
+    scene = sp.Scene(ball(9.81, 0.05, radius, pin.JointModelTranslation()))
     law = sp.ImpactLaw(1e6, exponent=1.5, damping=50.0, full_damping_depth=1e-5)
     friction = {} if friction is None else {"friction": friction}
     scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law, **friction)

@@ -35,22 +35,29 @@ def errors(contacts, normal):
     return abs(along - 1.0), float(np.linalg.norm(force - along * normal))
 
 
-@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize(
+    ("how", "count"),
+    [("facets", count) for count in COUNTS]
+    + [(how, count) for how in ("smooth", "given normals") for count in COUNTS[:-1]],
+)
 @pytest.mark.parametrize("kind", ["slivers", "delaunay"])
-def test_one_exact_contact(kind: str, count: int) -> None:
+def test_one_exact_contact(kind: str, how: str, count: int) -> None:
     if kind == "delaunay":
         pytest.importorskip("scipy")
         vertices, triangles = meshes.delaunay_plate(count, seed=count)
     else:
         vertices, triangles = meshes.random_plate(count, seed=count)
-    shell = Shell(vertices, triangles)
-    assert len(shell.elements) == len(triangles)
     up = np.array([0.0, 0.0, 1.0])
+    given = how == "given normals"
+    shell = Shell(vertices, triangles, normals=np.tile(up, (len(vertices), 1)) if given else None)
+    assert len(shell.elements) == len(triangles)
+    method = "facets" if how == "facets" else "smooth"
     worst = np.zeros(2)
-    for place in np.concatenate(spots(vertices, triangles, seed=count)):
+    places = np.concatenate(spots(vertices, triangles, seed=count))
+    for place in places if method == "facets" else places[::4]:
         for sign in (1.0, -1.0):
             center = np.array([place[0], place[1], sign * (RADIUS - DEPTH)])
-            contacts = shell.contacts(center, RADIUS, method="facets")
+            contacts = shell.contacts(center, RADIUS, method=method)
             assert len(contacts) == 1, (center, contacts.point)
             worst = np.maximum(worst, errors(contacts, sign * up))
     assert worst.max() <= 1e-12
@@ -85,30 +92,6 @@ def test_rotated_plate(count: int, slivers: bool) -> None:
         assert side_force <= 1e-12 + tilt
 
 
-def test_over_and_beyond_the_border() -> None:
-    """Beyond the border the closest point is the clamped one, the feature the border's."""
-    vertices, triangles = meshes.random_plate(200, seed=3)
-    shell = Shell(vertices, triangles)
-    rng = np.random.default_rng(3)
-    seen = set()
-    for x, y in rng.uniform(-0.56, 0.56, (2000, 2)):
-        center = np.array([x, y, rng.uniform(-0.05, 0.05)])
-        foot = np.array([np.clip(x, -0.5, 0.5), np.clip(y, -0.5, 0.5), 0.0])
-        distance = np.linalg.norm(center - foot)
-        contacts = shell.contacts(center, RADIUS, method="facets")
-        outside = int(abs(x) > 0.5) + int(abs(y) > 0.5)
-        if distance >= RADIUS:
-            assert len(contacts) == 0
-            continue
-        assert len(contacts) == 1
-        assert np.abs(contacts.point[0] - foot).max() <= 1e-15
-        assert abs(contacts.depth[0] - (RADIUS - distance)) <= 1e-15
-        assert np.abs(contacts.normal[0] - (center - foot) / distance).max() <= 1e-12
-        assert contacts.feature[0] == (Feature.FACE, Feature.EDGE, Feature.VERTEX)[outside]
-        seen.add(outside)
-    assert seen == {0, 1, 2}
-
-
 def test_inner_edges_and_vertices_are_face_contacts() -> None:
     vertices, triangles = meshes.grid_plate(4, 4)
     shell = Shell(vertices, triangles)
@@ -118,30 +101,6 @@ def test_inner_edges_and_vertices_are_face_contacts() -> None:
         assert contacts.feature[0] == Feature.FACE
         assert np.array_equal(contacts.point[0], [x, y, 0.0])
         assert np.array_equal(contacts.normal[0], [0.0, 0.0, 1.0])
-
-
-def test_quads_are_elements_and_change_nothing() -> None:
-    quads = shell_of(meshes.grid_plate(4, 4, quads=True))
-    assert quads.elements.shape == (16, 4)
-    for x, y in np.random.default_rng(0).uniform(-0.5, 0.5, (200, 2)):
-        contacts = quads.contacts([x, y, 0.095], RADIUS, method="facets")
-        assert len(contacts) == 1
-        assert np.abs(contacts.point[0] - [x, y, 0.0]).max() <= 1e-16
-        cell = int((x + 0.5) * 4) * 4 + int((y + 0.5) * 4)
-        assert contacts.element[0] == cell
-
-
-def test_reentrant_corner_of_an_l_plate() -> None:
-    """Over the missing quarter the plate's two borders push, each at its own closest point."""
-    shell = shell_of(meshes.l_plate(3))
-    contacts = shell.contacts([0.03, 0.04, 0.0], RADIUS, method="facets")
-    points = sorted(map(tuple, np.round(contacts.point, 14)))
-    assert points == [(0.0, 0.04, 0.0), (0.03, 0.0, 0.0)]
-    assert sorted(np.round(contacts.depth, 14)) == [0.06, 0.07]
-    assert all(contacts.feature == Feature.EDGE)
-    over = shell.contacts([-1e-3, -1e-3, 0.09], RADIUS, method="facets")
-    assert len(over) == 1
-    assert over.feature[0] == Feature.FACE
 
 
 def test_centre_on_the_surface_gives_a_finite_unit_normal() -> None:

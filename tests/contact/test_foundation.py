@@ -9,6 +9,7 @@ import pytest
 
 from sphshell_pin import Shell, _core
 from tests import meshes
+from tests.contact.helpers import directions
 from tests.contact.smooth.surfaces import SURFACES, shell_of, side_of
 from tests.contact.smooth.test_sweeps_edges import edged
 from tests.oracle import foundation as oracle
@@ -84,8 +85,7 @@ def test_on_a_sphere(ball: float, depth: float) -> None:
 def test_order_on_a_dome(depth: float) -> None:
     """Meshes of half the size have at most a quarter of the error, down to 1e-9."""
     rng = np.random.default_rng(0)
-    out = rng.normal(size=(6, 3))
-    out /= np.linalg.norm(out, axis=1)[:, None]
+    out = directions(rng, 6)
     force = -oracle.slope(lambda x: oracle.energy_in_ball(4.0, x, 1.0), 5 - depth, 1e-3)
     errors = []
     for h in (0.6, 0.3, 0.15):
@@ -146,8 +146,7 @@ def test_force_and_slope_are_derivatives(kind: str) -> None:
     else:
         shell = edged(kind)
         ends = shell.vertices[rng.choice(shell.edge_vertices[shell.edge_class > 0], 12)]
-        out = rng.normal(size=(12, 3))
-        out *= (rng.uniform(0.5, 0.95, 12) / np.linalg.norm(out, axis=1))[:, None]
+        out = directions(rng, 12) * rng.uniform(0.5, 0.95, (12, 1))
         centers = ends[:, 0] + rng.uniform(size=(12, 1)) * (ends[:, 1] - ends[:, 0]) + out
     for center in centers:
         force, energy, slope = total(shell, center)

@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from tests.models import ball
 
 RADIUS = 6e-3
 LAW = sp.HertzLaw(2e7, 0.4)
@@ -35,14 +36,8 @@ SHELLS = {
 
 
 def scene(shell: sp.Shell, mass: float = 0.02) -> sp.Scene:
-    model = pin.Model()
-    model.gravity.setZero()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "b")
-    inertia = pin.Inertia.FromSphere(mass, RADIUS)
-    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-    model.addFrame(pin.Frame("b", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    out = sp.Scene(model)
-    out.add_contact(sp.Sphere(RADIUS, "b"), shell, law=LAW, name="c")
+    out = sp.Scene(ball(0.0, mass, RADIUS, pin.JointModelTranslation()))
+    out.add_contact(sp.Sphere(RADIUS, "ball"), shell, law=LAW, name="c")
     return out
 
 

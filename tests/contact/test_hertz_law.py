@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from tests import meshes
+from tests.models import ball
 from tests.oracle.hertz import hertz_contact
 
 YOUNG, POISSON = 1e7, 0.3
@@ -25,10 +25,7 @@ class Surface:
         grid = [np.linspace(*span, n + 1) for span, n in zip(spans, counts, strict=True)]
         u, v = (one.ravel() for one in np.meshgrid(*grid, indexing="ij"))
         self.vertices, self.normals = point(u, v), normal(u, v)
-        rows = counts[1] + 1
-        corner = (np.arange(counts[0])[:, None] * rows + np.arange(counts[1])).ravel()
-        a, b, c, d = corner, corner + rows, corner + rows + 1, corner + 1
-        triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+        triangles = meshes.grid_plate(*counts)[1]
         self.triangles = triangles[:, ::-1] if turn else triangles
 
     def shell(self, *, exact=True):
@@ -97,11 +94,8 @@ SURFACES = {
 
 
 def ball_scene(shell, radius, law, gravity=(0, 0, 0), **more):
-    model = pin.Model()
-    model.gravity = pin.Motion(np.array([*gravity, 0, 0, 0]))
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, radius), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model = ball(radius=radius)
+    model.gravity.linear = np.array(gravity, dtype=float)
     scene = sp.Scene(model)
     scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law, method="smooth", **more)
     return scene
@@ -144,10 +138,7 @@ def test_flat_is_the_plane() -> None:
 
 
 def test_two_balls_are_hertz_on_both_radii() -> None:
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
-    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model)
+    scene = sp.Scene(ball(joint=pin.JointModelTranslation()))
     scene.add_contact(sp.Sphere(0.1, "ball"), sp.Sphere(0.3, "universe"), law=LAW)
     force = scene.external_forces(np.array([0, 0, 0.399]), np.zeros(3))[1].linear
     expected = sp.ImpactLaw.hertz(0.1, YOUNG, POISSON, YOUNG, POISSON, radius_2=0.3)
@@ -249,21 +240,25 @@ def test_a_socket_of_nearly_the_ball_s_radius_is_beyond_hertz() -> None:
         assert {e.kind for e in result.events} - {"touch", "lift_off", "deep"} == kinds
 
 
+TWICE = {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0}
+
+
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "more", "message"),
     [
-        ({"young": -1.0}, r"young = -1.0 must be positive"),
-        ({"young_2": 1e9}, r"young_2, poisson_2 = .* must be given together"),
-        ({"restitution": 0.5}, r"restitution, speed = .* must be given together"),
-        (
-            {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0},
-            "must not be given with a restitution",
-        ),
+        ((-1.0, 0.3), {}, "young = -1.0 must be positive"),
+        ((1e9, 0.3), {"young_2": 1e9}, "young_2, poisson_2 = .* must be given together"),
+        ((1e9, 0.3), {"restitution": 0.5}, "restitution, speed = .* must be given together"),
+        ((1e9, 0.3), TWICE, "must not be given with a restitution"),
+        (("steel", "gum"), {}, "no material 'gum'; the table has: steel, "),
+        (("steel", 0.3), {}, "young = 'steel' must be a number"),
+        ((2.1e11, "rubber"), {}, "poisson = 'rubber' must be a number"),
+        (("steel", "rubber", 1e7, 0.4), {}, r"young_2 = 1\d+.0 must be left out where materials"),
     ],
 )
-def test_wrong_arguments_are_named(arguments, message) -> None:
-    with pytest.raises(sp.errors.InvalidParameter, match=message):
-        sp.HertzLaw(**{"young": 1e9, "poisson": 0.3, **arguments})
+def test_wrong_arguments_are_named(arguments, more, message) -> None:
+    with pytest.raises(sp.SphshellError, match=message):
+        sp.HertzLaw(*arguments, **more)
 
 
 def test_where_nothing_is_known_of_the_shell_it_is_refused() -> None:
@@ -321,17 +316,3 @@ def test_names_of_materials_stand_for_their_values() -> None:
     assert bristle == sp.BristleFriction(*coefficients, 1e4)
     mindlin = sp.BristleFriction.mindlin("rubber", "steel")
     assert mindlin == sp.BristleFriction.mindlin(*coefficients, *numbers)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("steel", "gum"), "no material 'gum'; the table has: steel, "),
-        (("steel", 0.3), "young = 'steel' must be a number"),
-        ((2.1e11, "rubber"), "poisson = 'rubber' must be a number"),
-        (("steel", "rubber", 1e7, 0.4), "young_2 = 10000000.0 must be left out where materials"),
-    ],
-)
-def test_names_and_numbers_do_not_mix(arguments, message) -> None:
-    with pytest.raises(sp.SphshellError, match=re.escape(message)):
-        sp.HertzLaw(*arguments)

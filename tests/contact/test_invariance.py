@@ -1,14 +1,19 @@
-"""What must not matter does not: numbering, winding, duplicates, pose, scale, diagonals, splits."""
+"""What must not matter does not: numbering, winding, copies, pose, scale, diagonals, splits."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pytest
 
+from sphshell_pin import Shell
 from tests import meshes
 from tests.contact.helpers import difference, force_sum, positions, shell_of
+from tests.contact.smooth.surfaces import SURFACES, jittered_grid, mean_edge
 
-SURFACES = {
+FLAT = {
     "plate": meshes.random_plate(60, seed=1),
     "v groove": meshes.v_groove(0.5, cells=3),
     "cube": meshes.cube(),
@@ -18,77 +23,125 @@ SURFACES = {
     "fan": meshes.fan(5, seed=1),
     "soup": meshes.soup(30, seed=3),
 }
-RADIUS = 0.25
+CURVED = ("bowl", "dome", "torus inside", "wavy above", "cylinder outside")
+CASES = [*FLAT, *(f"smooth {one}{e}" for one in CURVED for e in ("", ", estimated"))]
+RADIUS, DEPTH = 0.25, 0.04
 
 
-def probes(mesh, count=60):
-    """Positions near the surface whose contacts do not hang on rounding."""
+@dataclass(frozen=True)
+class Case:
+    """A mesh, and spheres near it whose contacts do not hang on rounding; what they may differ by,
+    relative to the radius, and their forces, relative to that of depth one."""
+
+    mesh: tuple
+    centers: np.ndarray
+    method: str
+    radius: float
+    error: float
+    force: float
+
+    def find(self, shell, center, scale: float = 1.0):
+        return shell.contacts(center, self.radius * scale, method=self.method)
+
+
+def shell_from(vertices, elements, normals) -> Shell:
+    return Shell(vertices, elements, normals=normals)
+
+
+@cache
+def case(name: str) -> Case:
     rng = np.random.default_rng(11)
-    for center in positions(*mesh, RADIUS, count, seed=7, heights=(0.3, 0.9)):
-        yield center + rng.uniform(-1e-3, 1e-3, 3)
+    if name in FLAT:
+        centers = np.array([*positions(*FLAT[name], RADIUS, 60, seed=7, heights=(0.3, 0.9))])
+        centers += rng.uniform(-1e-3, 1e-3, centers.shape)
+        return Case((*FLAT[name], None), centers, "facets", RADIUS, 1e-12, 1e-11)
+    surface, _, estimated = name.removeprefix("smooth ").partition(", ")
+    vertices, elements, normals = SURFACES[surface].mesh(0.6)
+    centers = SURFACES[surface].probes(40, DEPTH, seed=2)[0]
+    centers = centers + rng.uniform(-5e-3, 5e-3, centers.shape)
+    mesh = (vertices, elements, None if estimated else normals)
+    return Case(mesh, centers, "smooth", 1.0, 1e-9, 1e-9 * DEPTH**1.5)
 
 
-def shuffled(mesh, seed=0):
-    vertices, triangles = mesh
+def of(normals, change):
+    return None if normals is None else change(normals)
+
+
+def shuffled(vertices, elements, normals, seed=0):
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(vertices))
     place = np.argsort(order)
-    turned = [np.roll(place[t], rng.integers(3)) for t in rng.permutation(triangles)]
-    return vertices[order], np.array(turned, dtype=np.int32)
+    turned = [np.roll(place[e], rng.integers(3)) for e in rng.permutation(elements)]
+    return vertices[order], np.array(turned, dtype=np.int32), of(normals, lambda n: n[order])
 
 
-def flipped(mesh, seed=1):
-    vertices, triangles = mesh
-    flip = np.random.default_rng(seed).random((len(triangles), 1)) < 0.5
-    return vertices, np.where(flip, triangles[:, ::-1], triangles).astype(np.int32)
+def some_turned_over(vertices, elements, normals):
+    flip = np.random.default_rng(1).random((len(elements), 1)) < 0.4
+    return vertices, np.where(flip, elements[:, ::-1], elements).astype(np.int32), normals
 
 
-def duplicated(mesh):
-    vertices, triangles = mesh
-    again = triangles[::2] + len(vertices)
-    return np.concatenate([vertices, vertices]), np.concatenate([triangles, again, triangles[::3]])
+def all_turned_over(vertices, elements, normals):
+    return vertices, elements[:, ::-1].copy(), normals
 
 
-def unwelded(mesh):
-    vertices, triangles = mesh
-    return vertices[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)
+def duplicated(vertices, elements, normals):
+    again = elements[::2] + len(vertices)
+    joined = np.concatenate([elements, again, elements[::3]])
+    return np.concatenate([vertices, vertices]), joined, of(normals, lambda n: np.r_[n, n])
 
 
-@pytest.mark.parametrize("change", [shuffled, flipped, duplicated, unwelded])
-@pytest.mark.parametrize("name", SURFACES)
-def test_bookkeeping(name: str, change) -> None:
-    mesh = SURFACES[name]
-    a, b = shell_of(mesh), shell_of(change(mesh))
-    for center in probes(mesh):
-        first, second = (s.contacts(center, RADIUS, method="facets") for s in (a, b))
-        assert difference(first, second, RADIUS) <= 1e-12, center.tolist()
+def unwelded(vertices, elements, normals):
+    flat = np.arange(elements.size, dtype=np.int32).reshape(-1, 3)
+    corners = vertices[elements].reshape(-1, 3)
+    return corners, flat, of(normals, lambda n: n[elements].reshape(-1, 3))
 
 
-@pytest.mark.parametrize("name", SURFACES)
+def normals_at_corners(vertices, elements, normals):
+    return vertices, elements, of(normals, lambda n: n[elements])
+
+
+CHANGES = [shuffled, some_turned_over, all_turned_over, duplicated, unwelded, normals_at_corners]
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("name", CASES)
+def test_same_surface_given_otherwise(name: str, change) -> None:
+    one = case(name)
+    shells = [shell_from(*mesh) for mesh in (one.mesh, change(*one.mesh))]
+    for center in one.centers:
+        a, b = (one.find(shell, center) for shell in shells)
+        assert len(a) >= (one.method == "smooth")
+        assert difference(a, b, one.radius) <= one.error, center.tolist()
+        size = np.linalg.norm(force_sum(a))
+        assert np.linalg.norm(force_sum(a) - force_sum(b)) <= max(one.error, 1e-9 * size)
+
+
+@pytest.mark.parametrize("name", CASES)
 def test_rigid_motion(name: str) -> None:
-    vertices, triangles = SURFACES[name]
-    rotation, shift = meshes.random_rotation(4), np.array([0.4, -0.7, 0.2])
-    a, b = shell_of((vertices, triangles)), shell_of((vertices @ rotation.T + shift, triangles))
-    for center in probes((vertices, triangles)):
-        first = a.contacts(center, RADIUS, method="facets")
-        second = b.contacts(rotation @ center + shift, RADIUS, method="facets")
-        assert len(first) == len(second)
-        assert np.sort(first.depth) == pytest.approx(np.sort(second.depth), abs=2e-12)
-        turned = rotation @ force_sum(first)
-        assert force_sum(second) == pytest.approx(turned, abs=1e-11)
+    one, rotation, shift = case(name), meshes.random_rotation(4), np.array([0.4, -0.7, 0.2])
+    vertices, elements, normals = one.mesh
+    there = shell_from(
+        vertices @ rotation.T + shift, elements, of(normals, lambda n: n @ rotation.T)
+    )
+    here = shell_from(*one.mesh)
+    for center in one.centers:
+        a, b = one.find(here, center), one.find(there, rotation @ center + shift)
+        assert len(a) == len(b) >= (one.method == "smooth")
+        assert np.sort(a.depth) == pytest.approx(np.sort(b.depth), abs=2 * one.error)
+        assert force_sum(b) == pytest.approx(rotation @ force_sum(a), abs=one.force)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 25.4, 1e4])
-@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("name", CASES)
 def test_scale(name: str, scale: float) -> None:
-    vertices, triangles = SURFACES[name]
-    a, b = shell_of((vertices, triangles)), shell_of((vertices * scale, triangles))
-    for center in probes((vertices, triangles), 30):
-        first = a.contacts(center, RADIUS, method="facets")
-        second = b.contacts(center * scale, RADIUS * scale, method="facets")
-        assert len(first) == len(second)
-        assert np.sort(second.depth) / scale == pytest.approx(np.sort(first.depth), abs=1e-12)
-        assert force_sum(second, 1.0) / scale == pytest.approx(force_sum(first, 1.0), abs=1e-11)
+    one = case(name)
+    vertices, *rest = one.mesh
+    here, there = shell_from(*one.mesh), shell_from(vertices * scale, *rest)
+    for center in one.centers[::2]:
+        a, b = one.find(here, center), one.find(there, center * scale, scale)
+        assert len(a) == len(b)
+        assert np.sort(b.depth) / scale == pytest.approx(np.sort(a.depth), abs=one.error)
+        assert force_sum(b) / scale**1.5 == pytest.approx(force_sum(a), abs=one.force)
 
 
 def subdivided(mesh):
@@ -110,10 +163,10 @@ def subdivided(mesh):
 @pytest.mark.parametrize("name", ["plate", "v groove", "cube", "icosphere", "bowl", "crumpled"])
 def test_split_elements(name: str) -> None:
     """Split triangles are coplanar only to rounding: same contacts, same force to 1e-9."""
-    mesh = SURFACES[name]
-    a, b = shell_of(mesh), shell_of(subdivided(mesh))
-    for center in probes(mesh):
-        first, second = (s.contacts(center, RADIUS, method="facets") for s in (a, b))
+    one = case(name)
+    shells = shell_of(FLAT[name]), shell_of(subdivided(FLAT[name]))
+    for center in one.centers:
+        first, second = (one.find(shell, center) for shell in shells)
         assert len(first) == len(second), center.tolist()
         assert force_sum(first) == pytest.approx(force_sum(second), rel=1e-9, abs=1e-12)
 
@@ -148,8 +201,79 @@ def test_t_junctions() -> None:
 
 def test_order_of_elements_never_changes_the_force() -> None:
     """On the borders themselves the set may hang on rounding, but not on the numbering."""
-    mesh = SURFACES["plate"]
-    shells = [shell_of(shuffled(mesh, seed)) for seed in range(4)]
+    mesh = FLAT["plate"]
+    shells = [shell_from(*shuffled(*mesh, None, seed)) for seed in range(4)]
     for center in positions(*mesh, RADIUS, 150, seed=9, heights=(0.3, 0.9)):
         forces = [force_sum(s.contacts(center, RADIUS, method="facets")) for s in shells]
         assert np.ptp(forces, axis=0).max() <= 1e-12, center.tolist()
+
+
+# A floor that turns up into a wall by a quarter of a cylinder: flat elements beside curved ones.
+ROUND, LONG, WIDE = 3.0, 4.0, 6.0
+
+
+def fillet(seed: int = 0, h: float = 0.6):
+    """Floor x < 0 and wall z > ROUND, both flat, joined by a round; the floor's and the wall's
+    inner vertices, and all diagonals there, depend on the seed."""
+    parts, count = [], 0
+    columns = round(WIDE / h)
+    flat, arc = round(LONG / h), round(ROUND * np.pi / 2 / h)
+    for k, (rows, reach) in enumerate(((flat, LONG), (arc, np.pi / 2), (flat, LONG))):
+        jitter = 1 if k == 1 else seed
+        s, y, triangles = jittered_grid((0.0, reach), (0.0, WIDE), rows, columns, jitter)
+        zero = np.zeros_like(s)
+        if k == 0:
+            point, normal = (s - LONG, y, zero), (zero, zero, zero + 1)
+        elif k == 1:
+            point = (ROUND * np.sin(s), y, ROUND * (1 - np.cos(s)))
+            normal = (-np.sin(s), zero, np.cos(s))
+        else:
+            point, normal = (zero + ROUND, y, ROUND + s), (zero - 1, zero, zero)
+        parts.append((np.stack(point, 1), triangles + count, np.stack(normal, 1)))
+        count += len(s)
+    return tuple(np.concatenate([part[i] for part in parts]) for i in range(3))
+
+
+def split_flat(vertices, elements, normals):
+    """Cut every flat element in three at a point within."""
+    rng = np.random.default_rng(5)
+    kept, added, more, count = [], [], [], len(vertices)
+    for t in elements:
+        if np.ptp(vertices[t, 2]) > 0 and np.ptp(vertices[t, 0]) > 0:
+            kept.append(t)
+            continue
+        added.append(rng.dirichlet([2.0, 2.0, 2.0]) @ vertices[t])
+        more.append(normals[t[0]])
+        kept += [(t[k], t[(k + 1) % 3], count) for k in range(3)]
+        count += 1
+    return np.concatenate([vertices, added]), np.array(kept), np.concatenate([normals, more])
+
+
+@pytest.mark.parametrize("change", ["other flat elements", "split flat elements"])
+def test_flat_elements_beside_curved_ones(change: str) -> None:
+    given = fillet()
+    assert mean_edge(given[0], given[1]) < 1
+    shell = Shell(given[0], given[1], normals=given[2])
+    assert shell.num_patches == 1
+    changed = fillet(seed=7) if change.startswith("other") else split_flat(*given)
+    other = Shell(changed[0], changed[1], normals=changed[2])
+    rng = np.random.default_rng(6)
+    s = rng.uniform(-2.5, 2.5 + ROUND * np.pi / 2, 200)
+    turn = np.clip(s / ROUND, 0, np.pi / 2)
+    normal = np.stack([-np.sin(turn), np.zeros_like(s), np.cos(turn)], axis=1)
+    straight = np.stack(
+        [np.minimum(s, 0), np.zeros_like(s), np.maximum(s - ROUND * np.pi / 2, 0)], axis=1
+    )
+    foot = np.stack(
+        [ROUND * np.sin(turn), rng.uniform(1.5, WIDE - 1.5, s.size), ROUND * (1 - np.cos(turn))],
+        axis=1,
+    )
+    centers = foot + straight + (1 - DEPTH) * normal
+    for center, exact, at in zip(centers, normal, s, strict=True):
+        a = shell.contacts(center, 1.0, method="smooth")
+        b = other.contacts(center, 1.0, method="smooth")
+        assert len(a) == len(b) == 1
+        assert np.abs(force_sum(a) - force_sum(b)).max() <= 1e-9 * DEPTH**1.5
+        # Over the flat parts the force is exact.
+        if not 0 < at < ROUND * np.pi / 2:
+            assert np.abs(force_sum(a) / DEPTH**1.5 - exact).max() <= 1e-12

@@ -133,12 +133,6 @@ def test_dissipation_is_exact_however_near_the_restitution_is_to_one(restitution
     assert law.dissipation == pytest.approx(exact, rel=2e-14)
 
 
-def test_hertz_asks_for_both_restitution_and_speed() -> None:
-    for half in ({"restitution": 0.5}, {"speed": 1.0}):
-        with pytest.raises(InvalidParameter, match="given together"):
-            ImpactLaw.hertz(0.01, 207e9, 0.29, 207e9, 0.29, **half)
-
-
 def test_laws_are_values() -> None:
     assert ImpactLaw(1.0, 1.5, 0.0, 1.0) == ImpactLaw(1.0, 1.5, 0.0, 1.0)
     with pytest.raises(dataclasses.FrozenInstanceError):

@@ -56,18 +56,6 @@ def test_plate_pushes_up_from_below() -> None:
     assert len(plate.contacts([0.05, 0.1, -0.101], 0.1, method="facets")) == 0
 
 
-def test_inside_mirrors_outside() -> None:
-    vertices, triangles = meshes.random_plate(50, seed=1)
-    upper = shell_of((vertices, triangles), side="outside")
-    lower = shell_of((vertices, triangles), side="inside")
-    for x, y, z in np.random.default_rng(0).uniform(-0.4, 0.4, (200, 3)) * [1, 1, 0.25]:
-        a = upper.contacts([x, y, z], 0.1, method="facets")
-        b = lower.contacts([x, y, -z], 0.1, method="facets")
-        assert len(a) == len(b)
-        assert a.depth == pytest.approx(b.depth, abs=1e-15)
-        assert a.normal == pytest.approx(-b.normal, abs=1e-12)
-
-
 def test_closed_shells_are_turned_outward() -> None:
     """The winding of a file cannot be trusted: a cube wound inward still pushes outward."""
     vertices, triangles = meshes.cube()

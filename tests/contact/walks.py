@@ -14,6 +14,32 @@ NUMBERS = {"facets": 0, "smooth": 2}
 WIDTH = 1e-12
 
 
+def narrowed(look, start, end, width: float, goes_left):
+    """Two centres `width` apart between two others, and what `look` says of them, by halving:
+    goes_left(first, here, last) tells in which half to look on, by what it says of the ends and of
+    the middle."""
+    first, last = look(start), look(end)
+    while np.linalg.norm(end - start) > width:
+        middle = (start + end) / 2
+        if (middle == start).all() or (middle == end).all():
+            break
+        here = look(middle)
+        if goes_left(first, here, last):
+            end, last = middle, here
+        else:
+            start, first = middle, here
+    return start, end, first, last
+
+
+def steepest(look, start, end, width: float):
+    """The same where vectors change most."""
+
+    def goes_left(first, here, last):
+        return np.linalg.norm(here - first) > np.linalg.norm(last - here)
+
+    return narrowed(look, start, end, width, goes_left)
+
+
 @dataclass
 class State:
     """What a sphere meets: its potential (law depth^1.5), the sizes of the forces, and the terms
@@ -38,22 +64,18 @@ def jumps(shell, method, path, radius=1.0, limit=1e-9):
     """Places where the potential jumps by more than `limit` of itself, with the share by which it
     does, and the states on both sides."""
     found = []
+
+    def look(center):
+        return state(shell, method, center, radius)
+
     for first, end in pairwise(path):
-        last = state(shell, method, end, radius)
-        start, here = first, state(shell, method, first, radius)
+        start, here, last = first, look(first), look(end)
         for _ in range(60):  # every border between the two
             if here.label == last.label:
                 break
-            low, high, before, after = start, end, here, last
-            while np.linalg.norm(high - low) > WIDTH * radius:
-                middle = (low + high) / 2
-                if (middle == low).all() or (middle == high).all():
-                    break
-                between = state(shell, method, middle, radius)
-                if between.label == here.label:
-                    low, before = middle, between
-                else:
-                    high, after = middle, between
+            low, high, before, after = narrowed(
+                look, start, end, WIDTH * radius, lambda a, b, _: b.label != a.label
+            )
             allowed = max(before.size, after.size) * np.linalg.norm(high - low) / radius
             lost = abs(after.energy - before.energy) - allowed
             if lost > limit * max(before.energy, after.energy):

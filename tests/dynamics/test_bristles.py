@@ -7,7 +7,6 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import _core
 from tests import meshes, models
 
 R = 0.05
@@ -155,29 +154,6 @@ def test_a_block_rides_on_a_turntable(integrator) -> None:
         assert along[20:] == pytest.approx(x + stretch, abs=2e-8)
 
 
-def test_rates_do_not_know_the_turn_of_the_shell() -> None:
-    """A block on a cart on the disc: whatever the disc's angle and speed, the bristle sees none."""
-    model = models.empty()
-    joint = models.add_body(model, "disc", pin.JointModelRZ())
-    models.add_body(model, "ball", pin.JointModelTranslation(), joint)
-    friction = _core.FrictionLaw("bristle", [0.5, 0.3, K, 30.0, 0.01, 0.0])
-    shell = sp.Shell(*meshes.random_plate(300, seed=2, size=2.0))
-    scene = sp.Scene(model)
-    law, bristle = models.linear_law(K, 300.0), sp.BristleFriction(0.5, 0.3, K, 30.0)
-    assert bristle._binding.coefficient(0.02) == friction.coefficient(0.02)
-    scene.add_contact(sp.Sphere(R, "ball"), shell, frame="disc", law=law, friction=bristle)
-    core = scene._binding
-    z = np.zeros(core.bristle_size)
-    z[:3] = [3e-5, -1e-5, 0.0]
-    rates = []
-    for angle, speed in ((0.0, 0.0), (1.3, 0.0), (0.4, 20.0)):
-        q, v = np.array([angle, 0.2, 0.1, R - DEPTH]), np.array([speed, 1e-3, 2e-3, 0.0])
-        rates.append(core.rates(q, v, z, np.zeros(4))[4:])
-    assert np.abs(rates[0][:2]) == pytest.approx([1e-3, 2e-3], rel=1e-9)
-    assert rates[1] == pytest.approx(rates[0], abs=1e-12)
-    assert rates[2] == pytest.approx(rates[0], abs=1e-12)
-
-
 def crossing(angle: float, record_dt: float, method: str = "smooth") -> sp.Result:
     """A block slides, and sticks at last, over a groove whose walls rise by `angle` [rad]."""
     shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
@@ -296,26 +272,3 @@ def test_force_and_moment_share_the_limit() -> None:
     assert whole[late] == pytest.approx(1.0, rel=2e-3)
     v = 0.5 * (rows.v[1:] + rows.v[:-1])
     assert (moment / force)[late] == pytest.approx((LEVER**2 * v[:, 1] / v[:, 0])[late], rel=1e-2)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_energy_of_random_rolls(seed: int) -> None:
-    """Friction gives nothing back: less than what a bristle holds, where contacts join."""
-    rng = np.random.default_rng(seed)
-    vertices, triangles = meshes.dome(cells=10, size=1.0, radius=1.0)
-    height = 0.02 * np.sin(9 * vertices[:, 0]) * np.cos(7 * vertices[:, 1])
-    shell = sp.Shell(vertices * [1, 1, -1] + height[:, None] * [0, 0, 1], triangles)
-    scene = sp.Scene(models.ball(radius=R))
-    friction = sp.BristleFriction(0.3, 0.25, 1e4, 20.0, torsional=bool(seed % 2))
-    law = models.linear_law(1e4, 30.0)
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, method="smooth")
-    q = models.free_q([*rng.uniform(-0.1, 0.1, 2), 0.0])
-    top = max(0.0, -float(shell.closest_points(q[None, :3]).distances[0]))
-    q[2] = 0.1 + top
-    v = np.concatenate([rng.uniform(-0.5, 0.5, 3), rng.uniform(-10, 10, 3)])
-    rows = run(scene, sp.Adaptive(1e-8), q, v, 0.6)
-    assert len(rows.contacts.t) > 100
-    energy = rows.energy
-    held = 0.5 * (0.3 * 5 * G) ** 2 / 1e4  # of a bristle at five times the weight
-    assert np.diff(energy.friction_loss).min() > -0.05 * held
-    assert np.abs(energy.residual).max() < 1e-5 * energy.exchanged

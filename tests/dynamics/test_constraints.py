@@ -8,18 +8,17 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
+from tests import meshes
+from tests.models import ball
 
 RADIUS, MASS, DT = 0.02, 0.26, 1e-3
 
 
 def ball_on_a_slope(angle: float, mu: float | None):
     """A steel ball that rests on a slope, turned in its joint, and its configuration."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(MASS, RADIUS), pin.SE3.Identity())
-    model.addBodyFrame("ball", joint, pin.SE3.Identity(), 0)
+    model = ball(9.81, MASS, RADIUS)
     law, turn = sp.HertzLaw("steel", "steel"), pin.exp3(np.array([0.0, angle, 0.0]))
-    plate = sp.Shell([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
+    plate = sp.Shell(*meshes.grid_plate(size=2.0, quads=True))
     friction = None if mu is None else sp.CoulombFriction(mu, mu)
     scene = sp.Scene(model)
     placement = pin.SE3(turn, np.array([0.1, 0.2, 0.3]))

@@ -40,14 +40,6 @@ def rolling(integrator, steps: int, damping: float = 20.0, friction=SMOOTH_FRICT
 
 
 @pytest.mark.parametrize(("integrator", "order"), STEPPERS)
-def test_order_of_a_ball_rolling_on_a_plate(integrator, order: int) -> None:
-    steps = 200 if order == 1 else 50
-    runs = [rolling(integrator, steps * k) for k in (1, 2, 4)]
-    seen = order_of(runs[0][0], [r for _, r in runs])
-    assert seen == pytest.approx(order, abs=0.25)
-
-
-@pytest.mark.parametrize(("integrator", "order"), STEPPERS)
 def test_order_with_both_bodies_tumbling(integrator, order: int) -> None:
     scene = models.two_free_bodies(models.linear_law(2000.0, 5.0), SMOOTH_FRICTION)
     q0, v0 = models.two_free_state()
@@ -131,29 +123,3 @@ def test_restitution_of_hertz_with_hunt_crossley(restitution: float) -> None:
         assert result.v[-1, 0] / speed == pytest.approx(expected, abs=1e-5)
         if speed == 0.5:
             assert expected == pytest.approx(restitution, abs=1e-9)
-
-
-def test_turntable_ball_is_dragged_along() -> None:
-    """A frictionless table leaves a resting ball at rest; friction drags it in the rim's sense."""
-    model = models.ball()
-    index = model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "table_joint")
-    model.appendBodyToJoint(index, pin.Inertia.FromSphere(5.0, 0.3), pin.SE3.Identity())
-    model.addFrame(pin.Frame("table", index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    ends = {}
-    for name, friction in (("none", None), ("coulomb", sp.CoulombFriction(0.3, 0.1, 0.1, 1.0))):
-        scene = sp.Scene(model)
-        scene.add_contact(
-            sphere=sp.Sphere(RADIUS, frame="ball"),
-            shell=models.plate(),
-            frame="table",
-            law=models.linear_law(4000.0, 20.0),
-            friction=friction,
-            method="facets",
-        )
-        q0 = np.concatenate([models.free_q([0.2, 0.0, RADIUS - 9.81 / 4000.0]), [1.0, 0.0]])
-        v0 = np.concatenate([np.zeros(6), [2 * np.pi]])
-        ends[name] = sp.Simulation(scene, sp.RungeKutta4(dt=1e-4)).run(q0, v0, 0.05)
-    assert ends["none"].q[-1, :2] == pytest.approx([0.2, 0.0], abs=1e-12)
-    assert ends["none"].v[-1, 6] == pytest.approx(2 * np.pi, rel=1e-12)
-    assert ends["coulomb"].q[-1, 1] > 1e-4
-    assert ends["coulomb"].v[-1, 6] < 2 * np.pi

@@ -61,6 +61,7 @@ def test_touch_times_against_the_closed_form(kind, rtol: float) -> None:
     half = np.pi - np.arctan(speed * omega / gravity)
     period = 2 * half / omega + 2 * speed / gravity
     times = np.array(touches(result))
+    assert result.events == tuple(sorted(result.events, key=lambda event: event.t))
     exact = speed / gravity + period * np.arange(len(times))
     assert times[0] == pytest.approx(exact[0], abs=1e-3 * rtol)
     assert times == pytest.approx(exact, abs=20 * rtol)

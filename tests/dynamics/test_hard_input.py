@@ -12,12 +12,9 @@ from tests import meshes, models
 
 
 def ball_model(joint=None, inertia=None) -> pin.Model:
-    model = pin.Model()
-    joint = pin.JointModelFreeFlyer() if joint is None else joint
-    index = model.addJoint(0, joint, pin.SE3.Identity(), "ball")
-    inertia = pin.Inertia.FromSphere(1.0, 0.1) if inertia is None else inertia
-    model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
-    model.addFrame(pin.Frame("tip", index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model = models.empty()
+    inertia = inertia or pin.Inertia.FromSphere(1.0, 0.1)
+    models.add_body(model, "tip", joint or pin.JointModelFreeFlyer(), inertia=inertia)
     return model
 
 
@@ -69,7 +66,7 @@ def test_an_interrupted_source_leaves_a_consistent_record(tmp_path) -> None:
 
 def test_a_joint_that_moves_no_mass_is_named() -> None:
     scene = sp.Scene(ball_model(inertia=pin.Inertia.Zero()))
-    with pytest.raises(InvalidParameter, match=r"'ball'.*moves no mass"):
+    with pytest.raises(InvalidParameter, match=r"'tip_joint'.*moves no mass"):
         sp.Simulation(scene).run(pin.neutral(scene.model), None, 0.01)
     with pytest.raises(InvalidParameter, match="moves no mass"):
         scene.explain()

@@ -15,6 +15,7 @@ from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario.format.build import build
 from tests import models
+from tests.dynamics.scenes import assert_rate_jacobian
 
 MASS, LENGTH, OWN = 1.0, 0.3, 0.01
 INERTIA = OWN + MASS * LENGTH**2
@@ -227,18 +228,7 @@ def everything() -> sp.Scene:
     ],
 )
 def test_slopes_agree_with_differences(q: float, v: float, z: float) -> None:
-    core = everything()._binding
-    tau, start, h = np.array([0.4]), np.array([q, v, z]), 1e-6
-
-    def rates(x: np.ndarray) -> np.ndarray:
-        return core.rates(x[:1], x[1:2], x[2:], tau)
-
-    found = core.rate_jacobian(start[:1], start[1:2], start[2:], tau)
-    steps = h * np.eye(3)
-    expected = np.transpose(
-        [(rates(start + step) - rates(start - step)) / (2 * h) for step in steps]
-    )
-    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+    assert_rate_jacobian(everything(), np.array([q]), np.array([v]), np.array([z]))
 
 
 def test_your_own_loop_makes_the_same_motion() -> None:

@@ -12,10 +12,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.dynamics.run.open_run import OpenRun
-from sphshell_pin.errors import InvalidParameter, ScenarioError
-from sphshell_pin.scenario import build
+from sphshell_pin.errors import InvalidParameter
 from tests import meshes, models
-from tests.scenario import files
 
 R = 0.02
 RUBBER, STEEL = (4e6, 0.48), (2.1e11, 0.3)
@@ -308,20 +306,6 @@ def test_friction_is_continuous_over_a_groove(rings: int) -> None:
     assert jumps[1] < 0.4 * jumps[0]
 
 
-def test_a_scenario_states_it(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    stated = 'friction = { type = "mindlin", mu_static = 0.5, mu_dynamic = 0.4, young = 5e6, '
-    stated += "poisson = 0.48, young_2 = 2.1e11, poisson_2 = 0.3, torsional = true, rings = 4 }"
-    text = files.DROP.replace("damping = 20.0 }", "damping = 20.0 }\n" + stated)
-    built = build(files.write(tmp_path, text), {"contact.ball-plate.friction.young": "6e6"})
-    (pair,) = built.scene.pairs
-    materials = 6e6, 0.48, 2.1e11, 0.3
-    assert pair.friction == sp.BristleFriction.mindlin(
-        0.5, 0.4, *materials, torsional=True, rings=4
-    )
-    with pytest.raises(ScenarioError, match=r"rings"):
-        build(files.write(tmp_path, text.replace("rings = 4", "rings = 9")), {})
-
-
 def test_a_source_has_no_radius() -> None:
     scene = sp.Scene(models.ball())
     with pytest.raises(InvalidParameter, match="needs a sphere, and a contact source has none"):
@@ -339,15 +323,3 @@ def test_a_wrench_needs_the_radius() -> None:
     plain = sp.BristleFriction.mindlin(0.5, 0.4, *RUBBER)
     with pytest.raises(InvalidParameter, match="must be the sphere's, of Mindlin's friction"):
         sp.contact_wrench(np.zeros(3), UP, 1e-4, still, still, LAW, plain, sp.BristleState())
-
-
-def test_time_scales_follow_the_stiffness_under_load() -> None:
-    depth = 1e-3
-    inertia = pin.Inertia.FromSphere(1.0, R)
-    scene = held_ball(pin.JointModelTranslation(), depth, STICKS, inertia)
-    figures = scene.explain(np.zeros(3)).pairs[0]
-    assert "Mindlin, coefficient 1000 at rest" in "".join(figures.modelled)
-    deepest = max(depth, figures.impact_depth)
-    half = math.pi / math.sqrt(STICKS.tangential_stiffness(disc(deepest)))
-    assert figures.shortest_time <= half
-    assert STICKS.slip_time(1.0, 1.0, disc(deepest)) == pytest.approx(half)

@@ -7,7 +7,6 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.dynamics.run.open_run import OpenRun
-from sphshell_pin.errors import FrameNotFound, InvalidParameter
 from tests import models
 
 G = 9.81
@@ -227,37 +226,6 @@ def test_a_run_that_diverges_says_so_and_stands_still() -> None:
     stood = run.time
     run.advance(0.1)
     assert run.time == stood
-
-
-@pytest.mark.parametrize(
-    ("frame", "force", "fault", "says"),
-    [
-        ("bal", [1, 0, 0], FrameNotFound, "no frame 'bal'"),
-        ("universe", [1, 0, 0], InvalidParameter, "fixed to the world"),
-        ("ball", [1, 0], InvalidParameter, "force_world"),
-        ("ball", [1, 0, np.nan], InvalidParameter, "force_world"),
-    ],
-)
-def test_a_push_that_cannot_be(frame: str, force: list[float], fault: type, says: str) -> None:
-    run = opened(sliding_ball(), FIXED[0], models.free_q([0.0, 0.0, R]), None)
-    with pytest.raises(fault, match=says):
-        run.push(frame, force)
-
-
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        (("ball", [0, 0], [0, 0, 0], 1.0), "point"),
-        (("ball", [0, 0, 0], [0, 0, np.inf], 1.0), "anchor_world"),
-        (("ball", [0, 0, 0], [0, 0, 0], -1.0), "stiffness"),
-        (("ball", [0, 0, 0], [0, 0, 0], 1.0, np.nan), "damping"),
-        (("universe", [0, 0, 0], [0, 0, 0], 1.0), "fixed to the world"),
-    ],
-)
-def test_a_pull_that_cannot_be(given: tuple, says: str) -> None:
-    run = opened(sliding_ball(), FIXED[0], models.free_q([0.0, 0.0, R]), None)
-    with pytest.raises(InvalidParameter, match=says):
-        run.pull(*given)
 
 
 def test_patches_can_be_switched_on_and_off_on_the_way() -> None:

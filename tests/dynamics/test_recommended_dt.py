@@ -13,7 +13,7 @@ import sphshell_pin as sp
 from sphshell_pin.dynamics.scene.explain import _round_down, relaxation_time, weakness
 from sphshell_pin.errors import SetupWarning
 from tests import models
-from tests.dynamics.test_two_spheres import in_touch, two_spheres
+from tests.dynamics.scenes import in_touch, two_spheres
 
 RADIUS, MASS, SPEED = 0.05, 0.7, 0.4
 STEEL = {"young": 2e8, "poisson": 0.3}
@@ -58,63 +58,38 @@ def shortest(scene: sp.Scene, q: list[float], v: list[float]) -> float:
     return figures.shortest_time
 
 
-@pytest.mark.parametrize("law", DAMPED)
-def test_the_decay_follows_from_the_force(law: str) -> None:
-    """20 decays at the largest depth: a mass on a damper c slows down by e in m / c."""
-    scene = falling(DAMPED[law])
+FRICTIONS = {
+    "none": None,
+    "coulomb": sp.CoulombFriction(0.5, 0.3, 1e-4, 0.1),
+    "bristle": sp.BristleFriction(0.5, 0.5, 1e8),
+    "damped bristle": sp.BristleFriction(0.5, 0.5, 1e6, 1e6),
+    "mindlin": sp.BristleFriction.mindlin(0.4, None, 1e9, 0.4),
+}
+
+
+@laws
+@pytest.mark.parametrize("friction", FRICTIONS)
+def test_the_shortest_time_is_that_of_the_law_or_of_the_friction(law: str, friction: str) -> None:
+    """At the larger of the depths of the start and of the impact, under the larger load."""
+    slip = FRICTIONS[friction]
+    scene = block((ELASTIC | DAMPED)[law], slip)
     one = scene.pairs[0].plane_law
-    depth = one.depth_of(0.5 * MASS * SPEED**2)
-    h = 1e-7
-    damping = (one.normal_force(depth, -h) - one.normal_force(depth, h)) / (2 * h)
-    found = shortest(scene, [RADIUS], [-SPEED])
-    assert found == pytest.approx(20 * MASS / damping, rel=1e-6)
-    assert found < 0.5 * one.contact_time(depth, SPEED)
+    for pressed in (0.0, 2e-3):
+        load = max(MASS * 9.81, one.normal_force(pressed))
+        times = [one.shortest_time(MASS, SPEED, load)]
+        if slip is not None:
+            depth = max(one.depth_of(0.5 * MASS * SPEED**2), pressed)
+            times.append(slip.slip_time(MASS, load, math.sqrt(RADIUS * depth)))
+        found = shortest(scene, [0.0, 0.0, RADIUS - pressed], [0.0, 0.0, -SPEED])
+        assert found == pytest.approx(min(times), rel=1e-9)
 
 
-@pytest.mark.parametrize("law", ELASTIC)
-def test_without_damping_it_is_the_contact_time(law: str) -> None:
-    """That of a run with error control."""
-    scene = falling(ELASTIC[law])
-    run = sp.Simulation(scene, sp.Adaptive(1e-9)).run([RADIUS + 1e-4], [-SPEED], 0.2)
-    contact_time = run.stats.pairs["ball-plate"].contact_time
-    assert shortest(scene, [RADIUS], [-SPEED]) == pytest.approx(contact_time, rel=2e-3)
-
-
-@pytest.mark.parametrize(("pressed", "gravity"), [(5e-3, 9.81), (0.0, 2500.0 / MASS)])
-def test_under_load_it_is_half_an_oscillation(pressed: float, gravity: float) -> None:
-    law = sp.ImpactLaw(1e8, 2.0)
-    depth = 5e-3  # where it is pressed or comes to rest, far deeper than an impact at 0.1 m/s
-    scene = falling(law, gravity=gravity)
-    half = math.pi * math.sqrt(MASS / (2 * 1e8 * depth))
-    assert shortest(scene, [RADIUS - pressed], [0.0]) == pytest.approx(half, rel=1e-6)
-
-
-def test_slow_slip_of_coulomb_friction_decays_under_the_load() -> None:
-    law, friction = sp.ImpactLaw(1e7, 1.0), sp.CoulombFriction(0.5, 0.3, 1e-4, 0.1)
-    load = MASS * 9.81
-    slow = 1e-6 * friction.v_static
-    damping = load * friction.coefficient(slow) / slow
-    found = shortest(block(law, friction), [0.0, 0.0, RADIUS - law.depth_at(load)], [0.0] * 3)
-    assert found == pytest.approx(20 * MASS / damping, rel=1e-4)
-    pressed = [0.0, 0.0, RADIUS - law.depth_at(2 * load)]
-    assert shortest(block(law, friction), pressed, [0.0] * 3) == pytest.approx(found / 2, rel=1e-4)
-    # A ball rolls: 2/7 of its mass resist a slip.
+def test_a_ball_that_rolls_resists_a_slip_with_two_sevenths_of_its_mass() -> None:
+    law, friction = sp.ImpactLaw(1e7, 1.0), FRICTIONS["coulomb"]
     ball = models.on_plate(models.ball(mass=MASS), law, friction)
-    q = models.free_q([0.0, 0.0, RADIUS - law.depth_at(load)])
-    assert shortest(ball, q, [0.0] * 6) == pytest.approx(2 / 7 * found, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("friction", "time"),
-    [
-        (sp.BristleFriction(0.5, 0.5, 1e6), math.pi * math.sqrt(MASS / 1e6)),
-        (sp.BristleFriction(0.5, 0.5, 1e6, 1e5), 20 * MASS / 1e5),
-    ],
-)
-def test_bristles_ring_or_decay(friction: sp.BristleFriction, time: float) -> None:
-    law = sp.ImpactLaw(1e4, 1.0)
-    q = [0.0, 0.0, RADIUS - law.depth_at(MASS * 9.81)]
-    assert shortest(block(law, friction), q, [0.0] * 3) == pytest.approx(time, rel=1e-6)
+    q = models.free_q([0.0, 0.0, RADIUS - law.depth_at(MASS * 9.81)])
+    expected = friction.slip_time(2 / 7 * MASS, MASS * 9.81, 1.0)
+    assert shortest(ball, q, [0.0] * 6) == pytest.approx(expected, rel=1e-3)
 
 
 @laws
@@ -194,21 +169,6 @@ def test_figures_of_a_spring() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gap", "v", "gravity", "speed"),
-    [
-        (0.02, 0.0, 9.81, math.sqrt(2 * 9.81 * 0.02)),
-        (0.02, 1.0, 9.81, 1.0),
-        (0.02, -1.0, 9.81, 1.0),
-        (-0.001, 0.0, 9.81, 0.1),
-        (0.02, 0.0, 0.0, 0.1),
-    ],
-)
-def test_speed_of_approach(gap: float, v: float, gravity: float, speed: float) -> None:
-    one = falling(ELASTIC["linear"], gravity=gravity).explain([RADIUS + gap], [v]).pairs[0]
-    assert (one.gap, one.approach_speed) == pytest.approx((gap, speed), rel=1e-9)
-
-
-@pytest.mark.parametrize(
     ("side", "gaps"),
     [("both", (0.01, 0.01)), ("outside", (0.01, -0.11)), ("inside", (-0.11, 0.01))],
 )
@@ -228,41 +188,84 @@ def two_bodies(joint: type) -> sp.Scene:
     return sp.Scene(model)
 
 
-def test_two_bodies_have_the_reduced_mass_and_the_relative_speed() -> None:
-    scene, law = two_bodies(models.pin.JointModelPZ), ELASTIC["linear"]
-    scene.add_contact(sp.Sphere(0.05, "one"), sp.Sphere(0.08, "two"), law=law)
-    scene.add_contact(sp.Sphere(0.05, "two"), sp.Sphere(0.08, "one"), law=law, name="turned")
-    for pair in scene.explain([0.0, 0.0], [-0.7, 0.2]).pairs:
-        found = (pair.gap, pair.effective_mass, pair.approach_speed)
-        assert found == pytest.approx((0.17, 0.75, max(0.9, math.sqrt(2 * 9.81 * 0.17))), rel=1e-9)
-        weight = 0.75 * 9.81
-        assert pair.resting_depth == pytest.approx(law.depth_at(weight), rel=1e-9)
-    # Of one center: pushed apart along z.
-    scene = two_bodies(models.pin.JointModelTranslation)
-    scene.add_contact(sp.Sphere(0.05, "one"), sp.Sphere(0.08, "two"), law=law)
-    pair = scene.explain([0.0, 0.0, -0.3, 0, 0, 0], [0.4, 0.5, -0.7, 0.1, 0.3, 0.2]).pairs[0]
-    found = (pair.gap, pair.effective_mass, pair.approach_speed)
-    assert found == pytest.approx((-0.13, 0.75, 0.9), rel=1e-9)
+def pair_of(model, *given, **more) -> sp.Scene:
+    scene = sp.Scene(model)
+    scene.add_contact(*given, law=ELASTIC["linear"], **more)
+    return scene
 
 
-@pytest.mark.parametrize("side", ["both", "outside", "inside"])
-def test_a_shell_that_moves_is_met_in_its_own_frame(side: str) -> None:
-    """And where the center lies on the surface the normal is the surface's."""
+def two_of(joint: type, *order: str) -> sp.Scene:
+    radii = {"one": 0.05, "two": 0.08} if order[0] == "one" else {"two": 0.05, "one": 0.08}
+    return pair_of(two_bodies(joint).model, *(sp.Sphere(radii[one], one) for one in order))
+
+
+def on_a_slide(side: str) -> sp.Scene:
+    """A shell that moves, turned in its frame, met by a sphere on another slide."""
     model = models.empty(0.0)
-    turn = models.pin.SE3(models.pin.utils.rpyToMatrix(0.0, math.pi / 2, 0.0), np.zeros(3))
     for name, mass in (("ball", 1.0), ("table", 3.0)):
         inertia = models.pin.Inertia.FromSphere(mass, RADIUS)
         models.add_body(model, name, models.pin.JointModelPX(), inertia=inertia)
-    scene = sp.Scene(model)
-    shell = models.plate(side=side)
+    turn = models.pin.SE3(models.pin.utils.rpyToMatrix(0.0, math.pi / 2, 0.0), np.zeros(3))
     sphere = sp.Sphere(RADIUS, "ball", (0.02, 0.0, 0.0))
-    scene.add_contact(sphere, shell, "table", turn, law=ELASTIC["linear"])
-    for x in (0.03, -0.02):
-        pair = scene.explain([x, 0.0], [-0.3, 0.2]).pairs[0]
-        height = x + 0.02
-        distance = -height if side == "inside" else height
-        found = (pair.gap, pair.effective_mass, pair.approach_speed)
-        assert found == pytest.approx((distance - RADIUS, 0.75, 0.5), rel=1e-9)
+    return pair_of(model, sphere, models.plate(side=side), "table", turn)
+
+
+def lever() -> sp.Scene:
+    """A link of inertia I on a hinge, its tip L away: I / L^2, at L w."""
+    model = models.empty(0.0)
+    inertia = models.pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.2, 0.3]))
+    tip = models.pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.06]))
+    models.add_body(model, "ball", models.pin.JointModelRY(), inertia=inertia, frame=tip)
+    return models.on_plate(model, ELASTIC["linear"])
+
+
+def beside_a_border() -> sp.Scene:
+    """The normal leads to the center."""
+    sphere = sp.Sphere(RADIUS, "ball", (0.53, 0.0, 0.04))
+    return pair_of(models.slider(0.0, MASS), sphere, models.plate())
+
+
+PZ, FREE = models.pin.JointModelPZ, models.pin.JointModelTranslation
+FALL = math.sqrt(2 * 9.81 * 0.17)
+# A scene, q, v; its gap, effective mass and speed of approach. Two bodies have the reduced mass.
+FIGURES = [
+    *(
+        (lambda gravity=g: falling(ELASTIC["linear"], gravity=gravity), [RADIUS + gap], [v])
+        + (gap, MASS, speed)
+        for gap, v, g, speed in (
+            (0.02, 0.0, 9.81, math.sqrt(2 * 9.81 * 0.02)),
+            (0.02, 1.0, 9.81, 1.0),
+            (0.02, -1.0, 9.81, 1.0),
+            (-0.001, 0.0, 9.81, 0.1),
+            (0.02, 0.0, 0.0, 0.1),
+        )
+    ),
+    (lambda: two_of(PZ, "one", "two"), [0.0, 0.0], [-0.7, 0.2], 0.17, 0.75, FALL),
+    (lambda: two_of(PZ, "two", "one"), [0.0, 0.0], [-0.7, 0.2], 0.17, 0.75, FALL),
+    # Of one center: pushed apart along z.
+    (lambda: two_of(FREE, "one", "two"), [0.0, 0.0, -0.3, 0, 0, 0])
+    + ([0.4, 0.5, -0.7, 0.1, 0.3, 0.2], -0.13, 0.75, 0.9),
+    # Where the center lies on the surface the normal is the surface's.
+    *(
+        (lambda side=side: on_a_slide(side), [x, 0.0], [-0.3, 0.2])
+        + ((-1 if side == "inside" else 1) * (x + 0.02) - RADIUS, 0.75, 0.5)
+        for side in ("both", "outside", "inside")
+        for x in (0.03, -0.02)
+    ),
+    (lever, [0.0], [0.5], 0.01, 0.2 / 0.4**2, 0.4 * 0.5),
+    (beside_a_border, [0.0], [-0.5], 0.0, MASS / 0.64, 0.4),
+]
+
+
+@pytest.mark.parametrize(("make", "q", "v", "gap", "mass", "speed"), FIGURES)
+def test_gap_mass_and_speed_of_approach(make, q, v, gap, mass, speed) -> None:
+    scene = make()
+    one = scene.explain(q, v).pairs[0]
+    found = (one.gap, one.effective_mass, one.approach_speed)
+    assert found == pytest.approx((gap, mass, speed), rel=1e-9, abs=1e-12)
+    weight = mass * float(np.linalg.norm(scene.model.gravity.linear))
+    depth = scene.pairs[0].law.depth_at(weight)
+    assert one.resting_depth == pytest.approx(depth, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -290,16 +293,6 @@ def test_bodies_that_turn_and_are_met_off_their_centers(seed: int) -> None:
     across = np.eye(3) - np.outer(normal, normal)
     slip_mass = 1 / np.linalg.eigvalsh(across @ mobility @ across).max()
     assert pair.shortest_time == pytest.approx(math.pi * math.sqrt(slip_mass / 1e12), rel=1e-9)
-
-
-def test_beside_a_border_the_normal_leads_to_the_center() -> None:
-    sphere = sp.Sphere(RADIUS, "ball", (0.53, 0.0, 0.04))
-    scene = sp.Scene(models.slider(0.0, MASS))
-    scene.add_contact(sphere, models.plate(), law=ELASTIC["linear"])
-    pair = scene.explain([0.0], [-0.5]).pairs[0]
-    found = (pair.gap, pair.effective_mass, pair.approach_speed)
-    assert found[1:] == pytest.approx((MASS / 0.64, 0.4), rel=1e-9)
-    assert pair.gap == pytest.approx(0.0, abs=1e-12)
 
 
 def test_what_does_not_move_at_all_has_no_mass() -> None:
@@ -369,19 +362,6 @@ def test_what_cannot_move_along_the_normal_has_no_time_scales() -> None:
     below = models.pin.SE3(np.eye(3), np.array([0.0, 0.0, -2 * RADIUS]))
     apart = models.on_plate(model, ELASTIC["linear"], friction, placement=below)
     assert apart.explain().pairs[0].shortest_time == math.inf
-
-
-def test_a_lever_weighs_by_its_arm() -> None:
-    """A link of inertia I on a hinge, its tip L away: I / L^2, at L w."""
-    model = models.empty(0.0)
-    inertia = models.pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.2, 0.3]))
-    tip = models.pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.06]))
-    at = models.pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.0]))
-    joint = models.pin.JointModelRY()
-    models.add_body(model, "ball", joint, placement=at, inertia=inertia, frame=tip)
-    pair = models.on_plate(model, ELASTIC["linear"]).explain([0.0], [0.5]).pairs[0]
-    found = (pair.gap, pair.effective_mass, pair.approach_speed)
-    assert found == pytest.approx((0.01, 0.2 / 0.4**2, 0.4 * 0.5), rel=1e-9)
 
 
 @pytest.mark.parametrize("speed", [0.02, 2.0])

@@ -83,70 +83,48 @@ def test_a_run_is_busy_for_its_own_controller(call: str) -> None:
     assert run.time > before
 
 
-def holder_of_a_run() -> object:
-    class Robot:
-        def __init__(self) -> None:
-            scene = sp.Scene(ball())
-            scene.add_contact_source(self.find, "ball", "universe", LAW)
-            simulation = sp.Simulation(scene)
-            self.run = OpenRun(simulation, Q, record_dt=1e-3, controller=self.torque)
-            self.run.advance(2e-3)
+class Holder:
+    """Holds what holds its own routines."""
 
-        def torque(self, t, q, v, contacts):
-            return np.zeros(6)
+    def __init__(self, make) -> None:
+        self.asks, self.scene = False, sp.Scene(ball())
+        self.pair = self.scene.add_contact_source(self.find, "ball", "universe", LAW)
+        self.held = make(self)
 
-        def find(self, pose_i, pose_j):
-            return some_contacts(1)
+    def torque(self, t, q, v, contacts):
+        return np.zeros(6)
 
-    return Robot()
-
-
-def holder_of_a_scene() -> object:
-    class Source:
-        def __init__(self) -> None:
-            self.scene = sp.Scene(ball())
-            self.scene.add_contact_source(self.find, "ball", "universe", LAW)
-            self.depth = 0
+    def find(self, pose_i, pose_j):
+        if self.asks:  # so that there are two evaluations at once
+            self.asks = False
             self.scene.contacts(Q)
-
-        def find(self, pose_i, pose_j):
-            if not self.depth:  # so that there are two evaluations at once
-                self.depth = 1
-                self.scene.contacts(Q)
-            return some_contacts(1)
-
-    return Source()
+        return some_contacts(1)
 
 
-def holder_of_a_pair() -> object:
-    class Pair:
-        def __init__(self) -> None:
-            scene = sp.Scene(ball())
-            self.core = scene.add_contact_source(self.find, "ball", "universe", LAW)._bind()
-
-        def find(self, pose_i, pose_j):
-            return some_contacts(0)
-
-    return Pair()
+def run_of(holder: Holder) -> OpenRun:
+    run = OpenRun(sp.Simulation(holder.scene), Q, record_dt=1e-3, controller=holder.torque)
+    run.advance(2e-3)
+    return run
 
 
-def holder_of_a_controller() -> object:
-    class Controlled:
-        def __init__(self) -> None:
-            self.core = _core.PythonController(self.torque)
-
-        def torque(self, t, q, v, contacts):
-            return np.zeros(6)
-
-    return Controlled()
+def scene_of(holder: Holder) -> sp.Scene:
+    holder.asks = True
+    holder.scene.contacts(Q)
+    return holder.scene
 
 
-@pytest.mark.parametrize(
-    "make", [holder_of_a_run, holder_of_a_scene, holder_of_a_pair, holder_of_a_controller]
-)
+def pair_of(holder: Holder) -> object:
+    return holder.pair._bind()
+
+
+def controller_of(holder: Holder) -> object:
+    return _core.PythonController(holder.torque)
+
+
+@pytest.mark.parametrize("make", [run_of, scene_of, pair_of, controller_of])
 def test_cycles_through_a_routine_are_collected(make) -> None:
-    watched = [weakref.ref(make()) for _ in range(5)]
-    kept = make()
+    watched = [weakref.ref(Holder(make)) for _ in range(5)]
+    kept = Holder(make)
     gc.collect()
     assert [one() for one in watched] == [None] * 5
     # What is still in use is not: the collector counts every reference once.
@@ -155,8 +133,8 @@ def test_cycles_through_a_routine_are_collected(make) -> None:
 
 
 def test_what_others_hold_of_a_cycle_survives() -> None:
-    kept = holder_of_a_run()
-    run, watched = kept.run, weakref.ref(kept)
+    kept = Holder(run_of)
+    run, watched = kept.held, weakref.ref(kept)
     del kept
     for _ in range(3):
         gc.collect()

@@ -215,29 +215,6 @@ def test_a_joint_torque_at_rest_carries_the_weight():
         assert result.sensors[name].columns == ("torque [N m]",)
 
 
-def test_a_rotor_takes_its_share_of_the_torque():
-    """An armature J and a link of inertia I: the link gets tau I / (I + J)."""
-    model = models.empty(gravity=0.0)
-    link, rotor, tau = 0.3, 0.2, 5.0
-    inertia = pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.1, link]))
-    models.add_body(model, "wheel", pin.JointModelRZ(), inertia=inertia)
-    model.armature = np.array([rotor])
-    result = read(
-        sp.Scene(model),
-        [0.0],
-        lambda t, q, v, contacts: [tau],
-        [
-            sp.JointTorqueSensor(name="torque", joint="wheel_joint"),
-            sp.ForceTorqueSensor(name="wrench", frame="wheel_joint"),
-        ],
-        0.1,
-        control_dt=0.01,
-    )
-    expected = tau * link / (link + rotor)
-    assert np.allclose(result.sensors["torque"].values, expected, rtol=1e-12)
-    assert np.allclose(result.sensors["wrench"].values[:, 5], expected, rtol=1e-12)
-
-
 def test_a_force_plate_on_the_world():
     """A ball rests on a plate; the sensor is between the plate and the world."""
     urdf = """<robot name="plate"><link name="world"/>
@@ -322,8 +299,9 @@ def test_what_a_joint_adds_is_transmitted():
             effort={joint: 4.0},
         ),
     )
-    sensor = sp.JointTorqueSensor(name="torque", joint=joint, rate=200)
-    simulation = sp.Simulation(scene, sp.Adaptive(rtol=1e-9), [sensor])
+    torque = sp.JointTorqueSensor(name="torque", joint=joint, rate=200)
+    sensors = [torque, sensor(joint, rate=200)]
+    simulation = sp.Simulation(scene, sp.Adaptive(rtol=1e-9), sensors)
     result = simulation.run(
         [0.0], [1.0], 0.2, lambda t, q, v, contacts: [tau], control_dt=0.05, record_dt=1 / 200
     )
@@ -331,4 +309,5 @@ def test_what_a_joint_adds_is_transmitted():
     alpha = (4.0 - damping * result.v[:, 0] - friction) / (link + rotor)
     seen = result.sensors["torque"].values[:, 0]
     assert np.allclose(seen[20:], link * alpha[20:], rtol=1e-6)
+    assert np.allclose(result.sensors["wrist"].values[:, 5], seen, rtol=1e-12)
     assert result.stats.joints[joint].cut_time > 0.19

@@ -10,6 +10,7 @@ import sphshell_pin as sp
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import models
+from tests.results import assert_same_bits
 
 BALL = "ball_joint"
 
@@ -128,10 +129,7 @@ def test_sensors_do_not_change_the_motion(integrator):
             simulation = sp.Simulation(scene, integrator, some)
             results.append(simulation.run(models.ARM_Q, None, 0.1, controller, record_dt=record_dt))
         plain, measured = results[-2:]
-        assert np.array_equal(plain.q, measured.q)
-        assert np.array_equal(plain.v, measured.v)
-        assert np.array_equal(plain.contacts.contact_id, measured.contacts.contact_id)
-        assert np.array_equal(plain.energy.total, measured.energy.total)
+        assert_same_bits(plain, measured)
         assert plain.sensors == {}
     assert results[1].stats.pairs["ball-plate"].touches > 0
 
@@ -329,10 +327,7 @@ def test_an_unknown_sensor_is_named_in_a_controller():
         (lambda: slider(None, [torque(), torque()]), r"sensors\[1\].name = 'torque' is taken"),
         (lambda: slider(None, torque()), "must be a list of sensors"),
         (lambda: slider(None, ["wrist"]), r"sensors\[0\] = 'wrist' must be a sensor"),
-        (lambda: torque(rate=0), "rate = 0 must lie in"),
-        (lambda: torque(delay=-1), "delay = -1 must not be negative"),
         (lambda: torque(seed=1.5), "seed = 1.5 must be a whole number"),
-        (lambda: torque(range=0), "range = 0 must be positive"),
         (lambda: sp.ContactSwitch(name="a", threshold=1), "must be one of the two"),
         (
             lambda: sp.ContactSwitch(name="a", contact="b", threshold=1, release=2),

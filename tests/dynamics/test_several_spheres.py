@@ -8,7 +8,6 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.errors import FrameNotFound, InvalidParameter
 from tests import meshes, models
 
 R = 0.006
@@ -149,26 +148,6 @@ def test_names_tell_frames() -> None:
     assert [pair.name for pair in ball] == ["ball/other-0", "ball/other-1"]
     assert {pair.kind for pair in ball} == {"sphere-sphere"}
     assert scene.pairs == (*made, *ball)
-
-
-@pytest.mark.parametrize(
-    ("spheres", "what"),
-    [
-        ([], "spheres = .* must be spheres, one at least"),
-        (sp.Sphere(R, "ball"), "must be spheres, one at least"),
-        ([sp.Sphere(R, "ball"), "ball"], r"spheres\[1\] = 'ball' must be a Sphere"),
-    ],
-)
-def test_what_is_no_list_of_spheres_is_refused(spheres, what: str) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(InvalidParameter, match=what):
-        sp.Scene(models.ball()).add_contacts(spheres, models.plate(), law=LAW)
-
-
-def test_a_refused_entry_leaves_the_scene_as_it_was() -> None:
-    scene = sp.Scene(models.ball())
-    with pytest.raises(FrameNotFound, match="'hand'"):
-        scene.add_contacts([sp.Sphere(R, "ball"), sp.Sphere(R, "hand")], models.plate(), law=LAW)
-    assert scene.pairs == ()
 
 
 def test_they_are_explained_by_the_nearest() -> None:

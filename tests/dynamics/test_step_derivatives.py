@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import FrozenInstanceError
+from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -14,21 +15,22 @@ from numpy.typing import NDArray
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import differences, models
-from tests.dynamics.test_contact_derivatives import ARM_V, BRISTLES, FRICTIONS
-from tests.dynamics.test_dynamics_derivatives import (
+from tests.dynamics import scenes
+from tests.dynamics.scenes import (
     BRISTLE,
+    BRISTLES,
     COULOMB,
+    FRICTIONS,
     LAWS,
     STOPS,
-    arm_on,
     in_bowl,
+    in_touch,
     moving,
     stuck,
+    two_spheres,
 )
 from tests.dynamics.test_mimic import CASES as MIMIC
-from tests.dynamics.test_mimic import with_contact
-from tests.dynamics.test_two_spheres import in_touch, two_spheres
-from tests.models import ARM_Q, two_free_bodies, two_free_state
+from tests.models import two_free_bodies, two_free_state
 from tests.studies import mostly_studies
 
 Array = NDArray[np.float64]
@@ -51,12 +53,46 @@ def one_step(
     return run.q[-1], run.v[-1]
 
 
-def assert_step(
-    scene: sp.Scene, integrator: object, q: Array, v: Array, *, tolerance: float = 1e-6
-) -> sp.StepDerivatives:
+def assert_columns(
+    got: sp.StepDerivatives,
+    end: tuple[Array, Array],
+    moves: dict[str, differences.Move],
+    after: Callable[..., tuple[Array, Array]],
+    tolerance: float = 1e-6,
+) -> None:
     """Every column relative to its largest entry, positions and velocities apart."""
-    model = scene.model
-    nv = model.nv
+    nv = len(end[1])
+    known = differences.ROUNDING * np.array([1.0, max(1.0, float(np.abs(end[1]).max()))])
+    columns = {f"q.{k}": (got.by_state[:, k], 1e-2) for k in range(nv)}
+    columns |= {f"v.{k}": (got.by_state[:, nv + k], 1e-2 * DT) for k in range(nv)}
+    columns |= {f"tau.{k}": (got.by_tau[:, k], 0.0) for k in range(nv)}
+    # Along the surface a place may not matter, and rounding is that of the others.
+    places = [k for k, column in enumerate(got.parameters) if differences.is_place(column)]
+    among = 1e-2 * DT * float(np.abs(got.by_parameters[:, places]).max(initial=0.0))
+    for k, column in enumerate(got.parameters):
+        columns[column] = got.by_parameters[:, k], among if k in places else 0.0
+    wrong = {}
+    for (name, (column, floor)), part in product(columns.items(), (0, 1)):
+        moved, scale, ahead = moves[name]
+        # At its bound, 0, a number is differenced to one side.
+        bound = 10.0 * tolerance if ahead else tolerance
+        error = differences.off(
+            column[part * nv : (part + 1) * nv],
+            lambda x, moved=moved, part=part: after(*moved(x))[part],
+            scale,
+            floor=floor,
+            tolerance=bound,
+            known=float(known[part]),
+            ahead=ahead,
+        )
+        if not error <= bound:
+            wrong[f"{'qv'[part]} by {name}"] = error
+    assert not wrong
+
+
+def assert_step(scene: sp.Scene, integrator: object, q: Array, v: Array) -> sp.StepDerivatives:
+    """Compare the derivatives of a step with those of runs of one step."""
+    model, nv = scene.model, scene.model.nv
     tau = np.random.default_rng(1).normal(size=nv)
     names = differences.names_of(scene)
     got = sp.Simulation(scene, integrator).step_derivatives(q, v, tau, parameters=names)  # type: ignore[arg-type]
@@ -65,53 +101,14 @@ def assert_step(
     np.testing.assert_allclose(got.v, end[1], rtol=0, atol=1e-12 * abs(end[1]).max())
     assert got.by_state.shape == (2 * nv, 2 * nv)
     assert got.by_tau.shape == (2 * nv, nv)
-    depth = differences.depth_of(scene, q, v)
-    fast = max(float(np.abs(v).max(initial=0.0)), 1e-2)
+    columns = [column for name in names for column in differences.columns_of(name)]
+    assert list(got.parameters) == columns
 
-    def after(
-        scene: sp.Scene = scene, q: Array = q, v: Array = v, tau: Array = tau
-    ) -> tuple[Array, Array]:
+    def after(scene: sp.Scene, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
         q, v = one_step(scene, integrator, q, v, tau)
         return np.asarray(pin.difference(model, end[0], q)), v - end[1]
 
-    columns = [column for name in names for column in differences.columns_of(name)]
-    assert list(got.parameters) == columns
-    # How well both are known: positions to eps times their size, over what a column changes.
-    known = differences.ROUNDING * np.array([1.0, max(1.0, float(np.abs(end[1]).max()))])
-    eye, errors = np.eye(nv), {}
-
-    def bound(name: str) -> float:
-        # At its bound, 0, a number is differenced to one side.
-        at_bound = name in columns and differences.scale_of(scene, name, depth)[1]
-        return 10.0 * tolerance if at_bound else tolerance
-
-    def check(name: str, column: Array, f: Callable[[float], tuple[Array, Array]], **more) -> None:  # type: ignore[no-untyped-def]
-        for part, rows in enumerate((slice(0, nv), slice(nv, 2 * nv))):
-            errors[f"{'qv'[part]} by {name}"] = differences.off(
-                column[rows],
-                lambda x, part=part: f(x)[part],
-                tolerance=bound(name),
-                known=float(known[part]),
-                **more,
-            )
-
-    floor = 1e-2
-    for k, e in enumerate(eye):
-        by_q, by_v = got.by_state[:, k], got.by_state[:, nv + k]
-        move = lambda x, e=e: after(q=pin.integrate(model, q, x * e))  # noqa: E731
-        check(f"q{k}", by_q, move, scale=depth, floor=floor)
-        check(f"v{k}", by_v, lambda x, e=e: after(v=v + x * e), scale=fast, floor=floor * DT)
-        check(f"tau{k}", got.by_tau[:, k], lambda x, e=e: after(tau=tau + x * e), scale=1e3)
-    # Along the surface a place may not matter, and rounding is that of the others.
-    places = [k for k, column in enumerate(columns) if differences.is_place(column)]
-    among = 1e-2 * float(np.abs(got.by_parameters[:, places]).max(initial=0.0))
-    for k, column in enumerate(columns):
-        size = DT * among if k in places else 0.0
-        scale, ahead = differences.scale_of(scene, column, depth)
-        f = lambda x, c=column: after(scene=differences.changed(scene, c, x))  # noqa: E731
-        check(column, got.by_parameters[:, k], f, scale=scale, ahead=ahead, floor=size)
-    wrong = {name: error for name, error in errors.items() if not error <= bound(name[5:])}
-    assert not wrong
+    assert_columns(got, end, differences.moves(scene, q, v, tau), after)
     return got
 
 
@@ -129,34 +126,19 @@ def test_a_touching_step(make, law: str, stepper: str) -> None:  # type: ignore[
     assert_step(scene, STEPPERS[stepper], q, v)
 
 
-@every_stepper
-@pytest.mark.parametrize("friction", BRISTLES)
-def test_bristles_are_stretched_within_the_step(friction: str, stepper: str) -> None:
-    scene, q, v = in_bowl(LAWS["impact"], FRICTIONS[friction])
-    assert_step(scene, STEPPERS[stepper], q, v)
+SCENES = {friction: partial(in_bowl, LAWS["impact"], FRICTIONS[friction]) for friction in BRISTLES}
+SCENES |= {name: partial(scenes.mimicking, name) for name in MIMIC}
+SCENES |= {
+    "two spheres": lambda: (two_spheres(LAWS["impact"], COULOMB), *in_touch(3)),
+    "joint components": partial(in_bowl, LAWS["impact"], COULOMB, joints=STOPS),
+}
 
 
 @every_stepper
-def test_two_spheres(stepper: str) -> None:
-    scene = two_spheres(LAWS["impact"], COULOMB)
-    assert_step(scene, STEPPERS[stepper], *in_touch(3))
-
-
-@every_stepper
-def test_joint_components(stepper: str) -> None:
-    scene, q, v = in_bowl(LAWS["impact"], COULOMB, joints=STOPS)
-    assert_step(scene, STEPPERS[stepper], q, v)
-
-
-@every_stepper
-@pytest.mark.parametrize("name", mostly_studies(MIMIC, lambda name: name != "panda"))
-def test_mimic_joints(name: str, stepper: str) -> None:
-    make, tip, other = MIMIC[name]
-    scene = with_contact(make()[0], tip, other)
-    # Less deep than half a radius.
-    scene = differences.changed(scene, f"{scene.pairs[0].name}.placement.vz", -0.45)
-    rng, nv = np.random.default_rng(3), scene.model.nv
-    q, v = rng.uniform(-0.3, 0.3, scene.model.nq), 0.1 * rng.normal(size=nv)
+@pytest.mark.parametrize("name", mostly_studies(SCENES, lambda name: name != "panda"))
+def test_a_step_of_other_scenes(name: str, stepper: str) -> None:
+    """Bristles are stretched within the step."""
+    scene, q, v = SCENES[name]()
     assert len(scene.contacts(q, v)) == 1
     assert_step(scene, STEPPERS[stepper], q, v)
 
@@ -220,28 +202,17 @@ def test_a_state_with_bristles() -> None:
     names = [name for name in differences.names_of(scene) if name.endswith(".stiffness")]
     got = simulation.step_derivatives(q, v, tau, parameters=names, state=state)
 
-    def after(q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+    def after(scene: sp.Scene, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
         v = v + DT * differences.acceleration(scene, q, v, tau, state)
         return np.asarray(pin.integrate(model, q, DT * v)), v
 
-    end = after(q, v, tau)
+    end = after(scene, q, v, tau)
     np.testing.assert_allclose(got.q, end[0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(got.v, end[1], rtol=0, atol=1e-12)
     without = simulation.step_derivatives(q, v, tau)
     assert np.abs(without.v - got.v).max() > 1e-5
-    for k, e in enumerate(np.eye(3)):
-        moves = {
-            "q": (got.by_state[:, k], lambda x, e=e: after(q + x * e, v, tau), 5e-3),
-            "v": (got.by_state[:, 3 + k], lambda x, e=e: after(q, v + x * e, tau), 0.01),
-            "tau": (got.by_tau[:, k], lambda x, e=e: after(q, v, tau + x * e), 1e3),
-        }
-        for column, f, scale in moves.values():
-            for part, rows in enumerate((slice(0, 3), slice(3, 6))):
-                one = lambda x, f=f, part=part: f(x)[part] - end[part]  # noqa: E731
-                error = differences.off(
-                    column[rows], one, scale, floor=1e-2 * DT, known=differences.ROUNDING
-                )
-                assert error <= 1e-6
+    by_state = replace(got, parameters=())
+    assert_columns(by_state, end, differences.moves(scene, q, v, tau), after)
     # One evaluation a step: the velocity changes by dt times the accelerations.
     step = DT * scene.dynamics_derivatives(q, v, tau, parameters=names, state=state).by_parameters
     size = np.abs(step).max(axis=0)
@@ -252,7 +223,7 @@ def test_a_state_with_bristles() -> None:
 def test_matrices_of_steps_in_a_row_are_those_of_a_run() -> None:
     """The product over ten steps, against differences of a run of ten steps."""
     scene, q, v = in_bowl(LAWS["impact"], COULOMB)
-    model, zero, count = scene.model, np.zeros(3), 10
+    zero, count = np.zeros(3), 10
     for integrator in STEPPERS.values():
         simulation = sp.Simulation(scene, integrator)
         whole, at, speed = np.eye(6), q, v
@@ -264,38 +235,27 @@ def test_matrices_of_steps_in_a_row_are_those_of_a_run() -> None:
             run = simulation.run(q, v, count * DT, lambda *_: zero)
             return np.r_[run.q[-1], run.v[-1]]
 
-        for k, e in enumerate(np.eye(3)):
-            start = end(q, v)
-            by_q = lambda x, e=e, s=start: end(pin.integrate(model, q, x * e), v) - s  # noqa: E731
-            by_v = lambda x, e=e, s=start: end(q, v + x * e) - s  # noqa: E731
-            for column, f, scale in ((k, by_q, 5e-3), (3 + k, by_v, 0.4)):
-                known = differences.ROUNDING
-                assert differences.off(whole[:, column], f, scale, known=known) <= 1e-6
-
-
-@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.Implicit()], ids=["adaptive", "implicit"])
-def test_an_integrator_of_variable_step_is_refused(integrator: object) -> None:
-    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
-    with pytest.raises(InvalidParameter, match="SemiImplicitEuler"):
-        sp.Simulation(scene, integrator).step_derivatives(q, v)  # type: ignore[arg-type]
+        start, moves = end(q, v), differences.moves(scene, q, v)
+        for column, name in enumerate(f"{half}.{k}" for half in "qv" for k in range(3)):
+            moved, scale, _ = moves[name]
+            f = lambda x, moved=moved, start=start, end=end: end(*moved(x)[1:3]) - start  # noqa: E731
+            assert differences.off(whole[:, column], f, scale, known=differences.ROUNDING) <= 1e-6
 
 
 def test_bad_input() -> None:
+    """Names, states and results are those of `dynamics_derivatives`."""
     scene, q, v = in_bowl(LAWS["impact"], COULOMB)
-    simulation = sp.Simulation(scene, sp.RungeKutta4(DT))
-    with pytest.raises(NameNotFound, match=r"tip\.law\.stiffness"):
-        simulation.step_derivatives(q, v, parameters=["tip.law.stifness"])
-    with pytest.raises(NameNotFound):
-        simulation.step_derivatives(q, v, parameters=["v0"])
-    with pytest.raises(InvalidParameter, match=r"tip\.law\.stiffness"):
-        simulation.step_derivatives(q, v, parameters=["tip.law.stiffness"] * 2)
-    with pytest.raises(InvalidParameter, match="tau"):
-        simulation.step_derivatives(q, v, np.zeros(2))
-    with pytest.raises(InvalidParameter, match="v = "):
-        simulation.step_derivatives(q, np.zeros(4))
-    other, *_ = arm_on(models.plate(), np.zeros(3), np.eye(3)[2], LAWS["impact"], BRISTLE)
-    with pytest.raises(InvalidParameter, match="state of this scene"):
-        simulation.step_derivatives(q, v, state=other.state(ARM_Q, ARM_V))
-    got = simulation.step_derivatives(q, v)
-    with pytest.raises(FrozenInstanceError):
-        got.by_tau = got.by_state  # type: ignore[misc]
+    for integrator in (sp.Adaptive(), sp.Implicit()):
+        with pytest.raises(InvalidParameter, match="SemiImplicitEuler"):
+            sp.Simulation(scene, integrator).step_derivatives(q, v)
+    step = sp.Simulation(scene, sp.RungeKutta4(DT)).step_derivatives
+    other, *state = scenes.on_plate(LAWS["impact"], BRISTLE)
+    for call, error, said in (
+        (lambda: step(q, v, parameters=["tip.law.stifness"]), NameNotFound, r"law\.stiffness"),
+        (lambda: step(q, v, parameters=["tip.law.stiffness"] * 2), InvalidParameter, "twice"),
+        (lambda: step(q, v, np.zeros(2)), InvalidParameter, "tau"),
+        (lambda: step(q, np.zeros(4)), InvalidParameter, "v has shape"),
+        (lambda: step(q, v, state=other.state(*state)), InvalidParameter, "state of this scene"),
+    ):
+        with pytest.raises(error, match=said):
+            call()

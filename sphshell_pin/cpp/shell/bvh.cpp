@@ -3,6 +3,7 @@
 #include <coal/BVH/BVH_model.h>
 
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 
 namespace sphshell {
@@ -48,53 +49,32 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     if (!source(i).isLeaf()) size[i] = size[source(i).leftChild()] + size[source(i).rightChild()];
   order.clear();
   order.reserve(triangles.size());
-  std::vector<int> stack;
-  // Appends the triangles of a subtree to `order`, from left to right.
-  const auto make_leaf = [&](int root) {
-    const int first = static_cast<int>(order.size());
-    stack.assign(1, root);
-    while (!stack.empty()) {
-      const auto& node = source(stack.back());
-      stack.pop_back();
-      if (node.isLeaf()) {
-        order.push_back(node.primitiveId());
-      } else {
-        stack.push_back(node.rightChild());
-        stack.push_back(node.leftChild());
-      }
-    }
-    return leaf(first, static_cast<int>(order.size()) - first);
+  // From left to right; walks have a stack of fixed size, and so have these functions.
+  const std::function<void(int)> add_triangles = [&](int at) {
+    const auto& node = source(at);
+    if (node.isLeaf()) return order.push_back(node.primitiveId());
+    add_triangles(node.leftChild()), add_triangles(node.rightChild());
   };
-  if (size[0] <= kLeafSize) {
-    root_.child[0] = make_leaf(0);
-    return;
-  }
-  nodes_.reserve(triangles.size() / 2);
-  struct Task {
-    int source, parent, side, depth;
-  };
-  // Depth first with a stack of its own: degenerate trees are deep.
-  std::vector<Task> tasks{{0, -1, 0, 0}};
-  while (!tasks.empty()) {
-    const Task task = tasks.back();
-    tasks.pop_back();
-    int id;
-    if (size[task.source] <= kLeafSize) {
-      id = make_leaf(task.source);
-    } else {
-      // Walks have a stack of fixed size.
-      if (task.depth + 2 >= kMaxDepth)
-        throw std::length_error("the bounding-box tree of the shell is too deep");
-      const auto& node = source(task.source);
-      id = static_cast<int>(nodes_.size());
-      nodes_.emplace_back();
-      store(nodes_[id], 0, source(node.leftChild()).bv);
-      store(nodes_[id], 1, source(node.rightChild()).bv);
-      tasks.push_back({node.rightChild(), id, 1, task.depth + 1});
-      tasks.push_back({node.leftChild(), id, 0, task.depth + 1});
+  const std::function<int(int, int)> add = [&](int at, int depth) {
+    if (size[at] <= kLeafSize) {
+      add_triangles(at);
+      return leaf(static_cast<int>(order.size()) - size[at], size[at]);
     }
-    if (task.parent >= 0) nodes_[task.parent].child[task.side] = id;
-  }
+    if (depth + 2 >= kMaxDepth)
+      throw std::length_error("the bounding-box tree of the shell is too deep");
+    const auto& node = source(at);
+    const int id = static_cast<int>(nodes_.size()),
+              child[2] = {node.leftChild(), node.rightChild()};
+    nodes_.emplace_back();
+    for (int side = 0; side < 2; ++side) {
+      store(nodes_[id], side, source(child[side]).bv);
+      const int added = add(child[side], depth + 1);
+      nodes_[id].child[side] = added;
+    }
+    return id;
+  };
+  nodes_.reserve(size[0] > kLeafSize ? triangles.size() / 2 : 0);
+  root_.child[0] = add(0, 0);
   nodes_.shrink_to_fit();
 }
 

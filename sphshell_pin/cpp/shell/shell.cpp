@@ -1,7 +1,6 @@
 #include "shell/shell.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -100,13 +99,10 @@ double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tang
     double turn, x, y;
     bool operator<(const Bearing& other) const { return turn < other.turn; }
   };
-  constexpr std::size_t kUsual = 16;
-  std::array<Bearing, kUsual> usual;
-  std::vector<Bearing> many;
+  thread_local std::vector<Bearing> bearing;
   const int begin = topology_.neighbor_begin[vertex], end = topology_.neighbor_begin[vertex + 1];
   const auto count = static_cast<std::size_t>(end - begin);
-  if (count > kUsual) many.resize(count);
-  Bearing* const bearing = count > kUsual ? many.data() : usual.data();
+  bearing.resize(count);
   double rise = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const int at = begin + static_cast<int>(i);
@@ -121,7 +117,7 @@ double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tang
     const double across = x / (std::abs(x) + std::abs(y));
     bearing[i] = {y >= 0 ? 1 - across : 3 + across, x, y};
   }
-  std::sort(bearing, bearing + count);
+  std::sort(bearing.begin(), bearing.end());
   double least = 1;  // cosine of the widest gap
   for (std::size_t i = 0; i < count; ++i) {
     const Bearing& here = bearing[i];
@@ -187,7 +183,7 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   if (at.feature >= 4) {
     normal = topology_.vertex_normal[triangles_[t][at.feature - 4]];
   } else if (at.feature >= 1) {
-    normal = topology_.edge_normal(topology_.edges[topology_.edge_of[3 * t + at.feature - 1]]);
+    normal = topology_.edge_normal(topology_.edge_at(3 * t + at.feature - 1));
   }
   const double length = normal.norm();
   normal = length > 1e-9 ? Vec3(normal / length) : facet.normal;

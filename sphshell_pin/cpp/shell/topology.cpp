@@ -121,11 +121,6 @@ void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Tri
   }
 }
 
-// In [0, pi], accurate at both ends.
-double angle_between(const Vec3& m, const Vec3& n) {
-  return std::atan2(m.cross(n).norm(), m.dot(n));
-}
-
 // Kinds of edges that are not boundaries: not manifold, or smooth or a crease by the angle, within
 // CAD faces by their normals.
 void classify_edges(const std::vector<Triangle>& triangles, double crease_angle,
@@ -193,8 +188,7 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
       const Vec3 b = vertices[triangles[t][previous_corner(k)]] - p;
       // Weighted with the angle at the vertex, so that the sum does not depend on the
       // triangulation.
-      out.vertex_normal[triangles[t][k]] +=
-          std::atan2(a.cross(b).norm(), a.dot(b)) * out.face_normal[t];
+      out.vertex_normal[triangles[t][k]] += angle_between(a, b) * out.face_normal[t];
     }
 }
 
@@ -203,13 +197,12 @@ void find_pinches(std::size_t vertices, const std::vector<Triangle>& triangles, 
   const int corners = static_cast<int>(3 * triangles.size());
   DisjointSets fans(corners), pieces(triangles.size());
   const auto vertex = [&](int c) { return triangles[triangle_of(c)][side_of(c)]; };
-  const auto after = [](int c) { return c - side_of(c) + next_corner(side_of(c)); };
   for (const Edge& edge : out.edges)
     for (int i = edge.begin + 1; i < edge.begin + edge.count; ++i) {
       const int h = out.incidence[edge.begin], g = out.incidence[i];
       const bool opposed = vertex(h) != vertex(g);
-      fans.merge(h, opposed ? after(g) : g);
-      fans.merge(after(h), opposed ? g : after(g));
+      fans.merge(h, opposed ? corner_after(g) : g);
+      fans.merge(corner_after(h), opposed ? g : corner_after(g));
     }
   // The first corner of a fan stands for it: a vertex with two of those is pinched.
   std::vector<char> fans_at(vertices, 0);
@@ -263,12 +256,11 @@ const Pinch* Topology::pinch_at(int vertex) const {
 // Within a face of CAD everything is smooth; between two where their normals are the same at both
 // ends.
 bool CadFaces::smooth(int h, int g) const {
-  const int t = triangle_of(h), u = triangle_of(g);
-  if (face[t] == face[u]) return true;
+  if (face[triangle_of(h)] == face[triangle_of(g)]) return true;
   const auto same = [&](int i, int j) {
     return (normals[i] - normals[j]).squaredNorm() < kEqualNormals * kEqualNormals;
   };
-  return same(h, 3 * u + next_corner(side_of(g))) && same(3 * t + next_corner(side_of(h)), g);
+  return same(h, corner_after(g)) && same(corner_after(h), g);
 }
 
 Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,

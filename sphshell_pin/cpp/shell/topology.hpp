@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -16,6 +17,11 @@ using Triangle = std::array<int, 3>;
 Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
                            const std::vector<Triangle>& triangles);
 
+// In [0, pi], accurate at both ends, where acos is not.
+inline double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
 enum class EdgeClass : std::uint8_t { Smooth = 0, Crease = 1, Boundary = 2, NonManifold = 3 };
 
 // A half-edge is one side k (corner k to corner k+1) of a triangle t, numbered 3 t + k.
@@ -23,6 +29,9 @@ inline int triangle_of(int half_edge) { return half_edge / 3; }
 inline int side_of(int half_edge) { return half_edge % 3; }
 inline int next_corner(int k) { return k == 2 ? 0 : k + 1; }
 inline int previous_corner(int k) { return k == 0 ? 2 : k - 1; }
+// The corner after this one (3 triangle + k), in the same triangle, and the one before.
+inline int corner_after(int c) { return 3 * triangle_of(c) + next_corner(side_of(c)); }
+inline int corner_before(int c) { return 3 * triangle_of(c) + previous_corner(side_of(c)); }
 
 struct Edge {
   int first_vertex, last_vertex;  // first < last
@@ -71,9 +80,11 @@ struct Topology {
   // Null of a vertex that is none.
   const Pinch* pinch_at(int vertex) const;
 
-  // Of an edge with two half-edges, the one that is not h.
-  int other_half_edge(const Edge& edge, int h) const {
-    return incidence[edge.begin + (incidence[edge.begin] == h ? 1 : 0)];
+  const Edge& edge_at(int half_edge) const { return edges[edge_of[half_edge]]; }
+  // The other one of an edge with two half-edges, else -1.
+  int other_half_edge(int h) const {
+    const Edge& edge = edge_at(h);
+    return edge.count != 2 ? -1 : incidence[edge.begin + (incidence[edge.begin] == h ? 1 : 0)];
   }
 
   // Pseudo-normal of an edge, not of unit length: the sum of its triangles' normals.

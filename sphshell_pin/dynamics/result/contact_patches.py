@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import read_only
 from sphshell_pin.errors import InvalidParameter
 
 RECORDED = ("patch", "torque")
@@ -31,11 +30,6 @@ def check_record(record: Collection[str]) -> frozenset[str]:
             valid = " or ".join(f"'{one}'" for one in RECORDED)
             raise InvalidParameter("record", name, f"must be {valid}")
     return frozenset(record)
-
-
-def patches_of(rows: NDArray[np.uint8]) -> Patches:
-    """Return the patches in the memory of the core's rows, read-only."""
-    return read_only(np.frombuffer(rows, PATCH))
 
 
 def patch_columns(patches: Patches) -> dict[str, NDArray[np.float64]]:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import read_only
-from sphshell_pin.dynamics.result.contact_patches import Patches, patches_of
+from sphshell_pin.dynamics.result import result_columns
+from sphshell_pin.dynamics.result.contact_patches import PATCH, Patches
 from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event, Origin
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene.joint_components import moving_joints
@@ -98,22 +99,21 @@ class Result(Summarized):
         return None if rows is None else replace(rows, result=self)
 
     @classmethod
-    def _from_blocks(
+    def _from_record(
         cls,
-        blocks: list[Columns],
+        whole: Columns,
         pairs: tuple[str, ...],
         stats: RunStats,
         scene: Scene,
         sensors: SensorSet,
     ) -> Result:
-        """Join the core's blocks of recorded rows."""
-        whole = {k: np.concatenate([b[k] for b in blocks]) for k in blocks[0]}
+        """Build from the rows that the core has recorded."""
         row = whole["contact_row"].astype(np.int64)
         log = {**columns(whole["contacts"]), "t": whole["t"][row], "row": row}
         energy = {
             f.name: read_only(whole["energy"][:, i]) for i, f in enumerate(fields(EnergyAudit))
         }
-        owners = _owners(pairs, scene)
+        owners, patches = _owners(pairs, scene), whole.get("patches")
         events = tuple(
             Event(float(t), owners[EVENT_KINDS[kind]][number], EVENT_KINDS[kind])
             for t, number, kind in zip(
@@ -131,7 +131,7 @@ class Result(Summarized):
             stats=stats,
             scene=scene,
             sensors=sensors.logs(whole),
-            patch_rows=patches_of(whole["patches"]) if "patches" in whole else None,
+            patch_rows=None if patches is None else read_only(np.frombuffer(patches, PATCH)),
             torque=read_only(whole["torques"]) if "torques" in whole else None,
         )
 
@@ -194,27 +194,19 @@ class Result(Summarized):
         and the largest depth, zero without contact. `scene` names the joints (default: the one that
         ran); without any, coordinates are q.0, q.1, ... without units.
         """
-        from sphshell_pin.dynamics.result.result_columns import row_columns
-
-        return row_columns(self, self.scene if scene is None else scene)
+        return result_columns.row_columns(self, self.scene if scene is None else scene)
 
     def contact_columns(self) -> dict[str, ArrayLike]:
         """Return the contact log as named scalar columns, units in the names (for CSV, tables)."""
-        from sphshell_pin.dynamics.result.result_columns import contact_columns
-
-        return contact_columns(self)
+        return result_columns.contact_columns(self)
 
     def event_columns(self) -> dict[str, ArrayLike]:
         """Return the events as named columns (for CSV, tables)."""
-        from sphshell_pin.dynamics.result.result_columns import event_columns
-
-        return event_columns(self)
+        return result_columns.event_columns(self)
 
     def energy_columns(self) -> dict[str, Array]:
         """Return the energy audit, and its residual, as named columns (for CSV, tables)."""
-        from sphshell_pin.dynamics.result.result_columns import energy_columns
-
-        return energy_columns(self)
+        return result_columns.energy_columns(self)
 
     def sensor_columns(self) -> dict[str, Array]:
         """Return the readings of all sensors as columns, units in the names (for CSV, tables).

@@ -29,7 +29,7 @@ from sphshell_pin.dynamics.result.contact_patches import PATCH
 from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event, Kept, Origin
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.run.sensitivities import Sensitivities
-from sphshell_pin.dynamics.scene.scene_contacts import Columns
+from sphshell_pin.dynamics.scene.scene_contacts import ROW, Columns
 from sphshell_pin.dynamics.sensing.sensor_log import joined_logs, split_logs
 from sphshell_pin.errors import ResultError
 
@@ -43,67 +43,48 @@ _Announced = tuple[np.dtype[np.generic], tuple[int, ...]]
 
 FLOAT, INT, LONG, BYTE = (np.dtype(one) for one in ("f8", "i4", "i8", "u1"))
 
+
+def _of_type(part: str, table: np.dtype[np.void]) -> dict[str, Kind]:
+    """Return the columns of a structured type, m entries each."""
+    fields = {name: table[name] for name in table.names or ()}
+    return {f"{part}.{name}": (one.base, ("m", *one.shape)) for name, one in fields.items()}
+
+
 ARRAYS: dict[str, Kind] = {
     "t": (FLOAT, ("n",)),
     "q": (FLOAT, ("n", "nq")),
     "v": (FLOAT, ("n", "nv")),
-    "contacts.pair": (INT, ("m",)),
-    "contacts.point_world": (FLOAT, ("m", 3)),
-    "contacts.normal_world": (FLOAT, ("m", 3)),
-    "contacts.depth": (FLOAT, ("m",)),
-    "contacts.normal_force": (FLOAT, ("m",)),
-    "contacts.friction_force_world": (FLOAT, ("m", 3)),
-    "contacts.slip_velocity_world": (FLOAT, ("m", 3)),
-    "contacts.element": (INT, ("m",)),
-    "contacts.feature": (BYTE, ("m",)),
-    "contacts.contact_id": (INT, ("m",)),
+    **_of_type("contacts", ROW),
     "contacts.t": (FLOAT, ("m",)),
     "contacts.row": (LONG, ("m",)),
-    "energy.kinetic": (FLOAT, ("n",)),
-    "energy.potential": (FLOAT, ("n",)),
-    "energy.elastic": (FLOAT, ("n",)),
-    "energy.damping_loss": (FLOAT, ("n",)),
-    "energy.friction_loss": (FLOAT, ("n",)),
-    "energy.control_work": (FLOAT, ("n",)),
+    **{f"energy.{one.name}": (FLOAT, ("n",)) for one in fields(EnergyAudit)},
 }
 """By name: the numbers of an array and its shape; a size of the same name is the same in all."""
 
-SENSOR_ARRAYS: dict[str, Kind] = {
-    "sensors.sensor": (INT, ("s",)),
-    "sensors.t": (FLOAT, ("s",)),
-    "sensors.sampled": (FLOAT, ("s",)),
-    "sensors.values": (FLOAT, ("w",)),
+OPTIONAL: dict[str, dict[str, Kind]] = {
+    "sensors": {
+        "sensors.sensor": (INT, ("s",)),
+        "sensors.t": (FLOAT, ("s",)),
+        "sensors.sampled": (FLOAT, ("s",)),
+        "sensors.values": (FLOAT, ("w",)),
+    },
+    "patches": _of_type("patches", PATCH),
+    "sensitivities": {
+        "sensitivities.q": (FLOAT, ("n", "nv", "p")),
+        "sensitivities.v": (FLOAT, ("n", "nv", "p")),
+        "sensitivities.force_world": (FLOAT, ("m", 3, "p")),
+        "sensitivities.normal_force": (FLOAT, ("m", "p")),
+        "sensitivities.depth": (FLOAT, ("m", "p")),
+    },
+    "torque": {"torque": (FLOAT, ("n", "nv"))},
 }
-"""The same of a run with sensors; other files have none of them."""
-
-PATCH_ARRAYS: dict[str, Kind] = {
-    "patches.half_axes": (FLOAT, ("m", 2)),
-    "patches.axis_world": (FLOAT, ("m", 3)),
-    "patches.peak_pressure": (FLOAT, ("m",)),
-    "patches.mean_pressure": (FLOAT, ("m",)),
-    "patches.approach": (FLOAT, ("m",)),
-}
-"""The same of a run that recorded patches."""
-
-SENSITIVITY_ARRAYS: dict[str, Kind] = {
-    "sensitivities.q": (FLOAT, ("n", "nv", "p")),
-    "sensitivities.v": (FLOAT, ("n", "nv", "p")),
-    "sensitivities.force_world": (FLOAT, ("m", 3, "p")),
-    "sensitivities.normal_force": (FLOAT, ("m", "p")),
-    "sensitivities.depth": (FLOAT, ("m", "p")),
-}
-"""The same of a run that recorded its derivatives; the header names their p columns."""
-
-TORQUE_ARRAYS: dict[str, Kind] = {
-    "torque": (FLOAT, ("n", "nv")),
-}
-"""The same of a run that recorded the controller's torques."""
+"""The same of runs that recorded more; other files have none of a group. The header names the p
+columns of sensitivities."""
 
 KEPT = "kept."
 """Begins the names of the arrays of `Origin.keep`."""
 
-_OPTIONAL = SENSOR_ARRAYS | PATCH_ARRAYS | SENSITIVITY_ARRAYS | TORQUE_ARRAYS
-_IN_FILE = {name: name for name in ARRAYS | _OPTIONAL}
+_IN_FILE = {name: name for part in (ARRAYS, *OPTIONAL.values()) for name in part}
 _IN_FILE["contacts.contact_id"] = "contacts.number"
 _KEPT_KINDS = (FLOAT, INT, BYTE, np.dtype(bool))
 
@@ -166,16 +147,15 @@ def save_result(result: Result, path: Path, home: str | PathLike[str] | None) ->
     }
     if result.sensors:
         header["sensors"] = {name: log.columns for name, log in result.sensors.items()}
-        arrays |= dict(zip(SENSOR_ARRAYS, joined_logs(result.sensors), strict=True))
+        arrays |= dict(zip(OPTIONAL["sensors"], joined_logs(result.sensors), strict=True))
     if result.patch_rows is not None:
-        for name in PATCH_ARRAYS:
-            arrays[name] = result.patch_rows[name.removeprefix("patches.")]
+        arrays |= {f"patches.{name}": result.patch_rows[name] for name in PATCH.names or ()}
     if result.torque is not None:
         arrays["torque"] = result.torque
     rows = result.sensitivity_rows
     if rows is not None:
         header["sensitivities"] = rows.parameters
-        for name in SENSITIVITY_ARRAYS:
+        for name in OPTIONAL["sensitivities"]:
             arrays[name] = getattr(rows, name.removeprefix("sensitivities."))
     _write(path, header, arrays)
     return path
@@ -218,24 +198,25 @@ def _write(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
 def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) -> Result:
     """See Result.load; `kind` is Result, of which this module knows nothing else."""
     header, arrays = _read_file(path, max_size)
-    log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
-    energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
+
+    def part(name: str) -> Columns:
+        """Return the arrays of one part, by the names of its fields."""
+        return {k.removeprefix(name): a for k, a in arrays.items() if k.startswith(name)}
+
     patches = None
-    if "patches.approach" in arrays:
-        patches = np.empty(len(log["row"]), PATCH)
-        for name in PATCH.names or ():
-            patches[name] = arrays[f"patches.{name}"]
+    if columns := part("patches."):
+        patches = np.empty(len(arrays["contacts.row"]), PATCH)
+        for name, column in columns.items():
+            patches[name] = column
         read_only(patches)
     sensitivities = None
-    if "sensitivities.q" in arrays:
-        rows = {name.removeprefix("sensitivities."): arrays[name] for name in SENSITIVITY_ARRAYS}
-        sensitivities = Sensitivities(tuple(header.sensitivities), **rows, result=None)
+    if columns := part("sensitivities."):
+        sensitivities = Sensitivities(tuple(header.sensitivities), **columns, result=None)
     origin = None
     if header.origin is not None:
         keep = None
         if header.origin.kept is not None:
-            inside = {k.removeprefix(KEPT): v for k, v in arrays.items() if k.startswith(KEPT)}
-            keep = partial(Kept, header.origin.kept, inside)
+            keep = partial(Kept, header.origin.kept, part(KEPT))
         scenario = header.origin.found_from(Path(path).parent)
         origin = Origin(scenario, header.origin.settings, keep)
     return kind(
@@ -243,14 +224,14 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
         q=arrays["q"],
         v=arrays["v"],
         pairs=tuple(header.pairs),
-        contacts=ContactLog(**log),
+        contacts=ContactLog(**part("contacts.")),
         events=tuple(Event(*e) for e in header.events),
-        energy=EnergyAudit(**energy),
+        energy=EnergyAudit(**part("energy.")),
         stats=header.stats,
         origin=origin,
         sensors=split_logs(
             {name: tuple(columns) for name, columns in header.sensors.items()},
-            *(arrays[name] for name in SENSOR_ARRAYS),
+            *(arrays[name] for name in OPTIONAL["sensors"]),
         )
         if header.sensors
         else {},
@@ -311,15 +292,8 @@ def _read(
 
 def _wanted(names: Collection[str]) -> Mapping[str, Kind]:
     """Return the arrays that a file must have that has those called `names`."""
-    found = dict(ARRAYS)
-    for part, owner in (
-        (SENSOR_ARRAYS, "sensors.t"),
-        (PATCH_ARRAYS, "patches.approach"),
-        (TORQUE_ARRAYS, "torque"),
-        (SENSITIVITY_ARRAYS, "sensitivities.q"),
-    ):
-        found |= part if owner in names else {}
-    return found
+    parts = [part for part in OPTIONAL.values() if not part.keys().isdisjoint(names)]
+    return {name: kind for part in (ARRAYS, *parts) for name, kind in part.items()}
 
 
 def _check_kinds(announced: Mapping[str, _Announced], wanted: Mapping[str, Kind]) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from sphshell_pin.deprecation import FormerDict
@@ -79,32 +79,26 @@ class JointFigures:
     peak_speed: float = 0.0
     first_too_fast: float | None = None
 
-    def with_stop(self, sums: Mapping[str, float]) -> JointFigures:
-        """Return these with what the core adds up at one more stop."""
-        return replace(
-            self,
-            stop_time=self.stop_time + sums["contact_time"],
-            stops=self.stops + int(sums["touches"]),
-            stop_impulse=self.stop_impulse + sums["impulse"],
-            peak_stop_force=max(self.peak_stop_force, sums["peak_force"]),
-            max_stop_depth=max(self.max_stop_depth, sums["max_depth"]),
+    @classmethod
+    def from_core(
+        cls, stops: Sequence[Mapping[str, float]], limits: Sequence[Mapping[str, float]]
+    ) -> JointFigures:
+        """Build from what the core adds up at the stops of a joint, and of its velocities."""
+
+        def first(name: str) -> float | None:
+            return min((one[name] for one in limits if one[name] >= 0), default=None)
+
+        return cls(
+            stop_time=sum(one["contact_time"] for one in stops),
+            stops=int(sum(one["touches"] for one in stops)),
+            stop_impulse=sum(one["impulse"] for one in stops),
+            peak_stop_force=max((one["peak_force"] for one in stops), default=0.0),
+            max_stop_depth=max((one["max_depth"] for one in stops), default=0.0),
+            cut_time=max((one["cut_time"] for one in limits), default=0.0),
+            first_cut=first("first_cut"),
+            peak_speed=max((one["peak_speed"] for one in limits), default=0.0),
+            first_too_fast=first("first_too_fast"),
         )
-
-    def with_limit(self, sums: Mapping[str, float]) -> JointFigures:
-        """Return these with what the core adds up of one more velocity."""
-        return replace(
-            self,
-            cut_time=max(self.cut_time, sums["cut_time"]),
-            first_cut=_earlier(self.first_cut, sums["first_cut"]),
-            peak_speed=max(self.peak_speed, sums["peak_speed"]),
-            first_too_fast=_earlier(self.first_too_fast, sums["first_too_fast"]),
-        )
-
-
-def _earlier(known: float | None, new: float) -> float | None:
-    if new < 0:
-        return known
-    return new if known is None else min(known, new)
 
 
 @dataclass(frozen=True, repr=False)

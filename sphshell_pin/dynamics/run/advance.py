@@ -26,11 +26,12 @@ from sphshell_pin.dynamics.result.contact_patches import check_record
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.run.integrators import Integrator
+from sphshell_pin.dynamics.scene import explain
 from sphshell_pin.dynamics.scene.explain import (
     DEFAULT_SPEED,
     coarseness,
     explain_pairs,
-    relaxation_time,
+    has_state,
     weakness,
 )
 from sphshell_pin.dynamics.scene.joint_components import moving_joints
@@ -182,22 +183,16 @@ def core_pairs(
 
     `warn` as of `start_run`; `limited_dt` [s] is that of the run's integrator.
     """
-    pairs = [pair._bind() for pair in scene.pairs]
-    # Only bristles need to know how fast an impact is.
-    has_state = any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
-    if not warn and not has_state:
-        return pairs
-    figures = explain_pairs(scene, q0, v0) if pairs else ()
-    for pair, core, figure in zip(scene.pairs, pairs, figures, strict=True):
-        core.relaxation = relaxation_time(pair, figure)
+    figures = explain_pairs(scene, q0, v0) if scene.pairs and (warn or has_state(scene)) else ()
+    for pair, figure in zip(scene.pairs, figures, strict=False) if warn else ():
         weak = weakness(pair, figure)
         # A sphere at rest in touch has no speed to judge by.
-        if warn and weak is not None and figure.approach_speed != DEFAULT_SPEED:
+        if weak is not None and figure.approach_speed != DEFAULT_SPEED:
             warnings.warn(weak, WeakLawWarning, stacklevel=4)
     coarse = coarseness(scene, figures, limited_dt) if warn else None
     if coarse is not None:
         warnings.warn(coarse, SetupWarning, stacklevel=4)
-    return pairs
+    return explain.core_pairs(scene, figures)
 
 
 def deep_start(scene: Scene, pair: int, depth: float) -> DeepStart:
@@ -248,7 +243,7 @@ def result_of(
         pairs=dict(zip(names, figures, strict=True)),
         joints=joint_figures(scene, summaries[len(names) :], core.limits),
     )
-    return Result._from_blocks([record], names, stats, scene, sensors)
+    return Result._from_record(record, names, stats, scene, sensors)
 
 
 def joint_figures(
@@ -256,14 +251,13 @@ def joint_figures(
 ) -> dict[str, JointFigures]:
     """Return the figures of the joints that have stops or limits, from what the core adds up."""
     model, joints = scene.model, scene.joints
-    found: dict[str, JointFigures] = {}
-    for name, sums in zip(joints.stopped_joints(model), stops, strict=True):
-        found[name] = found.get(name, JointFigures()).with_stop(sums)
-    if limits:
-        for name in dict.fromkeys((*joints.effort, *joints.speed)):
-            joint = find_joint(model, name)
-            for sums in limits[joint.idx_v : joint.idx_v + joint.nv]:
-                found[name] = found.get(name, JointFigures()).with_limit(sums)
+    stopped, found = joints.stopped_joints(model), {}
+    for name in dict.fromkeys((*stopped, *joints.effort, *joints.speed)):
+        joint, limited = find_joint(model, name), name in joints.effort or name in joints.speed
+        found[name] = JointFigures.from_core(
+            [sums for one, sums in zip(stopped, stops, strict=True) if one == name],
+            limits[joint.idx_v : joint.idx_v + joint.nv] if limited else [],
+        )
     return found
 
 

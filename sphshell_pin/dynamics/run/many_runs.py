@@ -1,29 +1,21 @@
-"""Makes many runs of one scene at once, over threads."""
+"""What many runs of one scene at once are made of: starts, controllers, and busy threads."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import as_floats, check_not_negative
-from sphshell_pin.dynamics.run.advance import (
-    GLANCE,
-    AnyController,
-    CtrlC,
-    bind_controller,
-    core_pairs,
-    run_settings,
-)
+from sphshell_pin.checks import check_floats
+from sphshell_pin.dynamics.run.advance import GLANCE, AnyController, CtrlC, bind_controller
 from sphshell_pin.dynamics.run.integrators import Integrator
-from sphshell_pin.dynamics.run.rollout import Plan, Rollout
 from sphshell_pin.dynamics.scene.scene import Scene
-from sphshell_pin.dynamics.scene.variations import Variations, check_names_of, has_length
+from sphshell_pin.dynamics.scene.variations import has_length
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
-from sphshell_pin.errors import InvalidParameter, RolloutInterrupted, SphshellError
+from sphshell_pin.errors import InvalidParameter, SphshellError
 from sphshell_pin.shell.options import thread_count
 
 Array = NDArray[np.float64]
@@ -35,89 +27,7 @@ _AHEAD = 32
 _MOST_THREADS = 1024
 
 
-def roll_out(
-    scene: Scene,
-    integrator: Integrator,
-    q0s: ArrayLike,
-    v0s: ArrayLike | None,
-    duration: float,
-    threads: int | None,
-    *,
-    controller: AnyController | Sequence[AnyController],
-    control_dt: float | None,
-    vary: Mapping[str, object] | None,
-    record_dt: float | None,
-    record: Collection[str] = (),
-    progress: Callable[[float], object] | None,
-    t0: float,
-    sensors: SensorSet,
-) -> Rollout:
-    """Make the runs of Simulation.rollout; its docstring says what the arguments are."""
-    began = time.perf_counter()
-    workers = _worker_count(threads)
-    duration = check_not_negative("duration", duration, "s")
-    vary = check_names_of(vary)
-    starts = _states(scene, q0s, v0s, vary, controller)
-    # Start and end are rows whatever the time between rows.
-    rows = record_dt if record_dt is not None else (duration or None)
-
-    def settings_of(scene: Scene, hold: float) -> _core.RunSettings:
-        return run_settings(scene, integrator, duration, hold, record_dt=rows, record=record, t0=t0)
-
-    settings = {0.0: settings_of(scene, 0.0)}
-    controllers = _one_each(controller, len(starts))
-    _check_controllers(scene, integrator, controllers, control_dt, starts, sensors)
-    variations = Variations(scene, vary, len(starts), sensors.sensors)
-    plan = Plan(starts, [None] * len(starts), variations, {}, t0)
-
-    def add(run: int) -> None:
-        q0, v0 = starts[run]
-        varied = variations.scene(run)
-        bound, hold = bind_controller(varied, integrator, controllers[run], control_dt, q0, sensors)
-        if hold not in settings:
-            settings[hold] = settings_of(varied, hold)
-        # The rollout warns of a weak law when a sphere has gone through.
-        pairs = core_pairs(varied, q0, v0, warn=False)
-        measuring = variations.sensors(run)
-        read = sensors if measuring is sensors.sensors else SensorSet(measuring, scene)
-        core.add(pairs, joints, bound, q0, v0, settings[hold], read.core)
-
-    def rollout() -> Rollout:
-        wall_time = time.perf_counter() - began
-        return Rollout(scene, integrator, core, plan, workers, wall_time, sensors)
-
-    workers = max(min(workers, len(starts)), 1)
-    joints = scene.joints._bind(scene.model)
-    core = _core.Rollout(scene.model, workers)
-    tasks = _Tasks(core, workers, progress, len(starts), plan.failures)
-    try:
-        with CtrlC() as ctrl_c:
-            for run in range(len(starts)):
-                try:
-                    add(run)
-                except Exception as fault:
-                    # A contact source is asked about the start, and may raise.
-                    plan.failures[run] = _not_begun(fault)
-                    continue
-                plan.numbers[run] = tasks.added
-                tasks.make_room(ctrl_c)
-            tasks.wait(0, ctrl_c)
-    except KeyboardInterrupt:
-        core.stop()
-        for run, number in enumerate(plan.numbers):
-            # The threads had not come to it.
-            if number is not None and not len(core.outcome(number).q):
-                plan.numbers[run] = None
-            if plan.numbers[run] is None and run not in plan.failures:
-                why = "the rollout was interrupted before this run began"
-                plan.failures[run] = SphshellError(why)
-        raise RolloutInterrupted(tasks.done, rollout()) from None
-    finally:
-        core.stop()
-    return rollout()
-
-
-class _Tasks:
+class Tasks:
     """Keeps the threads busy without making all runs ready at once."""
 
     def __init__(
@@ -156,7 +66,7 @@ class _Tasks:
                 return
 
 
-def _worker_count(threads: int | None) -> int:
+def worker_count(threads: int | None) -> int:
     """Return how many threads are wanted."""
     workers = thread_count(threads)
     if workers > _MOST_THREADS:
@@ -164,7 +74,7 @@ def _worker_count(threads: int | None) -> int:
     return workers
 
 
-def _not_begun(fault: Exception) -> SphshellError:
+def not_begun(fault: Exception) -> SphshellError:
     """Return why a run could not begin: a fault of this package, or of a user's routine."""
     if isinstance(fault, SphshellError):
         return fault
@@ -172,7 +82,7 @@ def _not_begun(fault: Exception) -> SphshellError:
     return SphshellError(f"the run could not begin, its routine raised {', '.join(told)}")
 
 
-def _check_controllers(
+def check_controllers(
     scene: Scene,
     integrator: Integrator,
     controllers: Sequence[AnyController],
@@ -196,7 +106,7 @@ def _check_controllers(
             ) from None
 
 
-def _one_each(
+def one_each(
     controller: AnyController | Sequence[AnyController], count: int
 ) -> Sequence[AnyController]:
     """Return the controller of each run."""
@@ -212,7 +122,7 @@ def _one_each(
     return controller
 
 
-def _states(
+def states_of(
     scene: Scene,
     q0s: ArrayLike,
     v0s: ArrayLike | None,
@@ -225,10 +135,7 @@ def _states(
     for name, given, size in (("q0s", q0s, model.nq), ("v0s", v0s, model.nv)):
         if given is None:
             continue
-        try:
-            table = as_floats(given)
-        except (TypeError, ValueError, OverflowError):
-            raise InvalidParameter(name, given, f"must be numbers, (n, {size})") from None
+        table = check_floats(name, given, f"must be numbers, (n, {size})")
         if table.ndim not in (1, 2) or table.shape[-1] != size:
             raise InvalidParameter(
                 name, given, f"must have shape (n, {size})", given=f"of shape {table.shape}"

@@ -7,7 +7,6 @@ from collections.abc import Collection
 from typing import NoReturn
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
@@ -25,7 +24,7 @@ from sphshell_pin.dynamics.run.advance import (
 from sphshell_pin.dynamics.run.simulation import Simulation
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.dynamics.scene.one_user import one_at_a_time
-from sphshell_pin.dynamics.scene.scene import ContactPair, Scene, SceneContacts
+from sphshell_pin.dynamics.scene.scene import ContactPair, Scene
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 from sphshell_pin.errors import InvalidParameter, NotPicklable
 
@@ -220,21 +219,15 @@ class OpenRun:
         damping = check_not_negative("damping", damping, "N s/m")
         self._act(frame, at, np.zeros(3), anchor, stiffness, damping)
 
-    def _act(
-        self,
-        frame: str,
-        point: Array,
-        force: Array,
-        anchor: Array,
-        stiffness: float,
-        damping: float,
-    ) -> None:
+    def _act(self, frame: str, point: Array, force: Array, anchor: Array, *spring: float) -> None:
+        """Let a force and a spring to an anchor (stiffness, damping) act on a point of `frame`."""
         model = self.scene.model
         number = find_frame(model, frame)
         where = model.frames[number]
         if where.parentJoint == 0:
             raise InvalidParameter("frame", frame, "is fixed to the world: nothing would move")
         at = where.placement.act(point)
+        stiffness, damping = spring
         self._core.push(where.parentJoint, at, force, anchor, stiffness, damping, number)
 
     @one_at_a_time
@@ -246,13 +239,7 @@ class OpenRun:
         # The core counts rows from the start of the run, a result from its own first one.
         record["contact_row"] = record["contact_row"] - first
         names = tuple(pair.name for pair in self.scene.pairs)
-        return Result._from_blocks([record], names, RunStats(), self.scene, self._sensors)
-
-
-def contacts_of(row: Result) -> SceneContacts:
-    """Return the contacts of a result of one row."""
-    log = row.contacts
-    return SceneContacts(**{name: getattr(log, name) for name in SceneContacts.__annotations__})
+        return Result._from_record(record, names, RunStats(), self.scene, self._sensors)
 
 
 def _alike(before: Scene, after: Scene) -> bool:
@@ -274,10 +261,6 @@ def _same_place(a: ContactPair, b: ContactPair) -> bool:
         and a.kind == b.kind
         and type(a.friction) is type(b.friction)
         and (a.friction and a.friction.state_size) == (b.friction and b.friction.state_size)
-        and _equal(a.placement_i, b.placement_i)
-        and _equal(a.placement_j, b.placement_j)
+        and bool(a.placement_i == b.placement_i)
+        and bool(a.placement_j == b.placement_j)
     )
-
-
-def _equal(a: pin.SE3 | None, b: pin.SE3 | None) -> bool:
-    return a is b or (a is not None and b is not None and a == b)

@@ -52,6 +52,16 @@ class Plan:
     failures: dict[int, SphshellError]
     t0: float
 
+    def leave_out(self, core: _core.Rollout) -> None:
+        """Note the runs that an interrupted rollout has not begun."""
+        for run, number in enumerate(self.numbers):
+            # The threads had not come to it.
+            if number is not None and not len(core.outcome(number).q):
+                self.numbers[run] = None
+            if self.numbers[run] is None and run not in self.failures:
+                why = "the rollout was interrupted before this run began"
+                self.failures[run] = SphshellError(why)
+
 
 class Rollout(Summarized, Sequence[Result]):
     """Runs that Simulation.rollout made: n of them, in the order of their starts.

@@ -2,30 +2,49 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
+from sphshell_pin import _core
+from sphshell_pin.checks import check_not_negative
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.run.advance import (
     AnyController,
     CtrlC,
     advance,
+    bind_controller,
+    core_pairs,
     result_of,
+    run_settings,
     start_run,
     step_of,
     why_ended,
 )
 from sphshell_pin.dynamics.run.integrators import Adaptive, Integrator
-from sphshell_pin.dynamics.run.many_runs import roll_out
-from sphshell_pin.dynamics.run.rollout import Rollout
+from sphshell_pin.dynamics.run.many_runs import (
+    Tasks,
+    check_controllers,
+    not_begun,
+    one_each,
+    states_of,
+    worker_count,
+)
+from sphshell_pin.dynamics.run.rollout import Plan, Rollout
 from sphshell_pin.dynamics.run.sensitivities import Asked
 from sphshell_pin.dynamics.scene.derivatives import StepDerivatives
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_state import SceneState
+from sphshell_pin.dynamics.scene.variations import Variations, check_names_of
 from sphshell_pin.dynamics.sensing.sensors import Sensor, SensorSet, check_sensors
-from sphshell_pin.errors import Interrupted, InvalidParameter, SimulationDiverged
+from sphshell_pin.errors import (
+    Interrupted,
+    InvalidParameter,
+    RolloutInterrupted,
+    SimulationDiverged,
+)
 from sphshell_pin.summary import Fact, Summarized
 
 
@@ -222,19 +241,65 @@ class Simulation(Summarized):
         RolloutInterrupted
             On Ctrl-C, with the `rollout` so far.
         """
-        return roll_out(
-            self.scene,
-            self.integrator,
-            q0s,
-            v0s,
-            duration,
-            threads,
-            controller=controller,
-            control_dt=control_dt,
-            vary=vary,
-            record_dt=record_dt,
-            record=record,
-            progress=progress,
-            t0=t0,
-            sensors=SensorSet(self.sensors, self.scene),
-        )
+        scene, integrator = self.scene, self.integrator
+        sensors = SensorSet(self.sensors, scene)
+        began = time.perf_counter()
+        workers = worker_count(threads)
+        duration = check_not_negative("duration", duration, "s")
+        vary = check_names_of(vary)
+        starts = states_of(scene, q0s, v0s, vary, controller)
+        # Start and end are rows whatever the time between rows.
+        rows = record_dt if record_dt is not None else (duration or None)
+
+        def settings_of(scene: Scene, hold: float) -> _core.RunSettings:
+            return run_settings(
+                scene, integrator, duration, hold, record_dt=rows, record=record, t0=t0
+            )
+
+        settings = {0.0: settings_of(scene, 0.0)}
+        controllers = one_each(controller, len(starts))
+        check_controllers(scene, integrator, controllers, control_dt, starts, sensors)
+        variations = Variations(scene, vary, len(starts), sensors.sensors)
+        plan = Plan(starts, [None] * len(starts), variations, {}, t0)
+
+        def add(run: int) -> None:
+            q0, v0 = starts[run]
+            varied = variations.scene(run)
+            bound, hold = bind_controller(
+                varied, integrator, controllers[run], control_dt, q0, sensors
+            )
+            if hold not in settings:
+                settings[hold] = settings_of(varied, hold)
+            # The rollout warns of a weak law when a sphere has gone through.
+            pairs = core_pairs(varied, q0, v0, warn=False)
+            measuring = variations.sensors(run)
+            read = sensors if measuring is sensors.sensors else SensorSet(measuring, scene)
+            core.add(pairs, joints, bound, q0, v0, settings[hold], read.core)
+
+        def rollout() -> Rollout:
+            wall_time = time.perf_counter() - began
+            return Rollout(scene, integrator, core, plan, workers, wall_time, sensors)
+
+        workers = max(min(workers, len(starts)), 1)
+        joints = scene.joints._bind(scene.model)
+        core = _core.Rollout(scene.model, workers)
+        tasks = Tasks(core, workers, progress, len(starts), plan.failures)
+        try:
+            with CtrlC() as ctrl_c:
+                for run in range(len(starts)):
+                    try:
+                        add(run)
+                    except Exception as fault:
+                        # A contact source is asked about the start, and may raise.
+                        plan.failures[run] = not_begun(fault)
+                        continue
+                    plan.numbers[run] = tasks.added
+                    tasks.make_room(ctrl_c)
+                tasks.wait(0, ctrl_c)
+        except KeyboardInterrupt:
+            core.stop()
+            plan.leave_out(core)
+            raise RolloutInterrupted(tasks.done, rollout()) from None
+        finally:
+            core.stop()
+        return rollout()

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin import _core
 from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
@@ -164,11 +165,9 @@ def _shortest_scale(scene: Scene, pairs: tuple[PairExplanation, ...]) -> float:
 
 
 def _recommended_dt(shortest: float) -> float:
-    return (
-        1e-3
-        if math.isinf(shortest)
-        else _round_down(max(shortest / STEPS_PER_SCALE, sys.float_info.min))
-    )
+    if math.isinf(shortest):
+        return 1e-3
+    return _round_down(max(shortest / STEPS_PER_SCALE, sys.float_info.min))
 
 
 # What a model may state of its joints, as a reader calls it.
@@ -240,6 +239,19 @@ def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
         return LONGEST_RELAXATION
     shortest = pair.plane_law.contact_time(pair.least_radius, limit)
     return min(0.02 * shortest, LONGEST_RELAXATION)
+
+
+def core_pairs(scene: Scene, figures: tuple[PairExplanation, ...]) -> list[_core.Pair]:
+    """Build the C++ pairs of `scene`, with the time in which their bristles relax."""
+    cores = [pair._bind() for pair in scene.pairs]
+    for pair, core, figure in zip(scene.pairs, cores, figures, strict=False):
+        core.relaxation = relaxation_time(pair, figure)
+    return cores
+
+
+def has_state(scene: Scene) -> bool:
+    """Whether a pair has bristles: only they need to know how fast an impact is."""
+    return any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
 
 
 def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
@@ -370,52 +382,39 @@ def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> A
 
 
 def _components(pair: ContactPair) -> tuple[str, ...]:
+    shell, frame_i, frame_j = pair.shell, pair.frame_i, pair.frame_j
+    bodies = [
+        f"sphere of radius {one.radius * 1e3:.4g} mm on frame '{one.frame}'"
+        for one in (pair.sphere, pair.other_sphere)
+        if one is not None
+    ]
     lines = []
-    if pair.shell is not None:
-        shell = pair.shell
-        one = (
-            f"plane on frame '{pair.frame_i}'"
-            if pair.sphere is None
-            else f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}'"
-        )
-        lines.append(f"{one} against shell '{shell.name}' on frame '{pair.frame_j}'")
+    if shell is not None:
+        bodies = bodies or [f"plane on frame '{frame_i}'"]
+        bodies.append(f"shell '{shell.name}' on frame '{frame_j}'")
         moving = "moves with its frame" if pair.joint_j else "does not move: no wrench on its side"
         lines.append(
             f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
             f"side '{shell.side}', method '{pair.method}'; the shell {moving}"
         )
-    elif pair.sphere is not None and pair.other_sphere is not None:
-        lines.append(
-            f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
-            f"sphere of radius {pair.other_sphere.radius * 1e3:.4g} mm on frame '{pair.frame_j}'"
-        )
-    else:
-        lines.append(
-            f"contact points of the user's own routine between frames '{pair.frame_i}' and "
-            f"'{pair.frame_j}'"
-        )
-    lines.append(f"normal force: {pair.law.text}")
-    lines.append(
-        "no friction: no tangential force is computed"
-        if pair.friction is None
-        else f"friction: {pair.friction.text}"
-    )
-    return tuple(lines)
+    own = f"contact points of the user's own routine between frames '{frame_i}' and '{frame_j}'"
+    friction = "no friction: no tangential force is computed"
+    if pair.friction is not None:
+        friction = f"friction: {pair.friction.text}"
+    first = " against ".join(bodies) or own
+    return first, *lines, f"normal force: {pair.law.text}", friction
 
 
 def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:
     out: list[str] = []
     where = f"contact '{pair.name}'"
     radius, shell = pair.least_radius, pair.shell
-    if pair.plane is not None and shell is not None:
+    if shell is not None:
+        sentence = unit_warning(scene.model, radius, shell.size) if pair.spheres else None
+        out += [f"{where}: {sentence}"] if sentence else []
         out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
     if not pair.spheres:
         return out
-    if shell is not None:
-        sentence = unit_warning(scene.model, radius, shell.size)
-        if sentence:
-            out.append(f"{where}: {sentence}")
-        out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
     weak = weakness(pair, figures)
     if weak is not None:
         out.append(weak)

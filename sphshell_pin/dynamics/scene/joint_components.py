@@ -156,32 +156,29 @@ class JointComponents:
             damping, armature = model.damping[at], np.array(model.armature[at])
             if not armature.any():
                 armature = model.rotorInertia[at] * model.rotorGearRatio[at] ** 2
-            if speed is not None and joint.nv == 1:
-                found["speed"][name] = float(speed[0])
-            if effort is not None and joint.nv == 1:
-                low, high = float(model.lowerEffortLimit[at][0]), float(effort[0])
-                upper = _stated(model.upperEffortLimit[at])
-                even = low >= 0 or upper is None or -low == float(upper[0])
-                found["effort"][name] = high if even or upper is None else (low, float(upper[0]))
-            if _any(damping):
-                found["damping"][name] = _short(damping)
-            if joint.nv == 1 and 0 < float(dry[0]) < _NO_LIMIT:
-                found["friction"][name] = JointFriction(float(dry[0]))
-            if _any(armature):
-                found["armature"][name] = _short(armature)
+            if joint.nv == 1:
+                if speed is not None:
+                    found["speed"][name] = float(speed[0])
+                if effort is not None:
+                    lower, high = float(model.lowerEffortLimit[at][0]), float(effort[0])
+                    upper = float(model.upperEffortLimit[at][0])
+                    even = lower >= 0 or not 0 < upper < _NO_LIMIT or -lower == upper
+                    found["effort"][name] = high if even else (lower, upper)
+                if 0 < float(dry[0]) < _NO_LIMIT:
+                    found["friction"][name] = JointFriction(float(dry[0]))
+            for kind, values in (("damping", damping), ("armature", armature)):
+                if np.all(np.isfinite(values)) and np.any(values > 0):
+                    found[kind][name] = _short(values)
             ends = _range(model, joint)
             if ends is not None and "limits" in wanted:
                 given = law
-                if given is None and inertia is not None:
-                    highest = (
-                        float(speed.max()) if speed is not None else _SPEED[joint_slides(joint)]
-                    )
-                    load = float(effort.max()) if effort is not None else 0.0
-                    given = _default_stop(
-                        float(inertia[at].max()), highest, load, joint_slides(joint)
-                    )
-                if given is not None:
-                    found["limits"][name] = JointLimits(_short(ends[0]), _short(ends[1]), given)
+                if inertia is not None:
+                    slides = joint_slides(joint)
+                    highest = _SPEED[slides] if speed is None else float(speed.max())
+                    load = 0.0 if effort is None else float(effort.max())
+                    given = _default_stop(float(inertia[at].max()), highest, load, slides)
+                assert given is not None
+                found["limits"][name] = JointLimits(_short(ends[0]), _short(ends[1]), given)
         return cls(**{one: found[one] for one in wanted})  # type: ignore[arg-type]  # each its own
 
     def replaced(self, joint: str, **changes: object) -> JointComponents:
@@ -414,10 +411,6 @@ def _default_stop(inertia: float, speed: float, load: float, slides: bool) -> Hu
 def _stated(values: Array) -> Array | None:
     """Return positive limits, of which all are stated; else None."""
     return values if np.all((values > 0) & (values < _NO_LIMIT)) else None
-
-
-def _any(values: Array) -> bool:
-    return bool(np.all(np.isfinite(values)) and np.any(values > 0))
 
 
 def _short(values: Array) -> Numbers:

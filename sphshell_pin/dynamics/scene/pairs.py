@@ -21,6 +21,7 @@ from sphshell_pin.contact import (
     Plane,
     Sphere,
 )
+from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.scene.sources import Find, checked_source
@@ -71,16 +72,19 @@ class ContactPair(Summarized):
     shell_placement = renamed("shell_placement", "placement_j")
 
     def __post_init__(self) -> None:
-        """Raise InvalidParameter for what needs a sphere or a shell where there is none."""
+        """Check law, friction and method, and what needs a sphere or a shell where there is none.
+
+        Raises InvalidParameter, NameNotFound for a method.
+        """
+        check_law(self.law, "" if self.find is None else "at the points of a contact source")
+        check_friction(self.friction)
+        Method.from_name(self.method)
         if self.plane is not None:
             self._check_plane()
         if isinstance(self.friction, FunctionFriction) and isinstance(self.law, FoundationLaw):
             must = "is for contacts at a point: beside a FoundationLaw take a CoulombFriction"
             raise InvalidParameter("friction", self.friction.kind, must)
-        if self.find is None:
-            return
-        check_law(self.law, "at the points of a contact source")
-        if isinstance(self.friction, MindlinFriction):
+        if self.find is not None and isinstance(self.friction, MindlinFriction):
             must = "needs a sphere, and a contact source has none: take a BristleFriction"
             raise InvalidParameter("friction", self.friction.kind, must)
 

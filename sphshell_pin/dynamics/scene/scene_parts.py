@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from copy import copy
 from dataclasses import replace
 from functools import partial
-from typing import Self, TypedDict, Unpack
+from typing import Self, TypedDict, TypeVar, Unpack
 
 import numpy as np
 import pinocchio as pin
@@ -20,9 +20,7 @@ from sphshell_pin.checks import (
     check_names,
     check_vector,
 )
-from sphshell_pin.contact import Friction, ImpactLaw, Method, NormalLaw, Plane, Sphere
-from sphshell_pin.contact.friction import check_friction
-from sphshell_pin.contact.normal_law import check_law
+from sphshell_pin.contact import Friction, ImpactLaw, NormalLaw, Plane, Sphere
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
 from sphshell_pin.dynamics.scene.models import (
     check_model,
@@ -43,16 +41,7 @@ from sphshell_pin.shell import Shell
 from sphshell_pin.summary import Detail, Fact, Summarized, names
 
 Array = NDArray[np.float64]
-
-
-class CoreParts(TypedDict):
-    """What the core makes a scene of."""
-
-    model: pin.Model
-    shown: pin.Model
-    pairs: list[_core.Pair]
-    joints: _core.JointEffects | None
-    convert: Callable[[object, object, object], tuple[Array, Array, Array]]
+C = TypeVar("C", _core.Scene, _core.SceneState)
 
 
 class _Settings(TypedDict, total=False):
@@ -267,11 +256,6 @@ class SceneParts(Summarized):
         unknown = set(changes) - set(known)
         if unknown:
             raise NameNotFound("setting", unknown.pop(), "a pair", known)
-        if "law" in changes:
-            check_law(changes["law"])
-        check_friction(changes.get("friction"))
-        if "method" in changes:
-            Method.from_name(changes["method"])
         old = self.pair(name)
         self._pairs = tuple(replace(p, **changes) if p is old else p for p in self._pairs)
         self._core = None
@@ -280,19 +264,14 @@ class SceneParts(Summarized):
     def _binding(self) -> _core.Scene:
         """The C++ binding, built when first needed."""
         if self._core is None:
-            self._core = _core.Scene(**self._binding_parts([p._bind() for p in self._pairs]))
+            self._core = self._compile(_core.Scene, [p._bind() for p in self._pairs])
         return self._core
 
-    def _binding_parts(self, pairs: list[_core.Pair]) -> CoreParts:
-        """Return what the core makes a scene or its state of, with `pairs`."""
+    def _compile(self, kind: type[C], pairs: list[_core.Pair]) -> C:
+        """Return what the core makes of the scene with `pairs`: itself or its state."""
         shown = self.model
-        return {
-            "model": self._model,
-            "shown": shown,
-            "pairs": pairs,
-            "joints": self._joints._bind(self._model),
-            "convert": partial(_converted, self._model, shown, self.lock),
-        }
+        convert = partial(_converted, self._model, shown, self.lock)
+        return kind(self._model, shown, pairs, self._joints._bind(self._model), convert)
 
     def shares_model(self, other: SceneParts) -> bool:
         """Whether both scenes have one model, as those that `with_pairs` makes."""
@@ -323,8 +302,6 @@ class SceneParts(Summarized):
                 FutureWarning,
                 stacklevel=3,
             )
-        check_law(law)
-        check_friction(friction)
         (joint_i, pose_i), (joint_j, pose_j) = (self.frame_in_joint(*frame) for frame in (i, j))
         pair = ContactPair(
             name=self._pair_name(name, default),

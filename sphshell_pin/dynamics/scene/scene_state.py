@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative
-from sphshell_pin.dynamics.scene.explain import explain_pairs, relaxation_time
+from sphshell_pin.dynamics.scene.explain import core_pairs, explain_pairs, has_state
 from sphshell_pin.errors import InvalidParameter, NotPicklable
 from sphshell_pin.summary import Fact, Summarized
 
@@ -43,12 +43,8 @@ class SceneState(Summarized):
         self._pairs = scene.pairs
         self.start = scene.check_state(scene.neutral if q is None else q, v)
         """Where it began: q (nq,), v (nv,)."""
-        cores = [pair._bind() for pair in scene.pairs]
-        if any(pair.friction and pair.friction.has_state for pair in scene.pairs):
-            figures = explain_pairs(scene, *self.start)
-            for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
-                core.relaxation = relaxation_time(pair, figure)
-        self._core = _core.SceneState(**scene._binding_parts(cores))
+        figures = explain_pairs(scene, *self.start) if has_state(scene) else ()
+        self._core = scene._compile(_core.SceneState, core_pairs(scene, figures))
         if q is not None:
             self._core.advance(*self.start, 0.0)
 

@@ -42,18 +42,15 @@ def checked_source(
             raise
         try:
             points, normals, depths = answer
-            count = len(depths)  # type: ignore[arg-type]  # what has no length is refused
-        except (TypeError, ValueError):
+            point, normal, depth = _rows(points), _rows(normals), as_floats(depths)
+            count = len(depth)  # what has no length is refused
+        except (TypeError, ValueError, OverflowError):
             raise InvalidParameter(where, answer, _SHAPES) from None
         if count > most:
             must = f"but must return {most} at most{' with BristleFriction' if bristles else ''}"
             raise InvalidParameter(where, count, must, f"returns {count} contacts,")
-        try:
-            point, normal, depth = _rows(points), _rows(normals), as_floats(depths)
-        except (TypeError, ValueError, OverflowError):
-            raise InvalidParameter(where, answer, _SHAPES) from None
         shapes = point.shape, normal.shape, depth.shape
-        if shapes != ((len(depth), 3), (len(depth), 3), (len(depth),)):
+        if shapes != ((count, 3), (count, 3), (count,)):
             raise InvalidParameter(where, shapes, _SHAPES, f"returns shapes {shapes},")
         if not (np.isfinite(point).all() and np.isfinite(depth).all()):
             raise InvalidParameter(where, point.tolist(), "must return finite points and depths")

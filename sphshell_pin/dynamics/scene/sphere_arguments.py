@@ -10,7 +10,7 @@ from typing import TypedDict
 import pinocchio as pin
 
 from sphshell_pin.checks import check_name, check_placement, check_type
-from sphshell_pin.contact import Method, Plane, Sphere
+from sphshell_pin.contact import Plane, Sphere
 from sphshell_pin.dynamics.scene.models import unit_warning
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.sources import Find
@@ -59,7 +59,6 @@ def parts_of(
         }
     check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file) or a Sphere")
     method = "smooth" if method is None else method
-    Method.from_name(method)
     placement = check_placement("placement", placement)
     parts: Parts = {"placement": placement, "method": method, "shell": shell}
     if isinstance(sphere, Plane):

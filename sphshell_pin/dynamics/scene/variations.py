@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypeGuard, TypeVar
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.checks import as_floats, check_placement, check_type
-from sphshell_pin.contact.friction import check_friction
-from sphshell_pin.contact.normal_law import check_law
+from sphshell_pin.checks import check_floats, check_placement, check_type
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.named_numbers import (
@@ -26,19 +24,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.sensing.sensors import Sensor
 
 T = TypeVar("T")
-
-
-def _check_placement(placement: object) -> pin.SE3:
-    check_type("placement", placement, pin.SE3, "must be a pinocchio.SE3")
-    return check_placement("placement", placement)
-
-
-# Of what is no number; numbers are checked by what has them.
-_CHECKS: dict[str, Callable[[object], object]] = {
-    "law": check_law,
-    "friction": check_friction,
-    "placement": _check_placement,
-}
 
 
 def check_names_of(vary: object) -> Mapping[str, object]:
@@ -112,8 +97,9 @@ class Variations:
         for name, number in numbers.items():
             value = self.columns[name][run]
             try:
-                if number.path[-1] in _CHECKS:
-                    value = _CHECKS[number.path[-1]](value)
+                if number.path[-1] == "placement":
+                    check_type("placement", value, pin.SE3, "must be a pinocchio.SE3")
+                    value = check_placement("placement", value)
                 out[number.at] = with_value(out[number.at], number.path, value)
             except InvalidParameter as error:
                 raise InvalidParameter(
@@ -135,10 +121,7 @@ def _values(
                 called, given, f"must be {count} values, one a run", given=f"of {len(given)} values"
             )
         return [one.item() if isinstance(one, np.generic) else one for one in given]
-    try:
-        values = as_floats(given)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidParameter(called, given, f"must be {count} numbers, one a run") from None
+    values = check_floats(called, given, f"must be {count} numbers, one a run")
     if values.shape != (count, *shape):
         wanted = (count, *shape)
         raise InvalidParameter(

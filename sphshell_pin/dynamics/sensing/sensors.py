@@ -125,7 +125,6 @@ class ForceTorqueSensor(_Analog, kind="force-torque"):
         return tuple(f"{part}_{axis} [{unit}]" for part, unit in parts for axis in "xyz")
 
     def _measured(self, scene: Scene) -> _core.Sensor:
-        check_name("frame", self.frame)
         part = subtree_of(scene, self.frame)
         pairs_i, pairs_j = (
             [
@@ -239,7 +238,6 @@ class ContactSwitch(Sensor, kind="contact-switch"):
                 scene.pair(self.contact)
         else:
             assert self.frame is not None
-            check_name("frame", self.frame)
             frames = self._frames(scene, self.frame)
             pairs = [
                 k

@@ -16,7 +16,7 @@ from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.run.advance import AnyController, step_of
-from sphshell_pin.dynamics.run.open_run import OpenRun, contacts_of
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.dynamics.scene.one_user import one_at_a_time
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
@@ -111,7 +111,7 @@ class LiveRun:
     @property
     def contacts(self) -> SceneContacts:
         """The contacts at `q`, `v`, with their forces."""
-        return contacts_of(self._row)
+        return self._row.contacts.at_row(0)
 
     @property
     def patches(self) -> Patches | None:

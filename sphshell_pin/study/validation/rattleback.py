@@ -57,9 +57,13 @@ def roll(spin: float, duration: float) -> tuple[Array, Array, Array]:
     return found.t, np.sum(found.y[:3] * found.y[3:], axis=0), found.t_events[0]
 
 
-def ellipsoid() -> sp.Shell:
-    """Blow up a cube whose sides are divided to the ellipsoid, with its normals."""
-    angle = np.tan(np.linspace(-math.pi / 4, math.pi / 4, CELLS + 1))
+def ellipsoid(cells: int, axes: Array) -> tuple[Array, Array, Array]:
+    """Blow up a cube of `cells`^2 quads a side to the ellipsoid of these half axes [m].
+
+    Return vertices (n, 3), of which the sides of the cube do not share any, quads (m, 4) and the
+    normals (n, 3).
+    """
+    angle = np.tan(np.linspace(-math.pi / 4, math.pi / 4, cells + 1))
     u, v = np.meshgrid(angle, angle, indexing="ij")
     number = np.arange(u.size).reshape(u.shape)
     corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
@@ -71,18 +75,19 @@ def ellipsoid() -> sp.Shell:
         sides.append(quads + k * u.size)
     every = np.concatenate(points).reshape(-1, 3)
     every /= np.linalg.norm(every, axis=1)[:, None]
-    normals = every / AXES
+    normals = every / axes
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return sp.Shell(every * AXES, np.concatenate(sides), normals=normals, side="outside")
+    return every * axes, np.concatenate(sides), normals
 
 
 def spin_on_plane(spin: float, duration: float) -> tuple[Array, Array, float]:
     """Return t (n,), the spin about the vertical (n,) and the energy lost [J], of the scene."""
     inertia = pin.Inertia(MASS, MIDDLE, INERTIA)
     scene = sp.Scene(model_of(("body", pin.JointModelFreeFlyer(), inertia), gravity=GRAVITY))
+    vertices, quads, normals = ellipsoid(CELLS, AXES)
     scene.add_contact(
         sp.Plane("universe"),
-        ellipsoid(),
+        sp.Shell(vertices, quads, normals=normals, side="outside"),
         "body",
         law=sp.ImpactLaw(STIFF, 1.0, DAMPING, 1e-7),
         friction=sp.BristleFriction(5.0, 5.0, STIFF, DAMPING),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Shell
 from sphshell_pin.cases.measured import Measured, write
-from tests.contact.helpers import energy, force_sum
+from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import jittered_grid
 from tests.contact.smooth.test_real_surfaces import faults, jump
 
@@ -54,18 +54,11 @@ def assert_no_jump(shell: Shell, center, radius: float = 1.0, force: float = 1e-
     rng, here = np.random.default_rng(0), find(shell, center, radius)
     size = here.depth.max() ** 1.5
     for _ in range(20):
-        move = rng.normal(size=3)
-        move *= 1e-9 * radius / np.linalg.norm(move)
+        move = 1e-9 * radius * directions(rng)
         there = find(shell, center + move, radius)
         assert jump(here, there, move) <= 1e-6
         change = np.linalg.norm(force_sum(there) - force_sum(here))
         assert change <= force * size
-
-
-def directions(rng: np.random.Generator, count: int) -> Array:
-    """Random unit vectors (count, 3)."""
-    out = rng.normal(size=(count, 3))
-    return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
 
 def graph(height, slopes, half: float, cells: int):

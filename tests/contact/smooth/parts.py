@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from tests import meshes
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -107,8 +108,7 @@ def extruded(
     vertices = np.concatenate(
         [np.c_[section, np.full(count, z)] for z in np.linspace(0, height, rows + 1)]
     )
-    first = (np.arange(rows)[:, None] * count + np.arange(count - 1)).ravel()
-    quads = np.stack([first, first + 1, first + 1 + count, first + count], 1)
+    quads = meshes._cells(rows, count - 1)[:, ::-1]
     which = rng.integers(count - 1, size=places)
     along = np.diff(section, axis=0)[which]
     aside = np.stack([-along[:, 1], along[:, 0]], 1) / np.linalg.norm(along, axis=1)[:, None]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Shell
 from tests import meshes
+from tests.contact.helpers import directions
 
 Array = NDArray[np.float64]
 
@@ -78,8 +79,7 @@ def ball_mesh(h: float) -> tuple[Array, NDArray[np.int32], Array]:
 
 
 def ball_points(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    normal = rng.normal(size=(count, 3))
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal = directions(rng, count)
     return BALL * normal, normal
 
 
@@ -172,20 +172,12 @@ def used(
 
 def can(columns: int = 40, rows: int = 4):
     """Cylinder of radius 2 with a flat lid at z = 0; normals per corner."""
-    turn = 2 * np.pi * np.arange(columns) / columns
-    ring = np.stack([2 * np.cos(turn), 2 * np.sin(turn), np.zeros(columns)], axis=1)
-    vertices = [ring - [0.0, 0.0, 0.5 * row] for row in range(rows + 1)] + [np.zeros((1, 3))]
-    triangles, normals, up = [], [], np.array([0.0, 0.0, 1.0])
-    for i in range(columns):
-        j = (i + 1) % columns
-        triangles.append((i, j, (rows + 1) * columns))
-        normals.append([up, up, up])
-        for row in range(rows):
-            a, b = row * columns, (row + 1) * columns
-            for t in ((a + i, b + i, b + j), (a + i, b + j, a + j)):
-                triangles.append(t)
-                normals.append([ring[k % columns] / 2 for k in t])
-    return np.concatenate(vertices), np.array(triangles, dtype=np.int32), np.array(normals)
+    heights = -0.5 * np.arange(rows + 1)
+    profile = np.stack([np.full(rows + 1, 2.0), heights], axis=1)
+    vertices, triangles = meshes.revolved([(0.0, 0.0), *profile], columns)
+    lid = (vertices[triangles][:, :, 2] == 0).all(axis=1)
+    normals = np.where(lid[:, None, None], [0, 0, 1], vertices[triangles] * [0.5, 0.5, 0])
+    return vertices, triangles[:, ::-1].copy(), normals[:, ::-1].copy()
 
 
 SURFACES = {

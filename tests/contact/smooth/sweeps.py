@@ -8,6 +8,7 @@ import numpy as np
 
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.test_potential import crossing, query
+from tests.contact.walks import steepest
 from tests.oracle.pieces import potential_and_force
 
 DEPTHS = (0.04, 0.004, 0.0004)
@@ -39,28 +40,16 @@ def borders(shell, start, end, width: float = WIDTH):
     return found
 
 
-def steepest(shell, start, end, width: float = WIDTH):
-    """Two centres `width` apart, between which the force changes most, by halving."""
-    first, last = (force_sum(query(shell, c)) for c in (start, end))
-    while np.linalg.norm(end - start) > width:
-        middle = (start + end) / 2
-        if (middle == start).all() or (middle == end).all():
-            break
-        force = force_sum(query(shell, middle))
-        if np.linalg.norm(force - first) > np.linalg.norm(last - force):
-            end, last = middle, force
-        else:
-            start, first = middle, force
-    return start, end
-
-
 def sweep(shell, path):
     """Pairs of centres WIDTH apart where the force may jump: wherever the features change, and,
     lest it jump where they do not, in the step of the path over which it changes most."""
     pairs = [pair for ends in pairwise(path) for pair in borders(shell, *ends)]
-    forces = np.array([force_sum(query(shell, center)) for center in path])
-    k = np.linalg.norm(np.diff(forces, axis=0), axis=1).argmax()
-    return [*pairs, steepest(shell, path[k], path[k + 1])]
+
+    def force(center):
+        return force_sum(query(shell, center))
+
+    k = np.linalg.norm(np.diff([force(c) for c in path], axis=0), axis=1).argmax()
+    return [*pairs, steepest(force, path[k], path[k + 1], WIDTH)[:2]]
 
 
 def changes(shell, pairs, depth: float):

@@ -10,9 +10,9 @@ import pytest
 
 from sphshell_pin import Shell
 from sphshell_pin.shell.contact_set import Feature
+from sphshell_pin.study.validation.rattleback import ellipsoid
 from tests.contact.helpers import force_sum
 from tests.contact.smooth.surfaces import SIDES, SURFACES, can, shell_of, side_of
-from tests.meshes import ellipsoid
 from tests.studies import mostly_studies
 
 COUNT = 300

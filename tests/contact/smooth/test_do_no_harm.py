@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull
 
 from sphshell_pin import Shell
 from tests import meshes
+from tests.contact.helpers import directions, places_by_area
 from tests.contact.smooth.parts import (
     Part,
     averaged_normals,
@@ -25,11 +26,14 @@ from tests.contact.smooth.surfaces import SURFACES, mean_edge, shell_of
 COUNT = 50  # of each family
 
 
+@pytest.mark.parametrize("averaged", [False, True])
 @pytest.mark.parametrize("make", [random_turned, random_extruded])
-def test_random_parts(make) -> None:
+def test_random_parts(make, averaged: bool) -> None:
     """Kinks of 3 to 29 degrees between stretches of 0.2 to 20 radii. A few polygons may turn as
-    evenly as a sampled curve does."""
-    worse = [seed for seed in range(COUNT) if make(seed).is_worse_than_flat()]
+    evenly as a sampled curve does. The normals of a file bear witness no more than the elements."""
+    parts = [make(seed) for seed in range(COUNT)]
+    normals = [averaged_normals(p.vertices, p.elements) if averaged else None for p in parts]
+    worse = [seed for seed in range(COUNT) if parts[seed].is_worse_than_flat(normals[seed])]
     assert len(worse) <= 0.02 * COUNT, worse
 
 
@@ -117,11 +121,7 @@ def test_propeller(radii: tuple[float, float]) -> None:
     more inside the flat elements touches the curved ones."""
     shell = Shell.from_file(Path(__file__).parents[2] / "data" / "propeller.stl", unit="mm")
     rng, count = np.random.default_rng(0), 2000
-    corners = shell.vertices[shell.triangles]
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(spans, axis=1)
-    which = rng.choice(len(areas), count, p=areas / areas.sum())
-    on_flat = np.einsum("nk,nkx->nx", rng.dirichlet([1.0, 1.0, 1.0], count), corners[which])
+    which, on_flat = places_by_area(shell.vertices, shell.triangles, rng, count)
     radius = np.exp(rng.uniform(*np.log(radii), count))
     outside = ((1 - rng.uniform(0.05, 0.2, count)) * radius)[:, None] * shell.triangle_normals[
         which
@@ -130,31 +130,14 @@ def test_propeller(radii: tuple[float, float]) -> None:
     assert (depth > 0).all()
 
 
-def test_turned_parts_with_averaged_normals() -> None:
-    """The normals of a file bear witness no more than the elements do."""
-    parts = [make(seed) for seed in range(COUNT) for make in (random_turned, random_extruded)]
-    worse = [
-        number
-        for number, part in enumerate(parts)
-        if part.is_worse_than_flat(averaged_normals(part.vertices, part.elements))
-    ]
-    assert len(worse) <= 0.02 * len(parts), worse
-
-
-def coarse_sphere(level: int):
-    vertices, elements = meshes.icosphere(level, 1.0)
-    return vertices, elements, vertices.copy()
-
-
 @pytest.mark.parametrize("level", [0, 1, 2])
 def test_coarse_spheres_with_good_normals_stay_curved(level: int) -> None:
     """From twenty elements on."""
-    vertices, elements, normals = coarse_sphere(level)
-    shell = Shell(vertices, elements, normals=normals)
+    vertices, elements = meshes.icosphere(level, 1.0)
+    shell = Shell(vertices, elements, normals=vertices)
     assert not shell.core_for("smooth").normals_set_aside.any()
     rng = np.random.default_rng(0)
-    places = rng.normal(size=(500, 3))
-    places *= 1.3 / np.linalg.norm(places, axis=1)[:, None]
+    places = 1.3 * directions(rng, 500)
     off = np.abs(shell.closest_points(places).distances - 0.3).max()
     assert off <= (0.03, 1.5e-3, 1e-4)[level]
 

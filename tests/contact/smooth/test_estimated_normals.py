@@ -15,20 +15,6 @@ def corner_normals(shell: Shell):
     return shell.core_for("smooth").corner_normals
 
 
-def turned(profile, columns: int):
-    """Surface of revolution round z through (radius, z) rows, as columns of triangles."""
-    turn = 2 * np.pi * np.arange(columns) / columns
-    rings = [
-        np.stack([r * np.cos(turn), r * np.sin(turn), np.full(columns, z)], 1) for r, z in profile
-    ]
-    triangles = []
-    for row in range(len(profile) - 1):
-        for i in range(columns):
-            a, b = row * columns + i, row * columns + (i + 1) % columns
-            triangles += [(a, b, b + columns), (a, b + columns, a + columns)]
-    return np.concatenate(rings), np.array(triangles, dtype=np.int32)
-
-
 @pytest.mark.parametrize("name", ["torus inside", "wavy above"])
 def test_order_of_the_normals(name: str) -> None:
     """Away from the borders; on meshes with jittered vertices and random diagonals."""
@@ -51,7 +37,7 @@ def test_order_of_the_normals(name: str) -> None:
 def test_exact_on_spheres(columns: int) -> None:
     """Elements of longitude and latitude, however narrow near the poles."""
     polar = np.linspace(0.05, np.pi - 0.05, columns)
-    vertices, elements = turned(np.stack([np.sin(polar), -np.cos(polar)], 1), columns)
+    vertices, elements = meshes.revolved(np.stack([np.sin(polar), -np.cos(polar)], 1), columns)
     error = corner_normals(Shell(vertices, elements)) - vertices[elements]
     assert np.abs(error).max() <= 1e-9
 
@@ -62,7 +48,7 @@ def test_wall_that_ends_in_fillets(rows: int) -> None:
     bend = np.linspace(0, np.pi / 3, rows + 1)
     fillet = np.stack([1 - 0.2 * (1 - np.cos(bend)), 3 + 0.2 * np.sin(bend)], 1)
     profile = np.concatenate([fillet[::-1] * [1, -1], fillet])
-    shell = Shell(*turned(profile, 48))
+    shell = Shell(*meshes.revolved(profile, 48))
     lifted = np.linalg.norm(shell.core_for("smooth").control_point_offsets, axis=2).max(axis=1)
     wall = np.ptp(shell.vertices[shell.triangles][:, :, 2], axis=1) > 5
     assert wall.sum() == 2 * 48

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Scene, Sphere
+from tests.contact.helpers import directions
 from tests.contact.smooth.surfaces import SURFACES, shell_of
-from tests.contact.smooth.test_potential import shell_with_edges
+from tests.contact.smooth.test_sweeps_edges import edged
 from tests.models import ball, free_q, linear_law
 
 
@@ -23,10 +24,9 @@ def paths(name: str):
     if name in SURFACES:
         centers, normals = SURFACES[name].probes(6, 0.03, seed=4)
     else:
-        shell = shell_with_edges(name)
+        shell = edged(name)
         edges = shell.edge_vertices[np.flatnonzero(shell.edge_class > 0)]
-        normals = rng.normal(size=(12, 3))
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        normals = directions(rng, 12)
         centers = shell.vertices[rng.choice(edges, 12)[:, 0]] + 0.97 * normals
     for center, normal in zip(centers, normals, strict=True):
         pace = rng.choice([1e-5, 1e-3, 5e-3])
@@ -37,7 +37,7 @@ def paths(name: str):
 
 @pytest.mark.parametrize("name", ["bowl", "torus inside", "wavy above", "can", "cube", "sheet"])
 def test_scene_finds_what_the_shell_finds(name: str) -> None:
-    shell = shell_of(name, 0.3) if name in SURFACES else shell_with_edges(name)
+    shell = shell_of(name, 0.3) if name in SURFACES else edged(name)
     scene = Scene(ball(gravity=0.0))
     scene.add_contact(
         sphere=Sphere(1.0, frame="ball"),

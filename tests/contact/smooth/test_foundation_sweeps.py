@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from tests.contact.smooth.sweeps import LIMIT, UP, WIDTH, segment
 from tests.contact.smooth.test_sweeps_edges import EDGED, along_edges, edged, over_vertex, star
 from tests.contact.smooth.test_sweeps_folds import KINDS, fold, fold_paths
 from tests.contact.smooth.test_sweeps_smooth import SMOOTH, rolled
+from tests.contact.walks import steepest
 
 DEPTHS = (0.04, 0.004)
 
@@ -22,29 +24,14 @@ def force(shell, center):
     return found[0][4].sum(axis=0)
 
 
-def jump(shell, start, end) -> tuple[float, float]:
-    """Change of the force where it changes most, WIDTH apart, and its size there; by halving."""
-    first, last = force(shell, start), force(shell, end)
-    while np.linalg.norm(end - start) > WIDTH:
-        middle = (start + end) / 2
-        if (middle == start).all() or (middle == end).all():
-            break
-        here = force(shell, middle)
-        if np.linalg.norm(here - first) > np.linalg.norm(last - here):
-            end, last = middle, here
-        else:
-            start, first = middle, here
-    size = max(np.linalg.norm(first), np.linalg.norm(last))
-    return float(np.linalg.norm(last - first)), float(size)
-
-
 def assert_no_jump(shell, paths, depth: float) -> None:
     """In every step of the paths, as a share of the force, or of that on a plane."""
     steps = [step for path in paths for step in pairwise(path)]
     assert steps
     for step in steps:
-        change, size = jump(shell, *step)
-        assert change <= LIMIT * max(size, np.pi * depth**2), step[0].tolist()
+        *_, first, last = steepest(partial(force, shell), *step, WIDTH)
+        size = max(*(np.linalg.norm(f) for f in (first, last)), np.pi * depth**2)
+        assert np.linalg.norm(last - first) <= LIMIT * size, step[0].tolist()
 
 
 @pytest.mark.parametrize("depth", DEPTHS)

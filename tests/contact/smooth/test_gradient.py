@@ -12,10 +12,9 @@ from tests import meshes
 from tests.contact.smooth.surfaces import SURFACES, can, shell_of
 
 LAW = ImpactLaw(2.0, exponent=1.5)
-STEP = 1e-5
 
 
-def differences(shell: Shell, center, radius: float, method: str):
+def differences(shell: Shell, center, radius: float, method: str, step: float):
     """Central differences (3, 3) of the force, None where other features take over."""
 
     def look(move):
@@ -26,19 +25,21 @@ def differences(shell: Shell, center, radius: float, method: str):
 
     out, here = np.zeros((3, 3)), look(np.zeros(3))[1]
     for k in range(3):
-        ahead, behind = look(STEP * np.eye(3)[k]), look(-STEP * np.eye(3)[k])
+        ahead, behind = look(step * np.eye(3)[k]), look(-step * np.eye(3)[k])
         if ahead[1] != here or behind[1] != here:
             return None
-        out[:, k] = (ahead[0] - behind[0]) / (2 * STEP)
+        out[:, k] = (ahead[0] - behind[0]) / (2 * step)
     return out
 
 
-def assert_gradient(shell: Shell, centers, radius: float, method: str = "smooth"):
+def assert_gradient(
+    shell: Shell, centers, radius: float, method: str = "smooth", step: float = 1e-5
+):
     """All gradients are right; returns the features and weights that were met."""
     met = set()
     for center in centers:
         found = shell.contacts(center, radius, method=method, gradient=True)
-        exact = differences(shell, np.asarray(center, dtype=float), radius, method)
+        exact = differences(shell, np.asarray(center, dtype=float), radius, method, step)
         if len(found) == 0 or exact is None:
             continue
         gradient = found.force_gradient(LAW)

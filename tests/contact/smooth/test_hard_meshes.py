@@ -8,8 +8,8 @@ import pytest
 from sphshell_pin import Shell
 from sphshell_pin.shell.curved import curved_mesh
 from tests import meshes
-from tests.contact.helpers import energy, force_sum, shell_of
-from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, directions, fails, find, push
+from tests.contact.helpers import directions, energy, force_sum, shell_of
+from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, push
 from tests.contact.smooth.surfaces import SURFACES
 from tests.oracle.pieces import potential_and_force
 

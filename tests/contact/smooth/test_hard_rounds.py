@@ -10,12 +10,11 @@ import pytest
 from sphshell_pin import Shell
 from sphshell_pin.shell.curved import curved_mesh
 from tests import meshes
-from tests.contact.helpers import energy, force_sum
+from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.hard_cases import (
     DEPTH,
     UP,
     assert_no_jump,
-    directions,
     fails,
     find,
     given,
@@ -180,14 +179,10 @@ def test_concentric_in_a_tube() -> None:
 
 def seat(columns: int, rows: int) -> Shell:
     """Countersink: a cone round z that opens upward by 45 degrees."""
-    turn, rho = 2 * np.pi * np.arange(columns) / columns, np.linspace(0.3, 2.0, rows + 1)
-    out = np.stack([np.cos(turn), np.sin(turn), np.ones(columns)], axis=1)
-    vertices = (rho[:, None, None] * out).reshape(-1, 3)
-    normals = np.tile(out * [-1.0, -1.0, 1.0] / np.sqrt(2), (rows + 1, 1))
-    first = (np.arange(rows)[:, None] * columns + np.arange(columns)).ravel()
-    second = first // columns * columns + (first + 1) % columns
-    elements = np.stack([first, first + columns, second + columns, second], axis=1)
-    return Shell(vertices, meshes._split(elements, np.zeros(len(elements), bool)), normals=normals)
+    rho = np.linspace(0.3, 2.0, rows + 1)
+    vertices, triangles = meshes.revolved(np.stack([rho, rho], axis=1), columns)
+    normals = vertices * [-1, -1, 1] / (np.sqrt(2) * vertices[:, 2:])
+    return Shell(vertices, triangles[:, ::-1], normals=normals)
 
 
 @pytest.mark.parametrize(("columns", "error"), [(32, 0.15), (64, 0.02), (128, 0.003)])
@@ -205,19 +200,13 @@ def test_ball_in_a_countersink(columns: int, error: float) -> None:
 
 def hole(corners: int, bored: bool) -> Shell:
     """Plate z = 0 with a hole of radius 0.6 round z; `bored`: with the wall of the hole."""
-    turn = 2 * np.pi * np.arange(corners) / corners
-    out = np.stack([np.cos(turn), np.sin(turn), np.zeros(corners)], axis=1)
-    rings = [rho * out for rho in (3.0, 2.0, 1.2, 0.6)]
-    rings += [0.6 * out - height * UP for height in (0.5, 1.0)] if bored else []
-    elements, normals = [], []
-    for k in range(len(rings) - 1):
-        i = np.arange(corners)
-        a, b = k * corners + i, k * corners + (i + 1) % corners
-        elements.append(np.stack([a, b, b + corners, a + corners], axis=1))
-        flat = np.tile(UP, (corners, 4, 1))
-        ends = np.stack([out, np.roll(out, -1, axis=0)], axis=1)
-        normals.append(flat if k < 3 else -ends[:, [0, 1, 1, 0]])
-    return Shell(np.concatenate(rings), np.concatenate(elements), normals=np.concatenate(normals))
+    wall = [(0.6, -0.5), (0.6, -1.0)] if bored else []
+    vertices, triangles = meshes.revolved(
+        [(3.0, 0.0), (2.0, 0.0), (1.2, 0.0), (0.6, 0.0), *wall], corners
+    )
+    at = vertices[triangles]
+    flat = (at[:, :, 2] == 0).all(axis=1)[:, None, None]
+    return Shell(vertices, triangles, normals=np.where(flat, UP, at * [-1, -1, 0] / 0.6))
 
 
 def test_rim_of_a_hole_in_a_sheet() -> None:

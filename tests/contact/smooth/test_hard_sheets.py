@@ -111,12 +111,8 @@ def test_back_to_back() -> None:
 
 def cap(valence: int):
     """`valence` triangles round the pole of a sphere of radius 4; exact normals."""
-    turn = 2 * np.pi * np.arange(valence) / valence
-    ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(valence)], axis=1)
-    normals = np.concatenate([[UP], np.sin(0.3) * ring + np.cos(0.3) * UP])
-    i = np.arange(valence)
-    elements = np.stack([0 * i, 1 + i, 1 + (i + 1) % valence], axis=1)
-    return 4 * normals, elements, normals
+    vertices, triangles = meshes.revolved([(0.0, 4.0), (4 * np.sin(0.3), 4 * np.cos(0.3))], valence)
+    return vertices, triangles[:, ::-1], vertices / 4
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

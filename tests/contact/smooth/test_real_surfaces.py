@@ -21,8 +21,9 @@ from sphshell_pin import Shell
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 from sphshell_pin.shell.faces import Face
-from tests.contact.helpers import energy, force_sum
+from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import mean_edge
+from tests.contact.walks import narrowed
 from tests.shell.surfaces import DATA
 from tests.shell.test_corpus import FILES, load
 
@@ -219,50 +220,22 @@ def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
     return max(lost - most, 0.0) / potential if potential > 0 else 0.0
 
 
-@pytest.mark.parametrize("name", cases(CROSSED))
-def test_potential_beside_each_sphere(name: str) -> None:
-    """A centre 1e-9 r further has the same potential; many stand exactly over sides and corners."""
-    some, rng, jumps = spheres(name), np.random.default_rng(1), {}
-    for i, found in enumerate(answers(name)):
-        move = rng.normal(size=3)
-        move *= 1e-9 * some.radii[i] / np.linalg.norm(move)
-        share = jump(found, some.find(i, move), move)
-        if not share <= 1e-6:
-            jumps[i] = share
-    assert not jumps
-
-
 def steepest_between(
     find: Callable[[Array], ContactSet], start: Array, end: Array, width: float
 ) -> tuple[Array, Array]:
     """The two centres `width` apart, between `start` and `end`, between which the potential changes
     most beside what the forces account for, by halving."""
-    first, last = find(start), find(end)
-    while np.linalg.norm(end - start) > width:
-        middle = (start + end) / 2
-        if (middle == start).all() or (middle == end).all():
-            break
-        found = find(middle)
-        if change(first, found, middle - start)[0] > change(found, last, end - middle)[0]:
-            end, last = middle, found
-        else:
-            start, first = middle, found
-    return start, end
 
+    def lost(before: tuple[ContactSet, Array], after: tuple[ContactSet, Array]) -> float:
+        return change(before[0], after[0], after[1] - before[1])[0]
 
-@pytest.mark.parametrize("name", cases(CROSSED))
-def test_potential_along_walks(name: str) -> None:
-    """Over a tenth of its radius a sphere crosses many borders; the potential jumps at none."""
-    some, rng, jumps = spheres(name), np.random.default_rng(2), {}
-    for i in range(WALKS):
-        move = rng.normal(size=3)
-        move *= 0.1 * some.radii[i] / np.linalg.norm(move)
-        look = partial(some.find, i)
-        start, end = steepest_between(look, np.zeros(3), move, 1e-9 * some.radii[i])
-        share = jump(look(start), look(end), end - start)
-        if not share <= 1e-6:
-            jumps[i] = share
-    assert not jumps
+    return narrowed(
+        lambda center: (find(center), center),
+        start,
+        end,
+        width,
+        lambda first, here, last: lost(first, here) > lost(here, last),
+    )[:2]
 
 
 def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: float):
@@ -287,21 +260,39 @@ def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: 
     return np.array(path)
 
 
-@pytest.mark.parametrize("name", cases(CROSSED))
-def test_potential_along_long_walks(name: str) -> None:
+def beside(some: Spheres):
+    """1e-9 r further; many stand exactly over sides and corners."""
+    rng = np.random.default_rng(1)
+    for i in range(COUNT):
+        yield i, partial(some.find, i), np.zeros(3), 1e-9 * some.radii[i] * directions(rng)
+
+
+def walks(some: Spheres):
+    """Over a tenth of its radius a sphere crosses many borders."""
+    rng = np.random.default_rng(2)
+    for i in range(WALKS):
+        move, look = 0.1 * some.radii[i] * directions(rng), partial(some.find, i)
+        yield i, look, *steepest_between(look, np.zeros(3), move, 1e-9 * some.radii[i])
+
+
+def long_walks(some: Spheres):
     """Over 30 radii at a twentieth of one; SPHSHELL_WALKS=100 takes more than the usual walk."""
-    some, rng, jumps = spheres(name), np.random.default_rng(3), {}
+    rng = np.random.default_rng(3)
     for i in rng.integers(COUNT, size=LONG_WALKS):
-        radius = some.radii[i]
-
-        def find(center: Array, radius: float = radius) -> ContactSet:
-            return some.shell.contacts(center, radius, method="smooth")
-
+        look = partial(some.shell.contacts, radius=some.radii[i], method="smooth")
         for start, end in pairwise(roll(some, i, rng, 30.0, 0.05)):
-            a, b = steepest_between(find, start, end, 1e-9 * radius)
-            share = jump(find(a), find(b), b - a)
-            if not share <= 1e-6:
-                jumps[int(i)] = share
+            yield i, look, *steepest_between(look, start, end, 1e-9 * some.radii[i])
+
+
+@pytest.mark.parametrize("ways", [beside, walks, long_walks])
+@pytest.mark.parametrize("name", cases(CROSSED))
+def test_potential_does_not_jump(name: str, ways) -> None:
+    """Between two centres that are near each other."""
+    jumps = {}
+    for i, look, start, end in ways(spheres(name)):
+        share = jump(look(start), look(end), end - start)
+        if not share <= 1e-6:
+            jumps[int(i)] = share
     assert not jumps
 
 

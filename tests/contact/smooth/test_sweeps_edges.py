@@ -9,6 +9,7 @@ import pytest
 
 from sphshell_pin import Shell
 from tests import meshes
+from tests.contact.helpers import directions
 from tests.contact.smooth import sweeps
 from tests.contact.smooth.surfaces import SURFACES, can
 from tests.contact.smooth.test_potential import query
@@ -20,22 +21,14 @@ def lens(half: float, rows: int, columns: int):
     """Two caps of a sphere of radius four that meet in a circle of radius `half`, and their normals
     per corner: a round crease."""
     drop = np.sqrt(16.0 - half**2)
-    polar = np.arcsin(half / 4) * np.arange(1, rows + 1) / rows
-    turn = 2 * np.pi * np.arange(columns) / columns
-    polar, turn = (g.ravel() for g in np.meshgrid(polar, turn, indexing="ij"))
-    upper = 4 * np.stack(
-        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=1
-    )
-    upper = np.concatenate([[[0.0, 0.0, 4.0]], upper])
-    triangles = cone(columns, 0.5, rows)[1]
-    upper[-columns:, 2] = drop
-    below = np.arange(len(upper)) + len(upper)
-    below[-columns:] = np.arange(len(upper) - columns, len(upper))
-    vertices = np.concatenate([upper - [0, 0, drop], (upper - [0, 0, drop]) * [1, 1, -1]])
-    normals = np.concatenate([upper[triangles], (upper * [1, 1, -1])[triangles][:, ::-1]]) / 4
-    triangles = np.concatenate([triangles, below[triangles][:, ::-1]])
-    used, triangles = np.unique(triangles, return_inverse=True)
-    return vertices[used], triangles.reshape(-1, 3).astype(np.int32), normals
+    polar = np.arcsin(half / 4) * np.arange(rows + 1) / rows
+    upper = np.stack([4 * np.sin(polar), 4 * np.cos(polar) - drop], axis=1)
+    upper[-1] = half, 0.0
+    vertices, triangles = meshes.revolved([*upper, *(upper[-2::-1] * [1, -1])], columns)
+    triangles, at = triangles[:, ::-1].copy(), vertices[triangles[:, ::-1]]
+    # From the middles of the caps' spheres, which are behind each other.
+    above = at.sum(axis=1)[:, None, 2:] > 0
+    return vertices, triangles, (at + np.where(above, [0, 0, drop], [0, 0, -drop])) / 4
 
 
 def curved_sheet(name: str):
@@ -97,8 +90,7 @@ def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0
     while count:
         a, b = shell.vertices[rng.choice(edges)]
         place = a + rng.choice([0.0, rng.uniform(), 1.0]) * (b - a)
-        out = rng.normal(size=3)
-        out /= np.linalg.norm(out)
+        out = directions(rng)
         if sign * out @ (place - inner) < 0:
             out = -out
         low, high = 0.7, 1.8
@@ -110,8 +102,7 @@ def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0
                 low = middle
             else:
                 high = middle
-        along = rng.normal(size=3)
-        along *= reach / np.linalg.norm(along)
+        along = reach * directions(rng)
         path = sweeps.segment(place + low * out - along, place + low * out + along, 9)
         # At the surface itself no normal is defined, and behind it a one-sided shell pushes back.
         distance = shell.closest_points(path).distances
@@ -126,7 +117,14 @@ EDGED = [
     for exact in (True, False)
 ] + [(kind, False) for kind in ("sheet", "l plate", "cube", "box", "cone")]
 SOME_EDGED = {
-    *(("can", True), ("cup", False), ("lens", False), ("wave", True)),
+    *(
+        ("can", True),
+        ("can", False),
+        ("cup", False),
+        ("lens", False),
+        ("wave", True),
+        ("tube", True),
+    ),
     *(("sheet", False), ("box", False), ("cone", False)),
 }
 EDGED = mostly_studies(EDGED, SOME_EDGED.__contains__)
@@ -243,8 +241,7 @@ def test_corner_of_a_box() -> None:
     rng = np.random.default_rng(6)
     for depth in sweeps.DEPTHS:
         corner = 2.0 - (1 - depth) * np.ones(3)
-        along = rng.normal(size=(6, 3))
-        along *= 0.02 / np.linalg.norm(along, axis=1)[:, None]
+        along = 0.02 * directions(rng, 6)
         paths = [sweeps.segment(corner - d, corner + 0.8 * d, 9) for d in along]
         sweeps.assert_continuous(shell, paths, depth)
         sweeps.assert_as_defined(shell, [c for path in paths for c in path[:4]], depth)

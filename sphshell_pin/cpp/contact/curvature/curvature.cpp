@@ -16,11 +16,6 @@ namespace {
 // Of the radius: a step of the center for second derivatives, and a distance without direction.
 constexpr double kMove = 1e-5, kNoDistance = 1e-6;
 
-// In [0, pi]; accurate for small and for nearly opposite vectors, where acos is not.
-double angle_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
 // Tangents along one line (the sine of their angle), as at the common corner of two curved sides
 // that go on into each other, are one.
 constexpr double kOneLine = 1e-8;
@@ -287,14 +282,8 @@ void Curvature::find_walls_of_vertex(int facet, int corner) {
     const auto [u, v] = corner_parameters(c % 3);
     return wall(c / 3, u, v);
   };
-  // Breadth first, over the edges at the vertex: all corners of the surface that are connected
-  // there.
-  corners_.assign(1, 3 * facet + corner);
-  for (std::size_t i = 0; i < corners_.size(); ++i)
-    for_each_beside(shell, corners_[i], [&](int other, const Edge&) {
-      if (std::find(corners_.begin(), corners_.end(), other) == corners_.end())
-        corners_.push_back(other);
-    });
+  connected_corners(shell, 3 * facet + corner, corners_,
+                    [](int, int, const Edge&) { return true; });
   // The creases that leave the vertex, each once; without one, the only wall.
   for (int c : corners_) {
     const Wall here = wall_at(c);

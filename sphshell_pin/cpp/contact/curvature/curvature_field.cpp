@@ -51,10 +51,9 @@ bool is_jump(const Shell& shell, int facet, int other) {
 // The half-edge, given in facets, of the neighbor that an element is joined to smoothly over a
 // side; -1: there is none.
 int joined_over(const Shell& shell, int facet, int side) {
-  const Edge& edge = edge_at(shell, facet, side);
-  if (edge.count != 2) return -1;
-  const int h = 3 * shell.triangle_of_facet(facet) + side;
-  const int other = shell.facet_half_edge(shell.topology().other_half_edge(edge, h));
+  const int h = shell.topology().other_half_edge(3 * shell.triangle_of_facet(facet) + side);
+  if (h < 0) return -1;
+  const int other = shell.facet_half_edge(h);
   for (int k : {side, next_corner(side)}) {
     const int corner = 3 * facet + k;
     const int beside = corner_of(shell, other, vertex_of(shell, corner));
@@ -246,16 +245,10 @@ CurvatureField::Rise CurvatureField::rise_of(int facet) {
 // other curvatures as well.
 void CurvatureField::collect_fan(int corner, bool all, std::vector<int>& corners) const {
   const Vec3 normal = normal_at(*shell_, corner);
-  corners.assign(1, corner);
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const int c = corners[i];
-    for_each_beside(*shell_, c, [&](int other, const Edge& edge) {
-      if (edge.count != 2) return;
-      if (std::find(corners.begin(), corners.end(), other) != corners.end()) return;
-      if (!is_one_normal(normal, normal_at(*shell_, other))) return;
-      if (all || !is_jump(*shell_, c / 3, other / 3)) corners.push_back(other);
-    });
-  }
+  connected_corners(*shell_, corner, corners, [&](int c, int other, const Edge& edge) {
+    return edge.count == 2 && is_one_normal(normal, normal_at(*shell_, other)) &&
+           (all || !is_jump(*shell_, c / 3, other / 3));
+  });
   std::sort(corners.begin(), corners.end());
 }
 

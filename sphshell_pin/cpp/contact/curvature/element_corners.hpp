@@ -1,7 +1,9 @@
 // Corners and sides of curved elements, by facets: corner 3 facet + k, half-edge 3 facet + side.
 #pragma once
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "shell/curved/curved.hpp"
 
@@ -39,8 +41,7 @@ inline Vec3 normal_at(const Shell& shell, int corner) {
 
 // The edge that a facet's side is.
 inline const Edge& edge_at(const Shell& shell, int facet, int side) {
-  const Topology& topology = shell.topology();
-  return topology.edges[topology.edge_of[3 * shell.triangle_of_facet(facet) + side]];
+  return shell.topology().edge_at(3 * shell.triangle_of_facet(facet) + side);
 }
 
 // The corner at a vertex of the element that a half-edge belongs to.
@@ -62,6 +63,20 @@ void for_each_beside(const Shell& shell, int corner, Visit&& visit) {
       const int h = shell.facet_half_edge(topology.incidence[edge.begin + n]);
       if (triangle_of(h) != corner / 3) visit(corner_of(shell, h, vertex), edge);
     }
+  }
+}
+
+// The corners at the same vertex that a first one leads to, breadth first, from element to element
+// where joins(corner, other, edge).
+template <class Joins>
+void connected_corners(const Shell& shell, int first, std::vector<int>& out, Joins&& joins) {
+  out.assign(1, first);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const int c = out[i];
+    for_each_beside(shell, c, [&](int other, const Edge& edge) {
+      if (std::find(out.begin(), out.end(), other) == out.end() && joins(c, other, edge))
+        out.push_back(other);
+    });
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "contact/query/closest_on_side.hpp"
+
 namespace sphshell {
 namespace {
 
@@ -11,17 +13,6 @@ constexpr double kFlatArc = 0.92;
 constexpr int kMostRootHalvings = 14;
 
 }  // namespace
-
-void Sextic::halve(Sextic& low, Sextic& high) const {
-  // Each pass leaves one coefficient of either half at its ends.
-  double work[7];
-  std::copy_n(f, 7, work);
-  for (int n = 0; n < 7; ++n) {
-    low.f[n] = work[0];
-    high.f[6 - n] = work[6 - n];
-    for (int i = 0; i < 6 - n; ++i) work[i] = (work[i] + work[i + 1]) / 2;
-  }
-}
 
 // The one root between the ends, by Newton's method within what is known to hold it.
 double Sextic::root() const {
@@ -60,7 +51,7 @@ void Sextic::roots(double begin, double end, int depth, double* out, int& count)
   }
   if (depth == kMostRootHalvings) return;
   Sextic low, high;
-  halve(low, high);
+  halve(f, low.f, high.f);
   const double middle = (begin + end) / 2;
   low.roots(begin, middle, depth + 1, out, count);
   high.roots(middle, end, depth + 1, out, count);

@@ -28,7 +28,6 @@ struct Sextic {
     for (double& value : f) value -= radius2;
   }
 
-  void halve(Sextic& low, Sextic& high) const;  // by de Casteljau
   // The one root where the ends have opposite signs.
   double root() const;
   // Appends its roots between the ends in their order; at most 6.
@@ -56,12 +55,12 @@ class CellQuadrature {
   // visit(x, area vector by parameters, weight) for all quadrature points.
   template <class Visit>
   void run(Visit&& visit) {
-    part({Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}, 0, visit);
+    part({Corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}}, 0, visit);
   }
 
  private:
   struct Part {
-    Vec2 corner[3];
+    Corners corner;
   };
   // A piece of the boundary: a straight one, or an arc over the chord from a to b.
   struct Piece {
@@ -180,12 +179,7 @@ class CellQuadrature::Arc {
 // Into four similar triangles by the middles of the sides.
 template <class Visit>
 void CellQuadrature::divide(const Part& w, int level, Visit& visit) {
-  const Vec2 half[3] = {(w.corner[0] + w.corner[1]) / 2, (w.corner[1] + w.corner[2]) / 2,
-                        (w.corner[2] + w.corner[0]) / 2};
-  part({half[0], half[1], half[2]}, level + 1, visit);
-  part({w.corner[0], half[0], half[2]}, level + 1, visit);
-  part({half[0], w.corner[1], half[1]}, level + 1, visit);
-  part({half[2], half[1], w.corner[2]}, level + 1, visit);
+  for (const Corners& quarter : quarters(w.corner)) part({quarter}, level + 1, visit);
 }
 
 // Stroud's rule of degree 5, Dunavant's of degree 8 (Int. J. Numer. Methods Eng. 21 (1985) 1129),

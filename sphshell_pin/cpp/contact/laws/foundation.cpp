@@ -50,12 +50,6 @@ Foundation::Foundation() : broad_(true) {
   points_.reserve(4096);
   counted_.reserve(256);
 }
-Foundation::Foundation(const Foundation&) : Foundation() {}
-Foundation& Foundation::operator=(const Foundation&) {
-  broad_ = BroadPhase(true);
-  return *this;
-}
-Foundation::~Foundation() = default;
 
 // One row a patch; few are in reach at once, so a search in order is enough.
 FoundationRow& Foundation::row_of(int patch, int sheet, int element) {
@@ -99,9 +93,7 @@ void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& r
           const double slope = left / (2 * rho2 * rho) + 3 * left * left / (8 * rho2 * rho2 * rho);
           const Vec3 line = d.cross(x);
           row.sum.force += g * line;
-          Mat3 turned;
-          turned << 0, -d.z(), d.y(), d.z(), 0, -d.x(), -d.y(), d.x(), 0;
-          row.sum.slope -= slope * line * x.transpose() + g * turned;
+          row.sum.slope -= slope * line * x.transpose() + g * cross_matrix(d);
           if (points) points_.push_back({x, Vec3::Zero(), 0, 0, g * line, number});
         }
     }

@@ -31,13 +31,10 @@ struct FoundationRow {
   Vec3 normal() const;  // direction of the force
 };
 
-// Scratch of one pair; no heap is used once it has grown. A copy starts with new scratch.
+// Scratch of one pair; no heap is used once it has grown.
 class Foundation {
  public:
   Foundation();
-  Foundation(const Foundation& other);
-  Foundation& operator=(const Foundation& other);
-  ~Foundation();
 
   // Rows of the patches that the ball overlaps, in no order. Slopes of the force and quadrature
   // points only where asked for; the forces of the points add up to those of the rows. The

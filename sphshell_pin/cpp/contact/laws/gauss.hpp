@@ -41,23 +41,13 @@ inline constexpr double kGaussWeights8[] = {
     0.05061426814518853, 0.11119051722668721, 0.15685332293894344, 0.18134189168918083,
     0.18134189168918083, 0.15685332293894344, 0.11119051722668721, 0.05061426814518853};
 
-// Of 3 to 8 nodes: exact for polynomials of degree 2 n - 1.
-// Gauss-Legendre.
+// Of 3 to 8 nodes, Gauss and Legendre's: exact for polynomials of degree 2 n - 1.
 inline GaussRule gauss_rule(int n) {
-  switch (n) {
-    case 3:
-      return {3, kGaussNodes3, kGaussWeights3};
-    case 4:
-      return {4, kGaussNodes4, kGaussWeights4};
-    case 5:
-      return {5, kGaussNodes5, kGaussWeights5};
-    case 6:
-      return {6, kGaussNodes6, kGaussWeights6};
-    case 7:
-      return {7, kGaussNodes7, kGaussWeights7};
-    default:
-      return {8, kGaussNodes8, kGaussWeights8};
-  }
+  static constexpr GaussRule kRules[] = {
+      {3, kGaussNodes3, kGaussWeights3}, {4, kGaussNodes4, kGaussWeights4},
+      {5, kGaussNodes5, kGaussWeights5}, {6, kGaussNodes6, kGaussWeights6},
+      {7, kGaussNodes7, kGaussWeights7}, {8, kGaussNodes8, kGaussWeights8}};
+  return kRules[n - 3];
 }
 
 }  // namespace sphshell

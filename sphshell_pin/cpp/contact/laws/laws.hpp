@@ -60,47 +60,49 @@ NormalForce<S> push(const S& total, const S& elastic) {
 // - needs_rate: whether the force depends on gap_rate.
 // Hertz's law also gets the scale of the gap, see Hertz [m^0.5].
 
+// What the laws have in common whose spring is k depth^e.
+struct PowerLaw {
+  double stiffness, exponent;  // [N/m^e], 1
+
+  template <class S>
+  S elastic(const S& depth) const {
+    return stiffness * power(depth, exponent);
+  }
+  double energy(double depth) const { return elastic(depth) * depth / (exponent + 1); }
+};
+
 // max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate)
-struct ImpactLaw {
+struct ImpactLaw : PowerLaw {
   static constexpr const char* kind = "impact";
-  double stiffness, exponent, damping, full_damping_depth;  // [N/m^e], 1, [N s/m], [m]
+  double damping, full_damping_depth;  // [N s/m], [m]
 
   explicit ImpactLaw(const Numbers& p)
-      : stiffness(p.at(0)), exponent(p.at(1)), damping(p.at(2)), full_damping_depth(p.at(3)) {}
+      : PowerLaw{p.at(0), p.at(1)}, damping(p.at(2)), full_damping_depth(p.at(3)) {}
 
   bool needs_rate() const { return damping > 0; }
 
   template <class S>
   NormalForce<S> force(const S& depth, const S& gap_rate) const {
-    const S elastic = stiffness * power(depth, exponent);
-    if (!needs_rate()) return {elastic, elastic};
-    return push(S(elastic - step(depth, 0, 0, full_damping_depth, damping) * gap_rate), elastic);
-  }
-
-  double energy(double depth) const {
-    return stiffness * power(depth, exponent) * depth / (exponent + 1);
+    const S spring = elastic(depth);
+    if (!needs_rate()) return {spring, spring};
+    return push(S(spring - step(depth, 0, 0, full_damping_depth, damping) * gap_rate), spring);
   }
 };
 
 // max(0, k depth^e (1 - b gap_rate))
-struct HuntCrossleyLaw {
+struct HuntCrossleyLaw : PowerLaw {
   static constexpr const char* kind = "hunt-crossley";
-  double stiffness, exponent, dissipation;  // [N/m^e], 1, [s/m]
+  double dissipation;  // [s/m]
 
-  explicit HuntCrossleyLaw(const Numbers& p)
-      : stiffness(p.at(0)), exponent(p.at(1)), dissipation(p.at(2)) {}
+  explicit HuntCrossleyLaw(const Numbers& p) : PowerLaw{p.at(0), p.at(1)}, dissipation(p.at(2)) {}
 
   bool needs_rate() const { return dissipation > 0; }
 
   template <class S>
   NormalForce<S> force(const S& depth, const S& gap_rate) const {
-    const S elastic = stiffness * power(depth, exponent);
-    if (!needs_rate()) return {elastic, elastic};
-    return push(S(elastic - elastic * dissipation * gap_rate), elastic);
-  }
-
-  double energy(double depth) const {
-    return stiffness * power(depth, exponent) * depth / (exponent + 1);
+    const S spring = elastic(depth);
+    if (!needs_rate()) return {spring, spring};
+    return push(S(spring - spring * dissipation * gap_rate), spring);
   }
 };
 
@@ -274,12 +276,7 @@ struct OwnFunction {
   // `what` of which law it is, and of which numbers.
   static double finite(double value, const char* what, const char* first, double x,
                        const char* second, double y) {
-    if (!std::isfinite(value)) fail(value, what, first, x, second, y);
-    return value;
-  }
-
-  [[noreturn]] static void fail(double value, const char* what, const char* first, double x,
-                                const char* second, double y) {
+    if (std::isfinite(value)) return value;
     std::ostringstream said;
     said << "the " << what << " is " << value << " at " << first << ' ' << x << ", " << second
          << ' ' << y << ": its function must return finite numbers";

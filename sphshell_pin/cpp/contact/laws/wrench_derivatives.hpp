@@ -12,13 +12,6 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Matrix63 = Eigen::Matrix<double, 6, 3>;
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
-// [x]: [x] y = x cross y.
-inline Mat3 cross_matrix(const Vec3& x) {
-  Mat3 out;
-  out << 0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0;
-  return out;
-}
-
 // A contact and the motion of the sphere's body against the shell; all in the shell's frame, twists
 // and wrenches about its origin.
 struct ContactSite {

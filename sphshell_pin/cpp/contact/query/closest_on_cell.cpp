@@ -53,7 +53,7 @@ double outside(double u, double v) { return std::max({-u, -v, u + v - 1}); }
 
 // A lower bound of |x|^2 over a part of a patch: the least of its 28 coefficients in Bernstein's
 // form, of degree 6.
-double least2_of(const CubicPatch& patch, const Vec2 (&corner)[3]) {
+double least2_of(const CubicPatch& patch, const Corners& corner) {
   // The square of a polynomial of degree 3 has degree 6. Its Bernstein coefficients are the
   // products of the control points, weighted by multinomial coefficients; the polynomial lies in
   // their convex hull, so the least coefficient bounds it from below. The control points of the
@@ -146,7 +146,7 @@ class CellSearch {
 
   // One part, a triangle in parameters. All derivatives are taken in the facet's plane in meters,
   // where the bounds hold.
-  void look_into(const Vec2 (&corner)[3], int halvings) {
+  void look_into(const Corners& corner, int halvings) {
     const Vec2 middle = (corner[0] + corner[1] + corner[2]) / 3;
     Expansion here(patch_, middle.x(), middle.y(), kOrigin);
     axes_.first(here.gu, here.gv);
@@ -173,13 +173,8 @@ class CellSearch {
     if (low > 0 || halvings == kMostHalvings) return descend(middle);
     if (halvings == 0) descend(middle);  // what it finds spares parts
     if (nothing_below(halvings == 0 ? whole2_ : least2_of(patch_, corner))) return;
-    const Vec2 half[3] = {(corner[0] + corner[1]) / 2, (corner[1] + corner[2]) / 2,
-                          (corner[2] + corner[0]) / 2};
-    // The part in the middle first: what it finds spares the others.
-    look_into({half[0], half[1], half[2]}, halvings + 1);
-    look_into({corner[0], half[0], half[2]}, halvings + 1);
-    look_into({half[0], corner[1], half[1]}, halvings + 1);
-    look_into({half[2], half[1], corner[2]}, halvings + 1);
+    // What the part in the middle finds spares the others.
+    for (const Corners& part : quarters(corner)) look_into(part, halvings + 1);
   }
 
   // What a part may hold beyond what is known cannot be felt.
@@ -218,7 +213,7 @@ class CellSearch {
     out_ = {Feature::Face, 0, 0.0, found};
   }
 
-  const Vec2 kWhole[3] = {{0, 0}, {1, 0}, {0, 1}};
+  const Corners kWhole = {Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};
   const FacetAxes axes_;
   CubicPatch patch_;
   Eigenvalues whole_{0, 0, 0};      // bounds on the second derivative of |x|^2 / 2

@@ -1,6 +1,7 @@
 // The point of a curved element, a cell, nearest to a point, and how it follows that point.
 #pragma once
 
+#include <array>
 #include <utility>
 
 #include "contact/query/contact.hpp"
@@ -21,6 +22,14 @@ struct Nearest {
   double t;   // along the side
   CellPoint at;
 };
+
+// A triangle in the parameters, divided into four similar ones by the middles of its sides: the
+// part in the middle first.
+using Corners = std::array<Eigen::Vector2d, 3>;
+inline std::array<Corners, 4> quarters(const Corners& c) {
+  const Eigen::Vector2d a = (c[0] + c[1]) / 2, b = (c[1] + c[2]) / 2, d = (c[2] + c[0]) / 2;
+  return {Corners{a, b, d}, Corners{c[0], a, d}, Corners{a, c[1], b}, Corners{d, b, c[2]}};
+}
 
 // The parameters u, v at t on side k.
 std::pair<double, double> on_side(int k, double t);

@@ -11,6 +11,19 @@
 
 namespace sphshell {
 
+// De Casteljau's halves of a polynomial by its n Bernstein coefficients.
+template <std::size_t n>
+void halve(const double (&c)[n], double (&low)[n], double (&high)[n]) {
+  // Each pass leaves one coefficient of either half at its ends.
+  double work[n];
+  std::copy_n(c, n, work);
+  for (std::size_t i = 0; i < n; ++i) {
+    low[i] = work[0];
+    high[n - 1 - i] = work[n - 1 - i];
+    for (std::size_t j = 0; j + 1 < n - i; ++j) work[j] = (work[j] + work[j + 1]) / 2;
+  }
+}
+
 // The derivative of half the square of the distance from x along a cubic side has degree 5; here by
 // its Bernstein coefficients.
 struct Quintic {
@@ -59,19 +72,6 @@ struct Quintic {
     return 5 *
            (s2 * s2 * (q[1] - q[0]) + 4 * s2 * s * t * (q[2] - q[1]) + 6 * s2 * t2 * (q[3] - q[2]) +
             4 * s * t2 * t * (q[4] - q[3]) + t2 * t2 * (q[5] - q[4]));
-  }
-
-  // Its halves (de Casteljau).
-  std::pair<Quintic, Quintic> halves() const {
-    std::pair<Quintic, Quintic> out;
-    double p[6];
-    std::copy_n(q, 6, p);
-    for (int i = 0; i < 6; ++i) {
-      out.first.q[i] = p[0];
-      out.second.q[5 - i] = p[5 - i];
-      for (int j = 0; j < 5 - i; ++j) p[j] = (p[j] + p[j + 1]) / 2;
-    }
-    return out;
   }
 
   // The one root of a quintic that rises through zero between the ends: Newton's method, halved
@@ -133,7 +133,8 @@ inline double nearest_on_side(const CubicCurve& side, const Vec3& x) {
     try_at(part.from + part.width / 2);
     if (steepest * part.width < kLevelSide * least || count + 2 > kMost || part.width < 1e-9)
       continue;
-    const auto [first, second] = part.quintic.halves();
+    Quintic first, second;
+    halve(part.quintic.q, first.q, second.q);
     parts[count++] = {second, part.from + part.width / 2, part.width / 2};
     parts[count++] = {first, part.from, part.width / 2};
   }

@@ -29,6 +29,12 @@ Minimum on_side(const Shell& shell, int f, int k, double t, const Probe& probe, 
   return {contact, f, vertex ? corner : k, false};
 }
 
+// Union-find with path halving.
+int root_of(std::vector<int>& parent, int i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
 // Rows: two directions in the plane, and its normal.
 Mat3 axes_of(const Plane& plane) {
   const Vec3 &n = plane.normal, east = n.unitOrthogonal();
@@ -115,16 +121,10 @@ void Components::merge(const Shell& shell, const Probe& probe, bool want_dn_dc,
   find_saddles(shell, probe, want_dn_dc, minima);
 }
 
-// Union-find with path halving.
-int Components::root(int cell) {
-  while (parent_[cell] != cell) cell = parent_[cell] = parent_[parent_[cell]];
-  return cell;
-}
-
 // By the number of the facet in cells_, if it has been reached.
 bool Components::belongs_to(int facet, int component) {
   const int cell = cells_.find(facet);
-  return cell != FacetTable::kNone && root(cell) == component;
+  return cell != FacetTable::kNone && root_of(parent_, cell) == component;
 }
 
 // Each cell a component of its own; the first ones are those of the minima.
@@ -208,7 +208,7 @@ void Components::add_candidates(const Shell& shell, const Probe& probe, int f, i
       continue;
     }
     const int h = 3 * shell.triangle_of_facet(f) + k;
-    const Edge& edge = topology.edges[topology.edge_of[h]];
+    const Edge& edge = topology.edge_at(h);
     const int name = shell.facet_half_edge(topology.incidence[edge.begin]);
     for (int i = edge.begin; i < edge.begin + edge.count; ++i)
       if (topology.incidence[i] != h)
@@ -226,14 +226,15 @@ void Components::grow_components(const Shell& shell, const Probe& probe, std::si
   for (int size = 16; active_.size() > 1; size *= 2) {
     for (std::size_t i = 0; i < active_.size(); ++i) {
       int component = active_[i];
-      if (root(component) != component) continue;
+      if (root_of(parent_, component) != component) continue;
       while (component >= 0 && components_[component].cells < size)
         component = expand(shell, probe, component);
     }
-    active_.erase(
-        std::remove_if(active_.begin(), active_.end(),
-                       [&](int p) { return root(p) != p || components_[p].open.empty(); }),
-        active_.end());
+    active_.erase(std::remove_if(active_.begin(), active_.end(),
+                                 [&](int p) {
+                                   return root_of(parent_, p) != p || components_[p].open.empty();
+                                 }),
+                  active_.end());
   }
 }
 
@@ -273,7 +274,7 @@ int Components::expand(const Shell& shell, const Probe& probe, int component) {
     add_candidates(shell, probe, facet, candidate.to, component);
     return component;
   }
-  const int other = root(candidate.to);
+  const int other = root_of(parent_, candidate.to);
   if (other == component) return component;
   tree_.push_back(candidate);
   // The longer heap is kept, so that each candidate is moved O(log n) times.
@@ -305,7 +306,7 @@ void Components::find_saddles(const Shell& shell, const Probe& probe, bool want_
   leader_.resize(minima.size());
   std::iota(leader_.begin(), leader_.end(), 0);
   for (const SaddleCandidate& candidate : tree_) {
-    const int a = root(candidate.from), b = root(candidate.to);
+    const int a = root_of(parent_, candidate.from), b = root_of(parent_, candidate.to);
     const int i = deepest_[a], j = deepest_[b];
     parent_[b] = a;
     deepest_[a] = i < 0 ? j : j < 0 ? i : std::min(i, j);
@@ -341,7 +342,7 @@ void Components::find_saddles(const Shell& shell, const Probe& probe, bool want_
   for (std::size_t i = 0; i < minima.size(); ++i) {
     if (absorbed_[i]) continue;
     int& group = minima[i].contact.group;
-    if (group >= 0) group = leader_of(group);
+    if (group >= 0) group = root_of(leader_, group);
     minima[kept++] = minima[i];
   }
   minima.erase(minima.begin() + kept, minima.end());
@@ -369,13 +370,7 @@ void Components::group_if_nearly_one(std::vector<Minimum>& minima, int deeper, i
   if (!near(a) || !near(b)) return;
   a.group = saddle.group = deeper;
   b.group = shallower;
-  leader_[leader_of(shallower)] = leader_of(deeper);
-}
-
-// Union-find again, over minima, with path halving.
-int Components::leader_of(int minimum) {
-  while (leader_[minimum] != minimum) minimum = leader_[minimum] = leader_[leader_[minimum]];
-  return minimum;
+  leader_[root_of(leader_, shallower)] = root_of(leader_, deeper);
 }
 
 template void Components::merge(const Shell&, const Sphere&, bool, std::vector<Minimum>&);

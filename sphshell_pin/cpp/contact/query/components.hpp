@@ -71,8 +71,7 @@ class Components {
 
   // Whether a comes after b.
   static bool lower(const SaddleCandidate& a, const SaddleCandidate& b);
-  // The component of a cell, by its first cell; and whether a facet is in it already.
-  int root(int cell);
+  // Whether a facet is in a component, named by its first cell, already.
   bool belongs_to(int facet, int component);
   void reset_components(std::size_t minima);
   // The ways out of a cell, onto the heap of its component.
@@ -92,8 +91,6 @@ class Components {
                            Contact& saddle);
   template <class Probe>
   void move_to_middles(const Probe& probe, std::vector<Minimum>& minima) const;
-  // The minimum that a group is shown in place of.
-  int leader_of(int minimum);
 
   FacetTable cells_;                   // the first of them hold the minima, in their order
   std::vector<int> parent_, deepest_;  // per cell; deepest_: minimum of its component, or -1

@@ -10,6 +10,13 @@ namespace sphshell {
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 
+// [x]: [x] y = x cross y.
+inline Mat3 cross_matrix(const Vec3& x) {
+  Mat3 out;
+  out << 0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0;
+  return out;
+}
+
 enum class Method : int { Facets = 0, Elements = 1, Smooth = 2 };
 enum class Feature : std::uint8_t { Face = 0, Edge = 1, Vertex = 2, Ring = 3 };
 

@@ -134,8 +134,7 @@ void FlatQuery::add_minima(const Shell& shell, const Sphere& sphere, bool want_d
   const auto add = [&](int f, int index, const Contact& contact, bool behind, const Mat3& dx_dc) {
     minima.push_back({contact, f, index, behind});
     Contact& added = minima.back().contact;
-    if (want_dn_dc && added.feature != Feature::Face)
-      added.dn_dc = dn_dc_of(added, sphere.radius, dx_dc);
+    if (want_dn_dc && added.feature != Feature::Face) added.dn_dc = slopes_of(added, sphere, dx_dc);
   };
   // A planar face has one nearest point, whichever of its facets hold it.
   std::sort(faces_.begin(), faces_.end(), [&](int x, int y) {
@@ -279,7 +278,7 @@ void FlatQuery::add_pinched(const Shell& shell, const Sphere& sphere, bool want_
     Contact contact = contact_at(shell.vertices()[at->vertex], facet.normal, sphere, facet.element,
                                  Feature::Vertex);
     contact.weight = more < 0 ? -1 : 1;
-    if (want_dn_dc) contact.dn_dc = contact.weight * dn_dc_of(contact, sphere.radius, Mat3::Zero());
+    if (want_dn_dc) contact.dn_dc = contact.weight * slopes_of(contact, sphere, Mat3::Zero());
     minima.insert(minima.end(), std::abs(more), {contact, triangle_of(h), side_of(h), false});
   }
 }

@@ -43,19 +43,16 @@ inline Contact contact_at(const Vec3& point, const Vec3&, const Plane& plane, in
   return {point, plane.normal, plane.depth(point), element, feature};
 }
 
-// How the normal changes with the center, where the contact point follows it by dx_dc (3, 3).
-inline Mat3 dn_dc_of(const Contact& contact, double radius, const Mat3& dx_dc) {
-  const double distance = radius - contact.depth;
+// What a contact keeps of how its point follows the probe: how the normal changes with the center,
+// where the contact point follows it by dx_dc (3, 3); of a plane that itself.
+inline Mat3 slopes_of(const Contact& contact, const Sphere& sphere, const Mat3& dx_dc) {
+  const double distance = sphere.radius - contact.depth;
   if (!(distance > 0)) return Mat3::Zero();
   const Vec3& n = contact.normal;
   // n = (c - x) / d: dn = (I - n n^T)(dc - dx) / d, and dx is tangential already.
   return (Mat3::Identity() - n * n.transpose() - dx_dc) / distance;
 }
 
-// What a contact keeps of how its point follows the probe.
-inline Mat3 slopes_of(const Contact& contact, const Sphere& sphere, const Mat3& dx_dc) {
-  return dn_dc_of(contact, sphere.radius, dx_dc);
-}
 inline Mat3 slopes_of(const Contact&, const Plane&, const Mat3& dx_dn) { return dx_dn; }
 
 }  // namespace sphshell

@@ -29,7 +29,7 @@ FeatureNormal feature_normal(const Shell& shell, const Minimum& at) {
     return {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])};
   }
   if (at.contact.feature == Feature::Edge) {
-    const Edge& edge = topology.edges[topology.edge_of[3 * t + at.index]];
+    const Edge& edge = topology.edge_at(3 * t + at.index);
     return {topology.edge_normal(edge), edge.on_rim()};
   }
   return {at.behind ? Vec3(-at.contact.normal) : at.contact.normal, false};
@@ -111,7 +111,7 @@ void find_elements(const Shell& shell, const Sphere& sphere, BroadPhase& broad,
     Feature feature = at.feature >= 4   ? Feature::Vertex
                       : at.feature >= 1 ? Feature::Edge
                                         : Feature::Face;
-    if (feature == Feature::Edge && topology.edges[topology.edge_of[3 * t + at.feature - 1]].inner)
+    if (feature == Feature::Edge && topology.edge_at(3 * t + at.feature - 1).inner)
       feature = Feature::Face;
     const Vec3& normal = topology.face_normal[t];
     const double height = normal.dot(center - at.point);

@@ -37,19 +37,13 @@ inline SideTest test_side(const Facet& facet, int k, const Vec3& center, double 
   return out;
 }
 
-// True where the distance to the facet does not fall when one leaves its side k inward.
-inline bool side_holds(const Facet& facet, int k, const Vec3& center, double tolerance2) {
-  const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
-  const double inward = facet.normal.dot(edge.cross(center - facet.corner[k]));
-  return inward <= 0 || inward * inward <= tolerance2 * edge.squaredNorm();
-}
-
 // `code` of a facet's side: kBoundary, the other half-edge, or, below kManifold, an edge of more
 // than two triangles, all of which are asked.
 inline bool edge_is_minimum(const Shell& shell, int code, const Vec3& center, double tolerance2) {
   if (code == kBoundary) return true;
+  // The distance to a facet does not fall when one leaves its side inward.
   const auto holds = [&](int h) {
-    return side_holds(shell.facets()[triangle_of(h)], side_of(h), center, tolerance2);
+    return test_side(shell.facets()[triangle_of(h)], side_of(h), center, tolerance2).not_within;
   };
   if (code >= 0) return holds(code);
   const std::vector<int>& all = shell.half_edges_of(kManifold - code);

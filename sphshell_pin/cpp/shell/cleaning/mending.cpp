@@ -15,49 +15,6 @@
 namespace sphshell {
 namespace {
 
-// The finalizer of MurmurHash3: neighboring cells get distant slots.
-std::uint64_t mix(std::uint64_t key) {
-  key ^= key >> 33;
-  key *= 0xff51afd7ed558ccdULL;
-  key ^= key >> 33;
-  key *= 0xc4ceb9fe1a85ec53ULL;
-  return key ^ (key >> 33);
-}
-
-// Open-addressing table from a key to the head of a chain of points.
-class CellTable {
- public:
-  explicit CellTable(std::size_t expected) {
-    std::size_t size = 16;
-    // At most half full.
-    while (size < 2 * expected) size *= 2;
-    keys_.assign(size, kFree);
-    heads_.assign(size, -1);
-    mask_ = size - 1;
-  }
-
-  std::int32_t find(std::uint64_t key) const {
-    for (std::size_t at = mix(key) & mask_;; at = (at + 1) & mask_) {
-      if (keys_[at] == key) return heads_[at];
-      if (keys_[at] == kFree) return -1;
-    }
-  }
-
-  // Makes `value` the head of the chain and returns the head before it.
-  std::int32_t push(std::uint64_t key, std::int32_t value) {
-    for (std::size_t at = mix(key) & mask_;; at = (at + 1) & mask_) {
-      if (keys_[at] == kFree) keys_[at] = key;
-      if (keys_[at] == key) return std::exchange(heads_[at], value);
-    }
-  }
-
- private:
-  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
-  std::vector<std::uint64_t> keys_;
-  std::vector<std::int32_t> heads_;
-  std::size_t mask_ = 0;
-};
-
 std::array<Vec3, 3> corners_of(const double* points, const std::int32_t* vertices) {
   std::array<Vec3, 3> out;
   for (int k = 0; k < 3; ++k)
@@ -81,34 +38,51 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
   const auto index = [&](double x, int axis) {
     return static_cast<std::uint64_t>(std::max(0.0, std::floor((x - low[axis]) / cell)));
   };
-  CellTable table(count);
-  std::vector<std::int32_t> chain(count, -1);
+  const auto key = [](std::uint64_t x, std::uint64_t y, std::uint64_t z) {
+    return (x << 42) | (y << 21) | z;
+  };
+  // The points by their cells.
+  using Place = std::pair<std::uint64_t, std::int32_t>;
+  LargeArray<Place> places(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double* p = points + 3 * i;
+    places[i] = {key(index(p[0], 0), index(p[1], 1), index(p[2], 2)), static_cast<std::int32_t>(i)};
+  }
+  std::sort(places.begin(), places.end());
+  // Merges two points that are near each other; whether they are equal.
+  const auto merge = [&](const Place& one, const Place& other) {
+    const double* p = points + 3 * static_cast<std::size_t>(one.second);
+    const double* q = points + 3 * static_cast<std::size_t>(other.second);
+    const double dx = p[0] - q[0], dy = p[1] - q[1], dz = p[2] - q[2];
+    const double squared = dx * dx + dy * dy + dz * dz;
+    if (squared <= tolerance * tolerance) groups.merge(one.second, other.second);
+    return squared == 0.0;
+  };
+  // Within each cell, of which one of equal points is kept.
+  std::size_t kept = 0, first = 0;
+  for (const Place& place : places) {
+    if (kept == 0 || places[kept - 1].first != place.first) first = kept;
+    bool same = false;
+    for (std::size_t k = first; k < kept; ++k) same = merge(place, places[k]) || same;
+    if (!same) places[kept++] = place;
+  }
+  places.resize(kept);
+  // And across cells, where the ball of the tolerance meets several: seldom, as they are wide.
+  for (const Place& place : places) {
+    const double* p = points + 3 * static_cast<std::size_t>(place.second);
     std::array<std::uint64_t, 3> from{}, to{};
     for (int axis = 0; axis < 3; ++axis) {
-      // All cells that the ball of the tolerance meets: seldom more than one, as cells are wide.
       from[axis] = index(p[axis] - tolerance, axis);
       to[axis] = index(p[axis] + tolerance, axis);
     }
-    bool same_place = false;
-    for (std::uint64_t x = from[0]; x <= to[0]; ++x) {
-      for (std::uint64_t y = from[1]; y <= to[1]; ++y) {
+    for (std::uint64_t x = from[0]; x <= to[0]; ++x)
+      for (std::uint64_t y = from[1]; y <= to[1]; ++y)
         for (std::uint64_t z = from[2]; z <= to[2]; ++z) {
-          for (std::int32_t j = table.find((x << 42) | (y << 21) | z); j >= 0; j = chain[j]) {
-            const double* other = points + 3 * static_cast<std::size_t>(j);
-            const double dx = p[0] - other[0], dy = p[1] - other[1], dz = p[2] - other[2];
-            const double squared = dx * dx + dy * dy + dz * dz;
-            if (squared > tolerance * tolerance) continue;
-            groups.merge(static_cast<std::int32_t>(i), j);
-            same_place = same_place || squared == 0.0;
-          }
+          const std::uint64_t cell = key(x, y, z);
+          if (cell == place.first) continue;
+          auto other = std::lower_bound(places.begin(), places.end(), Place(cell, 0));
+          for (; other != places.end() && other->first == cell; ++other) merge(place, *other);
         }
-      }
-    }
-    if (same_place) continue;  // an equal point is in the table already: keep chains short
-    const std::uint64_t key = (index(p[0], 0) << 42) | (index(p[1], 1) << 21) | index(p[2], 2);
-    chain[i] = table.push(key, static_cast<std::int32_t>(i));
   }
   out.representative.resize(count);
   for (std::size_t i = 0; i < count; ++i) {

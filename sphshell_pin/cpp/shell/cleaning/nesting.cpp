@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <tuple>
 #include <unordered_map>
+#include <utility>
 
 #include "shell/cleaning/mending.hpp"
+#include "shell/point_tree.hpp"
 
 namespace sphshell {
 
@@ -14,7 +16,7 @@ std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t
                                         std::size_t triangle_count, const double* queries,
                                         const std::uint8_t* closed, std::size_t component_count) {
   // Parity of crossings of a ray from each query, in a generic direction so that rays do not run
-  // along the axis-aligned faces and edges CAD is full of. The queries are sorted into a grid
+  // along the axis-aligned faces and edges CAD is full of. The queries are in a tree
   // across the ray, so each triangle meets only those near it.
   std::vector<std::int32_t> depth(component_count, 0);
   std::vector<std::int32_t> active;
@@ -34,77 +36,58 @@ std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t
     }
     return out;
   };
+  // In the plane across the ray, by component.
   std::vector<Vec> query(component_count);
-  std::array<double, 2> low{}, high{};
-  low.fill(std::numeric_limits<double>::infinity());
-  high.fill(-std::numeric_limits<double>::infinity());
+  std::vector<double> place(2 * component_count);
   for (const std::int32_t c : active) {
     query[c] = turned(queries + 3 * static_cast<std::size_t>(c));
-    for (int k = 0; k < 2; ++k) {
-      low[k] = std::min(low[k], query[c][k]);
-      high[k] = std::max(high[k], query[c][k]);
-    }
+    place[2 * c] = query[c][0], place[2 * c + 1] = query[c][1];
   }
-  // About one query in each cell.
-  const auto cells = static_cast<std::int64_t>(std::ceil(std::sqrt(double(active.size()))));
-  const auto cell_of = [&](double x, int k) {
-    const double width = std::max(high[k] - low[k], 1e-300);
-    const double at = std::floor((x - low[k]) / width * static_cast<double>(cells));
-    return static_cast<std::int64_t>(std::clamp(at, 0.0, static_cast<double>(cells - 1)));
-  };
-  std::vector<std::vector<std::int32_t>> grid(static_cast<std::size_t>(cells * cells));
-  for (const std::int32_t c : active) {
-    grid[cell_of(query[c][0], 0) * cells + cell_of(query[c][1], 1)].push_back(c);
-  }
+  const PointTree<2> tree(place.data(), std::move(active));
   std::unordered_map<std::uint64_t, bool> odd;
   for (std::size_t t = 0; t < triangle_count; ++t) {
     const std::int32_t owner = triangle_component[t];
     if (!closed[owner]) continue;
     std::array<std::int32_t, 3> index{};
     std::array<Vec, 3> corner{};
-    std::array<double, 2> from{low[0], low[1]}, to{high[0], high[1]};
+    PointTree<2>::Box span{};
     for (int k = 0; k < 3; ++k) {
       index[k] = triangles[3 * t + k];
       corner[k] = turned(points + 3 * static_cast<std::size_t>(index[k]));
     }
-    bool outside = false;
-    for (int k = 0; k < 2; ++k) {
-      const auto [least, most] = std::minmax({corner[0][k], corner[1][k], corner[2][k]});
-      outside = outside || least > high[k] || most < low[k];
-      from[k] = least;
-      to[k] = most;
-    }
-    if (outside) continue;
-    for (std::int64_t x = cell_of(from[0], 0); x <= cell_of(to[0], 0); ++x) {
-      for (std::int64_t y = cell_of(from[1], 1); y <= cell_of(to[1], 1); ++y) {
-        for (const std::int32_t c : grid[x * cells + y]) {
-          if (c == owner) continue;
-          const Vec& q = query[c];
-          bool inside = false;
-          for (int k = 0; k < 3; ++k) {
-            // Low index first, so that both users of an edge compute the very same number.
-            int a = k, b = (k + 1) % 3;
-            if (index[a] > index[b]) std::swap(a, b);
-            if ((corner[a][1] > q[1]) == (corner[b][1] > q[1])) continue;
-            const double share = (q[1] - corner[a][1]) / (corner[b][1] - corner[a][1]);
-            if (q[0] < corner[a][0] + share * (corner[b][0] - corner[a][0])) inside = !inside;
-          }
-          if (!inside) continue;
-          const Vec &a = corner[0], &b = corner[1], &d = corner[2];
-          const double ux = b[0] - a[0], uy = b[1] - a[1], vx = d[0] - a[0], vy = d[1] - a[1];
-          // Barycentric coordinates of the query in the projection: the height of the triangle
-          // there.
-          const double area = ux * vy - uy * vx;
-          if (area == 0.0) continue;
-          const double s = ((q[0] - a[0]) * vy - (q[1] - a[1]) * vx) / area;
-          const double r = ((q[1] - a[1]) * ux - (q[0] - a[0]) * uy) / area;
-          if (a[2] + s * (b[2] - a[2]) + r * (d[2] - a[2]) <= q[2]) continue;
-          const std::uint64_t key = (std::uint64_t(c) << 32) | std::uint64_t(owner);
-          // The ray along the third axis crosses this triangle above the query.
-          odd[key] = !odd[key];
-        }
+    for (int k = 0; k < 2; ++k)
+      std::tie(span.low[k], span.high[k]) = std::minmax({corner[0][k], corner[1][k], corner[2][k]});
+    const auto meets = [&](const PointTree<2>::Box& box) {
+      return box.low[0] <= span.high[0] && box.high[0] >= span.low[0] &&
+             box.low[1] <= span.high[1] && box.high[1] >= span.low[1];
+    };
+    tree.search(meets, [&](std::int32_t c) {
+      if (c == owner) return false;
+      const Vec& q = query[c];
+      bool inside = false;
+      for (int k = 0; k < 3; ++k) {
+        // Low index first, so that both users of an edge compute the very same number.
+        int a = k, b = (k + 1) % 3;
+        if (index[a] > index[b]) std::swap(a, b);
+        if ((corner[a][1] > q[1]) == (corner[b][1] > q[1])) continue;
+        const double share = (q[1] - corner[a][1]) / (corner[b][1] - corner[a][1]);
+        if (q[0] < corner[a][0] + share * (corner[b][0] - corner[a][0])) inside = !inside;
       }
-    }
+      if (!inside) return false;
+      const Vec &a = corner[0], &b = corner[1], &d = corner[2];
+      const double ux = b[0] - a[0], uy = b[1] - a[1], vx = d[0] - a[0], vy = d[1] - a[1];
+      // Barycentric coordinates of the query in the projection: the height of the triangle
+      // there.
+      const double area = ux * vy - uy * vx;
+      if (area == 0.0) return false;
+      const double s = ((q[0] - a[0]) * vy - (q[1] - a[1]) * vx) / area;
+      const double r = ((q[1] - a[1]) * ux - (q[0] - a[0]) * uy) / area;
+      if (a[2] + s * (b[2] - a[2]) + r * (d[2] - a[2]) <= q[2]) return false;
+      const std::uint64_t key = (std::uint64_t(c) << 32) | std::uint64_t(owner);
+      // The ray along the third axis crosses this triangle above the query.
+      odd[key] = !odd[key];
+      return false;
+    });
   }
   for (const auto& [key, value] : odd) {
     // Inside each component with an odd number of crossings.

@@ -202,11 +202,10 @@ void CurvedShell::bound_cells(const Shell& shell) {
     if (!facets_[f].flat) cells_[f] = bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
     for (int k = 0; k < 3; ++k) {
       const int h = 3 * shell.triangle_of_facet(static_cast<int>(f)) + k;
-      const Edge& edge = topology.edges[topology.edge_of[h]];
-      cells_[f].beyond[k] = edge.count == 1 ? kBoundary
-                            : edge.count > 2
-                                ? kNotOwned
-                                : shell.facet_half_edge(topology.other_half_edge(edge, h));
+      const Edge& edge = topology.edge_at(h);
+      cells_[f].beyond[k] = edge.count == 1  ? kBoundary
+                            : edge.count > 2 ? kNotOwned
+                                             : shell.facet_half_edge(topology.other_half_edge(h));
     }
   });
 }

@@ -40,7 +40,7 @@ std::array<double, 2> off_mean(const Shell& shell, const Fans& fans, int f, cons
   Vec3 alike = Vec3::Zero(), by_area = Vec3::Zero(), by_angle = Vec3::Zero();
   double lean = 0, off = std::numeric_limits<double>::infinity();
   for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
-    const Vec3 a = point(Fans::after(*c)) - point(*c), b = point(Fans::before(*c)) - point(*c);
+    const Vec3 a = point(corner_after(*c)) - point(*c), b = point(corner_before(*c)) - point(*c);
     const Vec3& n = shell.topology().face_normal[*c / 3];
     const double area = a.cross(b).norm();
     alike += n, by_area += area * n, by_angle += std::atan2(area, a.dot(b)) * n;
@@ -82,7 +82,7 @@ bool are_means(const Shell& shell, const Fans& fans, const std::vector<Vec3>& no
 // The surface at a side, from the normal at the opposite corner, if each of the two chords from
 // there leans alike at both ends: exact where it is quadratic.
 SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
-  const int i = h, j = Fans::after(h), o = opposite(h);
+  const int i = h, j = corner_after(h), o = opposite(h);
   const Vec3 &p = points()[vertex(i)], &q = points()[vertex(j)], &r = points()[vertex(o)];
   const Vec3 a = p - r, b = q - r;
   Vec3 along = q - p;
@@ -116,11 +116,11 @@ SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
 bool CreaseSearch::reaches_beyond(const Fans& fans, int h) const {
   const int o = opposite(h), fan = fans.of(o);
   const Vec3& r = points()[vertex(o)];
-  const Vec3 along = points()[vertex(Fans::after(h))] - points()[vertex(h)];
+  const Vec3 along = points()[vertex(corner_after(h))] - points()[vertex(h)];
   const Vec3 outward = along.cross(shell_.topology().face_normal[h / 3]);
   const double least = kBeyond * kBeyond * outward.squaredNorm();
   for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
-    for (int k : {Fans::after(*c), Fans::before(*c)}) {
+    for (int k : {corner_after(*c), corner_before(*c)}) {
       const Vec3 d = points()[vertex(k)] - r;
       const double away = -d.dot(outward);
       if (away > 0 && away * away >= least * d.squaredNorm()) return true;

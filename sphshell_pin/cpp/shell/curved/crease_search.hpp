@@ -58,7 +58,7 @@ class CreaseSearch {
     return is_known(joints_[e].half_edge[0]) && is_known(joints_[e].half_edge[1]);
   }
   // The corner opposite a half-edge.
-  static int opposite(int h) { return Fans::before(h); }
+  static int opposite(int h) { return corner_before(h); }
 
   void list_joints();
   void start();

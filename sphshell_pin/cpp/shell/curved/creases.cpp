@@ -53,9 +53,9 @@ void CreaseSearch::start() {
     const auto [h, g] = joints_[e].half_edge;
     // Given normals tell by themselves where they differ; settled joints likewise; else the angle
     // decides.
-    crease_[e] = given_ ? differ(h, Fans::after(g)) && differ(Fans::after(h), g)
+    crease_[e] = given_ ? differ(h, corner_after(g)) && differ(corner_after(h), g)
                  : is_settled(e)
-                     ? differ(h, Fans::after(g)) || differ(Fans::after(h), g)
+                     ? differ(h, corner_after(g)) || differ(corner_after(h), g)
                      : !topology.edges[e].inner && topology.edges[e].kind != EdgeClass::Smooth;
   }
   const Fans before = fans();
@@ -82,7 +82,7 @@ void CreaseSearch::start() {
     any = sharpen(shell_.crease_angle(), [&](const Joint& joint) {
       const auto whole = [&](int c) { return now.count(now.of(c)) == original_count_[c]; };
       const int h = joint.half_edge[0];
-      return !whole(h) || !whole(Fans::after(h));
+      return !whole(h) || !whole(corner_after(h));
     });
   }
 }
@@ -104,13 +104,13 @@ void CreaseSearch::normals_of(const Fans& fans) {
   if (!given_) {
     for (int c = 0; c < corners; ++c)
       if (divided_[c])
-        for (int k : {Fans::after(c), Fans::before(c)}) beside[fans.of(k)] = !divided_[k];
+        for (int k : {corner_after(c), corner_before(c)}) beside[fans.of(k)] = !divided_[k];
     // A closed fan has as many joints as corners.
     std::vector<int> joints(original_.size(), 0);
     for (std::size_t e = 0; e < joints_.size(); ++e) {
       if (crease_[e] || !joints_[e].exists()) continue;
       const int h = joints_[e].half_edge[0];
-      ++joints[fans.of(h)], ++joints[fans.of(Fans::after(h))];
+      ++joints[fans.of(h)], ++joints[fans.of(corner_after(h))];
     }
     for (int f = 0; f < corners; ++f) beside[f] = beside[f] && joints[f] < fans.count(f);
   }
@@ -163,7 +163,7 @@ bool CreaseSearch::add_creases() {
   const std::size_t count = joints_.size();
   const auto vertices_of = [&](std::size_t e) {
     const auto [h, g] = joints_[e].half_edge;
-    return std::array<int, 4>{vertex(h), vertex(Fans::after(h)), vertex(opposite(h)),
+    return std::array<int, 4>{vertex(h), vertex(corner_after(h)), vertex(opposite(h)),
                               vertex(opposite(g))};
   };
   // The larger of the two estimates' heights over the joint.
@@ -239,7 +239,7 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
     double before = 0;
     for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
       before = std::max(before, (original_[*c] - own).norm());
-      for (int w : {Fans::after(*c), Fans::before(*c)}) {
+      for (int w : {corner_after(*c), corner_before(*c)}) {
         if (divided_[w]) continue;
         const Vec3 d = (points()[vertex(w)] - points()[vertex(*c)]).normalized();
         square += d * d.transpose();

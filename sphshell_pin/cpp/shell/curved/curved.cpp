@@ -41,12 +41,6 @@ struct EdgeEnd {
   bool limited;  // a fan there was divided: no more lean than at the other end
 };
 
-// The angle [rad] between a tangent and a chord.
-// By atan2 of cross and dot product: exact for small angles too.
-double lean_of(const Vec3& tangent, const Vec3& d) {
-  return std::atan2(d.cross(tangent).norm(), d.dot(tangent));
-}
-
 // The unit vector nearest to the direction, forward along chord d, that is tangent to the planes of
 // all normals: with one of them its projection, with two their common line. False where there is
 // none.
@@ -64,7 +58,7 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
     // twice as much as for their mean, that is used.
     const Vec3 mean = (normals[0] + normals[1]).normalized();
     const Vec3 level = (d - d.dot(mean) * mean).normalized();
-    if (!(lean_of(out, d) <= 2 * lean_of(level, d))) out = level;
+    if (!(angle_between(out, d) <= 2 * angle_between(level, d))) out = level;
   }
   return out.dot(d) >= kMostLean * d.norm();
 }
@@ -73,7 +67,7 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
 // more than twice as much as the other. The unit tangent that leans no more than twice as much as
 // `other`.
 Vec3 limited_lean(const Vec3& tangent, const Vec3& other, const Vec3& forward) {
-  if (lean_of(tangent, forward) <= 2 * lean_of(other, forward)) return tangent;
+  if (angle_between(tangent, forward) <= 2 * angle_between(other, forward)) return tangent;
   // Within the plane of chord and tangent, turned back to twice the other's lean.
   const Vec3 aside = (tangent - tangent.dot(forward) * forward).normalized();
   const double along = other.dot(forward), off = forward.cross(other).norm();
@@ -310,14 +304,14 @@ std::vector<double> CurvedShell::chord_errors(const Shell& shell) const {
   const CoplanarRegions regions(shell, kSinglePrecision * shell.size());
   const SagittaWitness witness(shell, regions, [&](const Edge& edge) {
     const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
-    return (normal_at(h) - normal_at(Fans::after(g))).norm() <= 10 * kSameNormal &&
-           (normal_at(Fans::after(h)) - normal_at(g)).norm() <= 10 * kSameNormal;
+    return (normal_at(h) - normal_at(corner_after(g))).norm() <= 10 * kSameNormal &&
+           (normal_at(corner_after(h)) - normal_at(g)).norm() <= 10 * kSameNormal;
   });
   std::vector<double> out;
   for (int t = 0; t < static_cast<int>(facets_.size()); ++t) {
     out.push_back(witness.of(t));
     for (int k = 0; k < 3; ++k) {
-      const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
+      const Edge& edge = topology.edge_at(3 * t + k);
       for (int i = edge.begin; i < edge.begin + edge.count; ++i)
         out.back() = std::max(out.back(), witness.of(triangle_of(topology.incidence[i])));
     }
@@ -342,7 +336,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
     const int h = topology.incidence[edge.begin],
               g = topology.incidence[edge.begin + edge.count - 1];
     const bool opposed = triangles[h / 3][h % 3] != triangles[g / 3][g % 3];
-    const int h1 = Fans::after(h), g1 = Fans::after(g);
+    const int h1 = corner_after(h), g1 = corner_after(g);
     return edge.count == 2 && (normals_[h] - normals_[opposed ? g1 : g]).norm() <= kSameNormal &&
            (normals_[h1] - normals_[opposed ? g : g1]).norm() <= kSameNormal;
   };
@@ -359,10 +353,10 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
     for (int i = 0; i < edge.count; ++i) {
       const int h = topology.incidence[edge.begin + i];
       const Vec3& here = normals_[h];
-      const Vec3& there = normals_[3 * triangle_of(h) + next_corner(side_of(h))];
+      const Vec3& there = normals_[corner_after(h)];
       add_distinct(first, forward(h) ? here : there);
       add_distinct(last, forward(h) ? there : here);
-      limited = limited || divided_[h] || divided_[3 * triangle_of(h) + next_corner(side_of(h))];
+      limited = limited || divided_[h] || divided_[corner_after(h)];
     }
     const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
     const bool border = edge.kind == EdgeClass::Boundary;
@@ -372,7 +366,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
     if (witness) {
       Trust least = Trust::Own, most = Trust::Facet;
       for (int i = edge.begin; i < edge.begin + edge.count; ++i)
-        for (int c : {topology.incidence[i], Fans::after(topology.incidence[i])}) {
+        for (int c : {topology.incidence[i], corner_after(topology.incidence[i])}) {
           least = std::min(least, divided_[c] ? Trust::Facet : trust[c]);
           most = std::max(most, trust[c]);
         }
@@ -429,17 +423,16 @@ void CurvedShell::raise_centers(const Shell& shell) {
 // a crease, nor into a flat element, where the curvature ends. Else -1.
 int CurvedShell::corner_beyond(const Shell& shell, int h) const {
   const Topology& topology = shell.topology();
-  const Edge& edge = topology.edges[topology.edge_of[h]];
-  if (edge.count != 2) return -1;
-  const int g = topology.other_half_edge(edge, h);
-  const int t = triangle_of(h), u = triangle_of(g), k = side_of(h), l = side_of(g);
-  if (shell.triangles()[t][k] != shell.triangles()[u][next_corner(l)]) return -1;  // ill-wound
+  const int g = topology.other_half_edge(h);
+  if (g < 0) return -1;
+  const auto vertex = [&](int c) { return shell.triangles()[triangle_of(c)][side_of(c)]; };
+  if (vertex(h) != vertex(corner_after(g))) return -1;  // ill-wound
   if (facets_[triangle_of(shell.facet_half_edge(g))].flat) return -1;
   const auto differ = [&](int i, int j) {
     return (normals_[i] - normals_[j]).norm() > kSameNormal;
   };
-  if (differ(h, 3 * u + next_corner(l)) || differ(3 * t + next_corner(k), g)) return -1;
-  return 3 * u + previous_corner(l);
+  if (differ(h, corner_after(g)) || differ(corner_after(h), g)) return -1;
+  return corner_before(g);
 }
 
 }  // namespace sphshell

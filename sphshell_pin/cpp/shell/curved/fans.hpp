@@ -24,7 +24,7 @@ class Fans {
     for (const Edge& edge : topology.edges) {
       if (edge.count != 2 || !is_smooth(edge)) continue;
       const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
-      const int h1 = after(h), g1 = after(g);
+      const int h1 = corner_after(h), g1 = corner_after(g);
       const bool opposed = vertex(h) == vertex(g1);
       sets.merge(h, opposed ? g1 : g);
       sets.merge(h1, opposed ? g : g1);
@@ -37,12 +37,6 @@ class Fans {
     std::vector<int> fill(begin_.begin(), begin_.end() - 1);
     members_.resize(corners);
     for (int c = 0; c < corners; ++c) members_[fill[fan_of_[c]]++] = c;
-  }
-
-  static int after(int corner) { return 3 * triangle_of(corner) + next_corner(side_of(corner)); }
-  // The corner before this one, in the same triangle.
-  static int before(int corner) {
-    return 3 * triangle_of(corner) + previous_corner(side_of(corner));
   }
 
   int size() const { return static_cast<int>(fan_of_.size()); }
@@ -70,7 +64,7 @@ class Fans {
     for (std::size_t i = 0; i < fans; ++i) {
       if (sharp[out[i]]) continue;
       for (const int *d = begin(out[i]), *last = end(out[i]); d != last; ++d)
-        for (const int other : {after(*d), before(*d)}) {
+        for (const int other : {corner_after(*d), corner_before(*d)}) {
           const int v = vertex(other);
           if (v != own && (out.size() > fans + kFew ||
                            std::find(out.begin() + fans, out.end(), v) == out.end()))

@@ -36,7 +36,7 @@ Dominance::Dominance(const Shell& shell, const CoplanarRegions& regions)
 bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& ratio) const {
   const Topology& topology = shell_.topology();
   if (std::none_of(begin, end, [&](int c) {
-        return uneven_[topology.edge_of[c]] || uneven_[topology.edge_of[Fans::before(c)]];
+        return uneven_[topology.edge_of[c]] || uneven_[topology.edge_of[corner_before(c)]];
       }))
     return false;
   // One coplanar region of the fan: how high it stands over what it dominates; what dominates it.
@@ -60,10 +60,9 @@ bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& r
   bool any = false;
   ratio = 0;
   for (const int* c = begin; c != end; ++c)
-    for (const int h : {*c, Fans::before(*c)}) {
-      const Edge& edge = topology.edges[topology.edge_of[h]];
-      if (edge.count != 2) continue;
-      const int g = topology.other_half_edge(edge, h);
+    for (const int h : {*c, corner_before(*c)}) {
+      const int g = topology.other_half_edge(h);
+      if (g < 0) continue;
       const int here = regions_.of(triangle_of(h)), there = regions_.of(triangle_of(g));
       if (here == there || std::none_of(begin, end, [&](int d) { return d / 3 == g / 3; }))
         continue;

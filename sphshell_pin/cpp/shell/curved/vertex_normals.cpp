@@ -141,7 +141,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     if (!edge.inner && edge.kind != EdgeClass::Smooth) return false;
     const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
     return !known(h) || !known(g) ||
-           (out[h] - out[Fans::after(g)]).norm() + (out[Fans::after(h)] - out[g]).norm() <
+           (out[h] - out[corner_after(g)]).norm() + (out[corner_after(h)] - out[g]).norm() <
                kSameNormal;
   });
   const int count = fans.size();
@@ -266,7 +266,7 @@ bool estimated_elsewhere(const Shell& shell, const std::vector<Vec3>& given) {
   const auto alike = [&](int i, int j) { return (given[i] - given[j]).norm() <= kSameNormal; };
   const Fans fans(shell, [&](const Edge& edge) {
     const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
-    return alike(h, Fans::after(g)) && alike(Fans::after(h), g);
+    return alike(h, corner_after(g)) && alike(corner_after(h), g);
   });
   // Means over edges beyond the crease angle, as on a coarse ball, are better than none.
   int within = 0, beyond = 0;

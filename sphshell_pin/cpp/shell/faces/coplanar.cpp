@@ -44,9 +44,9 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
       out.area += area[t];
       for (int k = 0; k < 3; ++k) {
         box.extend(p[triangles[t][k]]);
-        const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
-        if (edge.count != 2) continue;
-        const int u = triangle_of(topology.other_half_edge(edge, 3 * t + k));
+        const int h = topology.other_half_edge(3 * t + k);
+        if (h < 0) continue;
+        const int u = triangle_of(h);
         if (of_[u] >= 0 || !lies_in_plane(u)) continue;
         of_[u] = region;
         found.push_back(u);

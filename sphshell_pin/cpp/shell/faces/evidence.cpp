@@ -64,9 +64,9 @@ std::vector<int> Recognizer::inner_vertices(const Growth& growth) {
   std::vector<int> border;
   for (const int t : growth.triangles)
     for (int k = 0; k < 3; ++k) {
-      const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
-      if (edge.count == 2 && is_marked(triangle_of(topology.other_half_edge(edge, 3 * t + k))))
-        continue;
+      const int g = topology.other_half_edge(3 * t + k);
+      if (g >= 0 && is_marked(triangle_of(g))) continue;
+      const Edge& edge = topology.edge_at(3 * t + k);
       border.push_back(edge.first_vertex);
       border.push_back(edge.last_vertex);
     }
@@ -117,10 +117,6 @@ bool Recognizer::is_over_determined(const Growth& growth) {
     leans.push_back(lean(t, s));
     tilts.push_back(growth.window * longest_side(t) / std::max(2 * area(t), 1e-300));
   }
-  const auto median = [](std::vector<double>& x) {
-    std::nth_element(x.begin(), x.begin() + std::ptrdiff_t(x.size() / 2), x.end());
-    return x[x.size() / 2];
-  };
   if (median(tilts) > kMostTilt * median(leans)) return false;
   // Small round regions need vertices inside: on a border alone many surfaces fit.
   const bool round = s.kind == FaceKind::Sphere || s.kind == FaceKind::Torus;

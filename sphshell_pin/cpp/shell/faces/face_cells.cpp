@@ -123,8 +123,7 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
     bent[f] = is_round(out[f].face) || !facets[f].flat;
     const int t = shell.triangle_of_facet(static_cast<int>(f));
     for (int k = 0; k < 3; ++k) {
-      const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
-      const int g = edge.count == 2 ? topology.other_half_edge(edge, 3 * t + k) : -1;
+      const int g = topology.other_half_edge(3 * t + k);
       if (g >= 0 && is_round(faces.of_triangle(triangle_of(g)))) bent[f] = 1;
     }
   }
@@ -144,8 +143,7 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
     for (const Vec3& p : facet.corner)
       if (!(std::abs(shape.distance(p)) <= kMostGap * shell.size())) open[cell.face] = 1;
     for (int k = 0; k < 3; ++k) {
-      const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
-      const int g = edge.count == 2 ? topology.other_half_edge(edge, 3 * t + k) : -1;
+      const int g = topology.other_half_edge(3 * t + k);
       const bool wound =
           g >= 0 && shell.triangles()[t][k] != shell.triangles()[triangle_of(g)][side_of(g)];
       const int beyond = wound ? triangle_of(shell.facet_half_edge(g)) : -1;

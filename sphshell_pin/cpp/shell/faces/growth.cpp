@@ -252,10 +252,9 @@ void Recognizer::absorb_slivers(Growth& growth) {
     const std::size_t end = all.size();
     for (; from < end; ++from)
       for (int k = 0; k < 3; ++k) {
-        const int h = 3 * all[from] + k;
-        const Edge& edge = topology.edges[topology.edge_of[h]];
-        if (edge.count != 2) continue;
-        const int u = triangle_of(topology.other_half_edge(edge, h));
+        const int h = topology.other_half_edge(3 * all[from] + k);
+        if (h < 0) continue;
+        const int u = triangle_of(h);
         if (is_marked(u) || of_[u] >= 0 || regions_.count(regions_.of(u)) >= kFewOfBand) continue;
         const Explained one = explain(u, growth.shape, growth.window, kMostLeanOfSlivers);
         if (!one.explained || one.sign != growth.sign ||

@@ -27,17 +27,39 @@ Eigen::VectorXd least_squares(const Matrix& a, const Vector& b) {
   return solver.solve(b);
 }
 
+// The mean of points, and the largest coordinate from there: fits are made about the one and in
+// units of the other, against cancellation.
+std::pair<Vec3, double> middle_and_size(const std::vector<Vec3>& points) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& x : points) middle += x / double(points.size());
+  double size = 0;
+  for (const Vec3& x : points) size = std::max(size, (x - middle).cwiseAbs().maxCoeff());
+  return {middle, size};
+}
+
+// A place by its height along the axis, and what is across that: `e` is unit, away from the axis,
+// on which there is no direction, and the result is finite.
+struct AboutAxis {
+  Vec3 y, across, e;
+  double h, off;
+  AboutAxis(const Primitive& p, const Vec3& x) : y(x - p.point), h(y.dot(p.axis)) {
+    across = y - h * p.axis;
+    off = across.norm();
+    e = across / std::max(off, 1e-300);
+  }
+};
+
 // The primitive of a kind with a known axis through `point`: its radii follow from points.
 Primitive with_axis(FaceKind kind, const Vec3& point, const Vec3& axis,
                     const std::vector<Vec3>& points) {
   const auto n = static_cast<Eigen::Index>(points.size());
   Eigen::ArrayXd along(n), off(n);
+  Primitive out{kind, point, axis, 0, 0};
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Vec3 y = points[i] - point;
-    along[i] = y.dot(axis);
-    off[i] = (y - along[i] * axis).norm();
+    const AboutAxis at(out, points[i]);
+    along[i] = at.h, off[i] = at.off;
   }
-  Primitive out{kind, point, axis, off.mean(), 0};
+  out.radius = off.mean();
   if (kind == FaceKind::Cone) {
     const Eigen::ArrayXd from_mean = along - along.mean();
     const double slope = (from_mean * off).sum() / std::max(from_mean.square().sum(), 1e-300);
@@ -75,13 +97,9 @@ double distance_and_row(const Primitive& p, const Frame& frame, const Vec3& x, R
     row << -n.x(), -n.y(), -n.z(), -1;
     return distance;
   }
-  const Vec3 y = x - p.point;
-  const double h = y.dot(p.axis);
-  const Vec3 across = y - h * p.axis;
-  const double off = across.norm();
-  // Unit, away from the axis; a turn of the axis moves a point at height h by h.
-  const Vec3 e = off > 0 ? Vec3(across / off) : Vec3::Zero();
-  const double eu = e.dot(frame.u), ev = e.dot(frame.v);
+  // A turn of the axis moves a point at height h by h.
+  const AboutAxis at(p, x);
+  const double h = at.h, off = at.off, eu = at.e.dot(frame.u), ev = at.e.dot(frame.v);
   if (p.kind == FaceKind::Cylinder) {
     row << -n.dot(frame.u), -n.dot(frame.v), -h * eu, -h * ev, -1;
   } else if (p.kind == FaceKind::Cone) {
@@ -140,10 +158,9 @@ double Primitive::distance(const Vec3& x, Vec3& normal) const {
     normal = y / std::max(length, 1e-300);
     return length - radius;
   }
-  const double h = y.dot(axis);
-  const Vec3 across = y - h * axis;
-  const double off = across.norm();
-  const Vec3 e = across / std::max(off, 1e-300);
+  const AboutAxis at(*this, x);
+  const double h = at.h, off = at.off;
+  const Vec3& e = at.e;
   if (kind == FaceKind::Cylinder) {
     normal = e;
     return off - radius;
@@ -167,15 +184,15 @@ Mat3 Primitive::hessian(const Vec3& x) const {
   distance(x, n);
   if (kind == FaceKind::Sphere)
     return (Mat3::Identity() - n * n.transpose()) / std::max(y.norm(), 1e-300);
-  const Vec3 across = y - y.dot(axis) * axis;
-  const double off = std::max(across.norm(), 1e-300);
-  const Vec3 e = across / off, around = axis.cross(e);
+  const AboutAxis at(*this, x);
+  const double off = std::max(at.off, 1e-300);
+  const Vec3 &e = at.e, around = axis.cross(e);
   // Around the axis the normal turns with the angle: curvature (n . e) / off. Cylinder and cone are
   // straight along the meridian; a torus has 1 / q.
   Mat3 out = n.dot(e) / off * around * around.transpose();
   if (kind == FaceKind::Torus) {
     const Vec3 meridian = n.cross(around);
-    const double q = std::hypot(off - radius, y.dot(axis));
+    const double q = std::hypot(off - radius, at.h);
     out += meridian * meridian.transpose() / std::max(q, 1e-300);
   }
   return out;
@@ -189,12 +206,11 @@ double Primitive::radius_at(const Vec3& x) const {
 
 bool Primitive::singular(const Vec3& x, double share) const {
   if (kind == FaceKind::Plane) return false;
-  const Vec3 y = x - point;
-  if (kind == FaceKind::Sphere) return y.norm() < share * radius;
-  const double h = y.dot(axis), off = (y - h * axis).norm();
-  const double size = std::max(std::abs(radius), std::abs(h));
-  return off < share * size ||
-         (kind == FaceKind::Torus && std::hypot(off - radius, h) < share * second);
+  const AboutAxis at(*this, x);
+  if (kind == FaceKind::Sphere) return at.y.norm() < share * radius;
+  const double size = std::max(std::abs(radius), std::abs(at.h));
+  return at.off < share * size ||
+         (kind == FaceKind::Torus && std::hypot(at.off - radius, at.h) < share * second);
 }
 
 // The intersection of two level sets: tangent n x m; curvature and offset v are in the plane of n
@@ -220,11 +236,7 @@ int num_parameters(FaceKind kind) {
 std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets) {
   std::vector<Primitive> out;
   const std::vector<Vec3>& points = facets.vertices;
-  Vec3 middle = Vec3::Zero();
-  // Guesses are made about the middle and in units of the size, against cancellation.
-  for (const Vec3& p : points) middle += p / double(points.size());
-  double size = 0;
-  for (const Vec3& p : points) size = std::max(size, (p - middle).cwiseAbs().maxCoeff());
+  const auto [middle, size] = middle_and_size(points);
   if (!(size > 0)) return out;
   if (kind == FaceKind::Sphere) {
     // |x|^2 = 2 c.x + (r^2 - c^2) is linear in the center c.
@@ -272,7 +284,7 @@ std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets
     square += weight * e * e.transpose();
     right += weight * e * e.dot((facets.centroids[i] - middle) / size);
   }
-  const auto add = [&](const Vec3& point, const Vec3& direction) {
+  const auto add = [&, &middle = middle, &size = size](const Vec3& point, const Vec3& direction) {
     if (point.allFinite() && direction.allFinite())
       out.push_back(with_axis(kind, middle + size * point, direction.normalized(), points));
   };
@@ -291,11 +303,7 @@ std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets
 
 bool fit_primitive(const std::vector<Vec3>& points, double tolerance, Primitive& primitive) {
   const auto n = static_cast<Eigen::Index>(points.size());
-  Vec3 middle = Vec3::Zero();
-  for (const Vec3& x : points) middle += x / double(n);
-  double size = 0;
-  for (const Vec3& x : points) size = std::max(size, (x - middle).cwiseAbs().maxCoeff());
-  // In units of the points, about their middle: all numbers are of one size.
+  const auto [middle, size] = middle_and_size(points);
   std::vector<Vec3> scaled;
   scaled.reserve(points.size());
   for (const Vec3& x : points) scaled.push_back((x - middle) / size);

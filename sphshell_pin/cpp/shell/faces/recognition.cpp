@@ -32,12 +32,6 @@ constexpr double kShort = 6, kMostRise = 4;
 // Simpler kinds win ties (cylinder, cone, sphere, torus).
 constexpr double kSimpler[] = {0, 1, 0.98, 0.97, 0.95};
 
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 // The others keep their order.
@@ -86,8 +80,7 @@ double Recognizer::longest_side(int t) const {
 
 // The angle [rad] between the normals of two facets.
 double Recognizer::turn(int t, int u) const {
-  const Vec3 &a = facet_normal(t), &b = facet_normal(u);
-  return std::atan2(a.cross(b).norm(), a.dot(b));
+  return angle_between(facet_normal(t), facet_normal(u));
 }
 
 std::vector<int> Recognizer::vertices_of(const std::vector<int>& triangles) const {
@@ -312,10 +305,9 @@ void Recognizer::add_planes(Faces& faces) const {
     for (int k = 0; k < 3 && is_plane; ++k) {
       const int h = 3 * static_cast<int>(t) + k, u = beside_[h];
       if (u < 0 || regions_.of(u) == regions_.of(int(t))) continue;
-      const int g = topology.other_half_edge(topology.edges[topology.edge_of[h]], h);
       if (of_[u] >= 0) continue;  // its normals are known
       is_plane = regions_.count(regions_.of(int(t))) >= kFewOfPlane &&
-                 regions_.height(h) > kFarther * regions_.height(g);
+                 regions_.height(h) > kFarther * regions_.height(topology.other_half_edge(h));
     }
   }
   for (std::size_t t = 0; t < of_.size(); ++t) {

@@ -1,11 +1,19 @@
 // Inside of recognition.cpp, growth.cpp and evidence.cpp: the search for faces in a mesh.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "shell/faces/recognition.hpp"
 
 namespace sphshell {
+
+// The upper one of two; reorders the values.
+inline double median(std::vector<double>& values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 // A connected part of the mesh that a primitive explains.
 struct Growth {

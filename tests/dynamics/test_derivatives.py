@@ -1,0 +1,333 @@
+"""Derivatives of contact forces, accelerations, rows and bristles' rates, against differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from sphshell_pin import testing
+from tests import differences, meshes, models
+from tests.contact.smooth.surfaces import SURFACES
+from tests.dynamics import scenes
+from tests.dynamics.scenes import (
+    ARM_V,
+    BRISTLE,
+    BRISTLES,
+    COULOMB,
+    FRICTIONS,
+    LAWS,
+    State,
+    assert_rate_jacobian,
+    free_ball,
+    in_bowl,
+    in_groove,
+    in_touch,
+    moving,
+    on_surface,
+    stretched,
+    stuck,
+    turned,
+    two_spheres,
+)
+from tests.dynamics.test_external_forces import CASES
+from tests.dynamics.test_mimic import CASES as MIMIC
+from tests.models import ARM_Q, TURNING, free_q, two_free_bodies, two_free_state
+
+Array = NDArray[np.float64]
+
+IMPACT = LAWS["impact"]
+WHERE: dict[str, Callable[..., State]] = {
+    "on a plate": scenes.on_plate,
+    "in a bowl": in_bowl,
+    "moving": moving,
+    "in a groove": in_groove,
+}
+WHERE |= {name: partial(on_surface, name) for name in SURFACES}
+ELLIPSES = ("dome", "torus inside", "wavy above")
+HERTZ = sp.HertzLaw(1e5, 0.3, restitution=0.8, speed=1.0)
+
+
+def at_corner(center: list[float], method: str) -> State:
+    scene = free_ball(sp.Shell(*meshes.cube(2.0)), friction=COULOMB, method=method)
+    return scene, turned(free_q(center), 2), np.full(6, 0.1)
+
+
+def on_elements() -> State:
+    """They are exact on a plane."""
+    shell = sp.Shell(*meshes.grid_plate(1, 1, 4.0, quads=True))
+    scene = free_ball(shell, friction=COULOMB, method="elements")
+    return scene, turned(free_q([0.3, 0.1, 0.95]), 1), np.full(6, 0.1)
+
+
+CHAINS = {" ".join(map(str, one)): partial(scenes.on_chain, *one) for one in CASES[::4]}
+CHAINS |= {
+    f"{i} {j} {tree}": partial(scenes.on_chain, i, j, tree, seed)
+    for joint, tree in product(TURNING, ("apart", "siblings", "chain"))
+    for seed, (i, j) in enumerate([(joint, "prismatic"), ("spherical", joint), (joint, joint)])
+}
+NOT_IN_PINOCCHIO = {f"JointModel{name}" for name in ("SphericalZYX", "Universal", "Composite")}
+SCENES: dict[str, Callable[[], State]] = {
+    **{
+        f"{where}, {law}": partial(WHERE[where], LAWS[law], COULOMB)
+        for where, law in product(("in a bowl", "moving"), LAWS)
+    },
+    **{
+        f"{where}, {name}": partial(WHERE[where], IMPACT, FRICTIONS[name])
+        for where, name in product(("on a plate", "in a bowl", "moving", "in a groove"), FRICTIONS)
+    },
+    **{
+        f"{name}, {friction}": partial(on_surface, name, IMPACT, FRICTIONS[friction], seed)
+        for name in SURFACES
+        for seed, friction in enumerate(FRICTIONS)
+    },
+    # Mindlin's disc follows the curvature of the shell, with its slopes.
+    **{
+        f"{name}, hertz, {friction}": partial(on_surface, name, HERTZ, FRICTIONS[friction])
+        for name, friction in product(ELLIPSES, ("soft finger", "mindlin", "rings"))
+    },
+    **{
+        f"{name}, facets {seed}": partial(on_surface, name, IMPACT, COULOMB, seed, method="facets")
+        for name, seed in product(ELLIPSES, range(2))
+    },
+    **{
+        f"corner {k}, {method}": partial(at_corner, center, method)
+        for k, center in enumerate([[1.2, 1.15, 0.1], [1.2, 1.2, 1.1], [0.2, 0.3, 1.9]])
+        for method in ("smooth", "facets")
+    },
+    **{
+        f"two spheres, {law}, {friction}": lambda law=law, friction=friction: (
+            two_spheres(LAWS[law], FRICTIONS[friction]),
+            *in_touch(3),
+        )
+        for law, friction in product(("impact", "hertz, two materials"), FRICTIONS)
+    },
+    **CHAINS,
+    **{
+        f"{name} {seed}": partial(scenes.mimicking, name, seed)
+        for name, seed in product(MIMIC, (3, 4))
+    },
+    # In a stop, with damping, armature and dry friction; ARM_Q is 0.1 rad beyond the range.
+    "joint components": partial(in_bowl, IMPACT, COULOMB, joints=scenes.STOPS),
+    "elements": on_elements,
+    "locked joint": scenes.locked,
+    "shell alone moves": scenes.shell_alone_moves,
+    "through a sheet": scenes.through_a_sheet,
+    "source": scenes.held_in_frame_j,
+    "two pairs": partial(scenes.two_pairs, IMPACT, COULOMB),
+    "no contacts": lambda: (sp.Scene(models.arm()), ARM_Q, ARM_V),
+}
+
+
+def assert_derivatives(scene: sp.Scene, q: Array, v: Array, tolerance: float = 1e-6) -> None:
+    """Forces and accelerations by q, v, tau and all numbers; what is exact algebra, to round-off.
+
+    The contact forces F alone are differentiated by `contact_derivatives`: of F = rnea(q, v, a) -
+    tau that is exact algebra.
+    """
+    model = scene.model
+    tau = np.random.default_rng(1).normal(size=model.nv)
+    testing.assert_derivatives(scene, q, v, tau, tolerance)
+    got = scene.dynamics_derivatives(q, v, tau)
+    expected = differences.acceleration(scene, q, v, tau)
+    np.testing.assert_allclose(got.acceleration, expected, rtol=0, atol=1e-9 * abs(expected).max())
+    supports = model.supports.tolist()
+    known = all(model.parents[j] in supports[j - 1] for j in range(1, model.njoints))
+    # Pinocchio has no derivatives of joints whose axes turn.
+    known &= not {joint.shortname() for joint in model.joints} & NOT_IN_PINOCCHIO
+    if known and not (scene.joints.kinds() or list(model.mimicking_joints)):
+        data = model.createData()
+        pin.computeRNEADerivatives(model, data, q, v, got.acceleration)
+        inertia = np.triu(data.M) + np.triu(data.M, 1).T
+        whole = data.dtau_dq + inertia @ got.by_q, data.dtau_dv + inertia @ got.by_v
+        size = max(np.abs(one).max() for one in (*whole, data.dtau_dq, data.dtau_dv))
+        for of_force, by in zip(scene.contact_derivatives(q, v), whole, strict=True):
+            np.testing.assert_allclose(of_force, by, rtol=0, atol=1e-10 * size)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_derivatives(name: str) -> None:
+    scene, q, v = SCENES[name]()
+    assert len(scene.contacts(q, v)) or name == "no contacts"
+    assert_derivatives(scene, q, v)
+
+
+def test_scenes_touch_as_they_are_meant_to() -> None:
+    scene, q, v = in_groove(IMPACT, COULOMB)
+    assert np.sign(scene.contacts(q, v).normal_force).tolist() == [1, 1, -1]
+    assert len(SCENES["two pairs"]()[0].contacts(ARM_Q, ARM_V)) == 2
+    scene, q, v = SCENES["joint components"]()
+    assert scene.joint_forces(q, v)[1] < -1.0
+    assert SCENES["locked joint"]()[0].model.nv == 2
+
+
+def test_forces_of_several_pairs_add_up() -> None:
+    scene, q, v = SCENES["two pairs"]()
+    scene.replace_pair("second", law=IMPACT, friction=COULOMB)
+    testing.assert_forces_balance(scene, q, v)
+
+
+@pytest.mark.parametrize(("friction", "tolerance"), [("none", 1e-6), ("coulomb", 1e-5)])
+def test_a_cluster_shown_as_one(friction: str, tolerance: float) -> None:
+    """With friction it acts as one contact, right but for the square of the normals' angle."""
+    shell = sp.Shell(*meshes.v_groove(np.radians(0.1), size=8.0, cells=2), crease_angle=1e-5)
+    scene = free_ball(shell, friction=FRICTIONS[friction])
+    found = shell.contacts(np.array([4e-4, 0.3, 0.97]), 1.0)
+    assert (found.weight.tolist(), found.terms.weight.tolist()) == ([1.0], [1.0, 1.0, -1.0])
+    assert_derivatives(scene, free_q([4e-4, 0.3, 0.97]), np.full(6, 0.1), tolerance)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["in a bowl, impact", "moving, hunt-crossley", "two spheres, impact, mindlin", "two pairs"],
+)
+def test_derivatives_of_rows(name: str) -> None:
+    assert_rows(*SCENES[name]())
+
+
+def assert_rows(scene: sp.Scene, q: Array, v: Array) -> None:
+    """Forces and depths of contacts by q, v and all numbers."""
+    got = scene.contact_force_derivatives(q, v, parameters=differences.names_of(scene))
+    nv = scene.model.nv
+    blocks = {f"q.{k}": (got.by_q[..., k], got.depth_by_q[:, k]) for k in range(nv)}
+    blocks |= {f"v.{k}": (got.by_v[..., k], np.zeros(len(got.depth_by_q))) for k in range(nv)}
+    for k, column in enumerate(got.parameters):
+        blocks[column] = got.by_parameters[..., k], got.depth_by_parameters[:, k]
+    moves = differences.moves(scene, q, v)
+    for column, parts in blocks.items():
+        moved, scale, ahead = moves[column]
+
+        def rows(x: float, part: int, moved=moved) -> Array:
+            other, q, v, _ = moved(x)
+            found = other.contacts(q, v)
+            return (found.force_world, found.depth)[part]
+
+        for part, one in enumerate(parts):
+            floor = 1e-2 * (1.0 if part else float(np.abs(got.by_q).max()))
+            f = partial(rows, part=part)
+            assert differences.off(one, f, scale, ahead=ahead, floor=floor) <= 1e-6, column
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_rates_of_chains_of_joints(name: str) -> None:
+    """The joints of "apart" are not in depth-first order."""
+    assert_rate_jacobian(*CHAINS[name](), np.zeros(0))
+
+
+# 1e-2 m of stretch are far over the limit, so that the sphere slides.
+@pytest.mark.parametrize("stretch", [1e-4, 1e-2])
+@pytest.mark.parametrize("friction", BRISTLES)
+@pytest.mark.parametrize("where", [one for one in WHERE if one != "in a bowl"])
+def test_rates_of_bristles(where: str, friction: str, stretch: float) -> None:
+    """On curved shells and edges how the turning of normals changes is left out."""
+    scene, q, v = WHERE[where](IMPACT, friction=FRICTIONS[friction])
+    curved = where == "in a groove" or where in SURFACES
+    turning = stretch * (30 if "rings" in friction else 1) if curved else 1e-6
+    step = 1e-7 if where == "in a groove" else 1e-6
+    assert_rate_jacobian(scene, q, v, stretched(scene, stretch), step=step, turning=turning)
+
+
+@pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
+def test_rates_of_bristles_on_the_ellipses_of_hertz(friction: str) -> None:
+    for name in ELLIPSES:
+        scene, q, v = on_surface(name, HERTZ, FRICTIONS[friction])
+        assert_rate_jacobian(scene, q, v, stretched(scene, 1e-4), turning=1e-2)
+
+
+@pytest.mark.parametrize("friction", BRISTLES)
+def test_rates_of_bristles_of_two_spheres(friction: str) -> None:
+    scene = two_spheres(IMPACT, FRICTIONS[friction])
+    turning = 0.3 if "rings" in friction else 1e-2
+    assert_rate_jacobian(scene, *in_touch(4, spin=2.0), stretched(scene, 2e-6), turning=turning)
+
+
+def test_rates_of_several_pairs_and_of_mimic_joints() -> None:
+    scene, q, v = SCENES["two pairs"]()
+    assert_rate_jacobian(scene, q, v, stretched(scene, 1e-4))
+    for name in MIMIC:
+        scene, q, v = scenes.mimicking(name)
+        assert_rate_jacobian(scene, q, v, stretched(scene, 1e-5))
+
+
+def test_rates_without_bristles() -> None:
+    assert_rate_jacobian(*moving(LAWS["hunt-crossley"], COULOMB), np.zeros(0))
+    q, v = two_free_state(depth=-0.2)
+    assert_rate_jacobian(two_free_bodies(IMPACT, COULOMB), q, v, np.zeros(0))
+
+
+def test_nothing_touches() -> None:
+    """Then they are Pinocchio's own, to the last bits, and no parameter matters."""
+    scene = two_free_bodies(IMPACT, COULOMB)
+    q, v = two_free_state(depth=-0.2)
+    by_q, by_v = scene.contact_derivatives(q, v)
+    assert by_q.shape == by_v.shape == (12, 12)
+    assert not by_q.any()
+    assert not by_v.any()
+    model, data, tau = scene.model, scene.model.createData(), np.arange(12.0)
+    got = scene.dynamics_derivatives(q, v, tau, parameters=differences.names_of(scene))
+    pin.computeABADerivatives(model, data, q, v, tau)
+    minv = np.triu(data.Minv) + np.triu(data.Minv, 1).T
+    for found, expected in (
+        (got.acceleration, data.ddq),
+        (got.by_q, data.ddq_dq),
+        (got.by_v, data.ddq_dv),
+        (got.by_tau, minv),
+    ):
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * size)
+    assert not got.by_parameters.any()
+
+
+def test_at_rest_by_default() -> None:
+    scene = free_ball(models.plate(4.0), friction=COULOMB)
+    q = free_q([0.1, 0.2, 0.97])
+    assert np.array_equal(scene.contact_derivatives(q), scene.contact_derivatives(q, np.zeros(6)))
+
+
+def test_bristles_of_a_state() -> None:
+    """Their stretch is held, in the shell's frame: by all numbers, the shell's place too."""
+    (scene, q, v), state = stuck()
+    tau, names = np.array([0.3, -0.2, 0.1]), differences.names_of(scene)
+    got = scene.dynamics_derivatives(q, v, tau, parameters=names, state=state)
+    without = scene.dynamics_derivatives(q, v, tau, parameters=names)
+    assert np.abs(got.acceleration - without.acceleration).max() > 0.1
+    # At rest the force along the plate is that of the springs alone.
+    resting = scene.contacts(q, np.zeros(3), state=state)
+    force, normal = resting.force_world[0], resting.normal_world[0]
+    along = force - normal * (normal @ force)
+    z = np.zeros(scene._binding.bristle_size)
+    z[:3] = -scene.pairs[0].placement.rotation.T @ along / BRISTLE.stiffness
+
+    def rates(scene: sp.Scene, q: Array, v: Array, tau: Array) -> Array:
+        return scene._binding.rates(q, v, z, tau)[:3]
+
+    expected = differences.acceleration(scene, q, v, tau, state)
+    for found in (rates(scene, q, v, tau), got.acceleration):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    columns = {f"q.{k}": got.by_q[:, k] for k in range(3)}
+    columns |= {f"v.{k}": got.by_v[:, k] for k in range(3)}
+    columns |= dict(zip(got.parameters, got.by_parameters.T, strict=True))
+    moves = differences.moves(scene, q, v, tau)
+    for name, column in columns.items():
+        moved, scale, ahead = moves[name]
+        f = partial(differences.acceleration, state=state) if name[:2] in ("q.", "v.") else rates
+        error = differences.off(column, lambda x, f=f, m=moved: f(*m(x)), scale, ahead=ahead)
+        assert error <= 1e-6, name
+
+
+def test_a_state_without_stretch_is_none() -> None:
+    scene, q, v = in_bowl(IMPACT, BRISTLE)
+    names = differences.names_of(scene)
+    one = scene.dynamics_derivatives(q, v, parameters=names)
+    other = scene.dynamics_derivatives(q, v, parameters=names, state=scene.state(q, v))
+    for name in ("acceleration", "by_q", "by_v", "by_tau", "by_parameters"):
+        size = np.abs(getattr(one, name)).max()
+        np.testing.assert_allclose(
+            getattr(other, name), getattr(one, name), rtol=0, atol=1e-12 * size
+        )
