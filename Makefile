@@ -103,8 +103,8 @@ work-precision: $(VENV)/.test ## error against computing time of the integrators
 rollouts: $(VENV)/.test ## print the speed-up of 10 000 runs over threads
 	$(BIN)/python -m benchmarks.rollout
 
-real-surfaces: $(VENV)/.test ## jumps and energies over the surfaces of FOLDER=...
-	$(BIN)/python -m benchmarks.real_surfaces $(or $(FOLDER),tests/data/corpus)
+real-surfaces: $(VENV)/.test ## answers to 1500 spheres on each surface of FOLDER=..., and jumps along walks
+	SPHSHELL_FOLDER=$(abspath $(FOLDER)) $(PYTEST) tests/contact/smooth/test_real_surfaces.py -m ""
 
 new-study: $(VENV)/.test ## what `new` writes for 22 robots and the parts of FOLDER=...
 	$(BIN)/python -m benchmarks.new_study $(or $(FOLDER),tests/data/corpus)

@@ -77,20 +77,14 @@ def main(problem_file: str, solution_file: str) -> None:
     solver = crocoddyl.SolverFDDP(problem)
     solver.th_stop = float(p["th_stop"])
     begun = time.process_time()
-    converged = solver.solve(list(p["guess"]), list(p["weights"]), 100)
+    solver.solve(list(p["guess"]), list(p["weights"]), 100)
     seconds = time.process_time() - begun
-    forces = [
-        data.differential[0].multibody.contacts.contacts["blade"].f.linear
-        for data in problem.runningDatas
-    ]
     np.savez(
         solution_file,
         xs=np.array(solver.xs),
         us=np.array(solver.us),
         gains=np.array(solver.K),
-        forces=np.linalg.norm(forces, axis=1),
         iterations=solver.iter,
-        converged=converged,
         seconds=seconds,
     )
 

@@ -9,7 +9,7 @@ bends the elements to the normals of their vertices, exact ones or those estimat
 bowl the sphere is pushed by both sides of every edge, and refinement does not help; the sum over
 elements grows without limit.
 
-python -m benchmarks.convergence    # prints tables, draws docs/pictures/convergence.png
+python -m benchmarks.convergence [--quick] [--write]    # writes docs/pictures/convergence.png
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.benchmarks.query import RADIUS as QUERY_RADIUS
 from sphshell_pin.benchmarks.query import query_contestant
 from sphshell_pin.benchmarks.surfaces import (
     DEPTH,
@@ -30,14 +29,10 @@ from sphshell_pin.benchmarks.surfaces import (
     SURFACES,
     Mesh,
     Surface,
-    touching_centers,
-    wavy_sheet,
 )
-from sphshell_pin.benchmarks.timing import one_core, part, silent, take_turns
+from sphshell_pin.benchmarks.timing import part, print_sections, silent, take_turns
 from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
-    TIME_COLUMNS,
-    TIMES,
     Finding,
     Picture,
     Progress,
@@ -48,7 +43,6 @@ from sphshell_pin.cases.contents import (
     columns,
     number,
 )
-from sphshell_pin.cases.machine import machine
 
 Array = NDArray[np.float64]
 PLACES = 300
@@ -139,22 +133,6 @@ def row_of(name: str, label: str, mesh: Mesh, forces: Array, normals: Array) -> 
         magnitude=float(np.abs(magnitudes - 1).mean()),
         direction=float(np.degrees(angles).mean()),
     )
-
-
-def measure_cost(rounds: int, progress: Progress = silent) -> dict[str, dict[str, Array]]:
-    """Return the times of a query [s] of each method on 200 k triangles, wavy and flat."""
-    depth = 0.0005
-    vertices, triangles = wavy_sheet(316, 1.0)
-    centers = touching_centers(20_000, 1.0, QUERY_RADIUS, depth)
-    above = centers * [1.0, 1.0, 0.0] + [0.0, 0.0, QUERY_RADIUS - depth]
-    surfaces = {"wavy sheet": (vertices, centers), "flat plate": (vertices * [1, 1, 0], above)}
-    found = {}
-    for k, (name, (corners, places)) in enumerate(surfaces.items()):
-        shell = Shell(corners, triangles)
-        methods = ("facets", "smooth", "elements")
-        contestants = {m: query_contestant(shell, places, m) for m in methods}
-        found[name] = take_turns(contestants, rounds, part(progress, k / 2, (k + 1) / 2))
-    return found
 
 
 KEY, TITLE = "forces", "Error of the contact force"
@@ -293,25 +271,6 @@ def errors_table(rows: list[Row]) -> Table:
     )
 
 
-def cost_table(cost: dict[str, dict[str, Array]]) -> Table:
-    """Return the times of our methods."""
-    return Table(
-        "queries_methods",
-        "What a method costs.",
-        columns(
-            "surface: 200 k triangles",
-            "method",
-            TIME_COLUMNS,
-            f"over_facets: over facets [{TIMES}]",
-        ),
-        [
-            (surface, method, *Spread.of(t), float(np.median(t / times["facets"])))
-            for surface, times in cost.items()
-            for method, t in times.items()
-        ],
-    )
-
-
 def picture(names: tuple[str, ...], rows: list[Row], *, against_time: bool) -> Picture:
     """Draw mean errors as lines, one panel per surface; against elements up to the largest, too."""
     looks = {rule: look for rule, look in LOOKS.items() if not against_time or rule != ESTIMATED}
@@ -367,17 +326,5 @@ def picture(names: tuple[str, ...], rows: list[Row], *, against_time: bool) -> P
     )
 
 
-def main() -> None:
-    """Measure, print the tables, draw the picture: those of the report, with the wavy sheet."""
-    one_core()
-    print(machine())
-    names = ("bowl", "dome", "torus", "wavy sheet")
-    rows = [row for name in names for row in measure(name, SURFACES[name], rounds=5)]
-    for table in (orders_table(names, rows), errors_table(rows), cost_table(measure_cost(15))):
-        print(f"{table.caption}\n\n{table.markdown()}")
-    PICTURE.write_bytes(picture(names, rows, against_time=False).png)
-    print(f"wrote {PICTURE}")
-
-
 if __name__ == "__main__":
-    main()
+    print_sections(section, picture=PICTURE)

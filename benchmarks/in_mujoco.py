@@ -13,19 +13,16 @@ from functools import partial
 import mujoco
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin.adapters.mujoco import attach
+from sphshell_pin.benchmarks.peers.merged import text
+from sphshell_pin.benchmarks.surfaces import Mesh, icosphere, torus
 from sphshell_pin.scenario import build
 
 Array = NDArray[np.float64]
 STATES, ROUNDS, CALLS = 1000, 15, 2000
-
-
-def text(*numbers: ArrayLike) -> str:
-    """Return numbers for an attribute of MJCF, exactly."""
-    return " ".join(repr(float(x)) for one in numbers for x in np.ravel(one))
 
 
 def mjcf_of(model: pin.Model, sphere: sp.Sphere) -> str:
@@ -68,16 +65,9 @@ def ball(radius: float, mass: float, options: str = "", more: str = "") -> str:
       <geom name="ball" type="sphere" size="{radius}"/></body>{more}</worldbody></mujoco>"""
 
 
-def torus(radius: float, tube: float, around: int = 96, across: int = 48) -> sp.Shell:
-    """Return a torus of quads about z."""
-    u, v = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")
-    a, b = 2 * np.pi * u / around, 2 * np.pi * v / across
-    out = radius + tube * np.cos(b)
-    points = np.stack([out * np.cos(a), out * np.sin(a), tube * np.sin(b)], axis=-1)
-    index = u * across + v
-    right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
-    quads = np.stack([index, right, np.roll(right, -1, axis=1), up], axis=-1)
-    return sp.Shell(points.reshape(-1, 3), quads.reshape(-1, 4), name="torus")
+def shell_of(mesh: Mesh) -> sp.Shell:
+    """Return a surface with its exact normals."""
+    return sp.Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
 
 
 def panda(rng: np.random.Generator) -> None:
@@ -142,7 +132,7 @@ def ball_in_torus(rng: np.random.Generator) -> None:
     inertia = text(0.1, 0.12, 0.2, 0.0, 0.01, 0.0)
     other = f"""<body name="torus"><freejoint/>
       <inertial pos="0 0 0" mass="2" fullinertia="{inertia}"/></body>"""
-    radius, shell = 0.095, torus(0.3, 0.1)
+    radius, shell = 0.095, shell_of(torus(0.3, 0.1, 0.02))
     model = mujoco.MjModel.from_xml_string(ball(radius, 0.3, more=other))
     data = mujoco.MjData(model)
     free = pin.Model()
@@ -186,17 +176,13 @@ def ball_in_torus(rng: np.random.Generator) -> None:
 def bowl(seconds: float = 60.0, dt: float = 1e-4) -> None:
     """Print by how much the energy of a ball that swings in a bowl changes."""
     radius, mass, law = 0.05, 0.2, sp.HuntCrossleyLaw(1e5, 1.5)
-    x, y = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41), indexing="ij")
-    points = np.stack([x, y, 2.0 - np.sqrt(4.0 - x**2 - y**2)], axis=-1)
-    index = np.arange(41 * 41).reshape(41, 41)
-    cells = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    shell = sp.Shell(points.reshape(-1, 3), np.stack(cells, axis=-1).reshape(-1, 4), name="bowl")
+    shell = shell_of(icosphere(5, 2.0))
     options = f'timestep="{dt}" integrator="RK4"'
     model = mujoco.MjModel.from_xml_string(ball(radius, mass, options))
     data = mujoco.MjData(model)
     depth = law.depth_at(mass * 9.81)
     along = np.array([np.sin(0.15), 0.0, -np.cos(0.15)])
-    data.qpos[:3] = [0, 0, 2.0] + (2.0 - radius + depth * np.cos(0.15)) * along
+    data.qpos[:3] = (2.0 - radius + depth * np.cos(0.15)) * along
 
     energies, sides = [], []
     with attach(model, shell, ["ball"], law=law) as contacts:

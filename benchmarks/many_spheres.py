@@ -12,6 +12,7 @@ from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
 from sphshell_pin.benchmarks.timing import one_core
 from sphshell_pin.cases.machine import machine
+from sphshell_pin.contact.normal_law import bisect
 from sphshell_pin.dynamics.run.integrators import Integrator
 
 COUNT, RADIUS, APART = 8, 0.006, 0.012
@@ -43,12 +44,12 @@ def scene_of(
 def height(shell: sp.Shell, gap: float) -> float:
     """Return the height [m] at which the lowest of the 64 spheres is `gap` off the sheet."""
     offsets = np.array([one.offset for one in pad(COUNT)])
-    low, high = -0.1, 0.3
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        distances = shell.closest_points(offsets + [-0.1, -0.1, middle]).distances
-        low, high = (low, middle) if np.min(distances) - RADIUS > gap else (middle, high)
-    return high
+
+    def excess(z: float) -> float:
+        distances = shell.closest_points(offsets + [-0.1, -0.1, z]).distances
+        return float(np.min(distances)) - RADIUS - gap
+
+    return bisect(excess, -0.1, 0.3)
 
 
 def step_time(scene: sp.Scene, integrator: Integrator, z: float, speed: float) -> float:

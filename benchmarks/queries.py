@@ -4,44 +4,37 @@ All contacts of a 10 mm sphere pressed 0.5 mm into a wavy sheet, at random posit
 do not know, on one core, by the default method, "smooth", unless another is named. Coal collects a
 contact for every triangle that is touched; trimesh, libigl and fcpw (in single precision) answer
 the smaller question of the one closest point. The sheet grows at equal size of its triangles, so
-that the sphere always touches the same number of them. In the picture every contestant has a
-process of its own; memory is what it holds after its first query. The ratios among the findings are
-measured in turn in one process.
+that the sphere always touches the same number of them. Every contestant has a process of its own,
+and they are asked in turn, round by round; memory is what it holds after its first query.
 
 python -m benchmarks.queries [--quick]    # prints the tables
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from sphshell_pin.benchmarks import convergence, query, sizes, timing
+from sphshell_pin.benchmarks import sizes
 from sphshell_pin.benchmarks.sizes import Row
 from sphshell_pin.benchmarks.surfaces import Array
+from sphshell_pin.benchmarks.timing import print_sections
 from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
     TIME_COLUMNS,
-    TIMES,
     Column,
     Finding,
     Picture,
     Progress,
     Section,
-    Spread,
     Table,
     about,
     columns,
-    markdown,
     number,
-    times_table,
 )
-from sphshell_pin.cases.machine import machine
 
-Times = dict[str, Array]
 KEY, TITLE = "queries", "Time and memory of a query"
 COLORS = {
     "smooth": (drawing.BLUE, "o"),
@@ -51,73 +44,53 @@ COLORS = {
     "libigl": (drawing.VIOLET, "D"),
     "fcpw": (drawing.GREY, "P"),
 }
+COMPARED = 199_712  # triangles of the sheet on which all are compared
+GROWN = 2_000_000  # of the largest one to which ours may grow, from the second of `sizes.CELLS`
 OTHERS = (
-    ("query_libigl", query.LIBIGL, "libigl's AABB tree (closest point)"),
-    ("query_fcpw", query.FCPW, "single-precision fcpw (closest point)"),
+    ("query_libigl", sizes.LIBIGL, "libigl's AABB tree (closest point)"),
+    ("query_fcpw", sizes.FCPW, "single-precision fcpw (closest point)"),
 )
 TEXT = about(__doc__)
 
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
-    rounds = 5 if quick else 15
-    peers = query.measure_peers(rounds, timing.part(progress, 0.0, 0.1))
-    cells = query.SHEETS[:3] if quick else query.SHEETS
-    growth = query.measure_sizes(rounds, timing.part(progress, 0.1, 0.2), cells)
-    cost = convergence.measure_cost(rounds, timing.part(progress, 0.2, 0.3))
     chosen = sizes.QUICK_CELLS if quick else sizes.CELLS
-    rows, notes = sizes.measure(chosen, 3 if quick else 7, timing.part(progress, 0.3, 1.0))
+    rows, notes = sizes.measure(chosen, 5 if quick else 15, progress)
     if quick:
         notes.append("Sheets of more than 200 k triangles were left out (--quick).")
-    found = assemble(peers, growth, cost, rows, notes)
-    large = f"query on {number(1000 * 1000 * 2)} triangles (left out by --quick)"
+    found = assemble(rows, notes)
+    large = f"query on {number(GROWN)} triangles (left out by --quick)"
     return replace(found, unmeasured=[*found.unmeasured, large]) if quick else found
 
 
-def assemble(
-    peers: Times,
-    growth: dict[int, Array],
-    cost: dict[str, Times],
-    rows: list[Row],
-    notes: list[str],
-) -> Section:
+def assemble(rows: list[Row], notes: list[str]) -> Section:
     """Return the section of what was measured."""
+    compared = {row.name: row.times for row in rows if row.triangles == COMPARED}
     return Section(
         KEY,
         TITLE,
         TEXT,
-        findings=findings_of(peers, growth, cost),
+        findings=findings_of(rows, compared) if compared else [],
         pictures=[picture(rows)] if rows else [],
-        tables=[
-            times_table(
-                "queries_peers",
-                "A query on 200 k triangles, in turn in one process.",
-                "code: 200 k triangles",
-                peers,
-                query.THIS,
-                "over_ours: over ours",
-            ),
-            convergence.cost_table(cost),
-            growth_table(growth),
-            sizes_table(rows),
-        ],
+        tables=[sizes_table(rows)],
         notes=notes,
         unmeasured=[
             f"query against {label}: not installed"
             for _, name, label in OTHERS
-            if name not in peers
+            if name not in compared
         ],
     )
 
 
-def findings_of(peers: Times, growth: dict[int, Array], cost: dict[str, Times]) -> list[Finding]:
-    """Return the ratios that have aims."""
-    this = peers[query.THIS]
+def findings_of(rows: list[Row], compared: dict[str, Array]) -> list[Finding]:
+    """Return the ratios that have aims; `compared`: times [s] on COMPARED triangles, by name."""
+    this, flat, coal = (compared[name] for name in (sizes.OURS, sizes.OURS_FLAT, sizes.COAL))
     found = [
         Finding.of_rounds(
             "query_coal",
             "query, 200 k triangles: time of coal::collide with all contacts / ours",
-            peers[query.COAL] / this,
+            coal / this,
             aim=15.0,
             sense=">=",
             headline=True,
@@ -125,40 +98,36 @@ def findings_of(peers: Times, growth: dict[int, Array], cost: dict[str, Times]) 
         Finding.of_rounds(
             "query_coal_facets",
             'the same with the method "facets" in place of "smooth", the default',
-            peers[query.COAL] / peers[query.FACETS],
+            coal / flat,
         ),
     ]
     for key, name, label in OTHERS:
-        if name in peers:
+        if name in compared:
             what = f"query, 200 k triangles: time of {label} / ours"
-            found.append(Finding.of_rounds(key, what, peers[name] / this, aim=1.0, sense=">="))
-    few, lot = min(growth), max(growth)
+            ratio = compared[name] / this
+            found.append(Finding.of_rounds(key, what, ratio, aim=1.0, sense=">="))
+    grown = [
+        row
+        for row in rows
+        if row.name == sizes.OURS and 2 * sizes.CELLS[1] ** 2 <= row.triangles <= GROWN
+    ]
+    few, many = grown[0], grown[-1]
     found += [
         Finding.of_rounds(
             "query_growth",
-            f"query at equal contact patch: {number(lot)} / {number(few)} triangles",
-            growth[lot] / growth[few],
+            f"query at equal contact patch: {number(many.triangles)} / {number(few.triangles)} "
+            "triangles",
+            many.times / np.median(few.times),
             aim=4.0,
         ),
         Finding.of_rounds(
             "query_smooth",
             "query, 200 k triangles: curved elements / flat ones",
-            cost["wavy sheet"]["smooth"] / cost["wavy sheet"]["facets"],
+            this / flat,
             aim=1.5,
         ),
     ]
     return found
-
-
-def growth_table(growth: dict[int, Array]) -> Table:
-    """Return our time at equal contact patch."""
-    few = growth[min(growth)]
-    return Table(
-        "queries_growth",
-        "Our query at equal contact patch, in turn in one process.",
-        columns("triangles", TIME_COLUMNS, f"over_smallest: over the smallest [{TIMES}]"),
-        [(count, *Spread.of(t), float(np.median(t / few))) for count, t in growth.items()],
-    )
 
 
 def sizes_table(rows: list[Row]) -> Table:
@@ -222,15 +191,5 @@ def picture(rows: list[Row]) -> Picture:
     )
 
 
-def main() -> None:
-    """Measure and print the tables."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.queries")
-    parser.add_argument("--quick", action="store_true", help="up to 200 k triangles")
-    quick = parser.parse_args().quick
-    timing.one_core()
-    print(machine())
-    print(markdown(section(quick=quick, progress=timing.silent)))
-
-
 if __name__ == "__main__":
-    main()
+    print_sections(section)

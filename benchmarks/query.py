@@ -1,21 +1,19 @@
-"""Cost of one contact query, against Coal, libigl and fcpw, and against the number of elements."""
+"""What answers queries of spheres on a mesh: ours, Coal, trimesh, libigl and fcpw."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
-from sphshell_pin.benchmarks.timing import silent, take_turns
-from sphshell_pin.cases.contents import Progress
 
 Array = NDArray[np.float64]
-RADIUS, DEPTH = 0.010, 0.0005
+RADIUS, DEPTH = 0.010, 0.0005  # [m]
 
 
 def per_center(ask: Callable[[], object], centers: Array) -> Callable[[], float]:
@@ -63,27 +61,32 @@ def coal_contestant(
     return per_center(ask, centers)
 
 
+def trimesh_contestant(
+    vertices: Array, triangles: NDArray[np.int32], centers: Array
+) -> Callable[[], float]:
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, triangles, process=False)
+    closest: Any = trimesh.proximity.closest_point
+    return per_center(lambda: closest(mesh, centers), centers)
+
+
 def libigl_contestant(
     vertices: Array, triangles: NDArray[np.int32], centers: Array
-) -> Callable[[], float] | None:
-    try:
-        import igl
-    except ImportError:
-        return None
+) -> Callable[[], float]:
+    import igl
+
     tree = igl.AABB()
     corners = triangles.astype(np.int64)
     tree.init(vertices, corners)
-
     return per_center(lambda: tree.squared_distance(vertices, corners, centers), centers)
 
 
 def fcpw_contestant(
     vertices: Array, triangles: NDArray[np.int32], centers: Array
-) -> Callable[[], float] | None:
-    try:
-        import fcpw
-    except ImportError:
-        return None
+) -> Callable[[], float]:
+    import fcpw
+
     scene = fcpw.scene_3D()
     scene.set_object_count(1)
     scene.set_object_vertices(np.asfortranarray(vertices, dtype=np.float32), 0)
@@ -96,44 +99,3 @@ def fcpw_contestant(
         scene.find_closest_points(points, reach, fcpw.interaction_3D_list())
 
     return per_center(ask, centers)
-
-
-THIS, FACETS, COAL = "this", "this, method facets", "coal::collide, all contacts"
-LIBIGL, FCPW = "libigl AABB, closest point", "fcpw, closest point, single precision"
-
-
-def measure_peers(rounds: int, progress: Progress = silent) -> dict[str, Array]:
-    """Return times [s] of a query on 200 k triangles at cold, random positions, by name.
-
-    A sphere that touches, all its contacts by the default method and by "facets"; libigl and fcpw,
-    where installed, look for the closest point alone.
-    """
-    vertices, triangles = wavy_sheet(316, 1.0)
-    shell = Shell(vertices, triangles)
-    centers = touching_centers(20_000, 1.0, RADIUS, DEPTH)
-    contestants = {
-        THIS: query_contestant(shell, centers),
-        FACETS: query_contestant(shell, centers, "facets"),
-        COAL: coal_contestant(vertices, triangles, centers[:2000]),
-    }
-    peers = {
-        LIBIGL: libigl_contestant(vertices, triangles, centers),
-        FCPW: fcpw_contestant(vertices, triangles, centers),
-    }
-    contestants |= {name: run for name, run in peers.items() if run is not None}
-    return take_turns(contestants, rounds, progress)
-
-
-SHEETS = ((32, 0.1), (100, 0.316), (316, 1.0), (1000, 3.16))  # cells along a side, side [m]
-
-
-def measure_sizes(
-    rounds: int, progress: Progress = silent, sheets: tuple[tuple[int, float], ...] = SHEETS
-) -> dict[int, Array]:
-    """Return times [s] at equal contact patch on sheets of all sizes, by their triangles."""
-    contestants = {}
-    for cells, size in sheets:
-        shell = Shell(*wavy_sheet(cells, size))
-        centers = touching_centers(20_000, size, RADIUS, DEPTH)
-        contestants[str(shell.num_elements)] = query_contestant(shell, centers)
-    return {int(n): t for n, t in take_turns(contestants, rounds, progress).items()}

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sphshell_pin.atomic import atomic_file
+from sphshell_pin.cases.contents import Table, columns
 
 Data = dict[str, Any]
 ROOT = Path(__file__).parent.parent
@@ -59,11 +60,9 @@ def blocks_of(data: Data) -> dict[str, str]:
 
 def findings(rows: list[list[str]]) -> str:
     """Return findings as a table: what, figure, quartiles, aim; a missed aim says so."""
-    lines = [["what", "figure", "quartiles", "aim"], ["---"] * 4]
-    for what, figure, quartiles, aim, verdict in rows:
-        missed = " (this aim is missed)" if verdict == "missed" else ""
-        lines.append([what.replace("|", "\\|"), figure, quartiles, aim + missed])
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    words = {"missed": " (this aim is missed)"}
+    cells = [(*row, f"{aim}{words.get(verdict, '')}") for *row, aim, verdict in rows]
+    return Table("", "", columns("what", "figure", "quartiles", "aim"), cells).markdown()
 
 
 def peers(ratios: str) -> str:
@@ -71,10 +70,11 @@ def peers(ratios: str) -> str:
     rows = [line.strip("| ").split(" | ")[:3] for line in ratios.splitlines()[2:]]
     names = list(dict.fromkeys(peer for _, peer, _ in rows))
     cells = {(scene, peer): ratio for scene, peer, ratio in rows}
-    lines = [["scene", *names], ["---"] * (len(names) + 1)]
-    for scene in dict.fromkeys(scene for scene, _, _ in rows):
-        lines.append([scene, *(cells.get((scene, name), "") for name in names)])
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    lines = [
+        (scene, *(cells.get((scene, name), "") for name in names))
+        for scene in dict.fromkeys(scene for scene, _, _ in rows)
+    ]
+    return Table("", "", columns("scene", *names), lines).markdown()
 
 
 def quoted(text: str, blocks: dict[str, str]) -> str:

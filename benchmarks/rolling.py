@@ -123,7 +123,6 @@ def on_turntable(
     velocity: tuple[float, float],
     stiffness: float,
     bristles: float,
-    mu: float = 0.5,
 ) -> Orbit:
     """Roll two orbits on a table z = 0 that turns by `turn` [rad/s] about z.
 
@@ -135,7 +134,7 @@ def on_turntable(
     b = ball.beta(depth)
     heavy = pin.Inertia(1.0, np.zeros(3), TABLE_INERTIA * np.eye(3))
     model = ball.model(("table", pin.JointModelRUBZ(), heavy))
-    scene = ball.scene(shell, law, ball.bristle(mu, bristles), model=model, frame="table")
+    scene = ball.scene(shell, law, ball.bristle(0.5, bristles), model=model, frame="table")
     center, along = np.array([*place, ball.radius - depth]), np.array([*velocity, 0.0])
     slip = along - turn * np.cross(UP, center)
     q0, v0 = state(center, along, np.cross(UP, slip) / (ball.radius - depth))

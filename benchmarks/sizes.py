@@ -22,8 +22,8 @@ from sphshell_pin.benchmarks.query import (
     coal_contestant,
     fcpw_contestant,
     libigl_contestant,
-    per_center,
     query_contestant,
+    trimesh_contestant,
 )
 from sphshell_pin.benchmarks.surfaces import Array, touching_centers, wavy_sheet
 from sphshell_pin.benchmarks.timing import silent
@@ -52,17 +52,22 @@ QUERIES = {COAL: 2000, TRIMESH: 200}  # in a round; 20 000 for the others
 
 @dataclass(frozen=True)
 class Row:
-    """One contestant on one sheet: times [s], memory held after a query [bytes].
+    """One contestant on one sheet: times [s] of a query (rounds,) and of building, memory [bytes].
 
-    The memory is NaN where it is less than what the process held before.
+    The memory is what is held after a query; NaN where it is less than the process held before.
     """
 
     name: str
     question: str
     triangles: int
-    query: Spread
+    times: Array
     build: float
     memory: float
+
+    @property
+    def query(self) -> Spread:
+        """Time of a query [s]."""
+        return Spread.of(self.times)
 
 
 def available() -> float:
@@ -75,14 +80,6 @@ def available() -> float:
     except OSError:
         pass
     return float("inf")
-
-
-def trimesh_contestant(vertices: Array, triangles: Any, centers: Array) -> Callable[[], float]:
-    import trimesh
-
-    mesh = trimesh.Trimesh(vertices, triangles, process=False)
-    closest: Any = trimesh.proximity.closest_point
-    return per_center(lambda: closest(mesh, centers), centers)
 
 
 def contestant(name: str, vertices: Array, triangles: Any, centers: Array) -> Callable[[], float]:
@@ -206,7 +203,7 @@ def measure_one(names: list[str], cells: int, rounds: int, notes: list[str]) -> 
             name,
             QUESTIONS[name],
             triangles,
-            Spread.of(np.array(times[name])),
+            np.array(times[name]),
             built[name][0],
             built[name][1] if built[name][1] > 0 else float("nan"),
         )

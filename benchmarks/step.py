@@ -113,28 +113,11 @@ def bare(scene: sp.Scene) -> Callable[[], float]:
 BARE, FREE, FAR = "ABA + integrate alone, C++", "scene without contact", "far sphere"
 TOUCHING = "touching, damping and friction"
 CONTROL_FREE, CONTROL_TOUCHING = "joint PD + gravity, no contact", "joint PD + gravity, touching"
-
-
-def measure_step(rounds: int, progress: Progress = silent) -> Times:
-    """Return the times of a step [s], by what the scene holds."""
-    shell = sp.Shell(*wavy_sheet(316, 1.0))
-    pd = sp.JointPD(100.0, 10.0)
-    return take_turns(
-        {
-            BARE: bare(panda()),
-            FREE: runner(panda()),
-            FAR: runner(with_sheet(panda(), shell, -1.0)),
-            TOUCHING: runner(with_sheet(panda(), shell, 5e-4)),
-            CONTROL_FREE: runner(panda(), pd),
-            CONTROL_TOUCHING: runner(with_sheet(panda(), shell, 5e-4), pd),
-        },
-        rounds,
-        progress,
-    )
+WHOLE = (BARE, FREE, FAR, TOUCHING, CONTROL_FREE, CONTROL_TOUCHING)
 
 
 def parts_of(times: Times) -> dict[str, Times]:
-    """Return the parts of a step [s] from the times of `measure_step`, by scene.
+    """Return the parts of a step [s] from the times of `measure`, by scene.
 
     "aba": ABA and integrate; "stepping": what a scene without contact takes beyond them; "contact":
     what a scene takes beyond one without contact (kinematics, query, law and wrench).
@@ -167,36 +150,38 @@ def with_moving_sheet(shell: sp.Shell) -> sp.Scene:
     return scene
 
 
-def measure_components(rounds: int, progress: Progress = silent) -> Times:
-    """Return the times of a step [s] of scenes that differ by one component."""
+def measure(rounds: int, progress: Progress = silent) -> Times:
+    """Return the times of a step [s]: of WHOLE, then of scenes that differ by one component."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
+    plain: dict[str, Any] = {"law": UNDAMPED, "friction": None}
+    pd = sp.JointPD(100.0, 10.0)
 
     def touching(**settings: Any) -> sp.Scene:
         return with_sheet(panda(), shell, 5e-4, **settings)
 
-    two = touching(law=UNDAMPED, friction=None)
-    with_sheet(two, shell, 5e-4, law=UNDAMPED, friction=None)
-    far = with_sheet(
-        touching(law=UNDAMPED, friction=None), shell, -1.0, law=UNDAMPED, friction=None
-    )
-
     def zero(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:
         return np.zeros_like(v)
 
+    second = "... and a {} second sphere"
     return take_turns(
         {
-            "no contact": runner(panda()),
+            BARE: bare(panda()),
+            FREE: runner(panda()),
+            FAR: runner(with_sheet(panda(), shell, -1.0)),
+            TOUCHING: runner(touching()),
+            CONTROL_FREE: runner(panda(), pd),
+            CONTROL_TOUCHING: runner(touching(), pd),
             "fingers not locked, no contact": runner(panda(lock=())),
             "far sphere, no damping, no friction": runner(
-                with_sheet(panda(), shell, -1.0, law=UNDAMPED, friction=None)
+                with_sheet(panda(), shell, -1.0, **plain)
             ),
-            "touching, no damping, no friction": runner(touching(law=UNDAMPED, friction=None)),
+            "touching, no damping, no friction": runner(touching(**plain)),
             "... and damping": runner(touching(friction=None)),
             "... and friction": runner(touching(law=UNDAMPED)),
-            "... and a far second sphere": runner(far),
-            "... and a touching second sphere": runner(two),
+            second.format("far"): runner(with_sheet(touching(**plain), shell, -1.0, **plain)),
+            second.format("touching"): runner(with_sheet(touching(**plain), shell, 5e-4, **plain)),
             "... and the shell on a moving body": runner(with_moving_sheet(shell)),
-            "... and a Python controller": runner(touching(law=UNDAMPED, friction=None), zero),
+            "... and a Python controller": runner(touching(**plain), zero),
         },
         rounds,
         progress,
@@ -215,13 +200,12 @@ TEXT = about(__doc__)
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
     rounds = 8 if quick else 50
-    steps = measure_step(rounds, part(progress, 0.0, 0.6))
-    added = measure_components(rounds // 2, part(progress, 0.6, 0.9))
+    steps = measure(rounds, part(progress, 0.0, 0.9))
     imports = measure_import(5 if quick else 15, part(progress, 0.9, 1.0))
-    return assemble(steps, added, imports)
+    return assemble(steps, imports)
 
 
-def assemble(steps: Times, added: Times, imports: Times) -> Section:
+def assemble(steps: Times, imports: Times) -> Section:
     """Return the section of what was measured."""
     parts = parts_of(steps)
     bare, control = steps[BARE], steps[CONTROL_TOUCHING]
@@ -258,12 +242,12 @@ def assemble(steps: Times, added: Times, imports: Times) -> Section:
                 "steps",
                 "Whole steps, in turn in one process.",
                 "scene",
-                steps,
+                {name: steps[name] for name in WHOLE},
                 BARE,
                 "over_bare: over ABA + integrate",
             ),
             parts_table(parts),
-            components_table(added),
+            components_table(steps),
         ],
     )
 
@@ -289,14 +273,17 @@ def parts_table(parts: dict[str, Times]) -> Table:
     )
 
 
-def components_table(added: Times) -> Table:
+def components_table(steps: Times) -> Table:
     """Return what each component of a scene adds."""
-    base = added["no contact"]
     return Table(
         "steps_components",
         "What a component adds to the step; a scene without it does not pay.",
         columns("scene", TIME_COLUMNS, "added_s: added [us]"),
-        [(name, *Spread.of(t), float(np.median(t - base))) for name, t in added.items()],
+        [
+            (name, *Spread.of(times), float(np.median(times - steps[FREE])))
+            for name, times in steps.items()
+            if name == FREE or name not in WHOLE
+        ],
     )
 
 

@@ -117,30 +117,9 @@ def torus(ring: float, tube: float, side: float) -> Mesh:
     return Mesh(vertices, triangles, normals)
 
 
-# A sheet over [-SHEET, SHEET]^2, with hills and saddles, for a sphere of radius one.
-SHEET, WAVE = 4.0, 0.3
-
-
-def on_sheet(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return points (n, 3) of a wavy sheet and their upward unit normals (n, 3)."""
-    p, q, r = 0.7 * x + 0.3, 0.6 * y, 0.5 * x - 0.8 * y
-    z = WAVE * (np.sin(p) * np.cos(q) + 0.2 * np.sin(r))
-    by_x = WAVE * (0.7 * np.cos(p) * np.cos(q) + 0.1 * np.cos(r))
-    by_y = WAVE * (-0.6 * np.sin(p) * np.sin(q) - 0.16 * np.cos(r))
-    normals = np.c_[-by_x, -by_y, np.ones(len(x))]
-    return np.c_[x, y, z], normals / np.linalg.norm(normals, axis=1)[:, None]
-
-
-def sheet(side: float) -> Mesh:
-    """Return a sheet with moved vertices and random diagonals, like `torus`."""
-    x, y, triangles = random_grid(round(1.15 * 2 * SHEET / side), SHEET)
-    points, normals = on_sheet(x, y)
-    return Mesh(points, triangles, normals)
-
-
-def random_grid(cells: int, half: float) -> tuple[Array, Array, NDArray[np.int32]]:
+def random_grid(cells: int, half: float, seed: int = 1) -> tuple[Array, Array, NDArray[np.int32]]:
     """Return moved x, y (n,) over the square of side 2 `half`, and random halves of the cells."""
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     vertices, triangles = wavy_sheet(cells, 2 * half)
     x, y, _ = vertices.T
     inner = np.maximum(np.abs(x), np.abs(y)) < half * (1 - 1e-9)
@@ -152,7 +131,7 @@ def random_grid(cells: int, half: float) -> tuple[Array, Array, NDArray[np.int32
 
 
 def plate(side: float, half: float) -> Mesh:
-    """Return the flat plate |x|, |y| <= `half` [m] of triangles like those of `sheet`."""
+    """Return the flat plate |x|, |y| <= `half` [m] of random triangles."""
     x, y, triangles = random_grid(max(3, round(1.15 * 2 * half / side)), half)
     up = np.tile([0.0, 0.0, 1.0], (len(x), 1))
     return Mesh(np.c_[x, y, np.zeros(len(x))], triangles, up)
@@ -189,12 +168,6 @@ def torus_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, count)))
 
 
-def sheet_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    clear = SHEET - 1.3  # of the borders
-    points, normals = on_sheet(*rng.uniform(-clear, clear, (2, count)))
-    return RADIUS * points, normals
-
-
 def plate_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     clear = PLATE - 1.3 * RADIUS
     xy = rng.uniform(-clear, clear, (count, 2))
@@ -209,11 +182,6 @@ def tori() -> list[Mesh]:
     return [torus(RING, TUBE, side * RADIUS) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
 
 
-def sheets() -> list[Mesh]:
-    meshes = [sheet(side) for side in (1.2, 0.6, 0.3, 0.15, 0.075)]
-    return [Mesh(RADIUS * m.vertices, m.triangles, m.normals) for m in meshes]
-
-
 def plates() -> list[Mesh]:
     return [plate(side * RADIUS, PLATE) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
 
@@ -222,6 +190,5 @@ SURFACES = {
     "bowl": Surface(balls, on_ball, inside=True),
     "dome": Surface(balls, on_ball, inside=False),
     "torus": Surface(tori, torus_places, inside=True),
-    "wavy sheet": Surface(sheets, sheet_places, inside=False),
     "flat plate": Surface(plates, plate_places, inside=False),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import os
 import subprocess
@@ -9,10 +10,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.cases.contents import Array, Progress
+from sphshell_pin.cases.contents import Array, Progress, Section, markdown
+from sphshell_pin.cases.machine import machine
 
 
 def silent(share: float) -> None:
@@ -72,3 +75,23 @@ def measure_import(rounds: int, progress: Progress = silent) -> dict[str, Array]
 
     modules = ("sphshell_pin", "pinocchio")
     return take_turns({m: partial(fresh, m) for m in modules}, rounds, progress)
+
+
+def print_sections(*measures: Callable[..., Section], picture: Path | None = None) -> None:
+    """Measure sections of the report and print them: what a command of one of them does.
+
+    `--quick` is that of the report; `--write` keeps the first picture of the first in `picture`.
+    """
+    parser = argparse.ArgumentParser(description="Measures this part of the report and prints it.")
+    parser.add_argument("--quick", action="store_true", help="fewer settings and rounds")
+    if picture is not None:
+        parser.add_argument("--write", action="store_true", help=f"write {picture.name}")
+    given = parser.parse_args()
+    one_core()
+    print(machine())
+    for measure in measures:
+        found = measure(quick=given.quick, progress=silent)
+        print(markdown(found))
+        if picture is not None and given.write:
+            picture.write_bytes(found.pictures[0].png)
+            print(f"wrote {picture}")

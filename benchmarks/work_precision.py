@@ -13,26 +13,16 @@ python -m benchmarks.work_precision [--quick] [--write]
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from sphshell_pin.benchmarks import analytic_cases, swing
-from sphshell_pin.benchmarks.timing import one_core, part, silent
-from sphshell_pin.benchmarks.work_precision_cases import (
-    FAST_CREEP,
-    SLOW_CREEP,
-    Case,
-    Judge,
-    References,
-    bowl,
-    press,
-    stick_slip,
-)
+from sphshell_pin.benchmarks.timing import part, print_sections, silent
+from sphshell_pin.benchmarks.work_precision_cases import Case, Judge, bowl, press, stick_slip
 from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (
     TIMES,
@@ -45,7 +35,6 @@ from sphshell_pin.cases.contents import (
     about,
     columns,
 )
-from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.errors import SimulationDiverged
@@ -64,7 +53,6 @@ ERRORS = (1e-2, 1e-4, 1e-6)
 TEXT = about(__doc__)
 PICTURE = Path(__file__).parent.parent / "docs" / "pictures" / "work_precision.png"
 TARGET = 1e-4  # error at which costs are compared
-ROUNDS = 5
 LONG = 0.5  # [s]: runs that take longer are made once
 
 
@@ -157,11 +145,10 @@ def thinned(case: Case) -> Case:
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
-    judges: list[Judge] = [analytic_cases.bob(), analytic_cases.bounces(), analytic_cases.glide()]
-    others = [bowl()]
+    known = [analytic_cases.bob(), analytic_cases.bounces(), analytic_cases.glide(), bowl()]
     if not quick:
-        others += [press(), stick_slip()]
-    judges += [References(case) for case in others]
+        known += [press(), stick_slip()]
+    judges = [Judge(case) for case in known]
     rows, cases = [], []
     for k, judge in enumerate(judges):
         case = thinned(judge.case) if quick else judge.case
@@ -259,10 +246,7 @@ def rows_table(rows: list[Row]) -> Table:
             "case; integrator; setting; error; cpu_s_per_s: CPU s/s; evaluations_per_s: "
             "evaluations / s; steps; rejected"
         ),
-        [
-            (r.case, r.integrator, r.setting, r.error, r.cpu, r.evaluations, r.steps, r.rejected)
-            for r in rows
-        ],
+        [astuple(row) for row in rows],
         folded=True,
     )
 
@@ -320,30 +304,5 @@ def drawn(rows: list[Row], case: Case, integrator: str) -> list[Row]:
     ]
 
 
-def main() -> None:
-    """Measure, print the tables, draw the picture: those of the report."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.work_precision", description=(__doc__ or "").partition("\n")[0]
-    )
-    parser.add_argument("--quick", action="store_true", help="one round, no fine settings")
-    parser.add_argument("--write", action="store_true", help=f"write {PICTURE.name}")
-    arguments = parser.parse_args()
-    one_core()
-    print(machine())
-    # Two presses: how much of the implicit methods' advantage the regularized friction makes.
-    cases = [bowl(), press(SLOW_CREEP), stick_slip(), press(FAST_CREEP)]
-    rows = []
-    for k, case in enumerate(cases):
-        cases[k] = chosen = thinned(case) if arguments.quick else case
-        judge = References(chosen)
-        print(f"{case.name}: references differ by {judge.disagreement():.0e}", flush=True)
-        rows += measure(chosen, judge, 1 if arguments.quick else ROUNDS)
-    print(rows_table(rows).markdown())
-    print(costs_table(cases, rows).markdown())
-    if arguments.write:
-        PICTURE.write_bytes(picture(cases, rows).png)
-        print(f"wrote docs/pictures/{PICTURE.name}")
-
-
 if __name__ == "__main__":
-    main()
+    print_sections(section, picture=PICTURE)

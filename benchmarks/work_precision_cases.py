@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -28,7 +28,7 @@ class Case:
     `figures` reads dimensionless vectors (n, k) off the rows of a result: the error is the largest
     length of the difference of one of them. Fixed steps divide `record_dt` [s]. `references` are
     two methods of different kinds; a result is judged by the one that is not of its own. A case
-    with a closed form has none.
+    with a closed form has that, `exact`, in their place: figures at the times t (n,).
     """
 
     name: str
@@ -42,6 +42,7 @@ class Case:
     record_dt: float
     figures: Callable[[Result], list[Array]]
     references: tuple[Integrator, ...] = ()
+    exact: Callable[[Array], list[Array]] | None = None
     integrators: tuple[Integrator, ...]
     quick_dt: float  # --quick makes no shorter steps
 
@@ -57,19 +58,8 @@ def difference(a: list[Array], b: list[Array]) -> float:
     return max(float(np.linalg.norm(x - y, axis=1).max()) for x, y in zip(a, b, strict=True))
 
 
-class Judge(Protocol):
-    """Judges the results of a case."""
-
-    @property
-    def case(self) -> Case:
-        """The case."""
-
-    def error(self, integrator: Integrator, result: Result) -> float:
-        """Return the largest error at any row of a result that `integrator` made."""
-
-
-class References:
-    """Judges the results of a case by its references, much finer runs."""
+class Judge:
+    """Judges the results of a case by its closed form, or by its references, much finer runs."""
 
     def __init__(self, case: Case) -> None:
         self.case = case
@@ -80,9 +70,13 @@ class References:
         return difference(self.known[0][1], self.known[1][1])
 
     def error(self, integrator: Integrator, result: Result) -> float:
-        """Return the error against the reference that another kind of method made."""
+        """Return the largest error at any row of a result that `integrator` made."""
+        figures = self.case.figures(result)
+        if self.case.exact is not None:
+            return difference(figures, self.case.exact(result.t))
+        # Against the reference that another kind of method made.
         own = isinstance(integrator, self.known[0][0])
-        return difference(self.case.figures(result), self.known[own][1])
+        return difference(figures, self.known[own][1])
 
 
 def decades(kind: Callable[[float], Integrator], *exponents: float) -> tuple[Integrator, ...]:
@@ -127,7 +121,7 @@ TIP = "panda_hand_tcp"
 YOUNG, POISSON = 210e9, 0.3  # [Pa]
 STEEL = sp.ImpactLaw.hertz(RADIUS, YOUNG, POISSON, YOUNG, POISSON, restitution=0.9, speed=0.1)
 PRESS, SPEED, LEAD_IN = 20.0, 0.05, 0.055  # [N], [m/s], [s]
-FAST_CREEP, SLOW_CREEP = 1e-4, 1e-5  # v_static [m/s]
+CREEP = 1e-5  # v_static [m/s]
 
 PRESS_SETTINGS = (
     *steps(sp.SemiImplicitEuler, 1e-4, 5e-5, 2.5e-5, 2e-5, 1e-5, 5e-6, 2.5e-6, 2e-6, 1e-6),
@@ -138,14 +132,14 @@ PRESS_SETTINGS = (
 )
 
 
-def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
+def press(duration: float = 0.4) -> Case:
     """Let a Panda press a steel ball on a steel plate, hold still, then slide.
 
     Regularised Coulomb friction creeps where it should stick: under half of its largest force at
     0.35 v_static. Up to v_static it is a damper of 1.5 mu N / v_static, and an explicit method is
     stable only with steps in proportion to v_static.
     """
-    law, friction = STEEL, sp.CoulombFriction(0.3, 0.25, v_static, 1e-2)
+    law, friction = STEEL, sp.CoulombFriction(0.3, 0.25, CREEP, 1e-2)
     scene = panda()
     tip = tip_position(scene, START)
     placement = pin.SE3(np.eye(3), tip - [0, 0, RADIUS - law.depth_at(PRESS)])
@@ -177,7 +171,7 @@ def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
         return [force / PRESS, tips / way]
 
     return Case(
-        name=f"press, v_static {v_static * 1e6:g} um/s",
+        name=f"press, v_static {CREEP * 1e6:g} um/s",
         title="Panda slides steel on steel",
         judged="error of force / 20 N, of position / way",
         scene=scene,

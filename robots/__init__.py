@@ -17,9 +17,8 @@ import pinocchio as pin
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.mimic import shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
-from sphshell_pin.robots.description import check_poses, check_size, parsed
+from sphshell_pin.robots.description import Description, check_poses, check_size, parsed
 from sphshell_pin.robots.files import (
-    Description,
     RobotError,
     build_geometry,
     build_model,
@@ -286,7 +285,8 @@ def mimics_of_library(
 def _held(robot: LoadedRobot, urdf: str) -> LoadedRobot:
     """Return a robot of `urdf` that floats with its root fixed where q0 has it."""
     # Pinocchio's routine that locks a joint confuses joints and links of the same name.
-    model, root = pin.buildModelFromUrdf(urdf), pin.XYZQUATToSE3(robot.q0[:7])
+    held, root = load_file(urdf, name=robot.name), pin.XYZQUATToSE3(robot.q0[:7])
+    model, collision, visual = held.model, held.collision_model, held.visual_model
     for one in ("armature", "rotorInertia", "rotorGearRatio"):
         setattr(model, one, np.array(getattr(robot.model, one))[6:])
     for joint in range(1, model.njoints):
@@ -295,21 +295,10 @@ def _held(robot: LoadedRobot, urdf: str) -> LoadedRobot:
     for frame in list(model.frames)[1:]:
         if frame.parentJoint == 0:
             frame.placement = root * frame.placement
-
-    def hung(geometry: pin.GeometryModel) -> pin.GeometryModel:
-        out = geometry.copy()
-        for one in out.geometryObjects:
-            frame = robot.model.frames[one.parentFrame]
-            one.parentFrame = model.getFrameId(frame.name, frame.type)
-            if one.parentJoint == 1:
-                one.placement = root * one.placement
-            one.parentJoint = max(one.parentJoint - 1, 0)
-        return out
-
-    shapes = hung(robot.collision_model), hung(robot.visual_model)
-    return replace(
-        robot, model=model, collision_model=shapes[0], visual_model=shapes[1], q0=robot.q0[7:]
-    )
+    for shape in (*collision.geometryObjects, *visual.geometryObjects):
+        if shape.parentJoint == 0:
+            shape.placement = root * shape.placement
+    return replace(held, q0=robot.q0[7:], description=None)
 
 
 def floats(model: pin.Model) -> bool:

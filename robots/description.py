@@ -1,13 +1,24 @@
-"""Descriptions of robots that pinocchio may read: its parser calls itself for every link."""
+"""Descriptions of robots, and what pinocchio may read: its parser calls itself for every link."""
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
 from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from xml.parsers import expat
 
+import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.dynamics.scene.mimic import Mimic
+from sphshell_pin.robots.mjcf_additions import Extras, Site
+from sphshell_pin.robots.packages import Folders
+
+Array = NDArray[np.float64]
 
 DEEPEST = 100
 """Elements of the file one within another; robots need seven."""
@@ -20,6 +31,41 @@ MOST_LINKS = 5000
 
 MOST_MEMORY = 2e9
 """[B] of a pinocchio.Data, which holds eight arrays of one number per three velocities."""
+
+
+@dataclass(frozen=True)
+class Description:
+    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of mjcf.py."""
+
+    file: Path
+    folders: Folders
+    root: ET.Element
+    mimics: tuple[Mimic, ...] = ()
+    loops: tuple[str, ...] = ()
+    """What closes kinematic loops or couples joints otherwise than by mimicking: not modeled."""
+    notes: tuple[str, ...] = ()
+    """What else the file states that is not modeled, one sentence each."""
+    start: Mapping[str, Array] = field(default_factory=dict)
+    """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
+    extras: Mapping[str, Extras] = field(default_factory=dict)
+    """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
+    sites: tuple[Site, ...] = ()
+    """Of MJCF."""
+    stated: ET.Element | None = None
+    """An MJCF as it was before it was brought into the plain form, with what it includes."""
+
+    def q0(self, model: pin.Model) -> Array:
+        """Return the configuration (nq,) that the file draws, of the model of `build_model`."""
+        q = np.array(pin.neutral(model))
+        for name, values in self.start.items():
+            at = model.joints[model.getJointId(name)].idx_q
+            q[at : at + len(values)] = values
+        return q
+
+    @property
+    def is_mjcf(self) -> bool:
+        """Whether it is MJCF."""
+        return self.root.tag == "mujoco"
 
 
 def check_memory(model: pin.Model) -> pin.Model:

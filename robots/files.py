@@ -6,11 +6,10 @@ import os
 import tempfile
 import xml.etree.ElementTree as ET
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -18,12 +17,9 @@ from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.errors import ShellFileError, SphshellError
-from sphshell_pin.robots.description import check_memory, check_size, parsed
+from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.shell.readers.ply import read_ply
-
-if TYPE_CHECKING:
-    from sphshell_pin.robots.mjcf import Extras, Site
 
 Array = NDArray[np.float64]
 
@@ -58,41 +54,6 @@ MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
 """Formats of the meshes that a robot may name."""
 
 _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files"
-
-
-@dataclass(frozen=True)
-class Description:
-    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of mjcf.py."""
-
-    file: Path
-    folders: Folders
-    root: ET.Element
-    mimics: tuple[Mimic, ...] = ()
-    loops: tuple[str, ...] = ()
-    """What closes kinematic loops or couples joints otherwise than by mimicking: not modeled."""
-    notes: tuple[str, ...] = ()
-    """What else the file states that is not modeled, one sentence each."""
-    start: Mapping[str, Array] = field(default_factory=dict)
-    """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
-    extras: Mapping[str, Extras] = field(default_factory=dict)
-    """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
-    sites: tuple[Site, ...] = ()
-    """Of MJCF."""
-    stated: ET.Element | None = None
-    """An MJCF as it was before it was brought into the plain form, with what it includes."""
-
-    def q0(self, model: pin.Model) -> Array:
-        """Return the configuration (nq,) that the file draws, of the model of `build_model`."""
-        q = np.array(pin.neutral(model))
-        for name, values in self.start.items():
-            at = model.joints[model.getJointId(name)].idx_q
-            q[at : at + len(values)] = values
-        return q
-
-    @property
-    def is_mjcf(self) -> bool:
-        """Whether it is MJCF."""
-        return self.root.tag == "mujoco"
 
 
 def read(
@@ -139,22 +100,10 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
             raise ValueError(f"its root element is <{tag}>; {_NEXT}")
         root = parsed(text)
         if tag == "mujoco":
-            from sphshell_pin.robots.mjcf import plain as in_plain_form
+            from sphshell_pin.robots.mjcf import plain
 
             what = "MJCF"
-            plain = in_plain_form(root, folders, floats=free_flyer)
-            return Description(
-                file,
-                folders,
-                plain.root,
-                plain.mimics,
-                plain.loops,
-                plain.notes,
-                plain.start,
-                plain.extras,
-                tuple(plain.sites),
-                root,
-            )
+            return plain(root, folders, floats=free_flyer)
         _check_tree(root)
         return Description(file, folders, root, tuple(_mimics(root)))
     except (ValueError, OSError, LookupError, RuntimeError) as error:  # the last: Pinocchio's
@@ -229,37 +178,32 @@ def build_geometry(
 
 def keep_spheres(description: Description) -> None:
     """Drop every geometry but the spheres of collision geometry, and so all meshes."""
-    root = description.root
-    if description.is_mjcf:
-        for body in root.iter("body"):
-            for geom in body.findall("geom"):
-                if geom.get("type") != "sphere":
-                    body.remove(geom)
-        for asset in root.findall("asset"):
-            root.remove(asset)
-        return
-    for link in root.iter("link"):
-        for part in [*link.findall("visual"), *link.findall("collision")]:
-            if part.tag == "visual" or part.find("geometry/sphere") is None:
-                link.remove(part)
+
+    def is_sphere(_: str, part: ET.Element) -> bool:
+        return part.get("type") == "sphere" or part.find("geometry/sphere") is not None
+
+    _keep_collision(description, is_sphere)
+    for asset in description.root.findall("asset"):
+        description.root.remove(asset)
 
 
 def keep_collision_of(description: Description, link: str) -> None:
     """Drop every geometry but the collision geometry of one link."""
-    root = description.root
-    for body in root.iter("body"):
-        for geom in body.findall("geom"):
-            if body.get("name") != link or _is_visual(geom):
-                body.remove(geom)
-    for one in root.iter("link"):
-        for part in [*one.findall("visual"), *one.findall("collision")]:
-            if part.tag == "visual" or one.get("name") != link:
-                one.remove(part)
+    _keep_collision(description, lambda name, _: name == link)
 
 
-def _is_visual(geom: ET.Element) -> bool:
-    """Whether MuJoCo lets a geom touch nothing."""
-    return geom.get("contype") == "0" and geom.get("conaffinity") == "0"
+def _keep_collision(description: Description, wanted: Callable[[str, ET.Element], bool]) -> None:
+    """Drop every geometry but that of collision that is `wanted`, by its link and element."""
+    for link in description.root.iter("body" if description.is_mjcf else "link"):
+        for part in [one for one in link if one.tag in ("geom", "visual", "collision")]:
+            if _is_visual(part) or not wanted(link.get("name", ""), part):
+                link.remove(part)
+
+
+def _is_visual(part: ET.Element) -> bool:
+    """Whether a geometry touches nothing, as URDF or MuJoCo has it."""
+    touches_nothing = part.get("contype") == "0" and part.get("conaffinity") == "0"
+    return part.tag == "visual" or touches_nothing
 
 
 def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element, list[str]]:
@@ -386,20 +330,13 @@ def _check_root(model: pin.Model, file: Path) -> None:
         )
 
 
-class _written:  # noqa: N801  # a context manager
-    """The path of a file with the XML of `root`, while it is needed."""
-
-    def __init__(self, root: ET.Element) -> None:
-        self._root = root
-
-    def __enter__(self) -> str:
-        handle, self._path = tempfile.mkstemp(suffix=".xml")
-        with os.fdopen(handle, "wb") as file:
-            file.write(ET.tostring(self._root, encoding="utf-8"))
-        return self._path
-
-    def __exit__(self, *_: object) -> None:
-        os.unlink(self._path)
+@contextmanager
+def _written(root: ET.Element) -> Iterator[str]:
+    """Yield the path of a file with the XML of `root`."""
+    with tempfile.NamedTemporaryFile(suffix=".xml") as file:
+        file.write(ET.tostring(root, encoding="utf-8"))
+        file.flush()
+        yield file.name
 
 
 def _line(error: Exception) -> str:

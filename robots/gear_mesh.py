@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from sphshell_pin.shell import Shell
+
 Array = npt.NDArray[np.float64]
 
 MODULE = 0.005
@@ -59,18 +61,9 @@ def gear_triangles(teeth: int, bore: float = 0.012) -> Array:
     return np.asarray(soup[np.linalg.norm(doubled, axis=1) > 1e-15])
 
 
-def write_stl(path: Path, triangles: Array) -> None:
-    """Write `triangles` (t,3,3) as a binary STL file."""
-    record = np.dtype([("normal", "<3f4"), ("corners", "<9f4"), ("attribute", "<u2")])
-    rows = np.zeros(len(triangles), dtype=record)
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    rows["normal"] = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    rows["corners"] = triangles.reshape(-1, 9)
-    header = b"involute spur gear, metres".ljust(80)
-    path.write_bytes(header + np.array([len(rows)], dtype="<u4").tobytes() + rows.tobytes())
-
-
 if __name__ == "__main__":
     folder = Path(__file__).parent / "meshes"
     for number in (20, 40):
-        write_stl(folder / f"gear_{number}.stl", gear_triangles(number))
+        corners = gear_triangles(number).reshape(-1, 3)
+        gear = Shell(corners, np.arange(len(corners)).reshape(-1, 3), clean=False)
+        gear.to_file(folder / f"gear_{number}.stl")

@@ -18,9 +18,8 @@ import pinocchio as pin
 
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots import LoadedRobot, exactly
-from sphshell_pin.robots.description import check_size
+from sphshell_pin.robots.description import Description, check_size
 from sphshell_pin.robots.files import (
-    Description,
     RobotError,
     build_geometry,
     build_model,

@@ -9,15 +9,16 @@ frame and unit is resolved, every body states its inertia and has one joint, whi
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.scene.mimic import Mimic
-from sphshell_pin.robots.description import MOST_LINKS
+from sphshell_pin.robots.description import MOST_LINKS, Description
+from sphshell_pin.robots.mjcf_additions import Extras, Site
+from sphshell_pin.robots.mjcf_couplings import couplings
 from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom, plain_place
 from sphshell_pin.robots.mjcf_values import (
     add_inertial,
@@ -42,60 +43,8 @@ _MOST_JOINTS = 6  # of a body; each becomes a body in the plain form, inside tha
 _COUNT = {"free": 7, "ball": 4, "slide": 1, "hinge": 1}
 
 
-@dataclass(frozen=True)
-class Extras:
-    """Damping and dry friction of a joint of several degrees of freedom: in SI units, for each."""
-
-    damping: float
-    friction: float
-
-    def give(self, model: pin.Model, joint: pin.JointModel) -> None:
-        """Write them into `model`."""
-        span = slice(joint.idx_v, joint.idx_v + joint.nv)
-        for name, value in (
-            ("damping", self.damping),
-            ("lowerDryFrictionLimit", -self.friction),
-            ("upperDryFrictionLimit", self.friction),
-        ):
-            values = np.array(getattr(model, name))
-            values[span] = value
-            setattr(model, name, values)
-
-
-@dataclass(frozen=True)
-class Site:
-    """A frame on a body, which pinocchio reads on bodies with joints only."""
-
-    name: str
-    body: str
-    place: pin.SE3
-
-    def give(self, model: pin.Model) -> None:
-        """Add it to `model`."""
-        place, frame, joint = self.place, 0, 0
-        if self.body != "world":
-            frame = model.getFrameId(self.body, pin.FrameType.BODY)
-            place = model.frames[frame].placement * place
-            joint = model.frames[frame].parentJoint
-        kind = pin.FrameType.OP_FRAME
-        model.addFrame(pin.Frame(self.name, joint, frame, place, kind), False)
-
-
-@dataclass
-class Plain:
-    """An MJCF in its plain form, and what of it cannot be said in it."""
-
-    root: ET.Element
-    mimics: tuple[Mimic, ...] = ()
-    loops: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    extras: dict[str, Extras] = field(default_factory=dict)
-    start: dict[str, Array] = field(default_factory=dict)
-    sites: list[Site] = field(default_factory=list)
-
-
-def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> Plain:
-    """Return the plain form of an MJCF; ValueError says what in it cannot be read.
+def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> Description:
+    """Return an MJCF in the plain form; ValueError says what in it cannot be read.
 
     What it includes is put into `root`, whose base `floats` or is fixed; None: as it states.
     """
@@ -153,7 +102,7 @@ class _Reader:
                     f"<{tag}> is not supported: let MuJoCo write the bodies out "
                     "(mujoco.MjSpec.from_file(...), compile(), to_xml())"
                 )
-        self.given = root
+        self.given, self.folders = root, folders
         self.compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
         if self.compiler.get("coordinate") == "global":
             raise ValueError('coordinate="global" is not supported: MuJoCo 2.3.3 converts it')
@@ -161,7 +110,9 @@ class _Reader:
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for one in root.findall("default"):
             self._read_class(one, "main", self.classes["main"])
-        self.meshes = Meshes(root, folders, self.compiler, self._with_defaults)
+        # What is not modeled: the names that each sentence is about.
+        self.notes: defaultdict[str, list[str]] = defaultdict(list)
+        self.meshes = Meshes(root, folders, self.compiler, self._with_defaults, self.notes)
         self.extras: dict[str, Extras] = {}
         self.parents: dict[str, str] = {}
         self.joints_of: dict[str, list[str]] = {"world": []}
@@ -169,16 +120,12 @@ class _Reader:
         self.sites: list[Site] = []
         # Where the file draws the joints that are not at zero there.
         self.start: dict[str, Array] = {}
-        self.springs: list[str] = []
-        self.cones: list[str] = []
-        self.weightless: list[str] = []
 
-    def read(self) -> Plain:
+    def read(self) -> Description:
         made = ET.Element("mujoco", model=self.given.get("model") or "robot")
         ET.SubElement(made, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
         made.append(self.meshes.asset())
         world = ET.SubElement(made, "worldbody")
-        scenery: list[str] = []
         bodies: list[ET.Element] = []
         for one in self.given.findall("worldbody"):
             held = ET.Element("body", name="world")
@@ -190,7 +137,8 @@ class _Reader:
                 elif element.tag == "geom":
                     geom = self._with_defaults(element, childclass)
                     if (geom.get("contype"), geom.get("conaffinity")) != ("0", "0"):
-                        scenery.append(geom.get("name", geom.get("type", "sphere")))
+                        text = "geoms of the world are no part of the robot, add them as shells"
+                        self.notes[text].append(geom.get("name", geom.get("type", "sphere")))
             bodies += list(held)
         if len(bodies) == 1 and bodies[0].find("joint") is not None:
             world.append(bodies[0])
@@ -203,9 +151,24 @@ class _Reader:
             raise ValueError("its <worldbody> has no <body>")
         self._weigh(made)
         self._keys(made)
-        mimics, loops = self._equalities()
-        notes = tuple(self._notes(scenery))
-        return Plain(made, mimics, loops, notes, self.extras, self.start, self.sites)
+        for one in self.given.iterfind("tendon/*"):
+            self.notes["tendons are not modeled"].append(one.get("name", one.tag))
+        mimics, loops = couplings(self.given, self.start, self.parents, self.joints_of)
+        return Description(
+            self.folders.file,
+            self.folders,
+            made,
+            mimics,
+            loops,
+            tuple(
+                f"{text}: {', '.join(map(repr, dict.fromkeys(names)))}"
+                for text, names in self.notes.items()
+            ),
+            self.start,
+            self.extras,
+            tuple(self.sites),
+            self.given,
+        )
 
     def _read_class(
         self, element: ET.Element, name: str, inherited: Mapping[str, Mapping[str, str]]
@@ -249,7 +212,7 @@ class _Reader:
         childclass = body.get("childclass", childclass)
         self.parents[name], self.joints_of[name] = parent, []
         if number(body.get("gravcomp"), 0.0):
-            self.weightless.append(name)
+            self.notes["gravity acts on bodies with gravcomp too"].append(name)
         place = pose * self._pose(body.attrib)
         parts = list(self._inside(body, pin.SE3.Identity(), childclass))
         joints = [part for part in parts if part[0].tag in ("joint", "freejoint")]
@@ -299,11 +262,8 @@ class _Reader:
             if part.tag != "geom":
                 continue
             geom = self._with_defaults(part, cls)
-
-            def pose_of(one: Mapping[str, str], at: pin.SE3 = at) -> pin.SE3:
-                return at * self._pose(one)
-
-            made, pose = plain_geom(geom, self.meshes, pose_of)
+            made, pose = plain_geom(geom, self.meshes, self._pose)
+            pose = at * pose
             if needs and low <= number(geom.get("group"), 0) <= high:
                 summed += geom_inertia(geom, made, self.meshes, name).se3Action(pose)
             if made is not None:
@@ -346,7 +306,7 @@ class _Reader:
         made = ET.Element("joint", name=name, type=kind)
         scalar = {key: number(" ".join(stated.get(key, "0").split()[:1]), 0.0) for key in _SCALARS}
         if scalar["stiffness"] or "springdamper" in stated:
-            self.springs.append(name)
+            self.notes["springs of joints (stiffness, springdamper) are not modeled"].append(name)
         if kind == "free":
             made.set("pos", "0 0 0")
         else:
@@ -357,7 +317,7 @@ class _Reader:
         if kind in ("free", "ball"):
             self.extras[name] = Extras(scalar["damping"], scalar["frictionloss"])
             if is_limited and kind == "ball":
-                self.cones.append(name)
+                self.notes["ranges of ball joints are not modeled"].append(name)
             return made
         unit = self.angle if kind == "hinge" else 1.0
         made.set("damping", repr(scalar["damping"]))
@@ -409,70 +369,3 @@ class _Reader:
             qpos = key.get("qpos", "")
             if key.get("name") and len(qpos.split()) == self.nq:
                 ET.SubElement(keys, "key", name=key.attrib["name"], qpos=qpos)
-
-    def _equalities(self) -> tuple[tuple[Mimic, ...], tuple[str, ...]]:
-        """Return the equalities that are mimic joints, and a sentence on each of the others."""
-        mimics, loops = [], []
-        for one in self.given.iterfind("equality/*"):
-            if one.get("active") == "false":
-                continue
-            label = f"<{one.tag}>" + (f" '{one.get('name')}'" if one.get("name") else "")
-            first, second = one.get(f"{one.tag}1"), one.get(f"{one.tag}2")
-            if one.tag == "joint" and first is not None:
-                terms = np.zeros(5)
-                stated = numbers(one.get("polycoef", "0 1 0 0 0"))[:5]
-                terms[: len(stated)] = stated
-                if second is not None and not terms[2:].any():
-                    # It is of the distances from ref.
-                    refs = [float(self.start.get(one, np.zeros(1))[0]) for one in (first, second)]
-                    offset = float(terms[0] + refs[0] - terms[1] * refs[1])
-                    mimics.append(Mimic(first, second, float(terms[1]), offset))
-                elif second is None:
-                    loops.append(f"{label} holds joint '{first}' at {terms[0]:g} (lock it instead)")
-                else:
-                    loops.append(f"{label} makes joint '{first}' follow '{second}' by a polynomial")
-            elif one.tag in ("connect", "weld"):
-                ends = [one.get("body1") or one.get("site1"), one.get("body2") or one.get("site2")]
-                names = self._between(*(end or "world" for end in ends))
-                bodies = " and ".join(f"'{end or 'world'}'" for end in ends)
-                loops.append(
-                    f"the kinematic loop that {label} closes between {bodies}"
-                    + (f", of the joints {', '.join(map(repr, names))}" if names else "")
-                )
-            else:
-                loops.append(f"{label} of <equality>")
-        return tuple(mimics), tuple(loops)
-
-    def _between(self, first: str, second: str) -> list[str]:
-        """Return the joints on the way from one body to another; none where one is unknown."""
-        ways = []
-        for body in (first, second):
-            way = [body]
-            while way[-1] in self.parents:
-                way.append(self.parents[way[-1]])
-            ways.append(way)
-        apart = set(ways[0]) ^ set(ways[1])
-        order = [*ways[0][::-1], *ways[1][::-1]]
-        return [name for body in order if body in apart for name in self.joints_of.get(body, [])]
-
-    def _notes(self, scenery: list[str]) -> Iterator[str]:
-        for names, text in (
-            (self.springs, "springs of joints (stiffness, springdamper) are not modeled"),
-            (self.cones, "ranges of ball joints are not modeled"),
-            (self.weightless, "gravity acts on bodies with gravcomp too"),
-            (
-                self.meshes.exact,
-                "masses of meshes that are not convex are those of their volume (inertia=exact)",
-            ),
-            (
-                self.meshes.hulls,
-                "masses of meshes that are not closed are those of their convex hulls",
-            ),
-            (self.meshes.left_out, "geoms of these kinds are left out"),
-            (scenery, "geoms of the world are no part of the robot, add them as shells"),
-        ):
-            if names:
-                yield f"{text}: {', '.join(map(repr, dict.fromkeys(names)))}"
-        tendons = [one.get("name", one.tag) for one in self.given.iterfind("tendon/*")]
-        if tendons:
-            yield f"tendons are not modeled: {', '.join(map(repr, tendons))}"

@@ -11,12 +11,34 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.robots.mjcf_values import numbers, turned_to
+from sphshell_pin.robots.mjcf_values import number, numbers, text_of, turned_to
 from sphshell_pin.robots.packages import Folders
 
 Array = NDArray[np.float64]
 
-_SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh")
+_INERTIA = pin.Inertia
+# Numbers in `size` of each kind of geom, its volume by these, and its inertia by mass and these.
+_SHAPES: dict[str, tuple[int, Callable[..., float], Callable[..., pin.Inertia]]] = {
+    "sphere": (1, lambda r: 4 / 3 * np.pi * r**3, _INERTIA.FromSphere),
+    "capsule": (
+        2,
+        lambda r, h: np.pi * r**2 * (2 * h + 4 / 3 * r),
+        lambda m, r, h: _INERTIA.FromCapsule(m, r, 2 * h),
+    ),
+    "cylinder": (
+        2,
+        lambda r, h: np.pi * r**2 * 2 * h,
+        lambda m, r, h: _INERTIA.FromCylinder(m, r, 2 * h),
+    ),
+    "box": (
+        3,
+        lambda x, y, z: 8 * x * y * z,
+        lambda m, x, y, z: _INERTIA.FromBox(m, 2 * x, 2 * y, 2 * z),
+    ),
+    "ellipsoid": (3, lambda x, y, z: 4 / 3 * np.pi * x * y * z, _INERTIA.FromEllipsoid),
+}
+_EXACT = "masses of meshes that are not convex are those of their volume (inertia=exact)"
+_HULLS = "masses of meshes that are not closed are those of their convex hulls"
 _SEEN = ("contype", "conaffinity", "group")
 
 
@@ -29,14 +51,13 @@ class Meshes:
         folders: Folders,
         compiler: Mapping[str, str],
         resolved: Callable[[ET.Element, str], dict[str, str]],
+        notes: Mapping[str, list[str]],
     ) -> None:
         folder = Path(compiler.get("meshdir", compiler.get("assetdir", "")))
         strip = compiler.get("strippath") == "true"
         self.files: dict[str, tuple[Path, Array]] = {}
         self.colors: dict[str, str] = {}
-        self.exact: list[str] = []
-        self.hulls: list[str] = []
-        self.left_out: list[str] = []
+        self.notes = notes
         self._moved: set[str] = set()
         self._kinds: dict[str, str] = {}
         for one in root.iterfind("asset/mesh"):
@@ -59,8 +80,7 @@ class Meshes:
         """Return the <asset> of the plain form."""
         made = ET.Element("asset")
         for name, (path, scale) in self.files.items():
-            numbers = " ".join(repr(float(k)) for k in scale)
-            ET.SubElement(made, "mesh", name=name, file=str(path), scale=numbers)
+            ET.SubElement(made, "mesh", name=name, file=str(path), scale=text_of(scale))
         return made
 
     def known(self, name: str | None) -> bool:
@@ -85,10 +105,10 @@ class Meshes:
             if kind == "convex":
                 mesh = mesh.convex_hull
             if not mesh.is_watertight or not mesh.volume:
-                self.hulls.append(name)
+                self.notes[_HULLS].append(name)
                 mesh = _hull(mesh)
             if kind == "legacy" and not mesh.is_convex:
-                self.exact.append(name)
+                self.notes[_EXACT].append(name)
             volume, center = float(mesh.volume), np.asarray(mesh.center_mass)
             sign = float(np.sign(volume))
             moments = sign * np.asarray(mesh.moment_inertia)
@@ -114,7 +134,7 @@ def plain_place(
     ends = numbers(stated["fromto"], 6).reshape(2, 3)
     along = ends[0] - ends[1]
     place = pin.SE3(turned_to(along), ends.mean(axis=0))
-    return pose_of({}) * place, 0.5 * float(np.linalg.norm(along))
+    return place, 0.5 * float(np.linalg.norm(along))
 
 
 def plain_geom(
@@ -127,17 +147,19 @@ def plain_geom(
     if half is not None and size:
         size = [size[0], half] if kind in ("capsule", "cylinder") else [size[0], size[0], half]
     fitted = kind != "mesh" and "mesh" in stated
-    if kind not in _SHAPES or fitted or (kind == "mesh" and not meshes.known(stated.get("mesh"))):
-        meshes.left_out.append(f"{kind} fitted to a mesh" if fitted else kind)
+    known = meshes.known(stated.get("mesh")) if kind == "mesh" else kind in _SHAPES and not fitted
+    if not known:
+        what = f"{kind} fitted to a mesh" if fitted else kind
+        meshes.notes["geoms of these kinds are left out"].append(what)
         return None, pose
-    need = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3, "mesh": 0}[kind]
-    if len(size) < need:
-        raise ValueError(f"a geom of the type {kind} needs {need} numbers in size")
     made = ET.Element("geom", type=kind)
-    if need:
-        made.set("size", " ".join(repr(k) for k in size[:need]))
-    else:
+    if kind == "mesh":
         made.set("mesh", stated["mesh"])
+    else:
+        need, *_ = _SHAPES[kind]
+        if len(size) < need:
+            raise ValueError(f"a geom of the type {kind} needs {need} numbers in size")
+        made.set("size", " ".join(repr(k) for k in size[:need]))
     for key in (*_SEEN, "name"):
         if key in stated:
             made.set(key, stated[key])
@@ -152,8 +174,8 @@ def geom_inertia(
 ) -> pin.Inertia:
     """Return the inertia that a geom gives its body, in the geom's frame."""
     kind = stated.get("type", "sphere")
-    density = float(numbers(stated.get("density", "1000"), 1)[0])
-    mass = float(numbers(stated["mass"], 1)[0]) if "mass" in stated else None
+    density = number(stated.get("density"), 1000.0)
+    mass = number(stated["mass"], 0.0) if "mass" in stated else None
     if kind in ("plane", "hfield") or mass == 0.0 or (mass is None and density == 0.0):
         return pin.Inertia.Zero()
     if made is None:
@@ -165,22 +187,9 @@ def geom_inertia(
         factor = density if mass is None else mass / volume
         return pin.Inertia(factor * inertia.mass, inertia.lever, factor * inertia.inertia)
     size = numbers(made.attrib["size"]).tolist()
-    volumes: dict[str, Callable[..., float]] = {
-        "sphere": lambda r: 4 / 3 * np.pi * r**3,
-        "capsule": lambda r, h: np.pi * r**2 * (2 * h + 4 / 3 * r),
-        "cylinder": lambda r, h: np.pi * r**2 * 2 * h,
-        "box": lambda x, y, z: 8 * x * y * z,
-        "ellipsoid": lambda x, y, z: 4 / 3 * np.pi * x * y * z,
-    }
-    inertias: dict[str, Callable[..., pin.Inertia]] = {
-        "sphere": pin.Inertia.FromSphere,
-        "capsule": lambda m, r, h: pin.Inertia.FromCapsule(m, r, 2 * h),
-        "cylinder": lambda m, r, h: pin.Inertia.FromCylinder(m, r, 2 * h),
-        "box": lambda m, x, y, z: pin.Inertia.FromBox(m, 2 * x, 2 * y, 2 * z),
-        "ellipsoid": pin.Inertia.FromEllipsoid,
-    }
+    _, volume_of, inertia_of = _SHAPES[made.attrib["type"]]
     try:
-        weight = float(density * volumes[made.attrib["type"]](*size)) if mass is None else mass
+        weight = float(density * volume_of(*size)) if mass is None else mass
     except OverflowError:
         raise ValueError(f"a geom of body '{body}' is too large to compute with: {size}") from None
-    return inertias[made.attrib["type"]](weight, *size)
+    return inertia_of(weight, *size)

@@ -15,26 +15,11 @@ from contextlib import contextmanager
 from typing import Any
 
 # Frames, code and tracebacks; and str.format, which reads attributes that its text names.
-_WAYS_OUT = frozenset(
-    [
-        "gi_frame",
-        "gi_code",
-        "gi_yieldfrom",
-        "cr_frame",
-        "cr_code",
-        "ag_frame",
-        "ag_code",
-        "tb_frame",
-        "f_back",
-        "f_builtins",
-        "f_code",
-        "f_globals",
-        "f_locals",
-        "format",
-        "format_map",
-        "mro",
-    ]
+_NAMES = (
+    "gi_frame gi_code gi_yieldfrom cr_frame cr_code ag_frame ag_code tb_frame f_back f_builtins "
+    "f_code f_globals f_locals format format_map mro"
 )
+_WAYS_OUT = frozenset(_NAMES.split())
 _REFUSED = (ast.Lambda, ast.Await, ast.Yield, ast.YieldFrom, ast.NamedExpr)
 _FUNCTIONS = (
     "abs all any bool dict divmod enumerate filter float int len list map max min pow range "

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
 import signal
 import subprocess
 import sys
 from collections.abc import Mapping
-from multiprocessing import spawn
 from pathlib import Path
 
 from sphshell_pin.errors import MissingExtra
+from sphshell_pin.limits import child_command, last_line
 from sphshell_pin.robots.packages import Folders
 
 TIME_LIMIT = 5.0
@@ -51,11 +50,10 @@ def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> byt
         "time_limit": TIME_LIMIT,
         "memory_limit": MEMORY_LIMIT,
     }
-    program = [os.fsdecode(spawn.get_executable() or sys.executable), "-P", "-c", _START]
     long = f"xacro takes more than {TIME_LIMIT:g} s to expand it: check its expressions and loops"
     try:
         done = subprocess.run(
-            [*program, *map(str, sys.path)],
+            child_command(_START),
             input=json.dumps(request).encode(),
             capture_output=True,
             timeout=WAIT,
@@ -69,8 +67,7 @@ def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> byt
         answer = json.loads(done.stdout)
         urdf, fault = answer.get("urdf"), answer.get("fault")
     except (ValueError, AttributeError):
-        lines = done.stderr.decode(errors="replace").split("\n")
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "no reason given")
+        last = last_line(done.stderr)
         fault = "memory" if "MemoryError" in last else f"failed ({last})"
     if fault == "memory":
         raise ValueError(

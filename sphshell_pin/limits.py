@@ -1,10 +1,25 @@
-"""Limits that a child process sets itself before it reads what may ask for too much."""
+"""Child processes for what may crash or ask for too much: their start, limits and last words."""
 
 from __future__ import annotations
 
+import os
 import resource
+import sys
 from contextlib import suppress
+from multiprocessing import spawn
 from pathlib import Path
+
+
+def child_command(program: str) -> list[str]:
+    """Return the command that runs a program with this interpreter, `sys.path` as arguments."""
+    python = os.fsdecode(spawn.get_executable() or sys.executable)
+    return [python, "-P", "-c", program, *map(str, sys.path)]
+
+
+def last_line(errors: bytes) -> str:
+    """Return the last line that a child wrote to its standard error."""
+    lines = map(str.strip, errors.decode(errors="replace").split("\n"))
+    return next(filter(None, reversed([*lines])), "no reason given")
 
 
 def limit_memory(limit: float | None) -> None:

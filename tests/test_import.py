@@ -40,6 +40,8 @@ HEAVY = (
     "imageio_ffmpeg",
 )
 
+EXTRAS = [name for name in HEAVY if name not in ("trimesh", "pydantic", "typer", "rich")]
+
 
 @pytest.fixture(scope="module")
 def loaded() -> set[str]:
@@ -51,6 +53,25 @@ def loaded() -> set[str]:
 @pytest.mark.parametrize("module", HEAVY)
 def test_heavy_module_is_not_loaded(loaded: set[str], module: str) -> None:
     assert not [name for name in loaded if name.split(".")[0] == module]
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "scenario.drafting.new",
+        "scenario.running.run",
+        "study.robot_check",
+        "study.validation.tosses",
+    ],
+)
+def test_commands_load_without_extras(module: str) -> None:
+    """What an extra brings is imported where it is used, so that its absence is told."""
+    program = f"""if True:
+        import sys
+        for name in {EXTRAS}:
+            sys.modules[name] = None
+        import sphshell_pin.{module}"""
+    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 def test_what_is_needed_is_loaded(loaded: set[str]) -> None:

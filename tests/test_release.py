@@ -6,27 +6,18 @@ import re
 import shutil
 import tomllib
 from datetime import date
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 import sphshell_pin
-from tests.test_packaging import NAME, script
+from tests.test_packaging import NAME, ROOT, load, script
 
-ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 RECIPE = ROOT / "packaging" / "conda" / "recipe.yaml"
 # What a package on PyPI is called on conda-forge, where that differs.
 CONDA = {"pin": "pinocchio", "meshcat": "meshcat-python", "matplotlib": "matplotlib-base"}
 FORMS = ROOT / ".github" / "ISSUE_TEMPLATE"
-
-
-def load(file):
-    yaml = pytest.importorskip("yaml", reason="needs PyYAML, which comes with the extra docs")
-    if not file.is_file():
-        pytest.skip(f"{file.name} is part of the checkout")
-    return yaml.safe_load(file.read_text(encoding="utf-8"))
 
 
 def changes():

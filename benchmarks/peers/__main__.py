@@ -1,14 +1,12 @@
 """The same scenes in other engines: error against CPU time.
 
-python -m benchmarks.peers [--engine E]... [--scene S]... [--quick] [--out DIR] [--write]
+python -m benchmarks.peers [--engine E]... [--scene S]... [--quick] [--write]
 """
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from sphshell_pin.atomic import atomic_file
 from sphshell_pin.benchmarks.peers.measuring import measure
 from sphshell_pin.benchmarks.peers.scenes import SCENES
 from sphshell_pin.benchmarks.peers.section import assemble, site_sections
@@ -26,7 +24,6 @@ def main() -> None:
     parser.add_argument("--engine", action="append", choices=ENGINES, help="only these, and ours")
     parser.add_argument("--scene", action="append", choices=SCENES, help="only these")
     parser.add_argument("--quick", action="store_true", help="fewer settings, swings and rounds")
-    parser.add_argument("--out", type=Path, help="folder for the tables, as .csv")
     parser.add_argument("--write", action="store_true", help="write docs/measured/peers.json")
     arguments = parser.parse_args()
     one_core()
@@ -37,15 +34,8 @@ def main() -> None:
         arguments.quick,
         say=lambda text: print(text, flush=True),
     )
-    tables = assemble(rows, ratios).tables
-    for table in tables:
+    for table in assemble(rows, ratios).tables:
         print(f"{table.caption}\n\n{table.markdown()}")
-    if arguments.out is not None:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        for table in tables:
-            with atomic_file(arguments.out / f"{table.name}.csv") as file:
-                file.write(table.csv().encode())
-        print(f"wrote {len(tables)} tables to {arguments.out}")
     if arguments.write:
         command = f"python -m benchmarks.peers{' --quick' * arguments.quick} --write"
         print(f"wrote {write('peers', command, site_sections(rows, ratios))}")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.shapes import Surface
@@ -15,9 +15,9 @@ from sphshell_pin.benchmarks.peers.shapes import Surface
 AXES = {"JointModelRX": "1 0 0", "JointModelRY": "0 1 0", "JointModelRZ": "0 0 1"}
 
 
-def numbers(values: Iterable[float]) -> str:
-    """Return the numbers with all their digits, as an attribute."""
-    return " ".join(repr(float(value)) for value in values)
+def text(*numbers: ArrayLike) -> str:
+    """Return numbers with all their digits, as an attribute."""
+    return " ".join(repr(float(x)) for one in numbers for x in np.ravel(one))
 
 
 def merged_urdf(scene: PressScene, scale: float = 1.0, sphere: bool = True) -> str:
@@ -37,22 +37,22 @@ def merged_urdf(scene: PressScene, scale: float = 1.0, sphere: bool = True) -> s
         inertia, placement = model.inertias[i], model.jointPlacements[i]
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = scale**2 * np.asarray(inertia.inertia)
         parts.append(
-            f'<link name="link{i}"><inertial><origin xyz="{numbers(scale * inertia.lever)}"/>'
-            f'<mass value="{numbers([inertia.mass])}"/><inertia ixx="{numbers([xx])}" '
-            f'ixy="{numbers([xy])}" ixz="{numbers([xz])}" iyy="{numbers([yy])}" '
-            f'iyz="{numbers([yz])}" izz="{numbers([zz])}"/></inertial>'
+            f'<link name="link{i}"><inertial><origin xyz="{text(scale * inertia.lever)}"/>'
+            f'<mass value="{text(inertia.mass)}"/><inertia ixx="{text(xx)}" '
+            f'ixy="{text(xy)}" ixz="{text(xz)}" iyy="{text(yy)}" '
+            f'iyz="{text(yz)}" izz="{text(zz)}"/></inertial>'
         )
         if sphere and i == tip.parentJoint:
             parts.append(
-                f'<collision><origin xyz="{numbers(scale * tip.placement.translation)}"/>'
-                f'<geometry><sphere radius="{numbers([scale * scene.radius])}"/></geometry>'
+                f'<collision><origin xyz="{text(scale * tip.placement.translation)}"/>'
+                f'<geometry><sphere radius="{text(scale * scene.radius)}"/></geometry>'
                 "</collision>"
             )
         turn = pin.rpy.matrixToRpy(placement.rotation)
         parts.append(
             f'</link><joint name="joint{i}" type="continuous">'
             f'<parent link="link{model.parents[i]}"/><child link="link{i}"/>'
-            f'<origin xyz="{numbers(scale * placement.translation)}" rpy="{numbers(turn)}"/>'
+            f'<origin xyz="{text(scale * placement.translation)}" rpy="{text(turn)}"/>'
             f'<axis xyz="{AXES[model.joints[i].shortname()]}"/></joint>'
         )
     return f'<robot name="arm">{"".join(parts)}</robot>'

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
+from sphshell_pin.benchmarks.peers.merged import text
+from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
 from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
 from sphshell_pin.benchmarks.peers.truths import (
@@ -124,11 +125,6 @@ def option_of(scene: Scene, params: Params) -> str:
         f'<option timestep="{params["dt"]}" integrator="{params["integrator"]}" solver="Newton" '
         f'tolerance="1e-10" gravity="{text(gravity)}" {friction}>{flag}</option>'
     )
-
-
-def text(numbers: Any) -> str:
-    """Return numbers as MJCF has them."""
-    return " ".join(repr(float(number)) for number in np.ravel(numbers))
 
 
 def law_of(scene: Scene, mass: float, d: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -341,18 +337,5 @@ def run_press(scene: PressScene, params: Params) -> Trajectory:
     data = mujoco.MjData(model)
     data.qpos[:], data.ctrl[:] = scene.q0, scene.q_ref
     states, cpu = rolled_out(model, data, scene.steps)
-    forces = contact_forces(model, data, states[-1])
-    tip = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, FRAME)
-    velocity = np.zeros(6)
-    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, tip, velocity, 0)
-    return Trajectory(
-        t=states[-1:, 0],
-        position=data.geom_xpos[tip][None].copy(),
-        velocity=velocity[None, 3:],
-        angular_velocity=velocity[None, :3],
-        cpu=cpu,
-        simulated=scene.duration,
-        steps=scene.steps,
-        force=forces.sum(axis=0)[None],
-        contact_forces=forces,
-    )
+    force = contact_forces(model, data, states[-1]).sum(axis=0)
+    return at_the_end(scene, data.qpos, data.qvel, cpu, scene.steps, force)

@@ -17,6 +17,7 @@ from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
 from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
 from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Impact
+from sphshell_pin.benchmarks.rolling import turned, velocities
 from sphshell_pin.dynamics.run.advance import advance, start_run
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 
@@ -147,9 +148,7 @@ def read(scene: BallScene, result: sp.Result, cpu: float) -> Trajectory:
     position, velocity = result.q[:, :3], result.v[:, :3]
     spin = np.zeros_like(position)
     if scene.rolls:
-        turns = [pin.Quaternion(q).matrix() for q in result.q[:, 3:7]]
-        velocity = np.einsum("nij,nj->ni", turns, velocity)
-        spin = np.einsum("nij,nj->ni", turns, result.v[:, 3:6])
+        velocity, spin = velocities(result), turned(result.q[:, 3:7], result.v[:, 3:6])
     log = result.contacts
     force = np.zeros_like(position)
     np.add.at(force, log.row, log.force_world)

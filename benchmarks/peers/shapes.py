@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks import swing
 from sphshell_pin.benchmarks.surfaces import height as wavy_height
-from sphshell_pin.benchmarks.surfaces import wavy_sheet
+from sphshell_pin.benchmarks.surfaces import random_grid, wavy_sheet
 
 Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
@@ -46,38 +46,19 @@ class Surface:
     boxes: tuple[Box, ...] = ()
 
 
-def grid(
-    cells: int, half_x: float, half_y: float, jitter: float, seed: int
-) -> tuple[Array, NDArray[np.int32]]:
-    """Return x, y (n, 2) [m] of moved grid points and triangles (m, 3) with random diagonals.
-
-    Points on the border and on the line x = 0 stay there (the crease of a groove).
-    """
-    rng = np.random.default_rng(seed)
-    vertices, triangles = wavy_sheet(cells, 2.0)
-    xy = vertices[:, :2].copy()
-    inner = np.maximum(np.abs(xy[:, 0]), np.abs(xy[:, 1])) < 1 - 1e-9
-    moved = jitter * rng.uniform(-1, 1, xy.shape) * 2 / cells * inner[:, None]
-    moved[np.abs(xy[:, 0]) < 1e-9, 0] = 0.0
-    (a, b, c), (_, _, d) = (half.T for half in np.split(triangles, 2))
-    first = rng.random(len(a)) < 0.5
-    halves = np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d])
-    return (xy + moved) * [half_x, half_y], np.hstack(halves).T.astype(np.int32)
-
-
 def plate(half: float, spacing: float, thickness: float = 0.1) -> Surface:
     """Return the flat square z = 0 of |x|, |y| <= `half` [m], of random triangles.
 
     The box of the same surface is `thickness` [m] thick.
     """
     cells = 2 * round(half / spacing)
-    xy, triangles = grid(cells, half, half, 0.2, seed=5)
-    vertices = np.c_[xy, np.zeros(len(xy))]
+    x, y, triangles = random_grid(cells, half, seed=5)
+    vertices = np.c_[x, y, np.zeros(len(x))]
     box = np.array([half, half, thickness / 2])
     return Surface(
         vertices,
         triangles,
-        np.tile([0.0, 0.0, 1.0], (len(xy), 1)),
+        np.tile([0.0, 0.0, 1.0], (len(x), 1)),
         spacing,
         half,
         height=lambda x, y: np.zeros_like(x + y),
@@ -135,8 +116,9 @@ def groove(opening: float, half: float, spacing: float) -> Surface:
     """Return a V along y with its crease at z = 0, each wall `opening` [rad] from the middle."""
     slope = 1 / math.tan(opening)
     cells = 2 * round(half / spacing)
-    xy, triangles = grid(cells, half, half, 0.2, seed=6)
-    vertices = np.c_[xy, slope * np.abs(xy[:, 0])]
+    x, y, triangles = random_grid(cells, half, seed=6)
+    x.reshape(cells + 1, -1)[cells // 2] = 0.0  # the crease
+    vertices = np.c_[x, y, slope * np.abs(x)]
     boxes = []
     for sign in (1.0, -1.0):
         along = np.array([sign * math.sin(opening), 0.0, math.cos(opening)])

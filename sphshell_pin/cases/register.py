@@ -34,20 +34,30 @@ class Known(Protocol):
 
 
 K = TypeVar("K", bound=Known)
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Register(Generic[K]):
-    """The cases of some modules of a package, by their names, in the order of the modules."""
+    """The cases of some modules of a package, by their names, in the order of the modules.
 
-    def __init__(self, package: str, modules: Sequence[str]) -> None:
+    `make` makes one of its name, its function and what else the decorator `case` is given.
+    """
+
+    def __init__(self, package: str, modules: Sequence[str], make: Callable[..., K]) -> None:
         self.modules = [f"{package}.{name}" for name in modules]
+        self._make = make
         self._known: dict[str, K] = {}
 
-    def add(self, name: str, case: K) -> None:
-        """Add a case; ValueError where the name is taken."""
-        if name in self._known:
-            raise ValueError(f"two cases are called {name!r}")
-        self._known[name] = case
+    def case(self, name: str, **facts: Any) -> Callable[[F], F]:
+        """Decorate the function that runs a case; ValueError where the name is taken."""
+
+        def register(run: F) -> F:
+            if name in self._known:
+                raise ValueError(f"two cases are called {name!r}")
+            self._known[name] = self._make(name, run, **facts)
+            return run
+
+        return register
 
     def collect(self, *, quick: bool = False, only: str | None = None) -> list[K]:
         """Import the modules and return their cases; `quick` leaves out the slow ones.

@@ -108,12 +108,11 @@ def contact_markers(
         markers.append(
             _marker(stamp, WORLD, "points", 0, SPHERE_LIST, (size,) * 3, POINT_COLOR, points=points)
         )
-    drawn = pushing(contacts, contacts.pair)
-    normal = drawn.normal_force[:, None] * drawn.normal_world
-    for k, point in enumerate(drawn.point_world):
+    drawn = pushing(contacts)
+    for k, point in enumerate(drawn.point):
         for what, color, force in (
-            ("normal", NORMAL_COLOR, normal[k]),
-            ("friction", FRICTION_COLOR, drawn.friction_force_world[k]),
+            ("normal", NORMAL_COLOR, drawn.normal[k]),
+            ("friction", FRICTION_COLOR, drawn.friction[k]),
         ):
             length = float(np.linalg.norm(force)) * scale.metres_per_newton
             if not 0.0 < length < np.inf:

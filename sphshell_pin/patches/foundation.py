@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on
+from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, poses_along
 from sphshell_pin.patches.sampling import Grid, divide
 
 if TYPE_CHECKING:
@@ -96,13 +95,11 @@ def overlap_of(result: Result, scene: Scene, patches: PlacedPatches) -> Overlap 
     if not foundations:
         return None
     centers, radii = np.full((len(patches.row), 3), np.nan), np.zeros(len(patches.row))
-    model, data = scene.model, scene.model.createData()
     for k in foundations:
-        pair = scene.pairs[k]
-        for at in np.flatnonzero(patches.pair == k):
-            q = np.asarray(result.q[patches.row[at]], dtype=float)
-            pin.forwardKinematics(model, data, q)
-            shell = data.oMi[pair.joint_j] * pair.placement_j
-            centers[at] = shell.actInv((data.oMi[pair.joint_i] * pair.placement_i).translation)
-            radii[at] = pair.least_radius
+        pair, own = scene.pairs[k], patches.pair == k
+        rows = patches.row[own]
+        turns, origins = poses_along(result, scene, rows, pair.joint_j, pair.placement_j)
+        places = poses_along(result, scene, rows, pair.joint_i, pair.placement_i)[1]
+        centers[own] = np.einsum("kij,ki->kj", turns, places - origins)
+        radii[own] = pair.least_radius
     return Overlap(centers, radii, np.isin(patches.pair, foundations))

@@ -79,9 +79,7 @@ class WearMap(Summarized):
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the arrays to a compressed .npz file; return its path."""
-        with atomic_file(Path(path)) as stream:
-            np.savez_compressed(stream, allow_pickle=False, **self.arrays())
-        return Path(path)
+        return _save(path, self.arrays())
 
     def arrays(self) -> dict[str, Array | Longs]:
         """Return corners, points, triangle, areas and depth by name."""
@@ -180,6 +178,12 @@ def _map(
     )
 
 
+def _save(path: str | PathLike[str], arrays: dict[str, Array | Longs]) -> Path:
+    with atomic_file(Path(path)) as stream:
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
+    return Path(path)
+
+
 def save_wear(maps: Sequence[WearMap], folder: str | PathLike[str]) -> None:
     """Write wear.npz, the arrays of all maps, and wear.png into `folder`.
 
@@ -190,8 +194,7 @@ def save_wear(maps: Sequence[WearMap], folder: str | PathLike[str]) -> None:
     for one in maps:
         prefix = "" if len(maps) == 1 else f"{one.shell.name}."
         arrays |= {f"{prefix}{name}": array for name, array in one.arrays().items()}
-    with atomic_file(Path(folder) / "wear.npz") as stream:
-        np.savez_compressed(stream, allow_pickle=False, **arrays)
+    _save(Path(folder) / "wear.npz", arrays)
     figure = offered("sphshell_pin.plot.wear:plot_wear")(maps)
     offered("sphshell_pin.plot.figure:write_figure")(Path(folder) / "wear.png", figure)
 

@@ -14,12 +14,7 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
 from sphshell_pin.plot.contact_path import plot_contact_path
 from sphshell_pin.plot.figure import NO_CONTACT, write_figure
-from sphshell_pin.plot.over_time import (
-    MOST_PAIRS,
-    plot_energy,
-    plot_force_and_depth,
-    plot_overview,
-)
+from sphshell_pin.plot.over_time import MOST_PAIRS, plot_energy, plot_force_and_depth, plot_overview
 from sphshell_pin.plot.sensors import plot_sensors
 from sphshell_pin.plot.series import MOST_POINTS
 

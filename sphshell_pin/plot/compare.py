@@ -93,10 +93,7 @@ def _quantity(name: str) -> str:
 
 
 def _draw(
-    axis: Axes,
-    quantity: str,
-    curves: dict[str, Curve | CurveDifference],
-    comparison: Comparison,
+    axis: Axes, quantity: str, curves: dict[str, Curve | CurveDifference], comparison: Comparison
 ) -> None:
     """Draw `curves` by the label of their run, in a unit that fits the largest."""
     axis.margins(x=0.01)
@@ -110,5 +107,5 @@ def _draw(
         if run.label in curves:
             t, values = thinned(curves[run.label].t, curves[run.label].values * factor)
             color = FIRST_COLOR if number == 0 else COLORS[(number - 1) % len(COLORS)]
-            width, style = (2.2, "-") if number == 0 else (1.2, "-")
-            axis.plot(t, values, style, color=color, linewidth=width, label=run.label)
+            width = 1.2 if number else 2.2
+            axis.plot(t, values, color=color, linewidth=width, label=run.label)

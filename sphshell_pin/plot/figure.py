@@ -22,13 +22,15 @@ INK = "#101418"
 _PREFIXES = {3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """Return an empty Figure of `width` by `height` inches, made without pyplot.
+def new_figure(width: float, height: float, title: str = "") -> Figure:
+    """Return an empty Figure of `width` by `height` inches with a `title`, made without pyplot.
 
     Raises MissingExtra without matplotlib.
     """
     matplotlib = import_extra("matplotlib.figure", "view", "a figure")
     figure: Figure = matplotlib.Figure(figsize=(width, height), layout="constrained")
+    if title:
+        figure.suptitle(title, fontsize=12)
     # A notebook shows it where it is the value of a cell, whatever backend it has.
     figure._repr_png_ = functools.partial(png, figure, 100)  # type: ignore[attr-defined]
     return figure
@@ -82,9 +84,8 @@ def say(axis: Axes, sentence: str) -> None:
 
 def only_say(title: str, sentence: str) -> Figure:
     """Return a figure of nothing but a `sentence`."""
-    figure = new_figure(9.0, 5.0)
+    figure = new_figure(9.0, 5.0, title)
     say(figure.subplots(), sentence)
-    figure.suptitle(title, fontsize=12)
     return figure
 
 

@@ -191,8 +191,7 @@ def shell_figure(title: str, count: int) -> tuple[Figure, list[Axes3D]]:
     """Return a figure called `title` and `count` axes in it, two in a row."""
     columns = min(count, 2)
     rows = -(-count // columns)
-    figure = new_figure(2.7 + 5.1 * columns, 0.8 + 5.4 * rows)
-    figure.suptitle(title, fontsize=12)
+    figure = new_figure(2.7 + 5.1 * columns, 0.8 + 5.4 * rows, title)
     look: dict[str, Any] = {"projection": "3d", "proj_type": "ortho", "computed_zorder": False}
     return figure, [figure.add_subplot(rows, columns, k + 1, **look) for k in range(count)]
 

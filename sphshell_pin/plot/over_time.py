@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sphshell_pin.dynamics.result.pair_series import PairSeries
-from sphshell_pin.plot.figure import (
-    NO_CONTACT,
-    count,
-    finish_axis,
-    label_axis,
-    new_figure,
-    say,
-)
+from sphshell_pin.plot.figure import NO_CONTACT, count, finish_axis, label_axis, new_figure, say
 from sphshell_pin.plot.series import FloatArray, thinned
 
 if TYPE_CHECKING:
@@ -62,15 +55,15 @@ def plot_force_and_depth(result: Result) -> Figure:
     """
     touched = [pair for pair in _series(result) if pair.touches]
     shown = _largest(touched)
+    title = f"Contact force and depth{_left_out(touched, shown)}"
     if len(shown) <= 1:
-        figure = new_figure(9.0, 6.5)
+        figure = new_figure(9.0, 6.5, title)
         axes = figure.subplots(2, 1, sharex=True).reshape(1, 2)
-        axes[0, 1].set_xlabel("time [s]")
     else:
-        figure = new_figure(12.0, 1.2 + 2.1 * len(shown))
+        figure = new_figure(12.0, 1.2 + 2.1 * len(shown), title)
         axes = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
-        for axis in axes[-1]:
-            axis.set_xlabel("time [s]")
+    for axis in axes[-1] if len(shown) > 1 else axes[-1, 1:]:
+        axis.set_xlabel("time [s]")
     if not shown:
         for axis, quantity in zip(axes[0], ("force", "largest depth"), strict=True):
             say(axis, NO_CONTACT)
@@ -79,18 +72,16 @@ def plot_force_and_depth(result: Result) -> Figure:
         _draw_forces(force, result, pair, max(one.peak for one in shown))
         _draw_depths(depth, result, [pair])
         force.set_title(_pair_title(result, pair), fontsize=10, loc="left")
-    figure.suptitle(f"Contact force and depth{_left_out(touched, shown)}", fontsize=12)
     return figure
 
 
 def plot_energy(result: Result) -> Figure:
     """Return a Figure of the energy audit and of its residual over time."""
-    figure = new_figure(10.0, 6.5)
+    figure = new_figure(10.0, 6.5, "Energy audit")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     _draw_energies(upper, result)
     _draw_residual(lower, result)
     lower.set_xlabel("time [s]")
-    figure.suptitle("Energy audit", fontsize=12)
     return figure
 
 

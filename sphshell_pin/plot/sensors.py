@@ -25,10 +25,9 @@ def plot_sensors(result: Result) -> Figure:
         for name, log in result.sensors.items()
         for unit in dict.fromkeys(column.partition(" ")[2] for column in log.columns)
     ]
-    figure = new_figure(10.0, 1.2 + 2.2 * max(len(parts), 1))
+    figure = new_figure(10.0, 1.2 + 2.2 * max(len(parts), 1), "Sensors")
     axes = figure.subplots(max(len(parts), 1), 1, sharex=True, squeeze=False)[:, 0]
     axes[-1].set_xlabel("time [s]")
-    figure.suptitle("Sensors", fontsize=12)
     if not parts:
         say(axes[0], NO_SENSORS)
     for (name, unit), axis in zip(parts, axes, strict=False):

@@ -49,7 +49,7 @@ def plot_sweep(table: pd.DataFrame, figure: str) -> Figure:
         raise NameNotFound("figure", figure, "the table", known, see="its columns")
     numbers, words = drawable_keys(table[keys])
     groups = _groups(table, words)
-    canvas = new_figure(7.5, 5.0)
+    canvas = new_figure(7.5, 5.0, figure if len(numbers) == 2 else "")
     if len(numbers) == 2:
         _draw_maps(canvas, groups, numbers, figure)
     elif numbers:
@@ -157,7 +157,6 @@ def _draw_maps(
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
     canvas.colorbar(mesh, ax=list(axes), label=figure_label(figure, units))
-    canvas.suptitle(figure, fontsize=12)
 
 
 def _borders(values: FloatArray) -> FloatArray:

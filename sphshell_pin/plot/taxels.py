@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.checks import check_positive
 from sphshell_pin.errors import InvalidParameter, import_extra
 from sphshell_pin.films import check_film, write_film
 from sphshell_pin.plot.figure import new_figure, reading_unit
@@ -57,9 +58,7 @@ def save_film(path: Path, images: TaxelImages, *, fps: float, speed: float) -> P
     `fps` or `speed` that is not positive or makes more than MOST_FRAMES; MissingExtra without
     matplotlib, or for a .mp4 without imageio-ffmpeg.
     """
-    for name, value in (("fps", fps), ("speed", speed)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InvalidParameter(name, value, "must be positive")
+    fps, speed = check_positive("fps", fps), check_positive("speed", speed)
     check_film(path, (LARGE, LARGE), fps)
     frames = _frames(images, fps, speed)
     # Films of odd sizes are refused by some players.

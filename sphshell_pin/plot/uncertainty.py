@@ -56,7 +56,7 @@ def plot_uncertainty(
     parts = [one is not None for one in (values, tornado, indices)]
     inputs = max((len(one) for one in (tornado, indices) if one is not None), default=0)
     height = max(4.2, 1.6 + 0.42 * min(inputs, _MOST_INPUTS))
-    canvas = new_figure(max(7.0, 5.4 * sum(parts)), height)
+    canvas = new_figure(max(7.0, 5.4 * sum(parts)), height, figure)
     if units is None:
         units = {} if tornado is None else units_of(tornado)
     axes = iter(canvas.subplots(1, max(sum(parts), 1), squeeze=False)[0])
@@ -66,7 +66,6 @@ def plot_uncertainty(
         _draw_tornado(next(axes), tornado, figure, units)
     if indices is not None:
         _draw_indices(next(axes), indices)
-    canvas.suptitle(figure, fontsize=12)
     return canvas
 
 
@@ -140,10 +139,7 @@ def _draw_tornado(axis: Axes, tornado: pd.DataFrame, figure: str, units: Mapping
     median = float(shown["median"].iloc[0])
     places = np.arange(len(shown))[::-1]
     # Each half as high as its row: both may lie on one side of the median.
-    for kind, percent, color, shift in (
-        ("low", 5, LOW_COLOR, 0.2),
-        ("high", 95, HIGH_COLOR, -0.2),
-    ):
+    for kind, percent, color, shift in (("low", 5, LOW_COLOR, 0.2), ("high", 95, HIGH_COLOR, -0.2)):
         ends = shown[kind].to_numpy(float)
         axis.barh(
             places + shift,

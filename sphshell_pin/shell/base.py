@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import cached_property
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,11 @@ from sphshell_pin.shell.options import SIDES, check_size
 from sphshell_pin.shell.raw import Bytes, Floats, Ints, Mask
 from sphshell_pin.summary import Summarized
 
-Scalar = TypeVar("Scalar", np.float64, np.int32, np.bool_)
+_ARRAYS: dict[str, npt.DTypeLike] = {
+    **dict.fromkeys(("elements", "source_element", "element_face"), np.int32),
+    **dict.fromkeys(("normals", "face_shapes"), np.float64),
+}
+"""Of a surface, taken over as they are."""
 
 
 class ShellBase(Summarized):
@@ -78,12 +82,11 @@ class ShellBase(Summarized):
         vertices = np.ascontiguousarray(surface.vertices, np.float64)
         triangles = np.ascontiguousarray(surface.triangles, np.int32)
         triangle_element = np.ascontiguousarray(surface.triangle_element, np.int32)
-        self.elements = _owned(surface.elements, np.int32)
-        self.source_element = _owned(surface.source_element, np.int32)
-        self.normals = _owned_if(surface.normals, np.float64)
-        self.element_face = _owned_if(surface.element_face, np.int32)
         self.face_names = tuple(surface.face_names)
-        self.face_shapes = _owned_if(surface.face_shapes, np.float64)
+        for one, kind in _ARRAYS.items():
+            array = getattr(surface, one)
+            owned = None if array is None else read_only(np.ascontiguousarray(array, kind))
+            setattr(self, one, owned)
         self.straight = None if surface.straight is None else read_only(surface.straight.copy())
         # Without cleaning there may be vertices no element uses.
         in_use = np.zeros(len(vertices), np.bool_)
@@ -207,11 +210,3 @@ class ShellBase(Summarized):
     def __setstate__(self, state: dict[str, object]) -> None:
         """Rebuild from arrays that are clean already."""
         self._set(**state)  # type: ignore[arg-type]
-
-
-def _owned(array: npt.NDArray[Scalar], kind: type[Scalar]) -> npt.NDArray[Scalar]:
-    return read_only(np.ascontiguousarray(array, kind))
-
-
-def _owned_if(array: npt.NDArray[Scalar] | None, kind: type[Scalar]) -> npt.NDArray[Scalar] | None:
-    return None if array is None else _owned(array, kind)

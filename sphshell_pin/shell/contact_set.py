@@ -96,17 +96,10 @@ class ContactSet(Summarized):
                 Fact("largest depth", float(self.depth.max()), "m"),
                 Fact("on", ", ".join(found), brief=len(found) == 1),
             ]
-        saddles = int(np.count_nonzero(self.weight < 0))
-        return (
-            [
-                *facts,
-                Fact(
-                    "saddles at which contacts merge", saddles, one="saddle at which contacts merge"
-                ),
-            ]
-            if saddles
-            else facts
-        )
+        saddles, merge = int(np.count_nonzero(self.weight < 0)), "at which contacts merge"
+        if saddles:
+            facts.append(Fact(f"saddles {merge}", saddles, one=f"saddle {merge}"))
+        return facts
 
     def _rows(self) -> Detail:
         headings = ("depth [m]", "point [m]", "normal", "feature", "element", "weight")

@@ -14,7 +14,7 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES
 from sphshell_pin.shell.cad.process import run_in_child
-from sphshell_pin.shell.raw import Floats, area_vectors
+from sphshell_pin.shell.raw import Floats, random_places
 from sphshell_pin.shell.readers import SUFFIXES, reader_for
 from sphshell_pin.shell.shell import Shell
 from sphshell_pin.shell.writers import encoded
@@ -201,11 +201,7 @@ class _Mesh:
 
     def samples(self, count: int, rng: np.random.Generator) -> Floats:
         """Random points (count, 3), spread by area [m]."""
-        corners = self._shell.vertices[self._shell.triangles]
-        area = np.linalg.norm(area_vectors(corners), axis=1)
-        chosen = rng.choice(len(area), count, p=area / area.sum())
-        weights = rng.dirichlet((1.0, 1.0, 1.0), count)
-        return np.asarray(np.einsum("nk,nkx->nx", weights, corners[chosen]))
+        return random_places(self._shell.vertices[self._shell.triangles], count, rng)[1]
 
 
 class _Faces:

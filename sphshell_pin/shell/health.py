@@ -99,6 +99,14 @@ _PROBLEMS = (
 )
 
 
+_POWERS = {
+    **dict.fromkeys(("scale", "size", "weld_tolerance", "weld_distance", "largest_warp"), 1),
+    **dict.fromkeys(("area", "largest_hole_area"), 2),
+    "volume": 3,
+}
+"""Of the length in fields that grow with the surface."""
+
+
 class _Sentences(string.Formatter):
     """Fills in sentences: `{count:noun}` counts, `{at:place}` and `{angle:degrees}` convert."""
 
@@ -394,28 +402,14 @@ class ShellHealth:
 
     def moved(self, scale: float, rotation: Floats, translation: Floats) -> ShellHealth:
         """Return the findings about the surface made `scale` times larger, turned and moved."""
-
-        def place(at: Place | None) -> Place | None:
-            if at is None:
-                return None
-            x, y, z = rotation @ (scale * np.array(at)) + translation
-            return (float(x), float(y), float(z))
-
-        return replace(
-            self,
-            curvature=None,
-            scale=self.scale * scale,
-            size=self.size * scale,
-            area=self.area * scale**2,
-            volume=self.volume * scale**3,
-            weld_tolerance=self.weld_tolerance * scale,
-            weld_distance=self.weld_distance * scale,
-            largest_warp=self.largest_warp * scale,
-            largest_hole_area=self.largest_hole_area * scale**2,
-            hole_at=place(self.hole_at),
-            non_manifold_at=place(self.non_manifold_at),
-            pinched_at=place(self.pinched_at),
-        )
+        changes: dict[str, object] = {"curvature": None}
+        for name, power in _POWERS.items():
+            changes[name] = getattr(self, name) * scale**power
+        for name in ("hole_at", "non_manifold_at", "pinched_at"):
+            if (at := getattr(self, name)) is not None:
+                place = rotation @ (scale * np.array(at)) + translation
+                changes[name] = tuple(place.tolist())
+        return self.labelled(**changes)
 
     def to_dict(self) -> dict[str, object]:
         """All fields by name."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import replace
 from pathlib import Path
 
 from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing
@@ -15,7 +14,6 @@ from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.cleaning import box_diagonal, clean_surface
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
-from sphshell_pin.shell.rounding import rounding
 from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 
 Scale = str | float | None
@@ -69,16 +67,12 @@ def _load_raw(
         return _load_shl(file, unit, scale, number)
     if isinstance(scale, str):
         raise InvalidParameter("scale", scale, f"must be a number for {suffix} files (no SCALE)")
-    raw = _rounded(READERS[suffix](file))
+    raw = READERS[suffix](file)
     if unit is None:
         size = box_diagonal(raw.vertices[raw.corners.ravel()])
         raise UnitMissing(file, size, METRES_PER_UNIT)
     factor = metres_per_unit(unit) * number
     return raw.scaled(factor).noting(*_scaled(number)), unit, factor
-
-
-def _rounded(raw: RawSurface) -> RawSurface:
-    return replace(raw, rounding=rounding(raw.vertices))
 
 
 def _scaled(number: float) -> tuple[str, ...]:
@@ -106,7 +100,7 @@ def _load_shl(
         factor = length * number
         note = f"scale {number:.9g} used in place of SCALE {written:.9g}, result taken in {taken}"
     version = f".shl version {found.version}"
-    return _rounded(found.raw).scaled(factor).noting(version, note), unit or "m", factor
+    return found.raw.scaled(factor).noting(version, note), unit or "m", factor
 
 
 def _check_scale(scale: Scale) -> float:

@@ -93,6 +93,14 @@ def area_vectors(corners: Floats) -> Floats:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
+def random_places(corners: Floats, count: int, rng: np.random.Generator) -> tuple[Longs, Floats]:
+    """Random points (count, 3) of triangles (t, 3, 3), spread by area, and the triangle of each."""
+    area = np.linalg.norm(area_vectors(corners), axis=1)
+    chosen = rng.choice(len(area), count, p=area / area.sum())
+    weights = rng.dirichlet((1.0, 1.0, 1.0), count)
+    return chosen, np.einsum("nk,nkx->nx", weights, corners[chosen])
+
+
 def raw_surface(vertices: object, elements: object, normals: object = None) -> RawSurface:
     """Check arrays and copy them into a `RawSurface`.
 
@@ -115,15 +123,35 @@ def raw_surface(vertices: object, elements: object, normals: object = None) -> R
     return RawSurface(points, offsets, corners, given, rounding=rounding(points, SCALES))
 
 
-def check_indices(offsets: Longs, corners: Ints, num_vertices: int) -> None:
-    """Raise InvalidShell if a polygon names a vertex that does not exist."""
+def check_vertices(points: Floats, first: int = 0) -> None:
+    """Raise InvalidShell unless three vertices or more are there, all finite.
+
+    first : the number of the first one in messages
+    """
+    if not 3 <= len(points) <= LARGEST_COUNT:
+        raise InvalidShell(f"a surface needs at least 3 vertices; {len(points)} given")
+    finite = np.isfinite(points)
+    if not finite.all():
+        wrong = np.flatnonzero(~finite.all(axis=1))
+        raise InvalidShell(
+            f"vertex {int(wrong[0]) + first} is not finite: {points[wrong[0]].tolist()}"
+            + (f" ({wrong.size} such vertices)" if wrong.size > 1 else "")
+        )
+
+
+def check_indices(offsets: Longs, corners: Ints, num_vertices: int, first: int = 0) -> None:
+    """Raise InvalidShell if a polygon names a vertex that does not exist.
+
+    first : the number of the first element and vertex in messages
+    """
     if corners.min() < 0 or corners.max() >= num_vertices:
         wrong = np.flatnonzero((corners < 0) | (corners >= num_vertices))
         slot = int(wrong[0])
         element = int(np.searchsorted(offsets, slot, side="right")) - 1
         raise InvalidShell(
-            f"element {element} uses vertex {int(corners[slot])}, but the {num_vertices} vertices "
-            f"are numbered 0 to {num_vertices - 1}: correct the index"
+            f"element {element + first} uses vertex {int(corners[slot]) + first}, but the "
+            f"{num_vertices} vertices are numbered {first} to {num_vertices - 1 + first}: correct "
+            "the index"
         )
 
 
@@ -136,15 +164,7 @@ def _vertices(vertices: object) -> Floats:
         raise InvalidShell(
             f"vertices must be an (n, 3) array [m]; the one given has shape {points.shape}"
         )
-    if not 3 <= len(points) <= LARGEST_COUNT:
-        raise InvalidShell(f"a surface needs at least 3 vertices; {len(points)} given")
-    finite = np.isfinite(points)
-    if not finite.all():
-        wrong = np.flatnonzero(~finite.all(axis=1))
-        raise InvalidShell(
-            f"vertex {int(wrong[0])} is not finite: {points[wrong[0]].tolist()}"
-            + (f" ({wrong.size} such vertices)" if wrong.size > 1 else "")
-        )
+    check_vertices(points)
     return points
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sphshell_pin import _core
 from sphshell_pin.shell.raw import Floats, Ints
 
 TANGENT_ANGLE = np.deg2rad(1.0)
@@ -39,18 +40,11 @@ def settle_joints(normals: Floats, triangles: Ints, face: Ints) -> Floats:
 
 def _settled(normals: Floats) -> Floats:
     """Mean normals (k, 3) of those that are linked by small angles."""
-    near = normals @ normals.T >= np.cos(TANGENT_ANGLE)
-    out = normals.copy()
-    left = np.ones(len(normals), np.bool_)
-    while left.any():
-        group = near[np.argmax(left)] & left
-        while True:
-            wider = near[group].any(axis=0) & left
-            if (wider == group).all():
-                break
-            group = wider
+    near = np.argwhere(normals @ normals.T >= np.cos(TANGENT_ANGLE))
+    group = _core.mend_components(len(normals), np.ascontiguousarray(near, np.int32))
+    out = np.empty_like(normals)
+    for one in np.unique(group):
         # Each distinct normal counts once, however many triangles a face has here.
-        mean = np.unique(np.round(normals[group], 9), axis=0).sum(axis=0)
-        out[group] = mean / np.linalg.norm(mean)
-        left &= ~group
+        mean = np.unique(np.round(normals[group == one], 9), axis=0).sum(axis=0)
+        out[group == one] = mean / np.linalg.norm(mean)
     return out

@@ -17,6 +17,7 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.raw import Floats, Ints, Mask, area_vectors
+from sphshell_pin.shell.readers.mesh import STL_RECORD
 from sphshell_pin.units import metres_per_unit
 
 
@@ -137,8 +138,7 @@ def _stl(surface: Written) -> bytes:
     corners = surface.vertices[surface.triangles]
     normal = area_vectors(corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
-    table = np.zeros(len(corners), kind)
+    table = np.zeros(len(corners), STL_RECORD)
     table["normal"] = normal / np.where(length > 0.0, length, 1.0)
     table["corners"] = corners
     head = f"binary stl of {surface.name}"[:80].encode("ascii", "replace").ljust(80)

@@ -32,11 +32,7 @@ __all__ = [
 
 
 def assert_forces_balance(
-    scene: Scene,
-    q: ArrayLike,
-    v: Optional = None,
-    tau: Optional = None,
-    tolerance: float = 1e-8,
+    scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None, tolerance: float = 1e-8
 ) -> float:
     """Assert that ABA with `scene.external_forces` gives M^-1 (tau - nle + J^T f).
 
@@ -89,11 +85,7 @@ def assert_lossless_energy_kept(result: Result, rtol: float = 1e-6) -> float:
 
 
 def assert_derivatives(
-    scene: Scene,
-    q: ArrayLike,
-    v: Optional = None,
-    tau: Optional = None,
-    tolerance: float = 1e-6,
+    scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None, tolerance: float = 1e-6
 ) -> float:
     """Assert that the analytic derivatives of forces and accelerations are those of differences.
 

@@ -59,18 +59,8 @@ def energy(result: Result) -> Finding:
     """
     scene = scene_of(result)
     audit = result.energy
-    kinetic, potential = _energies(scene, result)
-    parts = np.array(
-        [
-            kinetic,
-            potential,
-            audit.elastic,
-            audit.damping_loss,
-            audit.friction_loss,
-            -audit.control_work,
-        ]
-    )
-    return _residual(result, parts)
+    lost = audit.elastic, audit.damping_loss, audit.friction_loss, -audit.control_work
+    return _residual(result, np.array([*_energies(scene, result), *lost]))
 
 
 def elastic_energy(result: Result) -> Finding:

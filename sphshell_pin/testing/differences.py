@@ -163,14 +163,10 @@ def differences(
     f: _Function, model: pin.Model, q: Array, v: Array, step_q: float, step_v: float
 ) -> tuple[Array, Array]:
     """Return central differences (m, nv) of f(q, v) -> (m,), by the tangent of q and by v."""
-    by_q = [
-        np.sum([w * f(pin.integrate(model, q, p * step_q * e), v) for p, w in _PLACES], axis=0)
-        for e in np.eye(model.nv)
-    ]
-    by_v = [
-        np.sum([w * f(q, v + p * step_v * e) for p, w in _PLACES], axis=0) for e in np.eye(model.nv)
-    ]
-    return np.transpose(by_q) / step_q, np.transpose(by_v) / step_v
+    moved = [lambda x, e=e: f(pin.integrate(model, q, x * e), v) for e in np.eye(model.nv)]
+    faster = [lambda x, e=e: f(q, v + x * e) for e in np.eye(model.nv)]
+    by_q = [differentiated(one, step_q) for one in moved]
+    return np.transpose(by_q), np.transpose([differentiated(one, step_v) for one in faster])
 
 
 def _compare(what: str, got: Array, expected: Array, rounding: float, names: list[str]) -> Finding:

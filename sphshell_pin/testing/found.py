@@ -131,12 +131,8 @@ def passage(result: Result) -> Finding:
 
 def sphere_centers(corners: Array, radius: float, count: int, rng: np.random.Generator) -> Array:
     """Return centers (count, 3) round triangles (t, 3, 3): deep, barely touching, near and far."""
-    kinds = (
-        (0.02, 0.98),  # deep to shallow
-        (1.0 - 1e-6, 1.0 + 1e-6),  # barely
-        (1.01, 2.0),  # near
-        (5.0, 50.0),  # far
-    )
+    # Deep to shallow, barely, near, far.
+    kinds = (0.02, 0.98), (1.0 - 1e-6, 1.0 + 1e-6), (1.01, 2.0), (5.0, 50.0)
     spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = spans / np.linalg.norm(spans, axis=1)[:, None]
     points = samples(corners, count, rng)

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.dynamics import ContactPair, Scene
+from sphshell_pin.named_numbers import with_value
 from sphshell_pin.parameters import parameters_of
 
 _AXES = {"offset": ("x", "y", "z"), "placement": ("vx", "vy", "vz", "wx", "wy", "wz")}
@@ -64,16 +65,11 @@ def changed(scene: Scene, column: str, by: float) -> Scene:
     if part == "placement":
         twist = pin.Motion(by * np.eye(6)[_AXES[part].index(field)])
         new = replace(pair, placement=pair.placement * pin.exp6(twist))
+    elif field in _AXES["offset"]:
+        x, y, z = np.asarray(getattr(pair, part).offset) + by * np.eye(3)["xyz".index(field)]
+        new = with_value(pair, (part, "offset"), (float(x), float(y), float(z)))
     else:
-        whole = getattr(pair, part)
-        if field in _AXES["offset"]:
-            x, y, z = np.asarray(whole.offset) + by * np.eye(3)["xyz".index(field)]
-            whole = replace(whole, offset=(float(x), float(y), float(z)))
-        else:
-            value = {field: getattr(whole, field) + by}
-            law = part in ("law", "friction")
-            whole = whole.changed(**value) if law else replace(whole, **value)
-        new = replace(pair, **{part: whole})
+        new = with_value(pair, (part, field), getattr(getattr(pair, part), field) + by)
     return scene.with_pairs(tuple(new if one is pair else one for one in scene.pairs))
 
 

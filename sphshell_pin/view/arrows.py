@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sphshell_pin.view.nodes import (
     on_top,
     pose,
     rod,
+    rod_along,
     rotation_to,
     set_object,
     show,
@@ -25,6 +26,9 @@ from sphshell_pin.view.nodes import (
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
+
+    from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
+    from sphshell_pin.view.contact_path import ContactRows
 
 NORMAL_COLOR = 0xD4202A
 FRICTION_COLOR = 0xF08A00
@@ -37,24 +41,8 @@ SAME_CONTACT = 30.0  # likewise: farther away it is another contact
 ArrowKind = Literal["components", "total"]
 
 
-class ContactColumns(Protocol):
-    """The columns a picture needs, one row per contact, world frame [m], [N]."""
-
-    @property
-    def point_world(self) -> FloatArray:
-        """Contact points (k, 3) [m]."""
-
-    @property
-    def normal_world(self) -> FloatArray:
-        """Unit normals (k, 3), shell to sphere."""
-
-    @property
-    def normal_force(self) -> FloatArray:
-        """Normal forces (k,) on the sphere along the normal [N]."""
-
-    @property
-    def friction_force_world(self) -> FloatArray:
-        """Friction forces (k, 3) on the sphere [N]."""
+Contacts: TypeAlias = "SceneContacts | ContactRows"
+"""Points and normals (k, 3), forces and pairs (k,) of contacts, in the world."""
 
 
 def nice(value: float) -> float:
@@ -62,6 +50,12 @@ def nice(value: float) -> float:
     power = 10.0 ** np.floor(np.log10(value))
     steps = np.array([1.0, 2.0, 5.0, 10.0])
     return float(steps[np.argmin(np.abs(np.log(steps * power / value)))] * power)
+
+
+def arrow_length(scene: Scene, distance: float) -> float:
+    """Return how long the usual arrow is in a picture seen from a `distance` [m]."""
+    radii = [one.radius for pair in scene.pairs for one in pair.spheres]
+    return min([0.16 * distance, *(12.0 * radius for radius in radii)])
 
 
 @dataclass(frozen=True)
@@ -102,43 +96,42 @@ class ArrowScale:
         return f"{self.reference_length * 1e3:g} mm = {self.reference_force:g} N"
 
 
-def largest_force(contacts: ContactColumns) -> FloatArray:
+def largest_force(contacts: Contacts) -> FloatArray:
     """Magnitude (k,) of the total force of each contact [N]."""
     total = contacts.normal_world * contacts.normal_force[:, None] + contacts.friction_force_world
     return np.asarray(np.linalg.norm(total, axis=1))
 
 
 @dataclass(frozen=True)
-class ForceColumns:
-    """ContactColumns of their own."""
+class Forces:
+    """Forces (k, 3) [N] to be drawn as arrows from `point` (k, 3) [m], in the world."""
 
-    point_world: FloatArray
-    normal_world: FloatArray
-    normal_force: FloatArray
-    friction_force_world: FloatArray
+    point: FloatArray
+    normal: FloatArray
+    friction: FloatArray
 
 
-def pushing(contacts: ContactColumns, pair: IntArray) -> ContactColumns:
-    """Return `contacts` of the pairs `pair` (k,) without saddles, with the same sum of forces.
+def pushing(contacts: Contacts) -> Forces:
+    """Return the forces of `contacts` (k,) without saddles, with the same sum.
 
     A saddle takes off what two contacts of its pair push too much, and would be an arrow that
     pulls. Each of the two nearest contacts bears half of it: what is left of them still pushes.
     """
     saddle = contacts.normal_force < 0.0
-    if not saddle.any():
-        return contacts
     normal = contacts.normal_world * contacts.normal_force[:, None]
     friction = np.array(contacts.friction_force_world)
     for k in np.flatnonzero(saddle):
-        others = np.flatnonzero(~saddle & (pair == pair[k]))
+        others = np.flatnonzero(~saddle & (contacts.pair == contacts.pair[k]))
         far = np.linalg.norm(contacts.point_world[others] - contacts.point_world[k], axis=1)
         bearing = others[np.argsort(far, kind="stable")[:2]]
         normal[bearing] += normal[k] / max(len(bearing), 1)
         friction[bearing] += friction[k] / max(len(bearing), 1)
-    normal, kept = normal[~saddle], contacts.normal_world[~saddle]
-    force = np.linalg.norm(normal, axis=1)
-    direction = np.where(force[:, None] > 0.0, normal / np.where(force, force, 1.0)[:, None], kept)
-    return ForceColumns(contacts.point_world[~saddle], direction, force, friction[~saddle])
+    return Forces(contacts.point_world[~saddle], normal[~saddle], friction[~saddle])
+
+
+def strongest(force: FloatArray, size: int) -> IntArray:
+    """Return the indices of the `size` largest of `force` (k,) at most, in their order."""
+    return np.sort(np.argsort(-force, kind="stable")[:size])
 
 
 class ArrowPool:
@@ -153,12 +146,10 @@ class ArrowPool:
     ) -> None:
         self.size = size
         self._width = width
-        self._kind = kind
-        colors = (
-            {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR}
-            if kind == "components"
-            else {"total": TOTAL_COLOR}
-        )
+        colors = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR}
+        if kind == "total":
+            colors = {"total": TOTAL_COLOR}
+        self._parts = len(colors)
         self._arrows: list[tuple[Move, Move]] = []
         self._points: list[Move] = []
         self._arrow_nodes, self._point_nodes = [], []
@@ -180,25 +171,26 @@ class ArrowPool:
         self._directions = np.tile(np.array([0.0, 0.0, 1.0]), (len(self._arrows), 1))
         self.update(None, ArrowScale())
 
-    def update(self, contacts: ContactColumns | None, scale: ArrowScale) -> None:
-        """Show `contacts` at `scale`, and hide what the pool has left over."""
-        rows = self._strongest(contacts)
-        row_of_slot: dict[int, int] = {}
-        if contacts is not None and rows:
-            row_of_slot = self._slots(contacts, rows)
-        per_slot = len(self._arrows) // self.size if self.size else 0
+    def update(self, forces: Forces | None, scale: ArrowScale) -> None:
+        """Show `forces` at `scale`, and hide what the pool has left over."""
+        rows: dict[int, int] = {}
+        drawn = np.zeros((0, self._parts, 3))
+        if forces is not None:
+            drawn = np.stack((forces.normal, forces.friction), axis=1)
+            total = drawn.sum(axis=1, keepdims=True)
+            drawn = total if self._parts == 1 else drawn
+            with np.errstate(over="ignore"):  # of a run that diverges
+                most = strongest(np.linalg.norm(total[:, 0], axis=1), self.size)
+            rows = self._slots(forces.point, most)
         for slot, place_point in enumerate(self._points):
-            forces = np.zeros((per_slot, 3))
-            size = HIDDEN_SCALE
-            row = row_of_slot.get(slot)
-            if contacts is not None and row is not None:
-                self._where[slot] = contacts.point_world[row]
-                forces = self._forces(contacts, row)
-                size = 1.3 * self._width
+            arrows, size = np.zeros((self._parts, 3)), HIDDEN_SCALE
+            if forces is not None and slot in rows:
+                self._where[slot] = forces.point[rows[slot]]
+                arrows, size = drawn[rows[slot]], 1.3 * self._width
             place_point(pose(np.eye(3), self._where[slot], size))
-            for part in range(per_slot):
-                self._place_arrow(per_slot * slot + part, slot, forces[part], scale)
-        self._shown = set(row_of_slot)
+            for part, force in enumerate(arrows):
+                self._place_arrow(self._parts * slot + part, slot, force, scale)
+        self._shown = set(rows)
 
     def show_arrows(self, on: bool) -> None:
         """Show or hide the arrows, whatever forces there are."""
@@ -210,13 +202,12 @@ class ArrowPool:
         for node in self._point_nodes:
             show(node, on)
 
-    def _slots(self, contacts: ContactColumns, rows: list[int]) -> dict[int, int]:
-        """Return the row that each slot shows: a contact keeps its slot while it moves little.
+    def _slots(self, points: FloatArray, rows: IntArray) -> dict[int, int]:
+        """Return which of `rows` each slot shows: a contact keeps its slot while it moves little.
 
         Else an arrow would sweep across the picture whenever another contact comes or goes.
         """
-        points = contacts.point_world[rows]
-        far = np.linalg.norm(points[:, None] - self._where[None, :], axis=2)
+        far = np.linalg.norm(points[rows, None] - self._where[None, :], axis=2)
         taken: dict[int, int] = {}
         left = set(range(len(rows)))
         for flat in np.argsort(far, axis=None, kind="stable"):
@@ -224,26 +215,11 @@ class ArrowPool:
             if far[index, slot] > SAME_CONTACT * self._width:
                 break
             if index in left and slot in self._shown and slot not in taken:
-                taken[slot] = rows[index]
+                taken[slot] = int(rows[index])
                 left.remove(index)
         free = sorted(set(range(self.size)) - set(taken), key=lambda slot: slot in self._shown)
-        taken.update(zip(free, (rows[index] for index in sorted(left)), strict=False))
+        taken.update(zip(free, (int(rows[index]) for index in sorted(left)), strict=False))
         return taken
-
-    def _strongest(self, contacts: ContactColumns | None) -> list[int]:
-        if contacts is None or not len(contacts.normal_force):
-            return []
-        if len(contacts.normal_force) <= self.size:
-            return list(range(len(contacts.normal_force)))
-        order = np.argsort(-largest_force(contacts), kind="stable")[: self.size]
-        return sorted(int(row) for row in order)
-
-    def _forces(self, contacts: ContactColumns, row: int) -> FloatArray:
-        normal = contacts.normal_world[row] * contacts.normal_force[row]
-        friction = contacts.friction_force_world[row]
-        if self._kind == "total":
-            return np.asarray((normal + friction)[None, :])
-        return np.stack((normal, friction))
 
     def _place_arrow(self, arrow: int, contact: int, force: FloatArray, scale: ArrowScale) -> None:
         size = math.hypot(*force.tolist())
@@ -263,12 +239,9 @@ class ArrowPool:
             return
         self._waiting[arrow] = None
         direction = self._directions[arrow] = force / size
-        turn = rotation_to(direction)
         # The head keeps its shape; an arrow too short for it shrinks as a whole.
         head = min(HEAD_LENGTH * self._width, 0.6 * length)
         width = head / HEAD_LENGTH
-        shaft = length - head
-        place_shaft(pose(turn, start + 0.5 * shaft * direction, np.array([width, shaft, width])))
-        place_head(
-            pose(turn, start + (shaft + 0.5 * head) * direction, np.array([width, head, width]))
-        )
+        shaft = (length - head) * direction
+        place_shaft(rod_along(start, shaft, width))
+        place_head(rod_along(start + shaft, head * direction, width))

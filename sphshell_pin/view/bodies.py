@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.view.distance import draw_distance
 from sphshell_pin.view.nodes import (
+    OnJoint,
     lattice,
     line_segments,
     material,
@@ -34,47 +36,36 @@ _CELLS = 12  # of the square that stands for a plane, along a side
 COLORINGS = ("distance", "faces", "patches")
 """Ways to color a shell; of several that are on the first is seen."""
 
-ShellKey = tuple[int, int, bytes, bool]
-SphereKey = tuple[int, bytes, float]  # joint, placement in it, radius
-PlaneKey = tuple[int, bytes]
 
-
-def shell_key(pair: ContactPair) -> ShellKey:
+def shell_key(pair: ContactPair) -> Hashable:
     """Return a key: pairs with equal keys share the picture of their shell."""
     place = pair.placement_j.homogeneous.tobytes()
     return id(pair.shell), pair.joint_j, place, pair.method == "smooth"
 
 
-def sphere_key(sphere: PlacedSphere) -> SphereKey:
+def sphere_key(sphere: PlacedSphere) -> Hashable:
     """Return a key: spheres with equal keys share a picture."""
     return sphere.joint, sphere.placement.homogeneous.tobytes(), sphere.radius
 
 
-def plane_key(pair: ContactPair) -> PlaneKey:
+def plane_key(pair: ContactPair) -> Hashable:
     """Return a key: pairs with equal keys share the picture of their plane."""
     return pair.joint_i, pair.placement_i.homogeneous.tobytes()
 
 
-class DrawnShell:
+class DrawnShell(OnJoint):
     """The shell of `pair`, drawn below `visualizer`; `index` numbers the shells of the scene."""
 
     def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         shell = pair.shell
-        if shell is None:
-            raise ValueError("a pair without a shell")
+        assert shell is not None
+        node = visualizer[f"{index}_{node_name(shell.name)}"]
+        super().__init__(node, pair.joint_j, pair.placement_j)
         self.shell = shell
-        self.joint = pair.joint_j
-        self.node = visualizer[f"{index}_{node_name(shell.name)}"]
         self._curved = pair.method == "smooth"
         self._index = index
-        self._offset = pair.placement_j
         self._colorings: dict[str, bool] = {}
-        draw_shell(self.node, shell, index, curved=self._curved)
-        self._move = mover(self.node)
-
-    def update(self, data: pin.Data) -> None:
-        """Place it where forward kinematics left its joint in `data`."""
-        self._move((data.oMi[self.joint] * self._offset).homogeneous)
+        draw_shell(node, shell, index, curved=self._curved)
 
     @property
     def largest_distance(self) -> float:
@@ -108,12 +99,13 @@ class DrawnShell:
             show(self.node[name], name == seen)
 
 
-class DrawnSphere:
+class DrawnSphere(OnJoint):
     """A sphere of the pair `name`, drawn below `visualizer`; `index` numbers those of the scene."""
 
     def __init__(self, visualizer: Visualizer, name: str, drawn: PlacedSphere, index: int) -> None:
-        self.joint, self._offset, radius = drawn
-        node = self.node = visualizer[f"{index}_{node_name(name)}"]
+        joint, placement, radius = drawn
+        node = visualizer[f"{index}_{node_name(name)}"]
+        super().__init__(node, joint, placement)
         set_object(
             node["ball"],
             sphere(radius, 48),
@@ -141,11 +133,6 @@ class DrawnSphere:
             "LineSegments",
             order=6,
         )
-        self._move = mover(node)
-
-    def update(self, data: pin.Data) -> None:
-        """Place it where forward kinematics left its joint in `data`."""
-        self._move((data.oMi[self.joint] * self._offset).homogeneous)
 
 
 class DrawnPlane:
@@ -154,10 +141,8 @@ class DrawnPlane:
     def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         low, high = np.asarray(pair.shell.box) if pair.shell is not None else np.zeros((2, 3))
         self._cell = 0.5 * float(np.linalg.norm(high - low))
-        self._plane, self._shell = (
-            (pair.joint_i, pair.placement_i),
-            (pair.joint_j, pair.placement_j),
-        )
+        self._plane = pair.joint_i, pair.placement_i
+        self._shell = pair.joint_j, pair.placement_j
         self._center = 0.5 * (low + high)
         self._middle = np.full(3, np.inf)
         node = visualizer[f"{index}_{node_name(pair.name)}"]

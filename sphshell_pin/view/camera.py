@@ -6,16 +6,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 
-from sphshell_pin.view.nodes import Command, FloatArray, set_camera
+from sphshell_pin.view.nodes import Command, FloatArray
+from sphshell_pin.view.robot import check_geometry_model
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
+
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 FIELD_OF_VIEW = 40.0  # vertical [deg]
 ASPECT = 1.2  # of the part of the window that legend and controls leave free
 REACH = 8.0  # in sizes of the action: what is farther away need not be in the picture
 MARGIN = 1.12  # joints are points, links have some width
+_WIDTH = 0.05  # of links, in sizes of the robot
+_FAR = 2.0  # in sizes of the robot: corners of shells that are farther away may leave the picture
 
 # From the target to the eye, None where it is chosen. From straight above there is no upright: y
 # points up in the picture.
@@ -93,13 +99,7 @@ def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> F
     # Well to the side of straight ahead, so that neither arm nor arrows hide the contact.
     turn = np.deg2rad(-50.0)
     cosine, sine = np.cos(turn), np.sin(turn)
-    sideways = np.array(
-        [
-            outward[0] * cosine - outward[1] * sine,
-            outward[0] * sine + outward[1] * cosine,
-            0.0,
-        ]
-    )
+    sideways = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 0.0]]) @ outward
     # The flatter the subject lies, the more from above: a turntable, a pair of gears.
     extent = np.ptp(subject, axis=0)
     flatness = 1.0 - min(1.0, float(extent[2] / max(extent[0], extent[1], 1e-12)))
@@ -113,22 +113,112 @@ def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> F
     return np.asarray(direction / np.linalg.norm(direction))
 
 
+def choose_view(
+    scene: Scene,
+    configurations: FloatArray,
+    points_world: FloatArray | None = None,
+    normals_world: FloatArray | None = None,
+    visual_model: pin.GeometryModel | None = None,
+    reach: float = REACH,
+    direction: FloatArray | None = None,
+    *,
+    whole: bool = False,
+) -> View:
+    """Choose a camera for the `configurations` (n, nq) and the contacts seen in them, world [m].
+
+    Without contacts the spheres are where things happen; without spheres, the joints. What is
+    farther away than `reach` times the size of that need not be in the picture; with `whole` all of
+    the robot is, and of the shells what is not far from it. `direction` (3,) leads from the target
+    to the eye; without it, it is chosen. Raises InvalidParameter for a `visual_model` that does not
+    hang on the scene's joints.
+    """
+    model, data = scene.model, scene.model.createData()
+    boxes = []
+    if visual_model is not None:
+        check_geometry_model(model, visual_model)
+        boxes = _geometry_boxes(visual_model)
+    spheres = [one for pair in scene.pairs for one in pair.spheres]
+    centers: list[FloatArray] = []
+    around: list[FloatArray] = []
+    shells: list[FloatArray] = []
+    for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
+        pin.forwardKinematics(model, data, configurations[row])
+        around += [np.array(data.oMi[k].translation) for k in range(1, model.njoints)]
+        centers += [data.oMi[one.joint].act(one.placement.translation) for one in spheres]
+        if row == 0:
+            for joint, placement, box in boxes:
+                around += list(_corners(data.oMi[joint] * placement, box))
+            for pair in scene.pairs:
+                if pair.shell is not None:
+                    where = data.oMi[pair.joint_j] * pair.placement_j
+                    shells.append(_corners(where, np.asarray(pair.shell.box)))
+    action = np.array(centers or around or [np.zeros(3)])
+    if points_world is not None and len(points_world):
+        action = np.vstack((action, points_world)) if centers else points_world
+    radius = min((one.radius for one in spheres), default=0.02)
+    if whole and around:
+        robot = np.array(around + centers)
+        (middle, size), (center, half) = ball_around(robot), ball_around(action, 4.0 * radius)
+        # Joints are points, links have some width.
+        links = robot[:, None] + _WIDTH * size * np.vstack((np.eye(3), -np.eye(3)))
+        around += list(links.reshape(-1, 3))
+        # A shell is there as a whole, unless it is a floor that would leave little of the rest.
+        most = max(_FAR * size, reach * half)
+        for k, shell in enumerate(shells):
+            near = np.linalg.norm(shell - middle, axis=1) <= _FAR * size
+            near |= np.linalg.norm(shell - center, axis=1) <= reach * half
+            if not near.any() or ball_around(shell)[1] > most:
+                shells[k] = shell[near]
+        reach = np.inf
+    around += [corner for shell in shells for corner in shell]
+    normal = np.zeros(3)
+    if normals_world is not None and len(normals_world):
+        mean = normals_world.mean(axis=0)
+        # Normals on a plane lead into it; the eye stays on the side of the shells.
+        below = all(pair.plane is not None for pair in scene.pairs)
+        normal = (-mean if below else mean) / max(float(np.linalg.norm(mean)), 1e-9)
+    return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
+
+
+def _corners(where: pin.SE3, box: FloatArray) -> FloatArray:
+    """Return the corners (8, 3) [m] of a `box` (2, 3) that is placed at `where`."""
+    low, high = box
+    corners = 0.5 * (low + high) + 0.5 * (high - low) * _CORNERS
+    return np.asarray(corners @ where.rotation.T + where.translation)
+
+
+def _geometry_boxes(geometry_model: pin.GeometryModel) -> list[tuple[int, pin.SE3, FloatArray]]:
+    """Return joint, placement and box (2, 3) of geometry whose loaded size can be trusted."""
+    boxes = []
+    for body in geometry_model.geometryObjects:
+        # Coal ignores the length unit that a Collada file states, the page does not.
+        if body.meshPath.lower().endswith(".dae"):
+            continue
+        body.geometry.computeLocalAABB()
+        box = body.geometry.aabb_local
+        ends = np.array([box.min_, box.max_])
+        if np.isfinite(ends).all() and np.abs(ends).max() < 1e6:
+            boxes.append((body.parentJoint, body.placement, ends))
+    return boxes
+
+
 def look(visualizer: Visualizer, view: View) -> None:
     """Point the page's camera; the mouse then orbits about the target.
 
     meshcat 0.3.2's own live page does not know the target yet, and looks at the world's origin.
     """
-    set_camera(
-        visualizer,
-        {
-            "type": "PerspectiveCamera",
-            "fov": FIELD_OF_VIEW,
-            "aspect": ASPECT,
-            "near": 0.005 * view.distance,
-            "far": 200.0 * view.distance,
-            "zoom": 1.0,
-        },
-    )
+    path = visualizer["/Cameras/default/rotated"].path.lower()
+    camera = {
+        "uuid": f"{path}#camera",
+        "type": "PerspectiveCamera",
+        "fov": FIELD_OF_VIEW,
+        "aspect": ASPECT,
+        "near": 0.005 * view.distance,
+        "far": 200.0 * view.distance,
+        "zoom": 1.0,
+    }
+    placed = {"type": "set_object", "path": path, "object": {"object": camera}}
+    visualizer.window.send(Command(placed))
     visualizer["/Cameras/default/rotated/<object>"].set_property("position", _y_up(view.eye))
     target = {"type": "set_target", "path": "", "value": _y_up(view.target)}
     visualizer.window.send(Command(target))

@@ -13,7 +13,7 @@ from sphshell_pin.patches.placed import poses_along
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.result.result_parts import ContactLog
-    from sphshell_pin.dynamics.scene.scene import ContactPair, Scene
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -41,9 +41,10 @@ class ContactRows:
 
         The end of a run that diverged may hold numbers no picture can show: they are left out.
         """
-        order = np.argsort(np.asarray(log.row), kind="stable")
-        columns = {name: np.asarray(getattr(log, name))[order] for name in _COLUMNS}
-        rows = cls(**columns, patches=None if patches is None else patches[order])
+        columns: dict[str, Any] = {"patches": patches}
+        for name in [one.name for one in fields(cls) if one.name != "patches"]:
+            columns[name] = np.asarray(getattr(log, name))
+        rows = cls(**columns).select(np.argsort(columns["row"], kind="stable"))
         vectors = (rows.point_world, rows.normal_world, rows.friction_force_world)
         sound = np.abs(rows.normal_force) < LARGEST
         for vector in vectors:
@@ -52,17 +53,15 @@ class ContactRows:
 
     def select(self, chosen: slice | IndexArray | NDArray[np.bool_]) -> ContactRows:
         """Return the entries that `chosen`, a slice, mask or indices, picks."""
-        columns = {name: getattr(self, name)[chosen] for name in _COLUMNS}
-        patches = None if self.patches is None else self.patches[chosen]
-        return ContactRows(**columns, patches=patches)
+        columns: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
+        for name, column in columns.items():
+            columns[name] = None if column is None else column[chosen]
+        return ContactRows(**columns)
 
     def at(self, row: int) -> ContactRows:
         """Return the contacts of the recorded `row`."""
         first, last = np.searchsorted(self.row, (row, row + 1))
         return self.select(slice(int(first), int(last)))
-
-
-_COLUMNS = tuple(column.name for column in fields(ContactRows) if column.name != "patches")
 
 
 @dataclass(frozen=True)
@@ -96,9 +95,11 @@ def contact_paths(result: Result, scene: Scene | None) -> list[ContactPath]:
         own = own.select(order[np.unique(own.row[order], return_index=True)[1]])
         pair = None if scene is None else scene.pairs[index]
         points, normals = own.point_world, own.normal_world
-        on_shell = scene is not None and pair is not None and pair.shell is not None
-        if scene is not None and pair is not None and pair.shell is not None:
-            points, normals = _in_shell(scene, pair, result, own)
+        on_shell = pair is not None and pair.shell is not None
+        if scene is not None and pair is not None and on_shell:
+            turn, origin = poses_along(result, scene, own.row, pair.joint_j, pair.placement_j)
+            points = np.einsum("kij,ki->kj", turn, points - origin)
+            normals = np.einsum("kij,ki->kj", turn, normals)
         jump = np.zeros(max(0, len(points) - 1), dtype=bool)
         if pair is not None and pair.sphere is not None:
             steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -117,12 +118,3 @@ def spaced(points: FloatArray, step: float) -> IndexArray:
     along = np.concatenate(([0.0], np.cumsum(steps)))
     first = np.unique(np.floor(along / step), return_index=True)[1]
     return np.unique(np.append(first, len(points) - 1)).astype(np.int64)
-
-
-def _in_shell(
-    scene: Scene, pair: ContactPair, result: Result, contacts: ContactRows
-) -> tuple[FloatArray, FloatArray]:
-    """Return points and normals of `contacts` (k, 3) in the frame of `pair`'s shell."""
-    turn, origin = poses_along(result, scene, contacts.row, pair.joint_j, pair.placement_j)
-    points = np.einsum("kij,ki->kj", turn, contacts.point_world - origin)
-    return points, np.einsum("kij,ki->kj", turn, contacts.normal_world)

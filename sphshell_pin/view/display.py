@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from collections.abc import Callable, Hashable, Iterable
+from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.dynamics.scene.models import frame_on_joint
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns, pushing
+from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, Contacts, pushing
 from sphshell_pin.view.bodies import (
     COLORINGS,
     DrawnPlane,
     DrawnShell,
     DrawnSphere,
-    PlaneKey,
-    ShellKey,
-    SphereKey,
     plane_key,
     shell_key,
     sphere_key,
 )
-from sphshell_pin.view.camera import REACH, View, ball_around, look, set_surroundings
+from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
 from sphshell_pin.view.distance import Painting, range_text
 from sphshell_pin.view.frames import FrameAxes, draw_grid, grid_spacing
 from sphshell_pin.view.nodes import (
-    FloatArray,
     material,
     new_visualizer,
     node_name,
@@ -35,7 +31,7 @@ from sphshell_pin.view.nodes import (
     triangle_mesh,
 )
 from sphshell_pin.view.patches import PatchPool, PatchRows, PatchScale
-from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, check_geometry_model
+from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, frame_of_body
 from sphshell_pin.view.surface import FACE_COLORS, tube
 
 if TYPE_CHECKING:
@@ -45,9 +41,8 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import Scene
 
 TRAIL_COLOR = 0x8E1B8E
-_WIDTH = 0.05  # of links, in sizes of the robot
-_FAR = 2.0  # in sizes of the robot: corners of shells that are farther away may leave the picture
 
+Drawn = TypeVar("Drawn")
 
 Part = Literal[
     "robot",
@@ -68,6 +63,7 @@ PARTS: tuple[Part, ...] = get_args(Part)
 ones.
 """
 HIDDEN_AT_FIRST: frozenset[Part] = frozenset({*get_args(Painting), "frames", "grid"})
+OF_SHELLS: frozenset[Part] = frozenset({*get_args(Painting), "wireframe", "trails", "curved"})
 
 
 class Display:
@@ -107,12 +103,10 @@ class Display:
         self.arrow_scale = ArrowScale() if arrow_scale is None else arrow_scale
         self._hidden: set[Part] = set(HIDDEN_AT_FIRST)
         self._frames: FrameAxes | None = None  # until they are shown
-        self._shells: dict[ShellKey, DrawnShell] = {}
-        self._spheres: dict[SphereKey, DrawnSphere] = {}
-        self._planes: dict[PlaneKey, DrawnPlane] = {}
-        self._draw_shells()
-        self._draw_spheres()
-        self._draw_planes()
+        self._shells: dict[Hashable, DrawnShell] = {}
+        self._spheres: dict[Hashable, DrawnSphere] = {}
+        self._planes: dict[Hashable, DrawnPlane] = {}
+        self._draw_bodies()
         self._visual_model = visual_model
         self._robot = self._make_robot(visual_model)
         self.patch_scale = PatchScale(1.0)
@@ -127,10 +121,7 @@ class Display:
         self.update(neutral)
 
     def update(
-        self,
-        q: ArrayLike,
-        contacts: ContactColumns | None = None,
-        patches: PatchRows | None = None,
+        self, q: ArrayLike, contacts: Contacts | None = None, patches: PatchRows | None = None
     ) -> None:
         """Show configuration `q` (nq,) and `contacts` (of `scene.contacts`, or None for none).
 
@@ -143,17 +134,12 @@ class Display:
             )
         pin.forwardKinematics(self._model, self._data, configuration)
         self._robot.update(self._data)
-        for shell in self._shells.values():
-            shell.update(self._data)
-        for ball in self._spheres.values():
-            ball.update(self._data)
-        for plane in self._planes.values():
-            plane.update(self._data)
+        bodies = self._shells, self._spheres, self._planes
+        for one in (one for kind in bodies for one in kind.values()):
+            one.update(self._data)
         if self._frames is not None and "frames" not in self._hidden:
             self._frames.update(self._data)
-        pair = getattr(contacts, "pair", None)
-        seen = contacts if contacts is None or pair is None else pushing(contacts, pair)
-        self._arrows.update(seen, self.arrow_scale)
+        self._arrows.update(None if contacts is None else pushing(contacts), self.arrow_scale)
         if patches is None:
             return
         if self._patches is None:
@@ -237,16 +223,7 @@ class Display:
         self.scene = scene
         if scene.model is not self._model:
             self._model, self._data = scene.model, scene.model.createData()
-        anew = {shell_key(pair) for pair in scene.pairs if pair.shell} != set(self._shells)
-        if anew:
-            self.visualizer["shells"].delete()
-            self._draw_shells()
-        if {sphere_key(one) for pair in scene.pairs for one in pair.spheres} != set(self._spheres):
-            self.visualizer["spheres"].delete()
-            self._draw_spheres()
-        if {plane_key(pair) for pair in scene.pairs if pair.plane} != set(self._planes):
-            self.visualizer["planes"].delete()
-            self._draw_planes()
+        anew = self._draw_bodies()
         self._show_frames("frames" not in self._hidden)
         if visual_model is not self._visual_model:
             self._visual_model = visual_model
@@ -298,14 +275,10 @@ class Display:
 
     def grips(self) -> dict[str, str]:
         """Return the nodes that show moving bodies: their paths, each with a frame of its body."""
-        held = [(one.node, one.joint) for one in self._shells.values()]
-        held += [(one.node, one.joint) for one in self._spheres.values()]
-        found = {}
-        for node, joint in held:
-            frame = frame_on_joint(self._model, joint)
-            if joint and frame is not None:
-                found[node.path.lower()] = frame
-        return found | self._robot.grips()
+        bodies = (*self._shells.values(), *self._spheres.values())
+        held = [(one.node.path, frame_of_body(self._model, one.joint)) for one in bodies]
+        held += self._robot.held()
+        return {path.lower(): frame for path, frame in held if frame is not None}
 
     def _show_of_shell(self, shell: DrawnShell, part: Part, on: bool) -> None:
         if part in COLORINGS:
@@ -316,39 +289,43 @@ class Display:
         else:
             show(shell.node["elements" if part == "wireframe" else "trail"], on)
 
-    def _draw_shells(self) -> None:
-        self._shells.clear()
-        for pair in self.scene.pairs:
-            if pair.shell is not None and shell_key(pair) not in self._shells:
-                drawn = DrawnShell(self.visualizer["shells"], pair, len(self._shells))
-                self._shells[shell_key(pair)] = drawn
-                for part in ("curved", "wireframe", "trails"):
-                    if part in self._hidden:
-                        self._show_of_shell(drawn, part, False)
-        colorings: tuple[Part, ...] = get_args(Painting)
-        for coloring in colorings:
-            if coloring not in self._hidden:
-                for drawn in self._shells.values():
-                    self._show_of_shell(drawn, coloring, True)
-
-    def _draw_spheres(self) -> None:
-        self._spheres.clear()
-        for pair in self.scene.pairs:
-            for one in pair.spheres:
-                if sphere_key(one) not in self._spheres:
-                    drawn = DrawnSphere(
-                        self.visualizer["spheres"], pair.name, one, len(self._spheres)
-                    )
-                    self._spheres[sphere_key(one)] = drawn
-        if "spheres" in self._hidden:
+    def _draw_bodies(self) -> bool:
+        """Draw the bodies of the scene where they differ; return whether shells are drawn anew."""
+        pairs = self.scene.pairs
+        shells = ((shell_key(pair), pair) for pair in pairs if pair.shell is not None)
+        anew = self._draw("shells", DrawnShell, self._shells, shells)
+        for part in PARTS:
+            if anew and part in OF_SHELLS and part in self._hidden ^ HIDDEN_AT_FIRST:
+                for shell in self._shells.values():
+                    self._show_of_shell(shell, part, part not in self._hidden)
+        spheres = ((sphere_key(one), pair.name, one) for pair in pairs for one in pair.spheres)
+        if self._draw("spheres", DrawnSphere, self._spheres, spheres) and "spheres" in self._hidden:
             show(self.visualizer["spheres"], False)
+        planes = ((plane_key(pair), pair) for pair in pairs if pair.plane is not None)
+        self._draw("planes", DrawnPlane, self._planes, planes)
+        return anew
 
-    def _draw_planes(self) -> None:
-        self._planes.clear()
-        for pair in self.scene.pairs:
-            if pair.plane is not None and plane_key(pair) not in self._planes:
-                drawn = DrawnPlane(self.visualizer["planes"], pair, len(self._planes))
-                self._planes[plane_key(pair)] = drawn
+    def _draw(
+        self,
+        name: str,
+        kind: Callable[..., Drawn],
+        drawn: dict[Hashable, Drawn],
+        wanted: Iterable[tuple[object, ...]],
+    ) -> bool:
+        """Draw what is `wanted`, keys and arguments of `kind`, unless it is what is `drawn`.
+
+        Of equal keys the first counts. Returns whether it differed.
+        """
+        first: dict[Hashable, list[object]] = {}
+        for key, *given in wanted:
+            first.setdefault(key, given)
+        if set(first) == set(drawn):
+            return False
+        self.visualizer[name].delete()
+        drawn.clear()
+        for key, given in first.items():
+            drawn[key] = kind(self.visualizer[name], *given, len(drawn))
+        return True
 
     def _make_robot(self, visual_model: pin.GeometryModel | None) -> GeometryRobot | SkeletonRobot:
         if visual_model is not None and len(visual_model.geometryObjects):
@@ -361,97 +338,3 @@ class Display:
         drawn = {one.joint for one in self._spheres.values()}
         drawn |= {one.joint for one in self._shells.values()}
         return SkeletonRobot(self.visualizer, self._model, 0.5 * self.view.distance, tips, drawn)
-
-
-def choose_view(
-    scene: Scene,
-    configurations: FloatArray,
-    points_world: FloatArray | None = None,
-    normals_world: FloatArray | None = None,
-    visual_model: pin.GeometryModel | None = None,
-    reach: float = REACH,
-    direction: FloatArray | None = None,
-    *,
-    whole: bool = False,
-) -> View:
-    """Choose a camera for the `configurations` (n, nq) and the contacts seen in them, world [m].
-
-    Without contacts the spheres are where things happen; without spheres, the joints. What is
-    farther away than `reach` times the size of that need not be in the picture; with `whole` all of
-    the robot is, and of the shells what is not far from it. `direction` (3,) leads from the target
-    to the eye; without it, it is chosen. Raises InvalidParameter for a `visual_model` that does not
-    hang on the scene's joints.
-    """
-    model, data = scene.model, scene.model.createData()
-    boxes = [
-        (pair.joint_j, pair.placement_j, *np.asarray(pair.shell.box))
-        for pair in scene.pairs
-        if pair.shell is not None
-    ]
-    shells = len(boxes)
-    if visual_model is not None:
-        check_geometry_model(model, visual_model)
-        boxes += _geometry_boxes(visual_model)
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    centers: list[FloatArray] = []
-    around: list[FloatArray] = []
-    on_shells: list[FloatArray] = []
-    radii = [one.radius for pair in scene.pairs for one in pair.spheres]
-    for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
-        pin.forwardKinematics(model, data, configurations[row])
-        for joint in range(1, model.njoints):
-            around.append(np.array(data.oMi[joint].translation))
-        for pair in scene.pairs:
-            for one in pair.spheres:
-                centers.append(data.oMi[one.joint].act(one.placement.translation))
-        if row == 0:
-            for k, (joint, placement, low, high) in enumerate(boxes):
-                where = data.oMi[joint] * placement
-                (on_shells if k < shells else around).extend(
-                    where.act(low + corner * (high - low)) for corner in corners
-                )
-    touched = points_world is not None and len(points_world)
-    action = np.array(centers) if centers else np.array(around or [np.zeros(3)])
-    if touched and points_world is not None:
-        action = points_world if not centers else np.vstack((action, points_world))
-    radius = min(radii, default=0.02)
-    if whole and around:
-        robot = np.array(around + centers)
-        (middle, size), (center, half) = ball_around(robot), ball_around(action, 4.0 * radius)
-        # Joints are points, links have some width.
-        links = robot[:, None] + _WIDTH * size * np.vstack((np.eye(3), -np.eye(3)))
-        around += list(links.reshape(-1, 3))
-        # A shell is there as a whole, unless it is a floor that would leave little of the rest.
-        most = max(_FAR * size, reach * half)
-        for k in range(0, len(on_shells), len(corners)):
-            shell = np.array(on_shells[k : k + len(corners)])
-            near = np.linalg.norm(shell - middle, axis=1) <= _FAR * size
-            near |= np.linalg.norm(shell - center, axis=1) <= reach * half
-            around += list(shell if near.any() and ball_around(shell)[1] <= most else shell[near])
-        on_shells = []
-        reach = np.inf
-    around += on_shells
-    normal = np.zeros(3)
-    if touched and normals_world is not None:
-        mean = normals_world.mean(axis=0)
-        # Normals on a plane lead into it; the eye stays on the side of the shells.
-        below = all(pair.plane is not None for pair in scene.pairs)
-        normal = (-mean if below else mean) / max(float(np.linalg.norm(mean)), 1e-9)
-    return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
-
-
-def _geometry_boxes(
-    geometry_model: pin.GeometryModel,
-) -> list[tuple[int, pin.SE3, FloatArray, FloatArray]]:
-    """Return joint, placement and box (low, high) of geometry whose loaded size can be trusted."""
-    boxes = []
-    for body in geometry_model.geometryObjects:
-        # Coal ignores the length unit that a Collada file states, the page does not.
-        if body.meshPath.lower().endswith(".dae"):
-            continue
-        body.geometry.computeLocalAABB()
-        box = body.geometry.aabb_local
-        low, high = np.array(box.min_), np.array(box.max_)
-        if np.isfinite([low, high]).all() and np.abs([low, high]).max() < 1e6:
-            boxes.append((body.parentJoint, body.placement, low, high))
-    return boxes

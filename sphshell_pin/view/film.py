@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypedDict, TypeVar, get_args
@@ -25,7 +26,7 @@ from sphshell_pin.atomic.files import write_folder
 from sphshell_pin.checks import check_finite, check_vector
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.films import Pixels, check_film, write_film
-from sphshell_pin.view.recording import Shown, check_pace, render_recording, sound_rows
+from sphshell_pin.view.recording import Shown, check_pace, sound_rows
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
@@ -136,17 +137,7 @@ def render_film(
     if film:
         check_film(path, size, fps)
     times = _times(result, (time, time) if still else span, still=still)
-    page = render_recording(
-        result,
-        shown.scene,
-        shown.visual_model,
-        fps=fps,
-        speed=shown.speed,
-        title=shown.title,
-        span=times,
-        whole=True,
-    )
-    stage = _Stage(page, size, camera, chart, dark, told)
+    stage = _Stage(shown.page(fps, times), size, camera, chart, dark, told)
 
     def draw() -> None:
         with stage.opened(path):
@@ -166,7 +157,7 @@ def render_film(
                 old = [one.name for one in path.glob("frame_*.png")]
                 write_folder(path, files, [FRAME.format(1), *old])
 
-    _interruptibly(draw, stage.stop)
+    _interruptibly(draw, stage.stopped.set)
     return path
 
 
@@ -218,25 +209,19 @@ def _interruptibly(draw: Callable[[], None], stop: Callable[[], None]) -> None:
             raise
 
 
+@dataclass
 class _Stage:
-    """A browser that shows the `page` of a recording, and draws its pictures by their number."""
+    """A browser that shows the page `html` of a recording, and draws its pictures by number."""
 
-    def __init__(
-        self,
-        page: str,
-        size: tuple[int, int],
-        camera: Camera,
-        chart: bool,
-        dark: bool,
-        told: Callable[[int, int], object],
-    ) -> None:
-        self._html = page
-        self._size, self._camera, self._chart, self._dark = size, camera, chart, dark
-        self._told = told
-        self._stopped = threading.Event()
-        self._page: Page
-        self.stop = self._stopped.set
-        self.count = 0
+    html: str
+    size: tuple[int, int]
+    camera: Camera
+    chart: bool
+    dark: bool
+    told: Callable[[int, int], object]
+    stopped: threading.Event = field(default_factory=threading.Event)
+    page: Page = field(init=False)
+    count: int = 0
 
     @contextmanager
     def opened(self, path: Path) -> Iterator[None]:
@@ -246,30 +231,27 @@ class _Stage:
         except ImportError as missing:
             raise MissingExtra("playwright", "video", "a picture or film of a run") from missing
         # Text has the same size relative to the picture in every size of it.
-        scale = max(0.5, float(np.sqrt(self._size[0] * self._size[1] / LAID_OUT)))
-        width, height = (max(1, round(pixels / scale)) for pixels in self._size)
+        scale = max(0.5, float(np.sqrt(self.size[0] * self.size[1] / LAID_OUT)))
+        width, height = (max(1, round(pixels / scale)) for pixels in self.size)
         try:
             with sync_playwright() as driver:
                 browser = _launch(driver, path)
                 context = browser.new_context(
                     viewport={"width": width, "height": height},
                     device_scale_factor=scale,
-                    color_scheme="dark" if self._dark else "light",
+                    color_scheme="dark" if self.dark else "light",
                     reduced_motion="reduce",
                     offline=True,
                 )
-                self._page = context.new_page()
-                self._page.set_default_timeout(PATIENCE)
-                self._page.set_content(self._html)
-                self._page.wait_for_function("window.recording || window.recording_fault")
-                if not self._page.evaluate("Boolean(window.recording)"):
-                    fault = self._page.locator("#fault").text_content()
+                page = self.page = context.new_page()
+                page.set_default_timeout(PATIENCE)
+                page.set_content(self.html)
+                page.wait_for_function("window.recording || window.recording_fault")
+                if not page.evaluate("Boolean(window.recording)"):
+                    fault = page.locator("#fault").text_content()
                     raise ResultError(path, f"cannot be drawn: {fault}")
-                self._page.evaluate(
-                    "([camera, chart]) => recording.film(camera, chart)",
-                    [self._camera, self._chart],
-                )
-                self.count = int(self._page.evaluate("recording.clock.frames"))
+                page.evaluate("given => recording.film(...given)", [self.camera, self.chart])
+                self.count = int(page.evaluate("recording.clock.frames"))
                 yield
                 browser.close()
         except Error as fault:
@@ -279,16 +261,16 @@ class _Stage:
         """Draw the picture with this `number`, and return it as a .png file."""
         from PIL import Image
 
-        if self._stopped.is_set():
+        if self.stopped.is_set():
             raise _Stopped
-        self._page.evaluate("k => recording.draw_frame(k)", number)
-        drawn = self._page.screenshot()
+        self.page.evaluate("k => recording.draw_frame(k)", number)
+        drawn = self.page.screenshot()
         with Image.open(io.BytesIO(drawn)) as image:
-            if image.size == self._size:
+            if image.size == self.size:
                 return drawn
             # Whole pixels of the page are not always whole pixels of the picture.
             stream = io.BytesIO()
-            image.resize(self._size, Image.Resampling.LANCZOS).save(stream, "png")
+            image.resize(self.size, Image.Resampling.LANCZOS).save(stream, "png")
             return stream.getvalue()
 
     def pixels(self, number: int) -> Pixels:
@@ -302,7 +284,7 @@ class _Stage:
         """Draw one picture after the other."""
         for number in range(self.count):
             yield draw(number)
-            self._told(number + 1, self.count)
+            self.told(number + 1, self.count)
 
 
 def _launch(driver: Playwright, path: Path) -> Browser:

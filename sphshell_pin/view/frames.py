@@ -10,15 +10,13 @@ import pinocchio as pin
 from sphshell_pin.view.arrows import nice
 from sphshell_pin.view.nodes import (
     Json,
-    Move,
+    OnJoint,
     lattice,
     line_segments,
     material,
-    mover,
     on_top,
-    pose,
     rod,
-    rotation_to,
+    rod_along,
     set_object,
 )
 
@@ -38,10 +36,9 @@ LINES = 20  # of the grid, on each side of its middle
 def draw_axes(node: Visualizer, width: float, length: float, looks: list[Json]) -> None:
     """Draw x, y and z of `length` [m] and half `width` [m] below `node`, with a look for each."""
     for axis, look in enumerate(looks):
-        arm, direction = node["xyz"[axis]], np.eye(3)[axis]
+        arm = node["xyz"[axis]]
         set_object(arm, rod(0.45, 0.45), look, order=9)
-        shape = np.array([width, length, width])
-        arm.set_transform(pose(rotation_to(direction), 0.5 * length * direction, shape))
+        arm.set_transform(rod_along(np.zeros(3), length * np.eye(3)[axis], width))
 
 
 class FrameAxes:
@@ -59,20 +56,18 @@ class FrameAxes:
                 places.append((pair.joint_j, pair.placement_j))
         length = (0.05 if len(places) <= FEW else 0.025) * size
         looks = [on_top(color) for color in AXIS_COLORS]
-        self._moves: list[tuple[Move, int, pin.SE3]] = []
-        drawn: set[tuple[int, bytes]] = set()
+        self._drawn: dict[tuple[int, bytes], OnJoint] = {}
         for joint, placement in places:
             key = joint, placement.homogeneous.tobytes()
-            if key not in drawn:
-                node = visualizer[f"frame_{len(drawn)}"]
-                draw_axes(node, 0.06 * length, length if drawn else 2.0 * length, looks)
-                self._moves.append((mover(node), joint, placement))
-                drawn.add(key)
+            if key not in self._drawn:
+                node = visualizer[f"frame_{len(self._drawn)}"]
+                draw_axes(node, 0.06 * length, length if self._drawn else 2.0 * length, looks)
+                self._drawn[key] = OnJoint(node, joint, placement)
 
     def update(self, data: pin.Data) -> None:
         """Place them where forward kinematics left the joints in `data`."""
-        for move, joint, placement in self._moves:
-            move((data.oMi[joint] * placement).homogeneous)
+        for one in self._drawn.values():
+            one.update(data)
 
 
 def grid_spacing(view: View) -> float:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin._interrupts import interrupts_delayed
@@ -89,15 +90,15 @@ def typed_array(values: FloatArray | IntArray) -> Json:
     }
 
 
-def triangle_mesh(vertices: FloatArray, triangles: IntArray) -> Json:
-    """Geometry of an indexed mesh: `vertices` (n, 3) [m], `triangles` (t, 3)."""
-    return {
-        "type": "BufferGeometry",
-        "data": {
-            "attributes": {"position": typed_array(vertices)},
-            "index": typed_array(triangles.reshape(-1)),
-        },
-    }
+def triangle_mesh(
+    vertices: FloatArray, triangles: IntArray, colors: FloatArray | None = None
+) -> Json:
+    """Geometry of an indexed mesh: `vertices` (n, 3) [m] of `colors` (n, 3), `triangles` (t, 3)."""
+    attributes = {"position": typed_array(vertices)}
+    if colors is not None:
+        attributes["color"] = typed_array(colors)
+    data = {"attributes": attributes, "index": typed_array(triangles.reshape(-1))}
+    return {"type": "BufferGeometry", "data": data}
 
 
 def line_segments(vertices: FloatArray, segments: IntArray) -> Json:
@@ -203,14 +204,6 @@ def show(visualizer: Visualizer, on: bool) -> None:
     visualizer.set_property("visible", bool(on))
 
 
-def set_camera(visualizer: Visualizer, camera: Json) -> None:
-    """Replace the page's camera by the three.js `camera` description."""
-    node = visualizer["/Cameras/default/rotated"]
-    path = node.path.lower()
-    data = {"object": {"uuid": f"{path}#camera", **camera}}
-    visualizer.window.send(Command({"type": "set_object", "path": path, "object": data}))
-
-
 def is_below(path: str, parent: str) -> bool:
     """Whether the node at `path` is the one at `parent`, or below it."""
     return f"{path}/".startswith(parent.rstrip("/") + "/")
@@ -232,6 +225,33 @@ def pose(
     return matrix
 
 
+def hidden_at(place: FloatArray) -> FloatArray:
+    """Return the matrix (4, 4) of a node that waits, too small to be seen, at `place` (3,) [m]."""
+    return pose(np.eye(3), place, HIDDEN_SCALE)
+
+
+def rod_along(start: FloatArray, step: FloatArray, width: float) -> FloatArray:
+    """Return the matrix (4, 4) that makes a unit rod the one from `start` along `step` (3,) [m].
+
+    `width` [m] is what its radii are multiplied by; `step` must have a length.
+    """
+    shape = np.array([width, math.hypot(*step.tolist()), width])
+    return pose(rotation_to(step), start + 0.5 * step, shape)
+
+
+class OnJoint:
+    """A node that hangs on a `joint` of the model, at `placement` in it."""
+
+    def __init__(self, node: Visualizer, joint: int, placement: pin.SE3 | None = None) -> None:
+        self.node, self.joint = node, joint
+        self._placement = pin.SE3.Identity() if placement is None else placement
+        self._move = mover(node)
+
+    def update(self, data: pin.Data) -> None:
+        """Place it where forward kinematics left its joint in `data`."""
+        self._move((data.oMi[self.joint] * self._placement).homogeneous)
+
+
 def rotation_to(direction: FloatArray) -> FloatArray:
     """Return a rotation (3, 3) that takes y, the axis of three.js's cylinders, to `direction`."""
     # Plain numbers: for three of them NumPy takes ten times as long, in every frame of every arrow.
@@ -248,6 +268,4 @@ def rotation_to(direction: FloatArray) -> FloatArray:
         across = (y, -x, 0.0)
     length = math.sqrt(1.0 - least * least)
     a, b, c = across[0] / length, across[1] / length, across[2] / length
-    return np.array(
-        ((a, x, b * z - c * y), (b, y, c * x - a * z), (c, z, a * y - b * x)),
-    )
+    return np.array(((a, x, b * z - c * y), (b, y, c * x - a * z), (c, z, a * y - b * x)))

@@ -101,24 +101,14 @@ class FilmWindow:
         for path, frames in self._frames.items():
             matrices = np.array([frames[frame] for frame in sorted(frames)])
             matrices = matrices.reshape(-1, 4, 4).transpose(0, 2, 1)
-            stills.append(
-                {
-                    "type": "set_transform",
-                    "path": path,
-                    "matrix": matrices[0].T.reshape(-1).tolist(),
-                }
-            )
+            still = matrices[0].T.reshape(-1).tolist()
+            stills.append({"type": "set_transform", "path": path, "matrix": still})
             tracks = _pose_tracks(times[sorted(frames)], matrices)
             if tracks:
                 moving.append(_clip(path, tracks, times))
         for path, (instants, visible) in self._switches.items():
-            track = {
-                "name": ".visible",
-                "type": "bool",
-                "times": instants.tolist(),
-                "values": visible,
-            }
-            moving.append(_clip(path, [track], times))
+            track = {"type": "bool", "times": instants.tolist(), "values": visible}
+            moving.append(_clip(path, [{"name": ".visible", **track}], times))
         kinds = ("set_object", "set_transform", "set_property", "set_target")
         scene = sorted(self._commands.values(), key=lambda data: kinds.index(data["type"]))
         # The clips are loaded at rest; the page starts them once it has drawn the first frame.
@@ -168,14 +158,8 @@ def _pose_tracks(times: FloatArray, matrices: FloatArray) -> list[Json]:
         moves = step > 1e-9
         kept = np.ones(len(values), dtype=bool)
         kept[1:-1] = moves[:-1] | moves[1:]
-        tracks.append(
-            {
-                "name": f".{name}",
-                "type": kind,
-                "times": typed_array(times[kept])["array"],
-                "values": typed_array(values[kept].reshape(-1))["array"],
-            }
-        )
+        at, to = (typed_array(one)["array"] for one in (times[kept], values[kept].reshape(-1)))
+        tracks.append({"name": f".{name}", "type": kind, "times": at, "values": to})
     return tracks
 
 

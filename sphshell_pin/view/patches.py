@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.view.arrows import ContactColumns
+from sphshell_pin.view.arrows import Contacts, strongest
 from sphshell_pin.view.nodes import (
-    HIDDEN_SCALE,
     FloatArray,
     Move,
-    material,
+    hidden_at,
     mover,
+    on_top,
     pose,
     set_object,
     triangle_mesh,
-    typed_array,
 )
-from sphshell_pin.view.surface import ramp_colors
+from sphshell_pin.view.surface import between_rings, ramp_colors
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -81,32 +80,20 @@ class PatchPool:
             moves = []
             for level, mesh in enumerate(meshes):
                 node = visualizer[f"patch_{index}_{level}"]
-                look = material(
-                    "MeshBasic",
-                    0xFFFFFF,
-                    vertexColors=True,
-                    depthTest=False,
-                    depthWrite=False,
-                    transparent=True,
-                )
+                look = on_top(0xFFFFFF) | {"side": 2, "vertexColors": True}
                 set_object(node, mesh, look, order=9)
                 moves.append(mover(node))
             self._moves.append(moves)
-        self._hidden = pose(np.eye(3), np.zeros(3), HIDDEN_SCALE)
+        self._hidden = hidden_at(np.zeros(3))
 
-    def update(
-        self, contacts: ContactColumns | None, patches: PatchRows, scale: PatchScale
-    ) -> None:
+    def update(self, contacts: Contacts | None, patches: PatchRows, scale: PatchScale) -> None:
         """Show `patches` (k,) of `contacts` at `scale`: the largest forces, if there are many."""
-        count = 0 if contacts is None else len(contacts.normal_force)
-        order = np.arange(count)
-        if contacts is not None and count > self.size:
-            order = np.sort(np.argsort(-contacts.normal_force, kind="stable")[: self.size])
+        force = np.zeros(0) if contacts is None else contacts.normal_force
+        shown = strongest(force, self.size)
         for slot, moves in enumerate(self._moves):
             level, matrix = -1, self._hidden
-            if contacts is not None and slot < count:
-                k = int(order[slot])
-                level, matrix = self._place(contacts, k, patches[k], scale)
+            if contacts is not None and slot < len(shown):
+                level, matrix = self._place(contacts, int(shown[slot]), patches, scale)
             # The others wait where it is: else they would sweep across the picture when shown.
             waiting = matrix.copy()
             waiting[:3, :3] = self._hidden[:3, :3]
@@ -114,8 +101,9 @@ class PatchPool:
                 move(matrix if number == level else waiting)
 
     def _place(
-        self, contacts: ContactColumns, k: int, patch: np.void, scale: PatchScale
+        self, contacts: Contacts, k: int, patches: PatchRows, scale: PatchScale
     ) -> tuple[int, FloatArray]:
+        patch = patches[k]
         normal, axis = contacts.normal_world[k], patch["axis_world"]
         a, b = patch["half_axes"] * scale.factor
         share = patch["peak_pressure"] / scale.pressure
@@ -139,14 +127,5 @@ def _disc(level: float, rings: int = 10, sectors: int = 40) -> dict[str, Any]:
     angle = 2.0 * np.pi * np.arange(sectors) / sectors
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros(sectors)], axis=1)
     vertices = (radius[:, None, None] * around).reshape(-1, 3)
-    ring, sector = np.meshgrid(np.arange(len(radius) - 1), np.arange(sectors), indexing="ij")
-    first, beside = sector + sectors * ring, (sector + 1) % sectors + sectors * ring
-    triangles = np.concatenate(
-        [
-            np.stack([first, first + sectors, beside + sectors], axis=-1).reshape(-1, 3),
-            np.stack([first, beside + sectors, beside], axis=-1).reshape(-1, 3),
-        ]
-    )
-    mesh = triangle_mesh(vertices, triangles.astype(np.int32))
-    mesh["data"]["attributes"]["color"] = typed_array(np.repeat(color, sectors, axis=0))
-    return mesh
+    triangles = between_rings(len(radius), sectors)
+    return triangle_mesh(vertices, triangles, np.repeat(color, sectors, axis=0))

@@ -20,12 +20,13 @@ from sphshell_pin.view.arrows import (
     TOTAL_COLOR,
     ArrowKind,
     ArrowScale,
+    arrow_length,
     largest_force,
 )
 from sphshell_pin.view.bodies import SPHERE_COLOR
-from sphshell_pin.view.camera import DIRECTIONS
+from sphshell_pin.view.camera import DIRECTIONS, choose_view
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
-from sphshell_pin.view.display import TRAIL_COLOR, Display, choose_view
+from sphshell_pin.view.display import TRAIL_COLOR, Display
 from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
 from sphshell_pin.view.nodes import FloatArray, css, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
@@ -136,8 +137,7 @@ def render_recording(
         for name, toward in DIRECTIONS.items()
     }
     view = views["fit"]
-    radii = [one.radius for pair in scene.pairs for one in pair.spheres]
-    length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
+    length = arrow_length(scene, view.distance)
     scale = ArrowScale.from_forces(_forces(shown, arrows), length)
     most = int(np.bincount(shown.row).max(initial=0)) if len(shown.row) else 0
 
@@ -256,6 +256,19 @@ class Shown:
         speed = 1.0 if speed is None else speed
         return cls(result, scene, visual_model, title or "A finished run", speed)
 
+    def page(self, fps: float = 30, span: tuple[float, float] | None = None) -> str:
+        """Return the page of all of the robot: see `render_recording`."""
+        return render_recording(
+            self.result,
+            self.scene,
+            self.visual_model,
+            fps=fps,
+            speed=self.speed,
+            title=self.title,
+            span=span,
+            whole=True,
+        )
+
 
 def view_result(
     result: Result,
@@ -270,16 +283,8 @@ def view_result(
     if isinstance(height, bool) or not isinstance(height, int) or height <= 0:
         raise InvalidParameter("height", height, "must be a positive number of pixels")
     shown = Shown.of(result, scene, visual_model, title, speed)
-    page = render_recording(
-        result,
-        shown.scene,
-        shown.visual_model,
-        speed=shown.speed,
-        title=shown.title,
-        whole=True,
-    )
     bare = shown.visual_model is None and has_links(shown.scene.model)
-    return RecordingView(page, height, BARE if bare else "")
+    return RecordingView(shown.page(), height, BARE if bare else "")
 
 
 def choose_rows(

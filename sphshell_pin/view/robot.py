@@ -16,15 +16,15 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.frames import PALE_AXIS_COLORS, draw_axes
 from sphshell_pin.view.meshes import lit_facets
 from sphshell_pin.view.nodes import (
-    HIDDEN_SCALE,
     FloatArray,
     Move,
+    OnJoint,
+    hidden_at,
     material,
     mover,
     node_name,
-    pose,
     rod,
-    rotation_to,
+    rod_along,
     set_object,
     sphere,
 )
@@ -57,10 +57,13 @@ def check_geometry_model(model: pin.Model, geometry_model: pin.GeometryModel) ->
 
 def has_links(model: pin.Model) -> bool:
     """Whether the skeleton of `model` has rods between joints: it is more than bodies that fly."""
-    return any(
-        model.parents[joint] != 0 or model.joints[joint].nv == 1
-        for joint in range(1, model.njoints)
-    )
+    return bool(_linked(model))
+
+
+def _linked(model: pin.Model) -> list[int]:
+    """Return the joints to which a rod leads: those that let no body fly free of the world."""
+    joints = range(1, model.njoints)
+    return [joint for joint in joints if model.parents[joint] or model.joints[joint].nv == 1]
 
 
 class GeometryRobot:
@@ -95,16 +98,14 @@ class GeometryRobot:
             node = visualizer[viewer.getViewerNodeName(body, pin.GeometryType.VISUAL)]
             # A reference: it follows the update of all placements.
             self._parts.append((mover(node), self._placed.oMg[index], _in_body(body)))
-            self._paths.append(node.path.lower())
+            self._paths.append(node.path)
 
-    def grips(self) -> dict[str, str]:
-        """Return the nodes that show moving bodies: their paths, each with a frame of its body."""
-        found: dict[str, str] = {}
-        for path, body in zip(self._paths, self._geometry.geometryObjects, strict=True):
-            frame = _frame_of(self._model, body)
-            if frame is not None:
-                found[path] = frame
-        return found
+    def held(self) -> list[tuple[str, str | None]]:
+        """Return the paths of the nodes, each with a frame of its body, None if it cannot move."""
+        return [
+            (path, frame_of_body(self._model, body.parentJoint, body.parentFrame))
+            for path, body in zip(self._paths, self._geometry.geometryObjects, strict=True)
+        ]
 
     def update(self, data: pin.Data) -> None:
         """Place all geometry where forward kinematics left the joints in `data`."""
@@ -113,15 +114,14 @@ class GeometryRobot:
             move(where.homogeneous @ in_body)
 
 
-def _frame_of(model: pin.Model, body: pin.GeometryObject) -> str | None:
-    """Return a frame of the body that a geometry object shows; None if it cannot move."""
-    joint, number = body.parentJoint, body.parentFrame
+def frame_of_body(model: pin.Model, joint: int, number: int | None = None) -> str | None:
+    """Return a frame on `joint`, that with the `number` if it fits; None if it cannot move."""
     if joint == 0:
         return None
-    if number < model.nframes and model.frames[number].parentJoint == joint:
-        name = str(model.frames[number].name)
-        if find_frame(model, name) == number:
-            return name
+    if number is not None and number < model.nframes:
+        frame = model.frames[number]
+        if frame.parentJoint == joint and find_frame(model, frame.name) == number:
+            return str(frame.name)
     return frame_on_joint(model, joint)
 
 
@@ -154,23 +154,18 @@ class SkeletonRobot:
         self._held: list[tuple[str, int]] = []
         self._width = 0.012 * size
         self._links: list[tuple[Move, int, int, FloatArray]] = []
-        self._axes: list[tuple[Move, int]] = []
+        self._axes: list[OnJoint] = []
         root = visualizer["robot"]
         ends = [
             (model.parents[joint], joint, np.zeros(3), model.names[joint])
-            for joint in range(1, model.njoints)
-            if model.parents[joint] != 0 or model.joints[joint].nv == 1
+            for joint in _linked(model)
         ]
-        ends += [
-            (joint, joint, offset, f"tip_{index}")
-            for index, (joint, offset) in enumerate(tips)
-            if joint != 0
-        ]
+        ends += [(joint, joint, at, f"tip_{k}") for k, (joint, at) in enumerate(tips) if joint]
         for start, end, offset, name in ends:
             node = root["links"][node_name(name)]
             set_object(node, rod(1.0, 1.0), material("MeshPhong", LINK_COLOR))
             self._links.append((mover(node), start, end, offset))
-            self._held.append((node.path.lower(), start))
+            self._held.append((node.path, start))
         for joint in range(1, model.njoints):
             if joint in drawn or model.inertias[joint].mass == 0.0:
                 continue
@@ -180,24 +175,19 @@ class SkeletonRobot:
             )
             looks = [material("MeshBasic", color) for color in PALE_AXIS_COLORS]
             draw_axes(node, self._width, 5.0 * self._width, looks)
-            self._axes.append((mover(node), joint))
-            self._held.append((node.path.lower(), joint))
+            self._axes.append(OnJoint(node, joint))
+            self._held.append((node.path, joint))
 
-    def grips(self) -> dict[str, str]:
-        """Return the nodes that show moving bodies: their paths, each with a frame of its body."""
-        found = ((path, frame_on_joint(self._model, joint)) for path, joint in self._held if joint)
-        return {path: frame for path, frame in found if frame is not None}
+    def held(self) -> list[tuple[str, str | None]]:
+        """Return the paths of the nodes, each with a frame of its body, None if it cannot move."""
+        return [(path, frame_of_body(self._model, joint)) for path, joint in self._held]
 
     def update(self, data: pin.Data) -> None:
         """Place rods and axes where forward kinematics left the joints in `data`."""
         for move, start, end, offset in self._links:
             first = data.oMi[start].translation
             step = data.oMi[end].act(offset) - first
-            length = float(np.linalg.norm(step))
-            if length < self._width:
-                move(pose(np.eye(3), first, HIDDEN_SCALE))
-                continue
-            shape = np.array([self._width, length, self._width])
-            move(pose(rotation_to(step), first + 0.5 * step, shape))
-        for move, joint in self._axes:
-            move(data.oMi[joint].homogeneous)
+            short = np.linalg.norm(step) < self._width
+            move(hidden_at(first) if short else rod_along(first, step, self._width))
+        for one in self._axes:
+            one.update(data)

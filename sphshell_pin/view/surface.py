@@ -16,7 +16,6 @@ from sphshell_pin.view.nodes import (
     material,
     set_object,
     triangle_mesh,
-    typed_array,
 )
 
 if TYPE_CHECKING:
@@ -156,10 +155,8 @@ def draw_colored(
     node: Visualizer, vertices: FloatArray, triangles: IntArray, colors: FloatArray
 ) -> None:
     """Draw a mesh at `node` with `colors` (n, 3) from 0 to 1 of its vertices."""
-    geometry = triangle_mesh(vertices, triangles)
-    geometry["data"]["attributes"]["color"] = typed_array(colors)
     look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10, **PUSHED_BACK)
-    set_object(node, geometry, look)
+    set_object(node, triangle_mesh(vertices, triangles, colors), look)
 
 
 def patch_colors(count: int) -> FloatArray:
@@ -178,6 +175,14 @@ def great_circles(radius: float, points: int = 48) -> tuple[FloatArray, IntArray
     start = np.arange(points)
     ring = np.stack((start, (start + 1) % points), axis=1)
     return vertices, np.concatenate([ring + points * axis for axis in range(3)])
+
+
+def between_rings(rings: int, sides: int) -> IntArray:
+    """Return the triangles (t, 3) between `rings` of `sides` points each, ring after ring."""
+    row, column = np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij")
+    first, second = sides * row + column, sides * row + (column + 1) % sides
+    halves = (first, second, second + sides), (first, second + sides, first + sides)
+    return np.concatenate([np.stack(half, axis=-1).reshape(-1, 3) for half in halves])
 
 
 def tube(points: FloatArray, radius: float, sides: int = 6) -> tuple[FloatArray, IntArray]:
@@ -205,12 +210,4 @@ def tube(points: FloatArray, radius: float, sides: int = 6) -> tuple[FloatArray,
         + up[:, None, :] * np.sin(angles)[None, :, None]
     )
     vertices = (points[:, None, :] + radius * ring).reshape(-1, 3)
-    first = (sides * np.arange(len(points) - 1))[:, None] + np.arange(sides)[None, :]
-    second = (sides * np.arange(len(points) - 1))[:, None] + (np.arange(sides) + 1)[None, :] % sides
-    triangles = np.concatenate(
-        (
-            np.stack((first, second, second + sides), axis=-1).reshape(-1, 3),
-            np.stack((first, second + sides, first + sides), axis=-1).reshape(-1, 3),
-        )
-    )
-    return vertices, triangles
+    return vertices, between_rings(len(points), sides)

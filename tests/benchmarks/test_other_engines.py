@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
 
 from sphshell_pin.benchmarks import swing
 from sphshell_pin.benchmarks.peers import drake, scenes
@@ -139,25 +140,17 @@ def test_the_modulus_gives_the_load_at_the_depth_of_the_spring(name):
 def test_the_law_of_the_bowl_has_the_period_of_the_spring():
     scene = scenes.SCENES["bowl"]()
     pull = scene.stiffness**2 / drake.load(scene) / scene.mass
-    dt, reach = 1e-4, swing.ARM
 
-    def slope(state):
-        place, velocity = state
+    def rate(_, state):
+        place, velocity = state[:2], state[2:]
         out = np.linalg.norm(place)
-        back = pull * max(0.0, out - reach) ** 2 / out
-        return np.array([velocity, -back * place - [0, 9.81]])
+        back = pull * max(0.0, out - swing.ARM) ** 2 / out
+        return np.concatenate([velocity, -back * place - [0, 9.81]])
 
     x, _, z = swing.start(0.0)
-    state, rows = np.array([[x, z], [0.0, 0.0]]), []
-    for _ in range(round(1.35 * swing.reference_period() / dt)):
-        a = slope(state)
-        b = slope(state + dt / 2 * a)
-        c = slope(state + dt / 2 * b)
-        d = slope(state + dt * c)
-        rows.append(state[:, 0])
-        state = state + dt / 6 * (a + 2 * b + 2 * c + d)
-    x, v = np.array(rows).T
-    period = swing.mean_period(dt * np.arange(len(x)), x, v, 1)
+    t = np.arange(0.0, 1.35 * swing.reference_period(), 1e-3)
+    found = solve_ivp(rate, (0, t[-1]), [x, z, 0, 0], "DOP853", t, rtol=1e-10, atol=1e-12).y
+    period = swing.mean_period(t, found[0], found[2], 1)
     assert period == pytest.approx(swing.reference_period(), rel=1e-5)
 
 

@@ -22,7 +22,7 @@ from tests.contact.smooth.test_gradient import assert_gradient
 from tests.contact.walks import jumps, paths
 from tests.models import ball
 from tests.parts import occ
-from tests.shell.cad_shapes import parts
+from tests.parts.occ import parts
 
 MM = 1e-3
 VALVE_BODY = Path(__file__).parents[2] / "scenarios" / "surfaces" / "valve_body.step"

@@ -19,12 +19,10 @@ from OCP.GeomAbs import GeomAbs_C2
 from OCP.GeomAPI import GeomAPI_PointsToBSplineSurface, GeomAPI_ProjectPointOnSurf
 from OCP.gp import gp_Pnt
 from OCP.IFSelect import IFSelect_RetDone
-from OCP.IGESControl import IGESControl_Reader
 from OCP.Interface import Interface_Static
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
-from OCP.TopAbs import TopAbs_FACE
-from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS
+
+from sphshell_pin.shell.cad.reading import read_model
 
 FOLDER = Path(__file__).parent
 MODEL = FOLDER / "corpus" / "bladex_upper.iges"
@@ -36,11 +34,7 @@ EDGES = 0.05  # of the chord left out at each
 
 def model():
     """Return BladeX's surface; its parameters are in [0, 1]."""
-    reader = IGESControl_Reader()
-    assert reader.ReadFile(str(MODEL)) == IFSelect_RetDone
-    reader.TransferRoots()
-    explorer = TopExp_Explorer(reader.OneShape(), TopAbs_FACE)
-    return BRep_Tool.Surface_s(TopoDS.Face(explorer.Current()))
+    return BRep_Tool.Surface_s(read_model(MODEL).faces[0].shape)
 
 
 def places(surface, m, n):

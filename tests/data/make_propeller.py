@@ -9,12 +9,10 @@ from pathlib import Path
 
 import numpy as np
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeRevol
-from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt
 from OCP.StlAPI import StlAPI_Writer
+
+from tests.parts import occ
 
 OUT = Path(__file__).with_name("propeller.stl")
 # Radius and height along the axis: a long shaft, a cone of 15 degrees, the hub, a blunt cap.
@@ -22,22 +20,9 @@ PROFILE = ((0, -120), (8, -120), (8, -40), (14, -17.6), (14, 18), (10, 24), (0, 
 BLADES, ROOT, TIP = 3, 8.0, 70.0
 
 
-def wire(points):
-    polygon = BRepBuilderAPI_MakePolygon()
-    for x, y, z in points:
-        polygon.Add(gp_Pnt(float(x), float(y), float(z)))
-    polygon.Close()
-    return polygon
-
-
-def shaft():
-    face = BRepBuilderAPI_MakeFace(wire([(r, 0, z) for r, z in PROFILE]).Wire()).Face()
-    return BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))).Shape()
-
-
 def blade(turn: float):
     """Sections of a lens, turned more and more against the axis, lofted."""
-    loft = BRepOffsetAPI_ThruSections(True, False)
+    sections = []
     for along in np.linspace(0, 1, 5):
         radius, pitch = ROOT + along * (TIP - ROOT), np.radians(60 - 40 * along)
         chord, thick = 24 * (1 - 0.5 * along**2), 3.5 * (1 - 0.7 * along)
@@ -50,13 +35,12 @@ def blade(turn: float):
             radius * np.cos(turn) - across * np.sin(turn),
             radius * np.sin(turn) + across * np.cos(turn),
         )
-        loft.AddWire(wire(np.stack([x, y, axial], 1)).Wire())
-    loft.Build()
-    return loft.Shape()
+        sections.append(np.stack([x, y, axial], 1))
+    return occ.lofted(sections, ruled=False)
 
 
 def main() -> None:
-    whole = shaft()
+    whole = occ.turned(PROFILE)
     for i in range(BLADES):
         whole = BRepAlgoAPI_Fuse(whole, blade(2 * np.pi * i / BLADES)).Shape()
     BRepMesh_IncrementalMesh(whole, 0.4, False, 0.5, False)

@@ -1,6 +1,6 @@
 """Make scenarios/surfaces/valve_body.step and .urdf: a part for a hand to grasp.
 
-    python tests/data/make_valve_body.py
+    python -m tests.data.make_valve_body
 
 A valve body as one prints it of nylon: a barrel with a bore on a bolted flange, a collar on top,
 two side ports, edges rounded. The axis is z, the flange stands on z = 0.
@@ -13,18 +13,14 @@ from pathlib import Path
 
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
-from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
 from OCP.BRepGProp import BRepGProp
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
 from OCP.GeomAbs import GeomAbs_Circle
-from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
-from OCP.TopAbs import TopAbs_EDGE
-from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS
+
+from tests.parts import occ
 
 SURFACES = Path(__file__).parents[2] / "scenarios" / "surfaces"
 DENSITY = 1010.0  # kg/m^3, nylon 12
@@ -38,44 +34,30 @@ PORT, PORT_BORE, PORT_LENGTH, PORT_HEIGHT = 11.0, 7.0, 44.0, 72.0
 FILLET = 1.5
 
 
-def cylinder(radius, height, at=(0, 0, 0), along=(0, 0, 1)):
-    """Return a solid cylinder."""
-    axes = gp_Ax2(gp_Pnt(*at), gp_Dir(*along))
-    return BRepPrimAPI_MakeCylinder(axes, radius, height).Shape()
-
-
-def rounded(shape):
-    """Return `shape` with a fillet along each of its circles."""
-    fillet, taken = BRepFilletAPI_MakeFillet(shape), []
-    explorer = TopExp_Explorer(shape, TopAbs_EDGE)
-    while explorer.More():
-        edge = TopoDS.Edge(explorer.Current())
-        circle = BRepAdaptor_Curve(edge).GetType() == GeomAbs_Circle
-        if circle and not any(edge.IsSame(one) for one in taken):
-            taken.append(edge)
-            fillet.Add(FILLET, edge)
-        explorer.Next()
-    return fillet.Shape()
+def is_circle(edge):
+    """Whether an edge is a circle."""
+    return BRepAdaptor_Curve(edge).GetType() == GeomAbs_Circle
 
 
 def valve_body():
     """Return the solid."""
-    outer = cylinder(FLANGE, FLANGE_HEIGHT)
+    outer = occ.cylinder(FLANGE, FLANGE_HEIGHT)
     for one in (
-        cylinder(BARREL, HEIGHT - COLLAR_HEIGHT, (0, 0, 0.5 * FLANGE_HEIGHT)),
-        cylinder(COLLAR, COLLAR_HEIGHT, (0, 0, HEIGHT - COLLAR_HEIGHT)),
-        cylinder(PORT, 2 * PORT_LENGTH, (0, -PORT_LENGTH, PORT_HEIGHT), (0, 1, 0)),
+        occ.cylinder(BARREL, HEIGHT - COLLAR_HEIGHT, (0, 0, 0.5 * FLANGE_HEIGHT)),
+        occ.cylinder(COLLAR, COLLAR_HEIGHT, (0, 0, HEIGHT - COLLAR_HEIGHT)),
+        occ.cylinder(PORT, 2 * PORT_LENGTH, (0, -PORT_LENGTH, PORT_HEIGHT), (0, 1, 0)),
     ):
         outer = BRepAlgoAPI_Fuse(outer, one).Shape()
-    solid = rounded(outer)
+    circles = filter(is_circle, occ.edges_where(outer, lambda p: True))
+    solid = occ.filleted(outer, circles, FILLET)
     holes = [
-        cylinder(BORE, HEIGHT, (0, 0, FLANGE_HEIGHT)),
-        cylinder(PORT_BORE, 4 * PORT_LENGTH, (0, -2 * PORT_LENGTH, PORT_HEIGHT), (0, 1, 0)),
+        occ.cylinder(BORE, HEIGHT, (0, 0, FLANGE_HEIGHT)),
+        occ.cylinder(PORT_BORE, 4 * PORT_LENGTH, (0, -2 * PORT_LENGTH, PORT_HEIGHT), (0, 1, 0)),
     ]
     for k in range(4):
         angle = math.pi / 4 + k * math.pi / 2
         x, y = BOLT_CIRCLE * math.cos(angle), BOLT_CIRCLE * math.sin(angle)
-        holes.append(cylinder(BOLT, 3 * FLANGE_HEIGHT, (x, y, -FLANGE_HEIGHT)))
+        holes.append(occ.cylinder(BOLT, 3 * FLANGE_HEIGHT, (x, y, -FLANGE_HEIGHT)))
     for one in holes:
         solid = BRepAlgoAPI_Cut(solid, one).Shape()
     return solid

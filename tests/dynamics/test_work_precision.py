@@ -9,7 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.work_precision import cost_at, measure
-from sphshell_pin.benchmarks.work_precision_cases import References, bowl, press, stick_slip
+from sphshell_pin.benchmarks.work_precision_cases import Judge, bowl, press, stick_slip
 
 CASES = {
     "bowl": lambda: replace(bowl(), duration=0.2),
@@ -19,8 +19,8 @@ CASES = {
 
 
 @cache
-def judge_of(name: str) -> References:
-    return References(CASES[name]())
+def judge_of(name: str) -> Judge:
+    return Judge(CASES[name]())
 
 
 def test_references_of_different_kinds_agree():

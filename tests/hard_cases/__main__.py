@@ -9,11 +9,11 @@ import argparse
 import importlib
 import itertools
 import sys
-import time
+from pathlib import Path
 
+from sphshell_pin.benchmarks.hard_cases import measure
 from sphshell_pin.cases.contents import Verdict, verdicts_table
 from sphshell_pin.cases.measured import Measured, write
-from sphshell_pin.cases.register import Case
 from tests.hard_cases.verdict import CASES
 
 NAME = "hard_cases"
@@ -24,15 +24,15 @@ def row(verdict: Verdict) -> list[str]:
     return verdicts_table([verdict], grouped=False).cells[0]
 
 
-def sections(results: list[tuple[Case, list[Verdict]]]) -> list[Measured]:
+def sections(found: list[Verdict]) -> list[Measured]:
     """Return what the site shows: a section for each module."""
-    found = [verdict for _, verdicts in results for verdict in verdicts]
     wrong = sum(not verdict.ok for verdict in found)
     parts = [Measured(text=f"{len(found)} verdicts, {wrong} of them out of bounds.")]
-    for module, group in itertools.groupby(results, key=lambda result: result[0].module):
-        heading, _, text = (importlib.import_module(module).__doc__ or "").strip().partition(".")
-        verdicts = [verdict for _, some in group for verdict in some]
-        parts.append(Measured.of(verdicts_table(verdicts, grouped=False), heading, text.strip()))
+    docs = [(importlib.import_module(name).__doc__ or "").strip() for name in CASES.modules]
+    texts = {heading: text.strip() for heading, _, text in (doc.partition(".") for doc in docs)}
+    for heading, some in itertools.groupby(found, key=lambda verdict: verdict.group):
+        table = verdicts_table(list(some), grouped=False)
+        parts.append(Measured.of(table, heading, texts[heading]))
     return parts
 
 
@@ -47,21 +47,20 @@ def main() -> int:
     options = parser.parse_args()
     if options.write and (options.quick or options.only):
         parser.error("--write needs all cases: leave out --quick and --only")
-    results = []
-    for known in collect(quick=options.quick, only=options.only):
-        begin = time.perf_counter()
-        verdicts = known.verdicts()
-        print(f"{known.name} ({time.perf_counter() - begin:.1f} s)", flush=True)
-        for verdict in verdicts:
-            name, tried, _, expected, measured, error, bound, word = row(verdict)
-            figures = f"{expected:>13.30s} {measured:>13.40s} {error:>8s} <= {bound:>5s} {word}"
-            print(f"  {name:34.34s} {tried:52.52s} {figures}", flush=True)
-        results.append((known, verdicts))
+
+    def progress(share: float) -> None:
+        print(f"\r{share:.0%}", end="", file=sys.stderr, flush=True)
+
+    root = Path(__file__).parents[2]
+    found = measure(root, quick=options.quick, only=options.only, progress=progress).rows
+    for verdict in found:
+        name, tried, _, expected, measured, error, bound, word = row(verdict)
+        figures = f"{expected:>13.30s} {measured:>13.40s} {error:>8s} <= {bound:>5s} {word}"
+        print(f"  {name:34.34s} {tried:52.52s} {figures}")
     if options.write:
-        command = "python -m tests.hard_cases --write"
-        print(f"wrote {write(NAME, command, sections(results))}")
-    wrong = sum(not verdict.ok for _, verdicts in results for verdict in verdicts)
-    print(f"{sum(len(verdicts) for _, verdicts in results)} verdicts, {wrong} of them fail")
+        print(f"wrote {write(NAME, 'python -m tests.hard_cases --write', sections(found))}")
+    wrong = sum(not verdict.ok for verdict in found)
+    print(f"{len(found)} verdicts, {wrong} of them fail")
     return 1 if wrong else 0
 
 

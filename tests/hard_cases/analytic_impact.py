@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.analytic_cases import FALL, bounce
 from sphshell_pin.study.validation.restitution import hunt_crossley_restitution
 from tests import models
 from tests.hard_cases import surfaces
@@ -104,26 +105,13 @@ def hunt_crossley() -> Verdicts:
         yield compare("restitution", tried, formula, expected, seen.restitution, 1e-6, scale=1.0)
 
 
-def bounce(t: float, height: float, stiffness: float) -> tuple[float, float]:
-    """Height [m] over the touch and speed [m/s] at `t` of a ball let go at `height`, undamped."""
-    omega, speed = math.sqrt(stiffness / MASS), math.sqrt(2 * GRAVITY * height)
-    flight = 2 * speed / GRAVITY
-    touch = 2 * (math.pi - math.atan(speed * omega / GRAVITY)) / omega
-    since = (t + flight / 2) % (flight + touch)
-    if since <= flight:
-        return speed * since - 0.5 * GRAVITY * since**2, speed - GRAVITY * since
-    angle, sag = omega * (since - flight), GRAVITY / omega**2
-    depth = sag * (1 - math.cos(angle)) + speed / omega * math.sin(angle)
-    return -depth, -(sag * omega * math.sin(angle) + speed * math.cos(angle))
-
-
 def bouncing_error(integrator: object) -> float:
     """Return the error after five bounces, in the sixth flight, over the height of fall."""
-    height, stiffness, end = 0.02, 1e4, 0.75
+    height, stiffness, end = FALL, 1e4, 0.75
     model = models.slider(GRAVITY, MASS)
     scene = scene_of(surfaces.plate(), sp.ImpactLaw(stiffness, 1.0), model=model)
     result = sp.Simulation(scene, integrator).run([RADIUS + height], None, end)
-    z, speed = bounce(end, height, stiffness)
+    z, speed = bounce(np.array(end), stiffness)
     fall = math.sqrt(2 * GRAVITY * height)
     return math.hypot((result.q[-1, 0] - RADIUS - z) / height, (result.v[-1, 0] - speed) / fall)
 

@@ -47,13 +47,14 @@ def all_targets() -> list[Target]:
     cube_points, cube_sides = meshes.cube(BOX)
     ring = surfaces.torus(2 * TUBE, TUBE, 1.2)
     small = tetrahedron(0.5, at=(-0.125, -0.125, -0.125))
-    wavy = surfaces.sheet(0.6)
+    x, y, halves = surfaces.random_grid(15, 4.0)
+    wave = np.sin(0.7 * x + 0.3) * np.cos(0.6 * y) + 0.2 * np.sin(0.5 * x - 0.8 * y)
     return [
         Target("flat sheet", plate),
         Target("flat sheet of two triangles, 400 r", large),
         Target("dome", meshes.dome(8, 10.0, 8.0), True),
         Target("bowl", meshes.bowl(8, 5.0, 4.0), True),
-        Target("wavy sheet, moved vertices", (wavy.vertices, wavy.triangles), True),
+        Target("wavy sheet, moved vertices", (np.c_[x, y, 0.3 * wave], halves), True),
         Target("box", (cube_points, cube_sides), closed=True, interior=_in_box),
         Target("plate of 0.2 r", (cube_points * [3.0, 3.0, 0.05], cube_sides), closed=True),
         Target("tetrahedron of r / 2", (small[0], small[1].astype(np.int32)), closed=True),

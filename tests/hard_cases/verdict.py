@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from sphshell_pin.cases.contents import Verdict, at_most, compare
 from sphshell_pin.cases.register import Case, Register, Verdicts
 
@@ -23,16 +21,6 @@ CASES: Register[Case] = Register(
         "starts",
         "repeats",
     ),
+    Case,
 )
-
-
-def case(
-    name: str, *, slow: bool = False
-) -> Callable[[Callable[[], Verdicts]], Callable[[], Verdicts]]:
-    """Register a function that yields verdicts as a case, in the order of the module."""
-
-    def register(run: Callable[[], Verdicts]) -> Callable[[], Verdicts]:
-        CASES.add(name, Case(name, run, slow))
-        return run
-
-    return register
+case = CASES.case

@@ -5,7 +5,9 @@ import dataclasses
 import hashlib
 import os
 import pickle
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -114,70 +116,68 @@ def test_meshes_beyond_the_limit_are_named(
         Replay(with_kept(result, whole))
 
 
-def changed(result: sp.Result, what: str) -> Kept:
-    """Return what is kept, with one thing in it as it must not be."""
-    found = kept_of(result)
-    contents, arrays = found.contents, dict(found.arrays)
-    urdf, _, mjcf = contents["robots"]
-    if what == "include":
-        mjcf["text"] = mjcf["text"].replace("<asset>", '<include file="/etc/passwd"/><asset>')
-    elif what == "posture":
-        urdf["q0"] = [0.0]
-    elif what == "no number":
-        urdf["q0"] = [float("nan"), 0.0]
-    elif what == "no robot":
-        contents["robots"] = [None] * 3
-    elif what == "fewer robots":
-        contents["robots"] = []
-    elif what == "part":
-        contents["robots"] = "x"
-    elif what == "urdf":
-        urdf["text"] = "<robot"
-    elif what == "no surface":
-        del contents["surfaces"]["plate"]
-    elif what == "no table":
-        contents["tables"] = {}
-    elif what == "crease angle":
-        contents["surfaces"]["plate"]["crease_angle"] = -1.0
-    elif what == "index":
-        arrays["shell.plate.elements"] = arrays["shell.plate.elements"] + np.int32(100)
-    elif what == "triangle":
-        arrays["shell.plate.triangles"] = arrays["shell.plate.triangles"] + np.int32(7)
-    elif what == "face":
-        arrays["shell.valve.element_face"] = arrays["shell.valve.element_face"] + np.int32(999)
-    elif what == "normal":
-        arrays["shell.valve.normals"] = arrays["shell.valve.normals"] * np.nan
-    elif what == "kind of face":
-        arrays["shell.valve.face_shapes"] = arrays["shell.valve.face_shapes"] + 77.0
-    elif what == "numbers":
-        arrays["shell.plate.vertices"] = arrays["shell.plate.vertices"].astype(np.int32)
-    return Kept(contents, arrays)
+Parts = dict[str, Any]
+Change = Callable[[Parts, Parts], object]
+"""Changes contents and arrays of what is kept."""
 
 
-WRONG = {
-    "include": "it includes other files",
-    "posture": r"its posture \[0\.0\] is not one of 2 numbers",
-    "no number": r"its posture \[nan, 0\.0\] is not one of 2 numbers",
-    "no robot": "does not hold the robot 'arm/arm.urdf.xacro'",
-    "fewer robots": "it has 0 robots, not 3",
-    "part": "a wrong part, 'robots'",
-    "urdf": "not well-formed XML",
-    "no surface": "does not hold the surface 'plate'",
-    "no table": "does not hold the file 'law.csv' of a law",
-    "crease angle": "crease_angle",
-    "index": "element 0 uses vertex 100",
-    "triangle": "its triangles do not fit",
-    "face": "its element_face do not fit",
-    "normal": "its normals do not fit",
-    "kind of face": "its face_shapes do not fit",
-    "numbers": r"its vertices are int32 \(4, 3\), not f8",
+def in_text(robot: int, old: str, new: str) -> Change:
+    """Return what replaces the text of a robot."""
+    return lambda contents, _: contents["robots"][robot].update(
+        text=contents["robots"][robot]["text"].replace(old, new)
+    )
+
+
+def added(name: str, number: float) -> Change:
+    """Return what adds to an array."""
+    return lambda _, arrays: arrays.update({name: arrays[name] + arrays[name].dtype.type(number)})
+
+
+def posture(*q0: float) -> Change:
+    return lambda contents, _: contents["robots"][0].update(q0=list(q0))
+
+
+def part(name: str, value: object) -> Change:
+    return lambda contents, _: contents.update({name: value})
+
+
+PLATE, VALVE = "shell.plate.", "shell.valve."
+WRONG: dict[str, tuple[Change, str]] = {
+    "include": (
+        in_text(2, "<asset>", '<include file="/etc/passwd"/><asset>'),
+        "it includes other files",
+    ),
+    "posture": (posture(0.0), r"its posture \[0\.0\] is not one of 2 numbers"),
+    "no number": (posture(np.nan, 0.0), r"its posture \[nan, 0\.0\] is not one of 2 numbers"),
+    "no robot": (part("robots", [None] * 3), "does not hold the robot 'arm/arm.urdf.xacro'"),
+    "fewer robots": (part("robots", []), "it has 0 robots, not 3"),
+    "part": (part("robots", "x"), "a wrong part, 'robots'"),
+    "urdf": (in_text(0, "</robot>", ""), "not well-formed XML"),
+    "no surface": (lambda c, _: c["surfaces"].pop("plate"), "does not hold the surface 'plate'"),
+    "no table": (part("tables", {}), "does not hold the file 'law.csv' of a law"),
+    "crease angle": (
+        lambda contents, _: contents["surfaces"]["plate"].update(crease_angle=-1.0),
+        "crease_angle",
+    ),
+    "index": (added(f"{PLATE}elements", 100), "element 0 uses vertex 100"),
+    "triangle": (added(f"{PLATE}triangles", 7), "its triangles do not fit"),
+    "face": (added(f"{VALVE}element_face", 999), "its element_face do not fit"),
+    "normal": (added(f"{VALVE}normals", np.nan), "its normals do not fit"),
+    "kind of face": (added(f"{VALVE}face_shapes", 77.0), "its face_shapes do not fit"),
+    "numbers": (
+        lambda _, arrays: arrays.update({f"{PLATE}vertices": np.zeros((4, 3), np.int32)}),
+        r"its vertices are int32 \(4, 3\), not f8",
+    ),
 }
 
 
 @pytest.mark.parametrize("what", WRONG)
 def test_what_does_not_fit_is_said(result: sp.Result, what: str) -> None:
-    with pytest.raises(ResultError, match=WRONG[what] + r".*--scenario"):
-        Replay(with_kept(result, changed(result, what)))
+    found, (change, words) = kept_of(result), WRONG[what]
+    contents, arrays = found.contents, dict(found.arrays)
+    change(contents, arrays)
+    with pytest.raises(ResultError, match=words + r".*--scenario"):
+        Replay(with_kept(result, Kept(contents, arrays)))
 
 
 @pytest.mark.parametrize("place", [str(CUBE), f"file://{CUBE}", "package://finger/cube.stl"])

@@ -18,15 +18,17 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
 from OCP.IntTools import IntTools_FClass2d
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_OUT, TopAbs_REVERSED
-from OCP.TopExp import TopExp_Explorer
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_OUT
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 from scipy.optimize import minimize_scalar
 from scipy.spatial import cKDTree
 
 from sphshell_pin import Shell
+from sphshell_pin.shell.cad.model import box_size
 from sphshell_pin.shell.curved import curved_mesh, points_at
+from sphshell_pin.shell.raw import area_vectors, random_places
+from tests.parts.occ import faces, parts
 
 Array = NDArray[np.float64]
 
@@ -40,28 +42,16 @@ EDGE_POINTS = 129
 NEWTON_STEPS = 30
 
 
-@dataclass(frozen=True)
-class Nearest:
-    """Closest points of n points: distances (n,), points and unit normals (n, 3), on_edge (n,)."""
-
-    distances: Array
-    points: Array
-    normals: Array
-    on_edge: NDArray[np.bool_]
-
-
 class ExactShape:
     """A shape, scaled by `meters` per unit, whose faces and edges can be asked for distances."""
 
     def __init__(self, shape: Any, meters: float = 1e-3, seed_share: float = 2e-3) -> None:
         copy = BRepBuilderAPI_Copy(shape, True, False).Shape()
         self.meters = meters
-        self.faces = [TopoDS.Face(face) for face in _parts(copy, TopAbs_FACE)]
-        size = max(1e-12, _size(self.faces))
+        self.faces, size = faces(copy), box_size(copy)
         BRepMesh_IncrementalMesh(copy, seed_share * size, False, 0.2, False)
         self.surfaces = [BRepAdaptor_Surface(face) for face in self.faces]
         self.inside = [IntTools_FClass2d(face, 1e-9) for face in self.faces]
-        self.turned = [face.Orientation() == TopAbs_REVERSED for face in self.faces]
         self._triangles = [_triangles(face) for face in self.faces]
         self._reach = 2 * SPACING * size
         self._seeds, self._uv = [], []
@@ -72,7 +62,7 @@ class ExactShape:
         self._curves: list[Any] = []
         places, edge_of, at_edge = [], [], []
         for face in self.faces:
-            for edge in _parts(face, TopAbs_EDGE):
+            for edge in parts(face, TopAbs_EDGE):
                 if BRep_Tool.Degenerated_s(TopoDS.Edge(edge)):
                     continue
                 curve = BRepAdaptor_Curve(TopoDS.Edge(edge), face)
@@ -86,12 +76,10 @@ class ExactShape:
             self._edge_reach = max(np.linalg.norm(np.diff(p, axis=0), axis=1).max() for p in places)
             self._edge_of, self._at_edge = np.concatenate(edge_of), np.concatenate(at_edge)
 
-    def closest(self, points: Array) -> Nearest:
-        """Closest point of the trimmed faces to each of points (n, 3) [m]."""
+    def distances(self, points: Array) -> Array:
+        """Distances (n,) of points (n, 3) from the trimmed faces [m]."""
         places = np.asarray(points, float) / self.meters
         distance = np.full(len(places), np.inf)
-        closest, normal = np.zeros_like(places), np.zeros_like(places)
-        on_edge = np.zeros(len(places), bool)
         found = [tree.query(places, min(SEEDS, tree.n)) for tree in self._seeds]
         away = np.array([d.reshape(len(places), -1)[:, 0] for d, _ in found])
         near = [rows.reshape(len(places), -1) for _, rows in found]
@@ -105,30 +93,27 @@ class ExactShape:
                     foot, uv = self._foot(int(face), self._uv[face][seed], point)
                     off = float(np.linalg.norm(foot - point))
                     if off < distance[k] and self._holds(int(face), uv):
-                        distance[k], closest[k] = off, foot
-                        normal[k] = self._normal(int(face), uv)
+                        distance[k] = off
         if self._edge_seeds is None:
-            return Nearest(distance * self.meters, closest * self.meters, normal, on_edge)
+            return distance * self.meters
         away, near = self._edge_seeds.query(places, min(EDGE_SEEDS, self._edge_seeds.n))
         for k in np.flatnonzero(away[:, 0] - self._edge_reach < distance):
             for edge in np.unique(self._edge_of[near[k]]):
                 seed = near[k][np.argmax(self._edge_of[near[k]] == edge)]
-                foot = self._foot_on_edge(int(edge), float(self._at_edge[seed]), places[k])
-                off = float(np.linalg.norm(foot - places[k]))
-                if off < distance[k] * (1 - 1e-9):
-                    distance[k], closest[k], on_edge[k] = off, foot, True
-                    normal[k] = (places[k] - foot) / max(off, 1e-300)
-        return Nearest(distance * self.meters, closest * self.meters, normal, on_edge)
+                off = self._from_edge(int(edge), float(self._at_edge[seed]), places[k])
+                distance[k] = min(distance[k], off)
+        return distance * self.meters
 
     def samples(self, count: int, rng: np.random.Generator) -> Array:
         """Random points (n <= count, 3) of the trimmed faces [m], spread by area."""
-        areas = [_areas(points, rows) for points, _, rows in self._triangles]
+        spans = [area_vectors(points[rows]) for points, _, rows in self._triangles]
+        areas = [np.linalg.norm(one, axis=1) for one in spans]
         face = np.concatenate([np.full(len(area), k) for k, area in enumerate(areas)])
         row = np.concatenate([np.arange(len(area)) for area in areas])
         share = np.concatenate(areas)
         chosen = rng.choice(len(share), count, p=share / share.sum())
         found = []
-        for pick, weights in zip(chosen, _barycentric(rng, count), strict=True):
+        for pick, weights in zip(chosen, rng.dirichlet((1.0, 1.0, 1.0), count), strict=True):
             k = int(face[pick])
             _, uv, rows = self._triangles[k]
             at = weights @ uv[rows[row[pick]]]
@@ -138,14 +123,6 @@ class ExactShape:
 
     def _holds(self, face: int, uv: Array) -> bool:
         return bool(self.inside[face].Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_OUT)
-
-    def _normal(self, face: int, uv: Array) -> Array:
-        place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
-        self.surfaces[face].D1(*uv.tolist(), place, by_u, by_v)
-        normal = np.cross(by_u.Coord(), by_v.Coord())
-        length = np.linalg.norm(normal)
-        unit = normal / length if length > 0.0 else normal
-        return -unit if self.turned[face] else unit
 
     def _foot(self, face: int, seed: Array, point: Array) -> tuple[Array, Array]:
         """Foot of a point on the untrimmed surface, by Newton's method with a line search."""
@@ -181,8 +158,8 @@ class ExactShape:
                 break
         return np.array(surface.Value(*at.tolist()).Coord()), at
 
-    def _foot_on_edge(self, edge: int, seed: float, point: Array) -> Array:
-        """Nearest point of an edge near a seed."""
+    def _from_edge(self, edge: int, seed: float, point: Array) -> float:
+        """Distance from the nearest point of an edge near a seed."""
         curve = self._curves[edge]
         low, high = curve.FirstParameter(), curve.LastParameter()
         reach = (high - low) / (EDGE_POINTS - 1)
@@ -193,7 +170,7 @@ class ExactShape:
             return float(offset @ offset)
 
         found = minimize_scalar(away, bounds=bounds, options={"xatol": 1e-12 * (high - low)})
-        return np.array(curve.Value(float(found.x)).Coord())
+        return float(np.sqrt(found.fun))
 
 
 @dataclass(frozen=True)
@@ -201,40 +178,24 @@ class Deviation:
     """Distances [m] between a shell and the exact shape.
 
     flat, smooth : of points of the flat and of the curved elements from the shape
-    back, back_smooth : of points of the shape from the flat and from the curved elements
+    back : of points of the shape from the flat elements
     """
 
     flat: Array
     smooth: Array
     back: Array
-    back_smooth: Array
-
-    @property
-    def largest(self) -> tuple[float, float, float, float]:
-        """The largest of each."""
-        return tuple(  # type: ignore[return-value]
-            float(column.max()) for column in (self.flat, self.smooth, self.back, self.back_smooth)
-        )
 
 
 def deviation(shell: Shell, exact: ExactShape, samples: int, seed: int = 0) -> Deviation:
     """Distances of random points of a shell from the exact shape, and the other way."""
     rng = np.random.default_rng(seed)
     corners = shell.vertices[shell.triangles]
-    share = _areas(shell.vertices, shell.triangles)
-    chosen = rng.choice(len(share), samples, p=share / share.sum())
-    flat = np.einsum("nk,nkx->nx", _barycentric(rng, samples), corners[chosen])
+    chosen, flat = random_places(corners, samples, rng)
     points, _, _ = curved_mesh(shell, 4)
     smooth = points.reshape(len(corners), -1, 3)
     smooth = smooth[chosen, rng.integers(0, smooth.shape[1], samples)]
-    there = exact.samples(samples, rng)
-    back = [shell.closest_points(there, method=method).distances for method in ("facets", "smooth")]
-    return Deviation(
-        exact.closest(flat).distances,
-        exact.closest(smooth).distances,
-        np.abs(back[0]),
-        np.abs(back[1]),
-    )
+    back = shell.closest_points(exact.samples(samples, rng), method="facets").distances
+    return Deviation(exact.distances(flat), exact.distances(smooth), np.abs(back))
 
 
 def curved_places(shell: Shell, count: int, seed: int = 0) -> dict[str, Array]:
@@ -270,14 +231,6 @@ def curved_places(shell: Shell, count: int, seed: int = 0) -> dict[str, Array]:
     return found
 
 
-def _parts(shape: Any, kind: Any) -> list[Any]:
-    explorer, found = TopExp_Explorer(shape, kind), []
-    while explorer.More():
-        found.append(explorer.Current())
-        explorer.Next()
-    return found
-
-
 def _triangles(face: Any) -> tuple[Array, Array, NDArray[np.int64]]:
     """Points and parameters of the nodes of a face, and its triangles."""
     location = TopLoc_Location()
@@ -303,24 +256,3 @@ def _spread(corners: Array, spacing: float) -> tuple[Array, NDArray[np.int64]]:
         weights.append(np.tile(np.array(grid) / number, (len(own), 1)))
         triangle.append(np.repeat(own, len(grid)))
     return np.concatenate(weights), np.concatenate(triangle)
-
-
-def _size(faces: list[Any]) -> float:
-    """Diagonal of a box round some points of the faces."""
-    points = []
-    for face in faces:
-        for edge in _parts(face, TopAbs_EDGE):
-            curve = BRepAdaptor_Curve(TopoDS.Edge(edge), face)
-            ends = np.linspace(curve.FirstParameter(), curve.LastParameter(), 9)
-            points += [curve.Value(t).Coord() for t in ends.tolist()]
-    return float(np.linalg.norm(np.ptp(np.array(points), axis=0)))
-
-
-def _areas(points: Array, rows: NDArray[Any]) -> Array:
-    corners = points[rows]
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(0.5 * np.linalg.norm(spans, axis=1))
-
-
-def _barycentric(rng: np.random.Generator, count: int) -> Array:
-    return rng.dirichlet((1.0, 1.0, 1.0), count)

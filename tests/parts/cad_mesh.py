@@ -8,17 +8,10 @@ from numpy.typing import NDArray
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
-from OCP.GeomAbs import (
-    GeomAbs_Cone,
-    GeomAbs_Cylinder,
-    GeomAbs_Plane,
-    GeomAbs_Sphere,
-    GeomAbs_Torus,
-)
 
+from sphshell_pin.shell import raw
 from sphshell_pin.shell.cad.face_mesh import FaceMesh, take_mesh
-from tests.parts.occ import OccFailed, Solid
-from tests.shell.cad_shapes import faces
+from tests.parts.occ import OccFailed, Solid, faces
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,16 +19,8 @@ Ints = NDArray[np.int64]
 MM = 1e-3
 """Parts are in millimeters, shells in meters."""
 
-KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "spline")
+KINDS = (*raw.KINDS, "spline")
 """Of the surfaces below faces; all that is none of the first five counts as the last."""
-
-_KIND_OF = dict(
-    zip(
-        (GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus),
-        KINDS,
-        strict=False,
-    )
-)
 
 MOST_TRIANGLES = 30_000
 
@@ -97,8 +82,9 @@ def meshed_faces(solid: Solid, deflection: float, angle: float) -> list[Face]:
         mesh = take_mesh(shape)
         if mesh is None:
             raise OccFailed("a face without triangles")
-        kind = _KIND_OF.get(BRepAdaptor_Surface(shape).GetType(), "spline")
-        found.append(Face(shape, kind, mesh))
+        # OpenCASCADE numbers the kinds of surfaces in this order.
+        number = int(BRepAdaptor_Surface(shape).GetType())
+        found.append(Face(shape, KINDS[min(number, len(KINDS) - 1)], mesh))
     return found
 
 

@@ -18,6 +18,7 @@ from OCP.BRepBuilderAPI import (
 )
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeChamfer, BRepFilletAPI_MakeFillet
+from OCP.BRepGProp import BRepGProp
 from OCP.BRepOffsetAPI import BRepOffsetAPI_MakePipe, BRepOffsetAPI_ThruSections
 from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeBox,
@@ -31,17 +32,40 @@ from OCP.BRepPrimAPI import (
 from OCP.collections import Array1_gp_Pnt
 from OCP.GeomAPI import GeomAPI_PointsToBSpline
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Circ, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.GProp import GProp_GProps
 from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
+from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
-
-from tests.shell.cad_shapes import area_and_volume, parts
 
 Solid = Any
 Edge = Any
 Rng = np.random.Generator
 
 ORIGIN, UP = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def parts(shape: Any, kind: Any) -> list[Any]:
+    """Return the parts of one kind, each once."""
+    explorer, found = TopExp_Explorer(shape, kind), []
+    while explorer.More():
+        if not any(explorer.Current().IsSame(one) for one in found):
+            found.append(explorer.Current())
+        explorer.Next()
+    return found
+
+
+def faces(shape: Any) -> list[Any]:
+    return [TopoDS.Face(face) for face in parts(shape, TopAbs_FACE)]
+
+
+def area_and_volume(shape: Any) -> tuple[float, float]:
+    """Of OpenCASCADE's own integration [mm^2, mm^3]."""
+    surface, inside = GProp_GProps(), GProp_GProps()
+    # Without a tolerance trimmed splines are off by percents.
+    BRepGProp.SurfaceProperties_s(shape, surface, 1e-6)
+    BRepGProp.VolumeProperties_s(shape, inside, 1e-6)
+    return surface.Mass(), inside.Mass()
 
 
 class OccFailed(Exception):

@@ -19,10 +19,10 @@ from tests.parts.judge import (
     loaded,
     random_part,
 )
+from tests.parts.occ import area_and_volume
 from tests.parts.running import outcome
 from tests.parts.solids import FAMILIES, family_of, random_solid
 from tests.parts.truth import ExactFaces
-from tests.shell.cad_shapes import area_and_volume
 
 EXPORTED = tuple(kind for kind in KINDS_OF_FILE if kind != "decimated")
 
@@ -60,7 +60,7 @@ def test_places_are_as_far_as_they_say(family: str) -> None:
     solid = random_solid(tuple(FAMILIES).index(family))
     exact = ExactFaces(solid)
     places = exact.places(25, np.random.default_rng(0))
-    found = ExactShape(solid, meters=1.0).closest(places.points).distances
+    found = ExactShape(solid, meters=1.0).distances(places.points)
     assert len(found) >= 15
     np.testing.assert_allclose(found, places.distances, rtol=1e-6)
 

@@ -17,7 +17,8 @@ from OCP.IntTools import IntTools_FClass2d
 from OCP.TopAbs import TopAbs_IN
 
 from sphshell_pin import Shell
-from sphshell_pin.shell.cad.surface import corner_weights
+from sphshell_pin.shell.cad.face_mesh import FaceMesh
+from sphshell_pin.shell.cad.tessellation import Tessellation
 from tests.parts.cad_mesh import (
     KINDS,
     Array,
@@ -82,12 +83,11 @@ class ExactFaces:
         self.mesh: CadMesh = joined(self.faces)
         self.size = self.mesh.size
         # Every face has its own points: nothing is repaired, so no triangle loses its face.
-        corners = [face.mesh.points[face.mesh.triangles] for face in self.faces]
-        self._corners = np.concatenate(corners)
-        self._starts = np.cumsum([0, *map(len, corners)])
-        rows = np.arange(3 * len(self._corners)).reshape(-1, 3)
+        self._found = Tessellation(tuple(face.mesh for face in self.faces), 0.0, 0.0)
+        corners = np.concatenate([face.mesh.points[face.mesh.triangles] for face in self.faces])
+        rows = np.arange(3 * len(corners)).reshape(-1, 3)
         # In meters for the shell, which only has to find what is near.
-        self._shell = Shell(self._corners.reshape(-1, 3), rows, crease_angle=0.0)
+        self._shell = Shell(corners.reshape(-1, 3), rows, crease_angle=0.0)
         self.error = 0.0
         self._trimming = cache(lambda k: IntTools_FClass2d(self.faces[k].shape, 1e-9))
         self._adaptor = cache(lambda k: BRepAdaptor_Surface(self.faces[k].shape))
@@ -120,7 +120,8 @@ class ExactFaces:
             depth = self.size * np.exp(rng.uniform(*np.log(DEPTHS)))
             for radius in self.size * np.array(RADII):
                 center = at + (radius - depth) * normal
-                if set(self._faces_within(center, radius + clear + self.error)) == {k}:
+                near = self._nearest_of_faces(center, radius + clear + self.error)
+                if near.keys() == {k}:
                     rows.append((center, radius, depth))
                     break
         columns = zip(*rows, strict=True) if rows else (np.zeros((0, 3)), np.zeros(0), np.zeros(0))
@@ -134,9 +135,8 @@ class ExactFaces:
     def _beside(self, k: int, rng: Rng) -> tuple[Array, Array, float] | None:
         """Return a random point of a face, the normal there and an offset that the bend allows."""
         mesh = self.faces[k].mesh
-        areas = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
-        row = rng.choice(len(areas), p=areas / areas.sum())
-        uv = rng.dirichlet((1.0, 1.0, 1.0)) @ mesh.parameters(mesh.triangles[row : row + 1])[0]
+        row, weights = _anywhere(mesh, rng)
+        uv = weights @ mesh.parameters(mesh.triangles[row : row + 1])[0]
         if self._trimming(k).Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_IN:
             return None
         bend = BRepLProp_SLProps(self._adaptor(k), *uv.tolist(), 2, 1e-9)
@@ -151,10 +151,8 @@ class ExactFaces:
 
     def _inside_plane(self, k: int, rng: Rng) -> tuple[Array, Array]:
         mesh = self.faces[k].mesh
-        areas = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
-        row = rng.choice(len(areas), p=areas / areas.sum())
-        at = rng.dirichlet((1.0, 1.0, 1.0)) @ mesh.points[mesh.triangles[row]]
-        return at, mesh.corner_normals()[row, 0]
+        row, weights = _anywhere(mesh, rng)
+        return weights @ mesh.points[mesh.triangles[row]], mesh.corner_normals()[row, 0]
 
     def _is_nearest(self, points: Array, offset: Array) -> np.ndarray:
         """Whether no face is nearer to points (n, 3) than `offset` (n,)."""
@@ -164,14 +162,9 @@ class ExactFaces:
                 place.append(row)
                 triangle.append(one)
                 near.append(at)
-        rows, owner = np.array(place), self._face_of(np.array(triangle))
+        rows = np.array(place)
         distance = np.full(len(rows), np.inf)
-        for k in np.unique(owner).tolist():
-            own = np.flatnonzero(owner == k)
-            mesh = self.faces[k].mesh
-            nodes = mesh.triangles[np.array(triangle)[own] - self._starts[k]]
-            weights = corner_weights(mesh.points[nodes], np.array(near)[own])
-            uv = np.einsum("nk,nkx->nx", weights, mesh.parameters(nodes))
+        for _, mesh, own, uv in self._found.locate(np.array(triangle), np.array(near)):
             distance[own] = mesh.surface.distances(points[rows[own]], uv, 1e-9 * self.size)
         nearest = np.full(len(points), np.inf)
         np.minimum.at(nearest, rows, distance)
@@ -182,13 +175,14 @@ class ExactFaces:
         touched = self._shell.contacts(point, radius, method="elements")
         triangles = self._shell.source_element[touched.element]
         # Contacts come deepest first: the first of each face is the nearest.
-        faces, first = np.unique(self._face_of(triangles), return_index=True)
+        faces, first = np.unique(self._found.face_of(triangles), return_index=True)
         return {
             int(k): (int(triangles[i]), touched.point[i]) for k, i in zip(faces, first, strict=True)
         }
 
-    def _faces_within(self, point: Array, radius: float) -> list[int]:
-        return list(self._nearest_of_faces(point, radius))
 
-    def _face_of(self, triangles: Ints) -> Ints:
-        return np.searchsorted(self._starts, triangles, side="right") - 1
+def _anywhere(mesh: FaceMesh, rng: Rng) -> tuple[int, Array]:
+    """Return a random triangle of a face, by area, and random weights (3,) of its corners."""
+    areas = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
+    row = rng.choice(len(areas), p=areas / areas.sum())
+    return int(row), rng.dirichlet((1.0, 1.0, 1.0))

@@ -3,6 +3,7 @@
 import contextlib
 import shutil
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 import pinocchio as pin
@@ -71,17 +72,19 @@ HOSTILE = {
 }
 
 
+def xacro(tmp_path, inside):
+    """Return the file of a xacro robot."""
+    path = tmp_path / "r.xacro"
+    path.write_text(f"<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>{inside}</robot>")
+    return path
+
+
 @pytest.mark.parametrize("how", HOSTILE)
 def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
-    made, path = tmp_path / "made", tmp_path / "r.xacro"
-    expression = (
-        HOSTILE[how].replace("FILE", str(made)).replace("'", "&apos;").replace('"', "&quot;")
-    )
-    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-    link = "<link name='a'/>"
-    path.write_text(
-        f"{head}<xacro:property name='p' value='{expression}'/>{link}<link name='${{p}}'/></robot>"
-    )
+    made = tmp_path / "made"
+    expression = escape(HOSTILE[how].replace("FILE", str(made)), {"'": "&apos;", '"': "&quot;"})
+    links = "<link name='a'/><link name='${p}'/>"
+    path = xacro(tmp_path, f"<xacro:property name='p' value='{expression}'/>{links}")
     # What is in $(eval ...) ends at the first parenthesis, and is no expression then.
     why = "refused in the expression|too deeply" if "${" in HOSTILE[how] else "xacro cannot expand"
     with pytest.raises(robots.RobotError, match=why):
@@ -98,35 +101,27 @@ def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
 )
 def test_what_a_xacro_file_takes_is_limited(tmp_path, monkeypatch, expression, words):
     monkeypatch.setattr(xacro_file, "TIME_LIMIT", 1.0)
-    path = tmp_path / "r.xacro"
-    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-    path.write_text(f'{head}<link name="${{{expression}}}"/></robot>')
     with pytest.raises(robots.RobotError, match=words):
-        robots.load_file(path)
+        robots.load_file(xacro(tmp_path, f'<link name="${{{expression}}}"/>'))
 
 
 def test_what_the_check_of_expressions_misses_is_in_a_process_that_writes_nothing(
     tmp_path, monkeypatch
 ):
     """Without the check, an expression reaches open()."""
-    path, made = tmp_path / "r.xacro", tmp_path / "made"
+    made = tmp_path / "made"
     call = OS.replace("'", '"') + '.__init__.__globals__["__builtins__"]["open"]'
-    path.write_text(
-        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-        f'<link name=\'${{(lambda: {call}("{made}", "w").write("executed"))()}}\'/></robot>'
-    )
+    link = f'<link name=\'${{(lambda: {call}("{made}", "w").write("executed"))()}}\'/>'
     without = "from sphshell_pin.robots import xacro_expressions as x; x.check = lambda _: None"
     first, serve = xacro_file._START.strip().rsplit("\n", 1)
     monkeypatch.setattr(xacro_file, "_START", f"{first}\n{without}\n{serve}")
     with contextlib.suppress(robots.RobotError):
-        robots.load_file(path)
+        robots.load_file(xacro(tmp_path, link))
     assert made.exists()  # it was opened
     assert not made.read_bytes()
 
 
 def test_xacro_expressions_compute(tmp_path):
-    path = tmp_path / "r.xacro"
-    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
     names = ["${'a'.upper() + str(max([round(x) for x in (1.2, 3.7)]))}", "$(eval 'b2')"]
     links = "".join(f'<link name="{name}"/>' for name in names)
     joint = (
@@ -134,24 +129,20 @@ def test_xacro_expressions_compute(tmp_path):
         '<limit lower="${-pi/2}" upper="${radians(90) if 1 &lt; 2 else 0}" effort="1" '
         'velocity="1"/></joint>'
     )
-    path.write_text(f"{head}{links}{joint}</robot>")
-    model = robots.load_file(path).model
+    model = robots.load_file(xacro(tmp_path, links + joint)).model
     assert model.existFrame("A4")
     assert model.upperPositionLimit[0] == -model.lowerPositionLimit[0] == pytest.approx(np.pi / 2)
 
 
 def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
-    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-    path = tmp_path / "r.xacro"
     for inside, words in (
         ("${nix}", "xacro cannot expand it: .*nix"),
         ('<xacro:include filename="$(find nix)/a.xacro"/>', "no package 'nix' in .*--package-dir"),
         ('<xacro:include filename="b.xacro"/>', r"b\.xacro"),
         ("<link name='a'>", "xacro cannot expand it"),
     ):
-        path.write_text(f"{head}{inside}</robot>")
         with pytest.raises(robots.RobotError, match=words):
-            robots.load_file(path)
+            robots.load_file(xacro(tmp_path, inside))
     with pytest.raises(robots.RobotError, match=r"arguments are for files that end in \.xacro"):
         robots.load_file(robots.URDF_FOLDER / "ball.urdf", xacro_args={"a": 1})
     monkeypatch.setitem(__import__("sys").modules, "xacro", None)

@@ -35,14 +35,19 @@ def centers_and_radii(found: robots.MeshSpheres) -> tuple[np.ndarray, np.ndarray
     )
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_no_sphere_reaches_beyond_the_mesh(shape: str) -> None:
-    # The mesh's signed distance, by trimesh: positive inside.
-    shell = shell_of(SHAPES[shape])
+@pytest.fixture(scope="module", params=SHAPES)
+def found(request):  # type: ignore[no-untyped-def]
+    """The spheres of a shape, their centers and radii, and its mesh."""
+    shell = shell_of(SHAPES[request.param])
     found = robots.spheres_of_mesh(shell, "link", count=12)
-    assert len(found.spheres) == 12
-    centers, radii = centers_and_radii(found)
     mesh = trimesh.Trimesh(shell.vertices, shell.triangles, process=False)
+    return found, *centers_and_radii(found), mesh
+
+
+def test_no_sphere_reaches_beyond_the_mesh(found) -> None:  # type: ignore[no-untyped-def]
+    # The mesh's signed distance, by trimesh: positive inside.
+    _, centers, radii, mesh = found
+    assert len(centers) == 12
     _, distance, _ = trimesh.proximity.closest_point_naive(mesh, centers)
     assert (radii <= distance * (1 + 1e-9)).all()
     hull = trimesh.convex.convex_hull(mesh)  # these shapes are convex
@@ -53,12 +58,8 @@ def test_no_sphere_reaches_beyond_the_mesh(shape: str) -> None:
     assert (planes.max(axis=0) <= -radii * (1 - 1e-6)).all()
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_the_distances_are_those_of_other_places(shape: str) -> None:
-    shell = shell_of(SHAPES[shape])
-    found = robots.spheres_of_mesh(shell, "link", count=12)
-    centers, radii = centers_and_radii(found)
-    mesh = trimesh.Trimesh(shell.vertices, shell.triangles, process=False)
+def test_the_distances_are_those_of_other_places(found) -> None:  # type: ignore[no-untyped-def]
+    found, centers, radii, mesh = found
     places, _ = trimesh.sample.sample_surface(mesh, 5000, seed=7)
     heights = np.linalg.norm(places[:, None] - centers, axis=2) - radii
     largest = heights.min(axis=1).max()

@@ -4,28 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
-from OCP.BRepBuilderAPI import (
-    BRepBuilderAPI_MakeFace,
-    BRepBuilderAPI_MakePolygon,
-    BRepBuilderAPI_NurbsConvert,
-    BRepBuilderAPI_Transform,
-)
-from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
-from OCP.BRepGProp import BRepGProp
-from OCP.BRepPrimAPI import (
-    BRepPrimAPI_MakeBox,
-    BRepPrimAPI_MakeCone,
-    BRepPrimAPI_MakeCylinder,
-    BRepPrimAPI_MakePrism,
-    BRepPrimAPI_MakeSphere,
-    BRepPrimAPI_MakeTorus,
-)
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_NurbsConvert
 from OCP.BRepTools import BRepTools
 from OCP.collections import Array1_double, Array1_int, Array2_gp_Pnt
 from OCP.Geom import Geom_BSplineSurface
-from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
-from OCP.GProp import GProp_GProps
+from OCP.gp import gp_Pnt
 from OCP.IGESControl import IGESControl_Writer
 from OCP.Interface import Interface_Static
 from OCP.STEPCAFControl import STEPCAFControl_Writer
@@ -33,93 +16,57 @@ from OCP.STEPControl import STEPControl_AsIs
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
-from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS
+from OCP.TopAbs import TopAbs_FACE
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+from tests.parts import occ
 
 BALL, TUBE, RING = 12.0, 3.0, 9.0
 """Radius of the ball; radii of the tube of the ring and of its circle [mm]."""
 
 
 def box(x: float = 20.0, y: float = 30.0, z: float = 10.0) -> Any:
-    return BRepPrimAPI_MakeBox(x, y, z).Shape()
+    return occ.box((0, 0, 0), (x, y, z))
 
 
 def ball(radius: float = BALL) -> Any:
-    return BRepPrimAPI_MakeSphere(radius).Shape()
+    return occ.ball(radius)
 
 
 def cylinder(radius: float = 5.0, length: float = 20.0) -> Any:
-    return BRepPrimAPI_MakeCylinder(radius, length).Shape()
+    return occ.cylinder(radius, length)
 
 
 def cone(radius: float = 6.0, height: float = 10.0) -> Any:
-    return BRepPrimAPI_MakeCone(radius, 0.0, height).Shape()
+    return occ.cone(radius, 0.0, height)
 
 
 def ring() -> Any:
-    return BRepPrimAPI_MakeTorus(RING, TUBE).Shape()
+    return occ.torus(RING, TUBE)
 
 
 def rounded_box() -> Any:
     """A box with all edges rounded by 2 mm: planes, cylinders and balls, tangent to each other."""
     shape = box()
-    fillet = BRepFilletAPI_MakeFillet(shape)
-    for edge in parts(shape, TopAbs_EDGE):
-        fillet.Add(2.0, TopoDS.Edge(edge))
-    return fillet.Shape()
+    return occ.filleted(shape, occ.edges_where(shape, lambda p: True), 2.0)
 
 
 def drilled_plate() -> Any:
     """A plate with a round hole: its borders are hollow, seen from the plate."""
-    axis = gp_Ax2(gp_Pnt(20.0, 20.0, -1.0), gp_Dir(0.0, 0.0, 1.0))
-    hole = BRepPrimAPI_MakeCylinder(axis, 10.0, 7.0).Shape()
-    return BRepAlgoAPI_Cut(box(40.0, 40.0, 5.0), hole).Shape()
+    return occ.cut(box(40.0, 40.0, 5.0), occ.cylinder(10.0, 7.0, (20.0, 20.0, -1.0)))
 
 
 def bent_bar(turns: tuple[float, ...], length: float = 20.0) -> Any:
     """A bar 5 mm wide whose upper side is made of planes that turn by few degrees each."""
-    x, y, angle = 0.0, 0.0, 0.0
-    outline = BRepBuilderAPI_MakePolygon()
-    outline.Add(gp_Pnt(x, y, 0.0))
-    for turn in (0.0, *turns):
-        angle += np.deg2rad(turn)
-        x, y = x + length * np.cos(angle), y + length * np.sin(angle)
-        outline.Add(gp_Pnt(x, y, 0.0))
-    for corner in ((x, -30.0), (0.0, -30.0)):
-        outline.Add(gp_Pnt(*corner, 0.0))
-    outline.Close()
-    base = BRepBuilderAPI_MakeFace(outline.Wire()).Face()
-    return BRepPrimAPI_MakePrism(base, gp_Vec(0.0, 0.0, 5.0)).Shape()
+    angle = np.cumsum(np.radians((0.0, *turns)))
+    upper = length * np.cumsum(np.stack([np.cos(angle), np.sin(angle)], axis=1), axis=0)
+    return occ.extruded([(0.0, 0.0), *upper, (upper[-1, 0], -30.0), (0.0, -30.0)], 5.0)
 
 
 def nurbs(shape: Any) -> Any:
     """The same shape with all surfaces as splines."""
     return BRepBuilderAPI_NurbsConvert(shape).Shape()
-
-
-def parts(shape: Any, kind: Any) -> list[Any]:
-    explorer, found = TopExp_Explorer(shape, kind), []
-    while explorer.More():
-        if not any(explorer.Current().IsSame(one) for one in found):
-            found.append(explorer.Current())
-        explorer.Next()
-    return found
-
-
-def faces(shape: Any) -> list[Any]:
-    return [TopoDS.Face(face) for face in parts(shape, TopAbs_FACE)]
-
-
-def area_and_volume(shape: Any) -> tuple[float, float]:
-    """Of OpenCASCADE's own integration [mm^2, mm^3]."""
-    surface, inside = GProp_GProps(), GProp_GProps()
-    # Without a tolerance trimmed splines are off by percents.
-    BRepGProp.SurfaceProperties_s(shape, surface, 1e-6)
-    BRepGProp.VolumeProperties_s(shape, inside, 1e-6)
-    return surface.Mass(), inside.Mass()
 
 
 def write_brep(path: Path, shape: Any) -> Path:
@@ -145,12 +92,10 @@ def write_step(path: Path, *named: tuple[str, Any], unit: str = "MM", faces: Any
     XCAFApp_Application.GetApplication_s().InitDocument(document)
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     for k, (name, shape) in enumerate(named):
-        move = gp_Trsf()
-        move.SetTranslation(gp_Vec(100.0 * k, 0.0, 0.0))
-        label = tool.AddShape(BRepBuilderAPI_Transform(shape, move, True).Shape(), False)
+        label = tool.AddShape(occ.moved(shape, (100.0 * k, 0.0, 0.0)), False)
         TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
     for row, name in faces:
-        part = tool.AddSubShape(label, parts(tool.GetShape_s(label), TopAbs_FACE)[row])
+        part = tool.AddSubShape(label, occ.parts(tool.GetShape_s(label), TopAbs_FACE)[row])
         TDataStd_Name.Set_s(part, TCollection_ExtendedString(name))
     writer = STEPCAFControl_Writer()
     writer.SetNameMode(True)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin.shell import CleanedSurface
+from tests import meshes
 
 DATA = Path(__file__).parents[1] / "data" / "corpus"
 """Other people's surfaces whose licenses allow a copy; README.md there has origins and licenses."""
@@ -35,11 +36,8 @@ def surface_file(name: str) -> Path:
 
 def plate(n, height=0.0):
     """Return a unit plate of n x n quads with +z normals: vertices, quads."""
-    x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
-    index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    quads = np.stack([a, b, c, d], axis=-1).reshape(-1, 4)
-    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, height)]), quads
+    vertices, quads = meshes.grid_plate(n, n, quads=True)
+    return vertices + [0.5, 0.5, height], quads
 
 
 def tetrahedron(scale=1.0, at=(0.0, 0.0, 0.0)):

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
+from tests import meshes
 
 
 def sheet(cells: int = 120):
     """Vertices (n, 3) and triangles (m, 3) of a wavy sheet."""
-    x, y = (k.ravel() for k in np.meshgrid(*2 * [np.linspace(-1, 1, cells + 1)]))
-    i = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
-    a, b, c, d = (k.ravel() for k in (i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]))
-    triangles = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
-    return np.c_[x, y, 0.1 * np.sin(3 * x) * np.cos(4 * y)], triangles.astype(np.int32)
+    vertices, triangles = meshes.grid_plate(cells, cells, size=2.0)
+    x, y, _ = vertices.T
+    return np.c_[x, y, 0.1 * np.sin(3 * x) * np.cos(4 * y)], triangles
 
 
 def digest() -> str:

@@ -1,6 +1,5 @@
 """CAD faces say what is smooth: a coarse fillet stays one patch, a crease between faces is one."""
 
-import itertools
 import pickle
 from dataclasses import replace
 
@@ -21,26 +20,16 @@ def bent_sheet(crease_angle: float = np.deg2rad(10.0)) -> Shell:
 
     One plane is tangent to it, but for SLACK, the other meets it at a right angle.
     """
-    vertices, elements, normals, face = [], [], [], []
-
-    def add(corners, corner_normals, number: int) -> None:
-        first = len(vertices)
-        vertices.extend(corners)
-        normals.extend(corner_normals)
-        elements.append([first, first + 1, first + 2, first + 3])
-        face.append(number)
-
-    def on(angle: float, z: float) -> list[float]:
-        return [np.cos(angle), np.sin(angle), z]
-
     angles = np.linspace(0.0, np.pi / 2, 4)
-    for a, b in itertools.pairwise(angles):
-        corners = [on(a, 0.0), on(b, 0.0), on(b, 1.0), on(a, 1.0)]
-        add(corners, [[x, y, 0.0] for x, y, _ in corners], 0)
-    tilted = [np.sin(SLACK), np.cos(SLACK), 0.0]
-    add([[0, 1, 0], [-1, 1, 0], [-1, 1, 1], [0, 1, 1]], [tilted] * 4, 1)
-    add([[1, 0, 0], [1, 0, 1], [2, 0, 1], [2, 0, 0]], [[0.0, 1.0, 0.0]] * 4, 2)
-    raw = raw_surface(np.array(vertices, float), np.array(elements), np.array(normals))
+    outline = np.array([[2, 0], *np.c_[np.cos(angles), np.sin(angles)], [-1, 1]])
+    ends = np.stack([outline[:-1], outline[1:]], axis=1)
+    normals = ends.copy()
+    normals[0], normals[-1] = (0.0, 1.0), (np.sin(SLACK), np.cos(SLACK))
+    around = [0, 1, 1, 0]
+    vertices = np.dstack([ends[:, around], np.tile([0.0, 0.0, 1.0, 1.0], (5, 1))])
+    normals = np.dstack([normals[:, around], np.zeros((5, 4))])
+    face, elements = [2, 0, 0, 0, 1], np.arange(20).reshape(5, 4)
+    raw = raw_surface(vertices.reshape(-1, 3), elements, normals)
     names = ("round", "tangent", "other")
     surface = clean_surface(replace(raw, faces=np.array(face, np.int32), face_names=names))
     return Shell.from_surface(surface, crease_angle, name="bent")

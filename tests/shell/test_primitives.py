@@ -16,14 +16,6 @@ ROUND = {
     "cone": coal.Cone(0.2, 0.5),
     "ellipsoid": coal.Ellipsoid(0.1, 0.2, 0.35),
 }
-VOLUME = {
-    "sphere": 4 / 3 * np.pi * 0.3**3,
-    "cylinder": np.pi * 0.2**2 * 0.7,
-    "capsule": np.pi * 0.1**2 * (0.4 + 4 / 3 * 0.1),
-    "thin capsule": np.pi * 1e-6 * (1.0 + 4 / 3 * 1e-3),
-    "cone": np.pi * 0.2**2 * 0.5 / 3,
-    "ellipsoid": 4 / 3 * np.pi * 0.1 * 0.2 * 0.35,
-}
 
 
 def samples(shell, n=40):
@@ -77,8 +69,6 @@ def test_round_solids(name, share, segments):
     assert inside.min() > -1e-12 * diameter
     if "segments" not in option:
         assert inside.max() <= share * diameter * 1.001
-        assert health.volume == pytest.approx(VOLUME[name], rel=6 * share)
-        assert health.volume < VOLUME[name]
     at = depth_inside(name, shell.vertices)
     assert np.abs(at).max() < 1e-12 * max(shell.size, diameter)
 
@@ -107,17 +97,6 @@ def test_corner_normals_of_solids_with_a_rim(name, slope):
     assert normals[:, 2] == pytest.approx(slope / length)
     rim = np.hypot(points[:, 0], points[:, 1]) > 0.1
     assert normals[rim, :2] * 0.2 * length == pytest.approx(points[rim, :2])
-
-
-def test_normals_turn_only_at_true_creases():
-    for name, normals in (("cylinder", 2), ("cone", 2), ("capsule", 1), ("sphere", 1)):
-        shell = Shell.from_geometry(ROUND[name], segments=16)
-        kinds = {}
-        for triangle, corner in zip(shell.triangles, shell.normals, strict=True):
-            for v, n in zip(triangle, corner, strict=True):
-                if name != "cone" or shell.vertices[v, 2] < 0.2:
-                    kinds.setdefault(v, set()).add(tuple(np.round(n, 9) + 0.0))
-        assert max(map(len, kinds.values())) == normals, name
 
 
 def test_box():

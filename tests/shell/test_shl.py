@@ -6,7 +6,7 @@ import pytest
 from sphshell_pin.errors import InvalidParameter, InvalidShell, ShellFileError
 from sphshell_pin.shell import Shell
 
-from .surfaces import CUBE, CUBE_QUADS
+from .surfaces import CUBE, CUBE_QUADS, areas
 
 POINTS = [" ".join(str(x) for x in p) for p in CUBE]
 INWARD = ["4 " + " ".join(str(v + 1) for v in q[::-1]) for q in CUBE_QUADS]
@@ -63,9 +63,7 @@ def test_version_2_is_welded_and_keeps_its_normals(write):
     assert len(shell.vertices) == 8
     assert shell.health.welded_vertices == 16
     assert shell.health.turned_normals == 24
-    corners = shell.vertices[shell.triangles]
-    own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert shell.normals == pytest.approx(np.repeat(own[:, None], 3, axis=1))
+    assert shell.normals == pytest.approx(np.repeat(2 * areas(shell)[:, None], 3, axis=1))
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r", "  \n", "\t \r\n\r\n"])

@@ -5,16 +5,16 @@ import pytest
 
 from sphshell_pin import Shell
 from sphshell_pin.errors import InvalidShell
+from tests import meshes
 from tests.contact.helpers import force_sum
 
 
 def wavy(scale: float) -> Shell:
-    x, y = np.meshgrid(np.linspace(-1, 1, 12), np.linspace(-1, 1, 12), indexing="ij")
-    vertices = np.stack([x, y, 0.2 * np.sin(3 * x) * np.cos(2 * y)], axis=-1).reshape(-1, 3)
-    first = (np.arange(11)[:, None] * 12 + np.arange(11)).ravel()
-    elements = np.stack([first, first + 1, first + 13, first + 12], axis=1)
+    vertices, elements = meshes.grid_plate(11, 11, size=2.0, quads=True)
+    x, y, _ = vertices.T
+    vertices[:, 2] = 0.2 * np.sin(3 * x) * np.cos(2 * y)
     along_x, along_y = 0.6 * np.cos(3 * x) * np.cos(2 * y), -0.4 * np.sin(3 * x) * np.sin(2 * y)
-    normals = np.stack([-along_x, -along_y, np.ones_like(x)], axis=-1).reshape(-1, 3)
+    normals = np.stack([-along_x, -along_y, np.ones_like(x)], axis=1)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     return Shell(scale * vertices, elements, normals=normals)
 

@@ -15,19 +15,15 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks import analytic_cases, convergence, hard_cases, query, step
-from sphshell_pin.benchmarks import convergence as forces_section
-from sphshell_pin.benchmarks import hard_cases as hard_section
-from sphshell_pin.benchmarks import queries as queries_section
-from sphshell_pin.benchmarks import step as steps_section
-from sphshell_pin.benchmarks import work_precision as integrators_section
+from sphshell_pin.benchmarks import analytic_cases, convergence, hard_cases, step
+from sphshell_pin.benchmarks import queries as query_section
 from sphshell_pin.benchmarks import work_precision as work
 from sphshell_pin.benchmarks.peers import section as peers_section
 from sphshell_pin.benchmarks.peers.measuring import Ratio
 from sphshell_pin.benchmarks.peers.measuring import Row as PeerRow
 from sphshell_pin.benchmarks.sizes import Row as SizeRow
 from sphshell_pin.cases import machine
-from sphshell_pin.cases.contents import Column, Finding, Section, Spread, Table, Verdict
+from sphshell_pin.cases.contents import Column, Finding, Section, Table, Verdict
 from sphshell_pin.cases.drawing import spread_apart
 from sphshell_pin.errors import Interrupted
 from sphshell_pin.study.report import PAGE, making
@@ -55,49 +51,40 @@ def force_rows() -> list[convergence.Row]:
 def forces(*, quick, progress):
     rows = force_rows()
     progress(1.0)
-    return forces_section.assemble(convergence.REPORTED, rows)
+    return convergence.assemble(convergence.REPORTED, rows)
 
 
 def queries(*, quick, progress):
-    peers = {
-        query.THIS: times(1e-6),
-        query.FACETS: times(9e-7),
-        query.COAL: times(4e-5),
-        query.FCPW: times(2e-6),
-    }
-    growth = {2048: times(1e-6), 2_000_000: times(3e-6)}
-    cost = {"wavy sheet": {"facets": times(1e-6), "smooth": times(1.2e-6)}}
     rows = [
-        SizeRow(name, "contacts", count, Spread.of(times(1e-6)), 0.1, 500.0 * count)
-        for name in ("smooth", "coal::collide")
-        for count in (968, 199_712)
+        SizeRow(name, "contacts", count, times(seconds), 0.1, 500.0 * count)
+        for name, seconds in (("smooth", 1e-6), ("facets", 9e-7), ("coal::collide", 4e-5))
+        for count in (2048, 199_712)
     ]
-    return queries_section.assemble(peers, growth, cost, rows, ["trimesh is left out."])
+    return query_section.assemble(rows, ["trimesh is left out."])
 
 
 def integrators(*, quick, progress):
     chosen = (sp.RungeKutta4(1e-3), sp.RungeKutta4(2e-4), sp.Implicit(1e-3), sp.Implicit(1e-5))
     rows, cases = [], []
-    for judge in (analytic_cases.bob(), analytic_cases.bounces()):
-        cases.append(replace(judge.case, integrators=chosen))
-        rows += work.measure(cases[-1], judge, 1)
-    return integrators_section.assemble(cases, rows, SimpleNamespace(rms=1e-8, energy=2e-6))
+    for case in (analytic_cases.bob(), analytic_cases.bounces()):
+        cases.append(replace(case, integrators=chosen))
+        rows += work.measure(cases[-1], work.Judge(case), 1)
+    return work.assemble(cases, rows, SimpleNamespace(rms=1e-8, energy=2e-6))
 
 
 def steps(*, quick, progress):
-    names = (step.BARE, step.FREE, step.FAR, step.TOUCHING, step.CONTROL_FREE)
+    names = (*step.WHOLE[:-1], "... and damping")
     whole = {name: times(2e-6 + 2e-7 * k) for k, name in enumerate(names)}
     whole[step.CONTROL_TOUCHING] = times(3.5e-6)
-    added = {"no contact": times(2e-6), "... and damping": times(2.1e-6)}
     imports = {"sphshell_pin": times(0.14), "pinocchio": times(0.13)}
-    return steps_section.assemble(whole, added, imports)
+    return step.assemble(whole, imports)
 
 
 def hard(*, quick, progress):
     row = replace(Verdict.on("ball", "a < b & c", "1", 1.0, 1.0, 1e-9, 1e-6), group="Impacts")
     bad = replace(row, measured="passed", expected="none", value=math.inf)
     nothing = replace(row, value=0.0, aim=0.0)
-    return hard_section.assemble(hard_cases.Found([row, bad, nothing], 2, 1.0), quick=quick)
+    return hard_cases.assemble(hard_cases.Found([row, bad, nothing], 2, 1.0), quick=quick)
 
 
 def peers(*, quick, progress):
@@ -264,17 +251,17 @@ def test_the_cheapest_setting_of_an_integrator():
         SimpleNamespace(case="a", integrator="Implicit", error=e, cpu=c)
         for e, c in ((1e-3, 0.1), (1e-5, 0.4), (1e-6, 0.3))
     ]
-    assert integrators_section.cheapest(rows, "a", ("Implicit",), 1e-4) == 0.3
-    assert math.isnan(integrators_section.cheapest(rows, "a", ("Implicit",), 1e-7))
+    assert work.cheapest(rows, "a", ("Implicit",), 1e-4) == 0.3
+    assert math.isnan(work.cheapest(rows, "a", ("Implicit",), 1e-7))
 
 
 def test_order_and_error_of_a_power_law():
     line = [
         SimpleNamespace(side=h, mean=0.7 * h**4, largest=3 * h**4) for h in (1.2, 0.61, 0.29, 0.16)
     ]
-    assert forces_section.order(line) == pytest.approx(4.0)
-    assert forces_section.error_at(line) == pytest.approx(0.7 * 0.3**4)
-    assert forces_section.error_at(line, "largest") == pytest.approx(3 * 0.3**4)
+    assert convergence.order(line) == pytest.approx(4.0)
+    assert convergence.error_at(line) == pytest.approx(0.7 * 0.3**4)
+    assert convergence.error_at(line, "largest") == pytest.approx(3 * 0.3**4)
 
 
 def test_labels_move_apart_as_little_as_needed():
@@ -401,7 +388,7 @@ def test_a_folder_that_cannot_be(stubs, tmp_path):
 
 def test_away_from_the_checkout_there_are_no_hard_cases(monkeypatch, tmp_path):
     monkeypatch.setattr(hard_cases.sphshell_pin, "__file__", str(tmp_path / "p" / "__init__.py"))
-    section = hard_section.section(quick=True, progress=lambda share: None)
+    section = hard_cases.section(quick=True, progress=lambda share: None)
     assert section.error is None
     assert "part of the checkout" in section.notes[0]
 

@@ -26,14 +26,13 @@ def test_a_ball_is_solid():
 
 
 def test_wall_is_a_cylinder():
-    half, whole = rolling.wall(0.5, 0.4, 0.1, 20), rolling.wall(0.5, math.pi, 0.4, 40, rows=8)
-    assert (half.num_elements, whole.num_elements) == (20, 320)
-    # A ball inside it is as deep everywhere, to the error of curved elements of 9 degrees.
-    for shell, angle in ((half, 0.33), (whole, 2.9)):
-        out = np.array([math.sin(angle), 0.0, -math.cos(angle)])
-        found = shell.contacts(0.45 * out + [0.0, 0.03, 0.0], 0.06)
-        assert np.allclose(found.depth, [0.01], rtol=0, atol=3e-6)
-        assert np.allclose(found.normal, [-out], rtol=0, atol=1e-4)
+    shell = rolling.wall(0.5, 0.4, 0.1, 20)
+    assert shell.num_elements == 20
+    # A ball inside it is as deep everywhere.
+    out = np.array([math.sin(0.33), 0.0, -math.cos(0.33)])
+    found = shell.contacts(0.45 * out + [0.0, 0.03, 0.0], 0.06)
+    assert np.allclose(found.depth, [0.01], rtol=0, atol=3e-6)
+    assert np.allclose(found.normal, [-out], rtol=0, atol=1e-4)
 
 
 def test_cam_has_the_published_speed():

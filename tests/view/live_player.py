@@ -39,7 +39,6 @@ class BallPlayer:
         self.knob_values = {"stiffness": stiffness, "radius": RADIUS}
         self.wall_per_second = wall_per_second
         self.calls = []
-        self.fails = None
         self._make_scene()
         self.reset()
 
@@ -82,8 +81,6 @@ class BallPlayer:
 
     def advance(self, duration, wall=np.inf):
         self.calls.append((duration, wall))
-        if self.fails is not None:
-            raise self.fails
         if self.wall_per_second:
             duration = min(duration, wall / self.wall_per_second)
         end = self.time + duration
@@ -142,12 +139,11 @@ class FilmPlayer(BallPlayer):
 class ArmPlayer(BallPlayer):
     """Pinocchio's sample manipulator with its geometry, which stands still and touches nothing."""
 
-    def __init__(self, mesh_scale=(1.0, 1.0, 1.0)):
+    def __init__(self):
         super().__init__(height=1.0)
         model = pin.buildSampleModelManipulator()
         pair = contact_pair(model, "effector_body", 0.08, plate())
         self.visual_model = pin.buildSampleGeometryModelManipulator(model)
-        self.visual_model.geometryObjects[1].meshScale = np.array(mesh_scale)
         self.scene = SimpleNamespace(model=model, pairs=(pair,))
         self.q = pin.integrate(model, pin.neutral(model), np.linspace(0.1, 0.6, model.nv))
 

@@ -1,35 +1,26 @@
 from types import SimpleNamespace
 
-import meshcat
 import numpy as np
 import pytest
 
-from sphshell_pin.view.arrows import ArrowPool, ArrowScale, pushing
-from sphshell_pin.view.page import FilmWindow
+from sphshell_pin.view.arrows import ArrowPool, ArrowScale, Forces, pushing
+from tests.view.drawn import Film
 
 
 def forces(*normal, friction=None):
     count = len(normal)
-    return SimpleNamespace(
-        point_world=np.arange(3.0 * count).reshape(count, 3),
-        normal_world=np.tile([0.6, 0.0, 0.8], (count, 1)),
-        normal_force=np.array(normal, dtype=float),
-        friction_force_world=np.zeros((count, 3)) if friction is None else np.array(friction),
+    return Forces(
+        np.arange(3.0 * count).reshape(count, 3),
+        np.array(normal, dtype=float)[:, None] * [0.6, 0.0, 0.8],
+        np.zeros((count, 3)) if friction is None else np.array(friction),
     )
 
 
-def last_transforms(pool_of, contacts, scale, **options):
+def last_transforms(pool_of, given, scale, **options):
     """Transforms (path -> 4x4) after one update of a pool."""
-    window = FilmWindow()
-    pool = ArrowPool(meshcat.Visualizer(window=window), pool_of, 0.001, **options)
-    window.frame = 0
-    pool.update(contacts, scale)
-    commands = window.commands(np.zeros(1))
-    return {
-        command["path"].removeprefix("/meshcat/"): np.reshape(command["matrix"], (4, 4)).T
-        for command in commands
-        if command["type"] == "set_transform"
-    }
+    film = Film()
+    ArrowPool(film.canvas, pool_of, 0.001, **options).update(given, scale)
+    return film.matrices
 
 
 @pytest.mark.parametrize("peak", [1e-6, 0.03, 4.9, 5.0, 777.0, 2e7])
@@ -59,9 +50,9 @@ def test_no_force_at_all_still_gives_a_scale():
 
 def test_an_arrow_goes_from_the_contact_along_the_force():
     scale = ArrowScale(0.1, 5.0)
-    contacts = forces(4.0, friction=[[0.0, 1.0, 0.0]])
-    where = last_transforms(1, contacts, scale)
-    start = contacts.point_world[0]
+    given = forces(4.0, friction=[[0.0, 1.0, 0.0]])
+    where = last_transforms(1, given, scale)
+    start = given.point[0]
     for name, force in (("normal", np.array([2.4, 0.0, 3.2])), ("friction", np.array([0, 1.0, 0]))):
         shaft, head = where[f"{name}_0/shaft"], where[f"{name}_0/head"]
         # three.js's unit cylinder lies along y from -1/2 to 1/2.
@@ -81,8 +72,8 @@ def test_the_total_force_is_one_arrow():
 
 
 def test_no_node_ever_gets_a_singular_transform():
-    for contacts in (None, forces(), forces(0.0), forces(1e-12), forces(3.0)):
-        for matrix in last_transforms(2, contacts, ArrowScale()).values():
+    for given in (None, forces(), forces(0.0), forces(1e-12), forces(3.0)):
+        for matrix in last_transforms(2, given, ArrowScale()).values():
             assert np.linalg.norm(matrix[:3, :3], axis=0).min() > 0.0
             assert np.isfinite(matrix).all()
 
@@ -101,24 +92,16 @@ def test_no_arrow_is_longer_than_the_longest():
 
 
 def test_a_contact_keeps_its_arrow_when_another_lets_go():
-    window = FilmWindow()
-    pool = ArrowPool(meshcat.Visualizer(window=window), 3, 0.001)
+    film = Film()
+    pool = ArrowPool(film.canvas, 3, 0.001)
     both = forces(1.0, 2.0)
-    second = SimpleNamespace(**{name: column[1:] for name, column in vars(both).items()})
-    second.point_world = second.point_world + 0.01
-    for window.frame, contacts in enumerate((both, second, both)):
-        pool.update(contacts, ArrowScale())
-    clips = next(c for c in window.commands(np.arange(3.0)) if c["type"] == "set_animation")
-    sizes = {
-        clip["path"].rsplit("/", maxsplit=1)[1]: np.frombuffer(
-            next(t for t in clip["clip"]["tracks"] if t["name"] == ".scale")["values"].data, "<f4"
-        ).reshape(-1, 3)[:, 0]
-        for clip in clips["animations"]
-        if "point" in clip["path"] and any(t["name"] == ".scale" for t in clip["clip"]["tracks"])
-    }
+    second = Forces(both.point[1:] + 0.01, both.normal[1:], both.friction[1:])
+    sizes = []
+    for given in (both, second, both):
+        pool.update(given, ArrowScale())
+        sizes.append([film.matrices[f"point_{slot}"][0, 0] for slot in range(3)])
     # Only the first contact's point ever shrinks; the second's stays in its slot throughout.
-    assert list(sizes) == ["point_0"]
-    assert sizes["point_0"][1] < 1e-3 * sizes["point_0"][0]
+    np.testing.assert_array_equal(np.array(sizes) > 1e-4, [[1, 1, 0], [0, 1, 0], [1, 1, 0]])
 
 
 @pytest.mark.parametrize("size", [1e200, np.inf, np.nan])
@@ -135,21 +118,17 @@ def test_forces_beyond_all_bounds_are_drawn_as_far_as_can_be(size):
 def test_saddles_are_no_arrows_that_pull_and_the_sum_of_forces_stays(least):
     # A chain of three contacts with a saddle between each two, and a contact of another pair.
     normal = np.array([3.0, 3.0, 3.0, -3.0 * least, -3.0 * least, 5.0])
-    contacts = forces(*normal)
-    contacts.point_world = np.array(
-        [[0, 0, 0], [2, 0, 0], [4, 0, 0], [1, 0, 0], [3, 0, 0.0], [1, 0, 0]]
+    places = np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0], [1, 0, 0], [3, 0, 0.0], [1, 0, 0]])
+    normals = np.array([[np.sin(a), 0, np.cos(a)] for a in (0.2, 0, -0.2, 0.1, -0.1, 0)])
+    contacts = SimpleNamespace(
+        point_world=places,
+        normal_world=normals,
+        normal_force=normal,
+        friction_force_world=np.zeros((6, 3)),
+        pair=np.array([0, 0, 0, 0, 0, 1]),
     )
-    contacts.normal_world = np.array(
-        [[np.sin(a), 0, np.cos(a)] for a in (0.2, 0, -0.2, 0.1, -0.1, 0)]
-    )
-    pair = np.array([0, 0, 0, 0, 0, 1])
-    drawn = pushing(contacts, pair)
-    np.testing.assert_array_equal(drawn.point_world, contacts.point_world[[0, 1, 2, 5]])
-    assert (drawn.normal_force > 0.0).all()
-    pushes = np.sum(drawn.normal_world * contacts.normal_world[[0, 1, 2, 5]], axis=1)
-    assert (pushes > 0.0).all()
-    total = drawn.normal_force @ drawn.normal_world
-    np.testing.assert_allclose(total, normal @ contacts.normal_world, atol=1e-12)
-    assert drawn.normal_force[-1] == 5.0
-    alone = forces(1.0, 2.0)
-    assert pushing(alone, np.array([0, 0])) is alone
+    drawn = pushing(contacts)
+    np.testing.assert_array_equal(drawn.point, places[[0, 1, 2, 5]])
+    assert (np.sum(drawn.normal * normals[[0, 1, 2, 5]], axis=1) > 0.0).all()
+    np.testing.assert_allclose(drawn.normal.sum(axis=0), normal @ normals, atol=1e-12)
+    np.testing.assert_array_equal(drawn.normal[-1], [0.0, 0.0, 5.0])

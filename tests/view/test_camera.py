@@ -1,13 +1,11 @@
-import meshcat
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.scenario import build
-from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View, set_surroundings
-from sphshell_pin.view.display import choose_view
-from sphshell_pin.view.page import FilmWindow
+from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View, choose_view, set_surroundings
+from tests.view.drawn import Film
 
 
 def in_picture(view, points):
@@ -74,11 +72,6 @@ def test_the_whole_robot_is_in_the_picture_of_a_short_run():
 
 
 def test_nothing_of_the_page_itself_cuts_through_the_scene():
-    window = FilmWindow()
-    set_surroundings(meshcat.Visualizer(window=window))
-    hidden = {
-        command["path"]
-        for command in window.commands(np.zeros(1))
-        if command.get("property") == "visible" and command["value"] is False
-    }
-    assert hidden == {"/Axes", "/Grid"}
+    film = Film()
+    set_surroundings(film.canvas)
+    assert film.visible == {"/Axes": False, "/Grid": False}

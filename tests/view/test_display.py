@@ -9,8 +9,8 @@ import pytest
 from sphshell_pin import ImpactLaw, Plane, Scene, Shell, Sphere
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import ArrowScale, Display
-from sphshell_pin.view.display import choose_view
-from sphshell_pin.view.page import FilmWindow
+from sphshell_pin.view.camera import choose_view
+from tests.view.drawn import Film
 from tests.view.stand_ins import (
     a_scene,
     ball_configuration,
@@ -22,18 +22,10 @@ from tests.view.stand_ins import (
 
 
 def filmed(scene, q, contacts=None, **options):
-    """Transforms by path after one update, and all commands."""
-    window = FilmWindow()
-    display = Display(scene, visualizer=meshcat.Visualizer(window=window), **options)
-    window.frame = 0
-    display.update(q, contacts)
-    commands = window.commands(np.zeros(1))
-    transforms = {
-        command["path"].removeprefix("/meshcat/"): np.reshape(command["matrix"], (4, 4)).T
-        for command in commands
-        if command["type"] == "set_transform"
-    }
-    return transforms, commands
+    """Transforms by path after one update, and the paths of what was drawn."""
+    film = Film()
+    Display(scene, visualizer=film.canvas, **options).update(q, contacts)
+    return film.matrices, list(film.objects)
 
 
 def turntable_scene():
@@ -56,21 +48,21 @@ def test_both_of_two_spheres_are_drawn():
     scene = Scene(model)
     ends = Sphere(0.05, "ball"), Sphere(0.02, "table", (0.3, 0.0, 0.1))
     scene.add_contact(*ends, law=ImpactLaw(1e4), name="tip")
-    where, commands = filmed(scene, ball_configuration([1.0, 2.0, 3.0], 0.7))
+    where, drawn = filmed(scene, ball_configuration([1.0, 2.0, 3.0], 0.7))
     np.testing.assert_allclose(where["spheres/0_tip"][:3, 3], [1.0, 2.0, 3.0])
     turned = pin.utils.rotate("z", 0.7) @ [0.3, 0.0, 0.1]
     np.testing.assert_allclose(where["spheres/1_tip"][:3, 3], turned, atol=1e-12)
-    assert not any("/shells/" in command["path"] for command in commands)
+    assert not any(path.startswith("shells/") for path in drawn)
 
 
 def test_a_shell_shared_by_many_spheres_is_drawn_once():
     model = ball_model()
     shell = plate()
     pairs = [contact_pair(model, "ball", 0.05, shell, name=f"p{k}") for k in range(4)]
-    _, commands = filmed(a_scene(model, *pairs), ball_configuration(np.zeros(3)))
-    surfaces = [c for c in commands if c["path"].endswith("/surface")]
-    balls = [c for c in commands if c["path"].endswith("/ball") and "spheres" in c["path"]]
-    assert (len(surfaces), len(balls)) == (1, 1)
+    _, drawn = filmed(a_scene(model, *pairs), ball_configuration(np.zeros(3)))
+    assert sum(path.endswith("/surface") for path in drawn) == 1
+    balls = [path for path in drawn if path.startswith("spheres/") and path.endswith("/ball")]
+    assert balls == ["spheres/0_p0/ball"]
 
 
 def test_a_pair_without_sphere_or_shell_shows_its_contacts():
@@ -110,14 +102,14 @@ def test_given_geometry_is_drawn_where_pinocchio_puts_it():
     model = pin.buildSampleModelManipulator()
     geometry = pin.buildSampleGeometryModelManipulator(model)
     scene = a_scene(model, contact_pair(model, "effector_body", 0.05, plate()))
+    geometry.geometryObjects[1].meshScale = np.array([1.0, 2.0, 3.0])
     q = pin.integrate(model, pin.neutral(model), np.linspace(0.1, 0.6, model.nv))
     where, _ = filmed(scene, q, visual_model=geometry)
     data, placed = model.createData(), geometry.createData()
     pin.updateGeometryPlacements(model, data, geometry, placed, q)
     for index, body in enumerate(geometry.geometryObjects):
-        np.testing.assert_allclose(
-            where[f"robot/visuals/{body.name}"], placed.oMg[index].homogeneous, atol=1e-12
-        )
+        expected = placed.oMg[index].homogeneous @ np.diag([*body.meshScale, 1.0])
+        np.testing.assert_allclose(where[f"robot/visuals/{body.name}"], expected, atol=1e-12)
 
 
 def test_geometry_of_another_model_is_refused():
@@ -148,16 +140,16 @@ def test_arrows_and_points_scale_with_the_scene(size):
 
 def test_wrong_arguments_are_named():
     scene = turntable_scene()
-    page = meshcat.Visualizer(window=FilmWindow())
+    canvas = Film().canvas
     with pytest.raises(InvalidParameter, match="arrows"):
-        Display(scene, visualizer=page, arrows="both")
-    display = Display(scene, visualizer=page)
+        Display(scene, visualizer=canvas, arrows="both")
+    display = Display(scene, visualizer=canvas)
     with pytest.raises(InvalidParameter, match=r"\(8,\)"):
         display.update(np.zeros(3))
 
 
 def test_a_trail_needs_two_places():
-    display = Display(turntable_scene(), visualizer=meshcat.Visualizer(window=FilmWindow()))
+    display = Display(turntable_scene(), visualizer=Film().canvas)
     assert display.draw_trail("still", np.ones((5, 3))) is None
     node = display.draw_trail("moved", [[0, 0, 0], [0.1, 0, 0]], pair=0)
     assert node.path.lower() == "/meshcat/shells/0_disc/trail/moved"
@@ -190,7 +182,7 @@ def test_a_plane_is_drawn_where_its_shell_is_and_the_eye_above_it():
     foot = Shell([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
     scene.add_contact(tilted, foot, frame="ball", law=ImpactLaw(1e4), name="on")
     q = ball_configuration([30.0, 2.0, 3.0], 0.7)
-    where, commands = filmed(scene, q)
+    where, drawn = filmed(scene, q)
     square = where["planes/0_on"]
     up = pin.utils.rotate("z", 0.7) @ [np.sqrt(0.5), 0.0, np.sqrt(0.5)]
     np.testing.assert_allclose(square[:3, 2], up, atol=1e-12)
@@ -199,7 +191,7 @@ def test_a_plane_is_drawn_where_its_shell_is_and_the_eye_above_it():
     away = square[:3, 3] - [30.0, 2.0, 3.0]
     low, high = scene.pairs[0].shell.box
     assert np.linalg.norm(away - (away @ up) * up) < np.linalg.norm(high - low)
-    assert sum(c["path"].endswith("/square") for c in commands if c["type"] == "set_object") == 1
+    assert sum(path.endswith("/square") for path in drawn) == 1
     # Normals of contacts lead into the plane.
     view = choose_view(scene, q[None, :], np.array([[30.0, 2.0, 3.0]]), -up[None, :])
     assert (view.eye - view.target) @ up > 0

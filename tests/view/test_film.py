@@ -101,8 +101,7 @@ def test_a_film_shows_the_pictures_in_their_order(rendered):
 
 @pytest.mark.browser
 @pytest.mark.parametrize(
-    "name",
-    mostly_studies(["run.mp4", "run.gif", "frames"], lambda name: name == "run.mp4"),
+    "name", mostly_studies(["run.mp4", "run.gif", "frames"], lambda name: name == "run.mp4")
 )
 def test_ctrl_c_leaves_nothing(rendered, tmp_path, name):
     # Tests that run in the background inherit that Ctrl-C is to be ignored.

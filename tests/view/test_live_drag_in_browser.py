@@ -10,7 +10,6 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from tests.scenario.arms import write_arm
 from tests.scenario.files import DROP, write
-from tests.view.live_player import FilmPlayer
 from tests.view.test_live_in_browser import opened  # noqa: F401  (a fixture)
 
 pytestmark = pytest.mark.browser
@@ -36,16 +35,6 @@ def point_of(live):
     model, data = live.player.scene.model, live.player.scene.model.createData()
     pin.framesForwardKinematics(model, data, live.player.q)
     return data.oMf[model.getFrameId("lower")].act(IN_LOWER)
-
-
-def rightwards(tab):
-    """Return the direction in the world that is rightwards on the screen."""
-    return np.array(
-        tab.page.evaluate("""async () => {
-        const scene = await import("./scene.js");
-        return scene.Picture.prototype.direction.call({viewer}, "right");
-    }""")
-    )
 
 
 def drag_right(tab, start, steps=8):
@@ -82,7 +71,7 @@ def wait_until_still(live, tab):
 def test_a_link_is_dragged_with_the_mouse_and_comes_back(arm):
     live, tab = arm
     wait_until_still(live, tab)
-    rest, before, right = live.player.q.copy(), point_of(live), rightwards(tab)
+    rest, before, right = live.player.q.copy(), point_of(live), tab.rightwards()
     tab.page.keyboard.down("Control")
     eye = take_hold(live, tab)
     tab.wait("state.drag && state.drag.newtons > 1")
@@ -146,20 +135,6 @@ def test_a_finger_drags_where_the_button_is_on(arm):
     tab.wait("!state.drag")
 
 
-def test_a_drag_ends_when_the_tab_is_closed(arm):
-    live, tab = arm
-    wait_until_still(live, tab)
-    tab.page.keyboard.down("Control")
-    drag_right(tab, tab.page.evaluate(ON_SCREEN, point_of(live).tolist()))
-    tab.wait("state.drag")
-    tab.page.close()
-    for _ in range(200):
-        if live.player.drag is None:
-            break
-        time.sleep(0.05)
-    assert live.player.drag is None
-
-
 def test_sliders_move_the_targets_of_the_joints_in_degrees(arm):
     live, tab = arm
     tab.slide('[data-parameter="target-elbow"]', 0.0)
@@ -199,11 +174,3 @@ def test_a_word_is_a_menu_and_views_have_switches(opened, tmp_path):  # noqa: F8
     tab.wait("!('distance' in state.show)")
     assert not tab.page.locator(visible).is_visible()
     assert live.player.scene.pairs[0].method == "facets"
-
-
-def test_a_finished_run_has_neither_drags_nor_targets(opened):  # noqa: F811
-    _, tab = opened(FilmPlayer(), running=False)
-    for selector in ("#drag-mode", "#drag-section", "#targets-section", '[data-part="pressure"]'):
-        assert not tab.page.locator(selector).is_visible()
-    tab.page.keyboard.press("d")  # not a key of this page: no fault
-    tab.wait("state.t === 0")

@@ -1,6 +1,5 @@
 """Drags, targets and switches as messages of a browser: what they do, and what they are refused."""
 
-import asyncio
 import json
 
 import meshcat
@@ -10,50 +9,22 @@ import pytest
 
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
-from sphshell_pin.view.live import Live
 from tests.scenario.arms import write_arm
 from tests.scenario.files import write
+from tests.view.live_driver import OTHER_TAB, TAB, ForeignWindow, frames, say
 from tests.view.live_player import BallPlayer, FilmPlayer
-from tests.view.test_live_loop import OTHER_TAB, TAB, ForeignWindow, Told, frames, say
-
-
-class Watcher:
-    """Stands in for a browser that looks on."""
-
-    wake = asyncio.Event()
-
-    def send(self, data):
-        pass
-
 
 NODE = "/meshcat/robot/visuals/lower_0"
 
 
 @pytest.fixture
-def make():
-    made = []
-
-    def make_live(player, **options):
-        live = Live(player, **options)
-        live.told = live.server.report = Told()
-        live.server.clients.add(Watcher())
-        made.append(live)
-        return live
-
-    yield make_live
-    for live in made:
-        live.server.clients.clear()
-        live.stop()
-
-
-@pytest.fixture
 def arm(make, tmp_path):
-    return make(LiveRun(build(write_arm(tmp_path))))
+    return make(LiveRun(build(write_arm(tmp_path))), watched=True)
 
 
 @pytest.fixture
 def ball(make, tmp_path):
-    return make(LiveRun(build(write(tmp_path))))
+    return make(LiveRun(build(write(tmp_path))), watched=True)
 
 
 def drag(live, target, client=TAB, **fields):
@@ -206,7 +177,7 @@ def test_patches_are_computed_when_they_are_switched_on(ball):
 def test_parts_without_anything_to_show_have_no_switch(ball, make):
     # A box has patches, one a side; its elements are flat.
     assert {"patches", "pressure", "robot"} < set(ball._state()["show"])
-    plain = make(BallPlayer())._state()["show"]
+    plain = make()._state()["show"]
     assert not {"patches", "pressure", "distance"} & set(plain)
 
 

@@ -12,7 +12,7 @@ from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.live import Live
 from tests.scenario.files import FINGER, write
 from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
-from tests.view.test_recording_in_browser import count, is_blue, pixels_of, watch
+from tests.view.test_recording_in_browser import count, is_blue, is_greenish, pixels_of, watch
 
 pytestmark = pytest.mark.browser
 
@@ -51,6 +51,14 @@ class Tab:
             }""",
             [selector, share],
         )
+
+    def rightwards(self):
+        """Return the direction in the world that is rightwards on the screen."""
+        direction = self.page.evaluate("""async () => {
+            const scene = await import("./scene.js");
+            return scene.Picture.prototype.direction.call({viewer}, "right");
+        }""")
+        return np.array(direction)
 
     def scene(self):
         """Return the picture (h, w, 3) without the panels that lie over it."""
@@ -94,8 +102,7 @@ def test_ball_shell_and_arrow_are_seen_and_parts_can_be_hidden(opened):
     tab.wait("state.t > 0.09 && state.contacts.length")
     seen = tab.scene()
     assert np.count_nonzero(is_blue(seen)) > 100
-    shell = (seen[..., 1] - seen[..., 0] > 15) & (seen[..., 1] >= seen[..., 2])
-    assert np.count_nonzero(shell) > 0.03 * shell.size
+    assert np.mean(is_greenish(seen)) > 0.03
     assert count(seen, NORMAL_COLOR) > 30
     tab.click("[data-part=arrows]")
     tab.wait("!state.show.arrows")
@@ -165,13 +172,9 @@ def test_a_push_moves_the_ball_and_holding_pushes_on(opened):
     tab.page.wait_for_timeout(300)
     assert live.player.v[1] == pytest.approx(5.0 * 0.1, rel=0.02)  # 5 N for 0.1 s on 1 kg
     # The camera looks along -x more or less: its right hand is a direction of the world.
-    right = tab.page.evaluate("""async () => {
-        const scene = await import("./scene.js");
-        return scene.Picture.prototype.direction.call({viewer}, "right");
-    }""")
+    right = tab.rightwards()
     tab.page.select_option("#direction", "right")
     live.player.v[:] = 0.0
-    button = tab.page.locator("#hold").bounding_box()
     tab.page.locator("#hold").scroll_into_view_if_needed()
     button = tab.page.locator("#hold").bounding_box()
     tab.page.mouse.move(button["x"] + 20, button["y"] + 10)
@@ -190,7 +193,10 @@ def test_a_push_moves_the_ball_and_holding_pushes_on(opened):
 def test_a_finished_run_scrubs(opened):
     live, tab = opened(FilmPlayer(), running=False)
     assert tab.page.locator("#scrub").is_visible()
-    assert not tab.page.locator("#push-section").is_visible()
+    tab.page.keyboard.press("d")  # of other runs the key for drags: no fault
+    absent = ("push-section", "drag-mode", "drag-section", "targets-section")
+    for selector in (*(f"#{name}" for name in absent), '[data-part="pressure"]'):
+        assert not tab.page.locator(selector).is_visible()
     tab.slide("#scrubber", 0.75)
     tab.wait("state.t === 1.5")
     assert live.player.time == 1.5
@@ -262,19 +268,6 @@ def test_strip_and_list_show_the_forces(opened):
         return red;
     }""")
     assert drawn > 50
-
-
-@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
-def test_nothing_is_cut_off(opened, size):
-    _, tab = opened(BallPlayer())
-    tab.page.set_viewport_size({"width": size[0], "height": size[1]})
-    tab.wait("state.contacts.length")
-    cut = tab.page.evaluate("""() => [...document.querySelectorAll("button, th, td, output")]
-        .filter((one) => one.offsetParent && one.scrollWidth > one.clientWidth + 1)
-        .map((one) => one.innerText)""")
-    assert cut == []
-    box = tab.page.evaluate("document.documentElement.scrollHeight <= innerHeight")
-    assert box
 
 
 def test_what_is_no_number_is_answered_by_a_sentence(opened):

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import time
 import warnings
+from unittest.mock import Mock
 
 import meshcat
 import numpy as np
@@ -17,41 +18,10 @@ from sphshell_pin.view.live import Live, loop, preview
 from sphshell_pin.view.live.loop import BUDGET, FPS
 from sphshell_pin.view.live.opening import player_of
 from tests.scenario.files import DROP, write
+from tests.view.live_driver import TAB, ForeignWindow, frames, say
 from tests.view.live_player import BallPlayer, FilmPlayer
 
-TAB, OTHER_TAB = object(), object()
 START_KNOB = '\n[[knob]]\nkey = "robot.ball.start.root_joint.2"\n'
-
-
-class Told(list):
-    """Stands in for the answers to browsers."""
-
-    def __call__(self, client, text):
-        self.append((client, text))
-
-
-@pytest.fixture
-def make():
-    made = []
-
-    def make_live(player=None, **options):
-        live = Live(BallPlayer() if player is None else player, **options)
-        live.told = live.server.report = Told()
-        made.append(live)
-        return live
-
-    yield make_live
-    for live in made:
-        live.stop()
-
-
-def say(live, kind, client=TAB, **fields):
-    live.server.take(client, {"type": kind, **fields})
-
-
-def frames(live, count, wall=1 / 60):
-    for _ in range(count):
-        live.frame(wall)
 
 
 def test_time_runs_as_fast_as_asked(make):
@@ -76,10 +46,11 @@ def test_pause_step_run_reset(make):
     say(live, "run", on=False)
     frames(live, 10)
     assert live.player.time == 0.0
-    for _ in range(3):
+    for _ in range(3):  # a key held down, which acts no longer than until it is let go
         say(live, "step", seconds=0.002)
     frames(live, 2)
     assert live.player.time == pytest.approx(0.006)
+    assert len(live.player.calls) == 1
     assert not live.running
     say(live, "run", on=True)
     frames(live, 6)
@@ -118,7 +89,6 @@ def test_it_waits_for_the_first_browser_if_asked_to(make):
     live.server.clients.add(TAB)
     frames(live, 10)
     assert live.player.time > 0.1
-    live.server.clients.clear()
 
 
 def test_a_slider_that_is_dragged_is_one_change(make):
@@ -136,10 +106,7 @@ def test_a_slider_that_is_dragged_is_one_change(make):
 def test_whatever_a_knob_does_the_run_goes_on(make):
     live = make()
 
-    def breaks(*_):
-        raise ZeroDivisionError("a defect")
-
-    live.player.change = breaks
+    live.player.change = Mock(side_effect=ZeroDivisionError("a defect"))
     say(live, "parameter", key="stiffness", value=1.0)
     live.frame(1 / 60)
     assert live.told == [(TAB, "ZeroDivisionError: a defect")]
@@ -171,23 +138,26 @@ def test_what_is_held_pushes_until_it_is_let_go(make):
     assert live.player.v[0] == speed
 
 
-def test_a_run_that_fails_stops_says_why_and_can_start_again(make):
-    live = make()
-    live.server.clients.add(TAB)
-    live.player.fails = SimulationDiverged(0.5, "it blew up", None)
-    frames(live, 3)
-    assert not live.running
-    assert "it blew up" in live._state()["ended"]
-    say(live, "run", on=True)
-    live.frame(1 / 60)
-    assert "Reset" in live.told[-1][1]
-    live.player.fails = None
+@pytest.mark.parametrize("what", ["player.advance", "picture.update"])
+@pytest.mark.parametrize(
+    "fault", [SimulationDiverged(0.5, "it blew up", None), ZeroDivisionError("no direction")]
+)
+def test_what_fails_stops_the_run_says_why_and_can_start_again(make, monkeypatch, what, fault):
+    live = make(watched=True)
+    owner, name = what.split(".")
+    with monkeypatch.context() as broken:
+        broken.setattr(getattr(live, owner), name, Mock(side_effect=fault))
+        frames(live, 3)
+        assert not live.running
+        assert str(fault) in live._state()["ended"]
+        say(live, "run", on=True)
+        frames(live, 1)
+        assert "Reset" in live.told[-1][1]
     say(live, "reset")
     say(live, "run", on=True)
     frames(live, 10)
     assert live.player.time > 0.1
     assert live._state()["ended"] is None
-    live.server.clients.clear()
 
 
 def test_a_finished_run_scrubs_and_starts_again_at_its_end(make):
@@ -270,13 +240,11 @@ def test_in_slow_motion_the_chart_has_a_point_a_frame(make):
 
 
 def test_a_state_that_is_no_number_is_not_drawn(make):
-    live = make()
-    live.server.clients.add(TAB)
+    live = make(watched=True)
     live.player.q = np.full(3, np.nan)
     live.player.advance = lambda *_: BallPlayer().advance(0.0)
     frames(live, 3)
     assert np.isfinite(live._window._matrices).all()
-    live.server.clients.clear()
 
 
 def test_ctrl_c_ends_it_cleanly():
@@ -289,18 +257,6 @@ def test_ctrl_c_ends_it_cleanly():
     live = Live(Interrupted())
     live.run()
     assert not live.server._thread.is_alive()
-
-
-class ForeignWindow:
-    """Stands in for the window of somebody's meshcat server."""
-
-    web_url = "http://127.0.0.1:7000/static/"
-
-    def __init__(self):
-        self.commands = []
-
-    def send(self, command):
-        self.commands.append(command.lower())
 
 
 def test_a_picture_in_somebody_elses_window(make):
@@ -368,37 +324,6 @@ def test_fixed_steps_longer_than_a_frame_keep_the_speed(make, tmp_path):
     assert live.player.time == pytest.approx(0.1, abs=1.1e-3)
 
 
-def test_a_key_held_down_does_not_go_on_when_it_is_let_go(make):
-    live = make(running=False)
-    advanced, advance = [], live.player.advance
-    live.player.advance = lambda *given: (advanced.append(given[0]), advance(*given))[1]
-    for _ in range(5):
-        say(live, "step", seconds=1e-3)
-    frames(live, 1)
-    assert live.player.time == pytest.approx(5e-3)
-    assert advanced == [pytest.approx(5e-3)]
-
-
-def test_a_picture_that_fails_is_told_and_the_page_goes_on(make):
-    live = make()
-    live.server.clients.add(TAB)
-
-    def fail(*_):
-        raise ZeroDivisionError("no direction")
-
-    update, live.picture.update = live.picture.update, fail
-    frames(live, 3)
-    assert not live.running
-    assert "no direction" in live._state()["ended"]
-    live.picture.update = update
-    say(live, "reset")
-    say(live, "run", on=True)
-    frames(live, 3)
-    live.server.clients.clear()
-    assert live._state()["ended"] is None
-    assert live.player.time > 0.0
-
-
 def test_the_arrow_of_a_push_ends_where_a_knob_starts_the_run_anew(make, tmp_path):
     live = make(LiveRun(build(write(tmp_path, DROP + START_KNOB))))
     frames(live, 6)
@@ -411,15 +336,12 @@ def test_the_arrow_of_a_push_ends_where_a_knob_starts_the_run_anew(make, tmp_pat
 
 
 def test_the_legend_says_where_arrows_are_cut(make):
-    live = make()
+    live = make(watched=True)
     frames(live, 60)
-    live.draw()
     assert live._state()["cut"] is False
     say(live, "push", body="ball", direction=[1.0, 0.0, 0.0], newtons=1e6, seconds=1.0)
     live.running = False
-    live.server.clients.add(TAB)
     frames(live, 1)
-    live.server.clients.clear()
     assert live._state()["cut"] is True
 
 

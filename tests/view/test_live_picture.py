@@ -11,10 +11,12 @@ from sphshell_pin.contact import CoulombFriction
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, SceneContacts
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
-from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View
-from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, lowered
+from sphshell_pin.view.arrows import Forces
+from sphshell_pin.view.camera import View
+from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, lowered
 from sphshell_pin.view.live.window import LiveWindow
 from tests.scenario.files import DROP, write
+from tests.view.drawn import attribute
 from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
 from tests.view.stand_ins import ball_configuration, ball_model, contact_pair, plate
 from tests.view.test_camera import in_picture
@@ -96,14 +98,7 @@ def test_a_trail_grows_on_its_shell_and_moves_with_it():
         easel.draw()
     pieces = [o for path, o in easel.browser.objects.items() if "/trail/" in path]
     assert len(pieces) > 1
-    points = np.vstack(
-        [
-            np.frombuffer(
-                o["geometries"][0]["data"]["attributes"]["position"]["array"].data, "<f4"
-            ).reshape(-1, 3)
-            for o in pieces
-        ]
-    )
+    points = np.vstack([attribute(drawn) for drawn in pieces])
     radius = np.hypot(points[:, 0], points[:, 1])
     np.testing.assert_allclose(radius, 0.3, atol=2.0 * easel.picture.display.trail_width)
     seen = -np.arctan2(points[:, 1], points[:, 0])
@@ -123,9 +118,7 @@ def test_a_contact_that_jumps_starts_another_piece():
             easel.draw()
     for path, drawn in easel.browser.objects.items():
         if "/trail/" in path:
-            data = drawn["geometries"][0]["data"]["attributes"]["position"]["array"].data
-            x = np.frombuffer(data, "<f4")[::3]
-            assert np.ptp(x) < 0.1
+            assert np.ptp(attribute(drawn)[:, 0]) < 0.1
 
 
 def test_trails_outlast_a_shell_drawn_anew_and_pairs_on_one_shell_have_one_each():
@@ -176,23 +169,9 @@ def test_every_part_can_be_hidden_and_shown(part):
         assert easel.picture.shown[part] is on
 
 
-def test_patches_have_colours_of_their_own():
-    easel = Easel(BallPlayer())
-    easel.picture.show("patches", True)
-    easel.draw()
-    (drawn,) = [o for path, o in easel.browser.objects.items() if path.endswith("/patches")]
-    attributes = drawn["geometries"][0]["data"]["attributes"]
-    assert drawn["materials"][0]["vertexColors"]
-    positions, colors = (
-        np.frombuffer(attributes[name]["array"].data, "<f4") for name in ("position", "color")
-    )
-    assert len(colors) == len(positions)
-    assert 0.0 < colors.min() <= colors.max() < 1.0
-
-
 def test_a_push_is_an_arrow_from_the_body():
     easel = Easel(BallPlayer())
-    easel.draw(PushShown.at(np.array([0.0, 0.0, 0.2]), np.array([3.0, 0.0, 0.0])))
+    easel.draw(Forces(np.array([[0, 0, 0.2]]), np.array([[3.0, 0, 0]]), np.zeros((1, 3))))
     shaft = easel.browser.matrices["/meshcat/push/total_0/shaft"]
     np.testing.assert_allclose((shaft @ [0, -0.5, 0, 1])[:3], [0.0, 0.0, 0.2], atol=1e-6)
     assert (shaft @ [0, 0.5, 0, 1])[0] > 0.01
@@ -222,17 +201,6 @@ def test_the_scale_of_arrows_is_found_once_and_then_kept():
     assert easel.picture.arrow_scale.reference_force > found.reference_force
 
 
-def test_the_robot_is_placed_as_pinocchio_places_it():
-    player = ArmPlayer(mesh_scale=[1.0, 2.0, 3.0])
-    model, geometry = player.scene.model, player.visual_model
-    seen = Easel(player).draw().matrices
-    data, placed = model.createData(), geometry.createData()
-    pin.updateGeometryPlacements(model, data, geometry, placed, player.q)
-    for index, body in enumerate(geometry.geometryObjects):
-        expected = placed.oMg[index].homogeneous @ np.diag([*body.meshScale, 1.0])
-        np.testing.assert_allclose(seen[f"/meshcat/robot/visuals/{body.name}"], expected, atol=1e-6)
-
-
 def test_axes_show_how_frames_are_placed_and_the_grid_says_its_spacing():
     player = ArmPlayer()
     easel = Easel(player)
@@ -252,8 +220,7 @@ def test_axes_show_how_frames_are_placed_and_the_grid_says_its_spacing():
             np.testing.assert_allclose(
                 along / np.linalg.norm(along), data.oMi[joint].rotation[:, k], atol=1e-5
             )
-    drawn = seen.objects["/meshcat/grid"]["geometries"][0]["data"]["attributes"]["position"]
-    points = np.frombuffer(drawn["array"].data, "<f4").reshape(-1, 3)
+    points = attribute(seen.objects["/meshcat/grid"])
     step = np.diff(np.unique(points[:, 0].round(5))).min()
     assert easel.picture.display.grid == f"grid of {1e3 * step:g} mm at z = 0"
     assert np.ptp(points[:, :2], axis=0) == pytest.approx(40 * step, rel=1e-5)
@@ -273,9 +240,9 @@ def test_the_curved_surface_of_contact_can_be_compared_with_the_flat_one(tmp_pat
     easel = Easel(player)
 
     def least_radius():
-        drawn = easel.draw().objects["/meshcat/shells/0_plate/surface"]["geometries"][0]["data"]
-        points = np.frombuffer(drawn["attributes"]["position"]["array"].data, "<f4").reshape(-1, 3)
-        corners = points[np.frombuffer(drawn["index"]["array"].data, "<u4").reshape(-1, 3)]
+        drawn = easel.draw().objects["/meshcat/shells/0_plate/surface"]
+        index = drawn["geometries"][0]["data"]["index"]["array"].data
+        corners = attribute(drawn)[np.frombuffer(index, "<u4").reshape(-1, 3)]
         mantle = np.ptp(corners[..., 2], axis=1) > 1e-3
         middles = 0.5 * (corners + np.roll(corners, 1, axis=1))[mantle]
         return np.hypot(middles[..., 0], middles[..., 1]).min()
@@ -291,14 +258,7 @@ def test_the_curved_surface_of_contact_can_be_compared_with_the_flat_one(tmp_pat
 
 def test_the_first_camera_of_a_finished_run_has_all_of_its_part():
     seen = Easel(FilmPlayer()).picture.view
-    corners = plate().vertices
-    back = (seen.eye - seen.target) / seen.distance
-    depth = (corners - seen.eye) @ -back
-    right = np.cross([0.0, 0.0, 1.0], back)
-    right /= np.linalg.norm(right)
-    slope = np.tan(np.deg2rad(0.5 * FIELD_OF_VIEW))
-    for axis, wide in ((right, ASPECT), (np.cross(back, right), 1.0)):
-        assert np.abs((corners - seen.target) @ axis / depth).max() < wide * slope
+    assert np.abs(in_picture(seen, plate().vertices)).max() < 1.0
     player = FilmPlayer()
     player.seek(0.7)
     Easel(player)

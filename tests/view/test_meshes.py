@@ -5,7 +5,6 @@ import re
 import struct
 from pathlib import Path
 
-import meshcat
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -23,6 +22,7 @@ from sphshell_pin.view.meshes import (
     take_out_numbers,
 )
 from sphshell_pin.view.robot import GeometryRobot
+from tests.view.drawn import Film
 
 PAGE = (
     Path(page_module.__file__)
@@ -120,12 +120,12 @@ def ball(rings=24):
     return np.concatenate(facets)
 
 
-def stl(corners, title=b""):
+def stl(corners, title=b"", normals=None):
     """A binary STL file of these facets, written field by field."""
     parts = [title.ljust(80, b" "), len(corners).to_bytes(4, "little")]
-    for facet in corners:
-        normal = np.cross(facet[1] - facet[0], facet[2] - facet[0])
-        normal /= np.linalg.norm(normal) or 1.0
+    if normals is None:
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    for normal, facet in zip(normals, corners, strict=True):
         parts += [np.vstack((normal, facet)).astype("<f4").tobytes(), b"\0\0"]
     return b"".join(parts)
 
@@ -190,15 +190,12 @@ def plain(value):
 
 def stl_of(normals, corners):
     """Return facets as a binary STL file, and as a text file."""
-    facets = np.zeros(len(corners), STL_FACET)
-    facets["normal"], facets["corners"] = normals, corners
-    binary = b"a title".ljust(80) + len(facets).to_bytes(4, "little") + facets.tobytes()
-    text = "solid a\n"
-    for normal, three in zip(facets["normal"], facets["corners"], strict=True):
+    text, normals, corners = "solid a\n", np.asarray(normals, "<f4"), np.asarray(corners, "<f4")
+    for normal, three in zip(normals, corners, strict=True):
         text += f"facet normal {' '.join(map(repr, normal.tolist()))}\n outer loop\n"
         text += "".join(f"  vertex {' '.join(map(repr, one.tolist()))}\n" for one in three)
         text += " endloop\nendfacet\n"
-    return binary, (text + "endsolid a\n").encode()
+    return stl(corners, b"a title", normals), (text + "endsolid a\n").encode()
 
 
 @pytest.mark.parametrize("kind", [0, 1])
@@ -236,15 +233,8 @@ def test_a_robot_s_mesh_is_sent_with_normals(tmp_path):
     )
     model = pin.buildModelFromUrdf(str(tmp_path / "dark.urdf"))
     visual = pin.buildGeomFromUrdf(model, str(tmp_path / "dark.urdf"), pin.GeometryType.VISUAL)
-    window = page_module.FilmWindow()
-    GeometryRobot(meshcat.Visualizer(window=window), model, visual)
-    meshes = [
-        geometry["data"].data
-        for command in window.commands(np.zeros(1))
-        if command["type"] == "set_object"
-        for geometry in command["object"]["geometries"]
-        if geometry.get("format") == "stl"
-    ]
-    (sent,) = meshes
-    facets = np.frombuffer(sent, STL_FACET, -1, STL_HEADER)
+    film = Film()
+    GeometryRobot(film.canvas, model, visual)
+    (sent,) = [geometry for drawn in film.objects.values() for geometry in drawn["geometries"]]
+    facets = np.frombuffer(sent["data"].data, STL_FACET, -1, STL_HEADER)
     np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [1, 0, 0]], atol=1e-7)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from sphshell_pin.dynamics.result.contact_patches import PATCH
-from sphshell_pin.view.nodes import new_visualizer
-from sphshell_pin.view.page import FilmWindow
 from sphshell_pin.view.patches import LEVELS, PatchPool, PatchScale
+from tests.view.drawn import Film
 from tests.view.stand_ins import contact_log
 
 
@@ -23,21 +22,17 @@ def some_patches(*rows):
 
 @pytest.fixture
 def pool():
-    pytest.importorskip("meshcat")
-    window = FilmWindow()
-    made = PatchPool(new_visualizer(window)["pressure"], 2)
+    film = Film()
+    made = PatchPool(film.canvas, 2)
 
     def shown(rows, patches, scale):
         """The discs in the picture: (slot, level) and pose of each."""
-        window.frame = 0
         made.update(contact_log(rows), patches, scale)
-        poses = {}
-        for path, frames in window._frames.items():
-            matrix = np.reshape(frames[0], (4, 4)).T
-            if np.linalg.norm(matrix[:3, 0]) > 1e-5:
-                _, slot, level = path.rsplit("_", 2)
-                poses[int(slot), int(level)] = matrix
-        return poses
+        return {
+            tuple(map(int, path.split("_")[1:])): matrix
+            for path, matrix in film.matrices.items()
+            if np.linalg.norm(matrix[:3, 0]) > 1e-5
+        }
 
     return shown
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-from scipy.spatial import ConvexHull, QhullError
 
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
+from sphshell_pin.errors import import_extra
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.shell.shell import Shell
 
@@ -52,9 +52,10 @@ class LinkGeometry:
 
     def depth(self, center: Array) -> float:
         """Return how far `center` (3,) [m] is inside the convex hull [m]; negative outside."""
+        spatial = import_extra("scipy.spatial", "robots", "whether a sphere is inside its link")
         try:
-            hull = ConvexHull(self.corners)
-        except (QhullError, ValueError):  # flat, or nothing
+            hull = spatial.ConvexHull(self.corners)
+        except (spatial.QhullError, ValueError):  # flat, or nothing
             return -math.inf
         return float(-(hull.equations[:, :3] @ center + hull.equations[:, 3]).max())
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
-from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.cad.face_mesh import ALONG, FaceMesh
+from sphshell_pin.shell.cad.face_surface import stationary_parameter
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.surface import CadSurface
 from sphshell_pin.shell.cleaned import CleanedSurface
@@ -34,9 +34,9 @@ MOST_ROUNDS = 6
 SAME_PLACE = 1e-6
 """A corner this near to a node, as a share of the size, is it: cleaning welds within less."""
 
-CURVE_SEEDS, CURVE_STEPS, SETTLED = 9, 4, 0.01
-"""Places along an edge from the nearest of which Newton's method goes on; its steps; the share of
-the chord error below which a step no longer changes the distance notably."""
+CURVE_SEEDS, SETTLED = 9, 0.01
+"""Places along an edge from the nearest of which Newton's method goes on; the share of the chord
+error below which its step no longer changes the distance notably."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +100,14 @@ class _Places:
         self._factor, self._tolerance = factor, cad.stated
         polygon = surface.source_element[surface.triangle_element]
         self.corners = surface.vertices[surface.triangles] / factor
-        self._sides = _own_sides(surface.triangles, cad.face_of(polygon))
+        self._sides = _own_sides(surface.triangles, cad.found.face_of(polygon))
         self._of_face: list[tuple[FaceMesh, Longs, Floats]] = []
         self._curves: list[tuple[Occ, Longs, Floats]] = []  # sides (n, 2), their parameters
         corner_rows = np.repeat(polygon, 3)
-        for face, mesh, rows, uv in cad.locate(corner_rows, self.corners.reshape(-1, 3)):
+        for face, mesh, rows, uv in cad.found.locate(corner_rows, self.corners.reshape(-1, 3)):
             own = rows[::3] // 3
             self._of_face.append((mesh, own, uv.reshape(-1, 3, 2)))
-            nodes = mesh.triangles[polygon[own] - cad.starts[face]]
+            nodes = mesh.triangles[polygon[own] - cad.found.starts[face]]
             self._find_curves(mesh, own, nodes, SAME_PLACE * cad.size)
 
     def errors(self, shell: ShellBase) -> Errors:
@@ -238,7 +238,7 @@ def _note(found: Errors, stated: float, factor: float, count: int, bent: float) 
 def _from_curve(curve: Occ, points: Floats, ends: Floats, settled: float) -> Floats:
     """Largest distances (n,) of points (n, k, 3) along sides from a curve, `ends` (n, 2) on it.
 
-    Gauss-Newton steps shorter than `settled` are the last, where there is no closed form.
+    Newton's steps shorter than `settled` are the last, where there is no closed form.
     """
     if curve.GetType() == GeomAbs_Circle:
         circle = curve.Circle()
@@ -257,25 +257,16 @@ def _from_curve(curve: Occ, points: Floats, ends: Floats, settled: float) -> Flo
 
 def _side_from_curve(curve: Occ, points: Floats, start: float, end: float, settled: float) -> float:
     """Largest distance of points (k, 3) along a side from the curve between two parameters."""
-    place, tangent = gp_Pnt(), gp_Vec()
     # Its speed may be anything: the middle of the side need not be near that of the parameters.
     seeds = np.linspace(start, end, CURVE_SEEDS)
     along = np.array([curve.Value(at).Coord() for at in seeds.tolist()])
-    low, high = curve.FirstParameter(), curve.LastParameter()
+    ends = curve.FirstParameter(), curve.LastParameter()
     largest = 0.0
     for point in points:
         away = np.linalg.norm(along - point, axis=1)
-        nearest, at = float(away.min()), float(seeds[np.argmin(away)])
-        for _ in range(CURVE_STEPS):
-            curve.D1(at, place, tangent)
-            offset, derivative = point - place.Coord(), np.array(tangent.Coord())
-            nearest = min(nearest, float(np.linalg.norm(offset)))
-            square = float(derivative @ derivative)
-            if square == 0.0:
-                break
-            along_curve = float(offset @ derivative)
-            at = min(max(at + along_curve / square, low), high)
-            if along_curve**2 <= settled**2 * square:
-                break
+        seed, nearest = float(seeds[np.argmin(away)]), float(away.min())
+        at = stationary_parameter(curve, point, seed, ends, settled)
+        if at is not None:
+            nearest = min(nearest, float(np.linalg.norm(curve.Value(at).Coord() - point)))
         largest = max(largest, nearest)
     return largest

@@ -11,18 +11,14 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.gp import gp_Pnt2d
 from OCP.IntTools import IntTools_FClass2d
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_OUT
-from OCP.TopoDS import TopoDS
+from OCP.TopAbs import TopAbs_OUT
 
+from sphshell_pin.shell.cad.face_mesh import FaceMesh
 from sphshell_pin.shell.cad.face_surface import stationary_parameter
-from sphshell_pin.shell.cad.model import subshapes
-from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.surface import CadSurface
-from sphshell_pin.shell.raw import Floats, Ints, area_vectors
+from sphshell_pin.shell.raw import Floats, Ints, random_places
 from sphshell_pin.shell.shell import Shell
 
 TRIMMING = 1e-9
@@ -41,8 +37,6 @@ REACH = 4.0
 AWAY = 100.0
 """A stationary point farther from the contact, in the same unit, is that of another place."""
 
-EDGE_SEEDS = 65
-
 
 @dataclass(frozen=True)
 class StationaryPoint:
@@ -55,15 +49,6 @@ class StationaryPoint:
     normal: Floats | None
 
 
-@dataclass(frozen=True)
-class _Edge:
-    """One edge of a face: its curve, and points (k, 3) at parameters (k,) along it."""
-
-    curve: Occ
-    at: Floats
-    points: Floats
-
-
 class TrimmedFaces:
     """The trimmed faces that a tessellation approximates [units of the model]."""
 
@@ -74,7 +59,6 @@ class TrimmedFaces:
         self._corners = points[triangles]
         self._shell = Shell(points, triangles, crease_angle=0.0)
         self._inside = cache(lambda face: IntTools_FClass2d(cad.sewn.faces[face], TRIMMING))
-        self._edges = cache(lambda face: tuple(_edges_of(cad.sewn.faces[face])))
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -99,12 +83,8 @@ class TrimmedFaces:
 
     def samples(self, count: int, rng: np.random.Generator) -> Floats:
         """Random points (n <= count, 3) of the exact surfaces, spread by area."""
-        area = np.linalg.norm(area_vectors(self._corners), axis=1)
-        chosen = rng.choice(len(area), count, p=area / area.sum())
-        weights = rng.dirichlet((1.0, 1.0, 1.0), count)
-        places = np.einsum("nk,nkx->nx", weights, self._corners[chosen])
         points = []
-        for face, mesh, _, uv in self._cad.locate(chosen, places):
+        for face, mesh, _, uv in self._cad.found.locate(*random_places(self._corners, count, rng)):
             # Along a hollow border the triangles reach beyond the face.
             points.append(mesh.surface.nodes(uv[[self._holds(face, one) for one in uv]])[0])
         return np.concatenate(points)
@@ -117,13 +97,13 @@ class TrimmedFaces:
         error = max(self._cad.found.error, self._cad.stated)
         polygons, places = self._faces_near(contact, REACH * error)
         found: list[StationaryPoint] = []
-        for face, mesh, _, uv in self._cad.locate(polygons, places):
+        for face, mesh, _, uv in self._cad.found.locate(polygons, places):
             at = mesh.surface.stationary(center, uv[0], SETTLED * self._cad.size)
             if at is not None and self._holds(face, at):
                 points, normals = mesh.surface.nodes(at[None])
                 if normals.any():
                     found.append(StationaryPoint(points[0], normals[0]))
-            found += self._on_edges(face, center, contact)
+            found += self._on_edges(mesh, center, contact)
         if not found:
             return None
         away = np.array([np.linalg.norm(one.point - contact) for one in found])
@@ -145,13 +125,13 @@ class TrimmedFaces:
         touched = self._shell.contacts(point, radius, method="elements")
         polygons = self._shell.source_element[touched.element]
         # Contacts come deepest first: the first of each face is the nearest.
-        _, first = np.unique(self._cad.face_of(polygons), return_index=True)
+        _, first = np.unique(self._cad.found.face_of(polygons), return_index=True)
         return polygons[first], touched.point[first]
 
     def _to_surfaces(self, points: Floats, polygons: Ints, near: Floats) -> Floats:
         """Distances (n,) of points from the surfaces below triangles, next to points `near`."""
         found = np.full(len(points), np.inf)
-        for _, mesh, own, uv in self._cad.locate(polygons, near):
+        for _, mesh, own, uv in self._cad.found.locate(polygons, near):
             found[own] = mesh.surface.distances(points[own], uv, SETTLED * self._cad.size)
         return found
 
@@ -159,22 +139,12 @@ class TrimmedFaces:
         """Whether a face holds the point of its surface at parameters uv (2,)."""
         return bool(self._inside(face).Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_OUT)
 
-    def _on_edges(self, face: int, center: Floats, near: Floats) -> Iterator[StationaryPoint]:
+    def _on_edges(self, mesh: FaceMesh, center: Floats, near: Floats) -> Iterator[StationaryPoint]:
         """Stationary points on the edges of a face, and their ends."""
-        for edge in self._edges(face):
-            seed = float(edge.at[np.argmin(np.linalg.norm(edge.points - near, axis=1))])
-            ends = float(edge.at[0]), float(edge.at[-1])
-            at = stationary_parameter(edge.curve, center, seed, ends, SETTLED * self._cad.size)
-            if at is not None:
-                yield StationaryPoint(np.array(edge.curve.Value(at).Coord()), None)
-            yield StationaryPoint(edge.points[0], None)
-            yield StationaryPoint(edge.points[-1], None)
-
-
-def _edges_of(face: Occ) -> Iterator[_Edge]:
-    for part in subshapes(face, TopAbs_EDGE):
-        edge = TopoDS.Edge(part)
-        if not BRep_Tool.Degenerated_s(edge):
-            curve = BRepAdaptor_Curve(edge, face)
-            at = np.linspace(curve.FirstParameter(), curve.LastParameter(), EDGE_SEEDS)
-            yield _Edge(curve, at, np.array([curve.Value(t).Coord() for t in at.tolist()]))
+        for border in mesh.borders:
+            away = np.linalg.norm(mesh.points[border.nodes] - near, axis=1)
+            seed, low, high = (float(border.at[k]) for k in (np.argmin(away), 0, -1))
+            ends = min(low, high), max(low, high)
+            at = stationary_parameter(border.curve, center, seed, ends, SETTLED * self._cad.size)
+            for parameter in (*ends, *([] if at is None else [at])):
+                yield StationaryPoint(np.array(border.curve.Value(parameter).Coord()), None)

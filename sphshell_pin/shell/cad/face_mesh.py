@@ -20,7 +20,7 @@ from OCP.TopoDS import TopoDS
 from sphshell_pin.shell.cad.face_surface import SINGULAR, FaceSurface, dot
 from sphshell_pin.shell.cad.model import subshapes
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.raw import Floats, Longs, Mask
+from sphshell_pin.shell.raw import Floats, Longs, Mask, area_vectors
 
 ALONG = (0.25, 0.5, 0.75)
 """Where along a side the distance is measured."""
@@ -158,6 +158,19 @@ class FaceMesh:
         count = (~free).sum(axis=1, keepdims=True)
         mean = np.where(free, 0.0, uv).sum(axis=1, keepdims=True) / np.maximum(count, 1)
         return np.where(free & (count > 0), mean, uv)
+
+    def parameters_at(self, triangles: Longs, points: Floats) -> Floats:
+        """Parameters (n, 2) of points (n, 3) near `triangles` (n,)."""
+        nodes = self.triangles[triangles]
+        corners = self.points[nodes]
+        spans = area_vectors(corners)
+        square = np.maximum(dot(spans, spans), np.finfo(float).tiny)
+        offset, one, two = (at - corners[:, 0] for at in (points, corners[:, 1], corners[:, 2]))
+        second = dot(np.cross(offset, two), spans) / square
+        third = dot(np.cross(one, offset), spans) / square
+        weights = np.clip(np.stack([1.0 - second - third, second, third], axis=1), 0.0, 1.0)
+        weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
+        return np.asarray(np.einsum("nk,nkx->nx", weights, self.parameters(nodes)))
 
     def _errors(self, sides: Longs, tolerance: float) -> tuple[Floats, Floats]:
         """Largest distance to the surface along each side, and at the middle of each triangle."""

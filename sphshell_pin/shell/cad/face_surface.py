@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.GeomAbs import (
-    GeomAbs_C0,
-    GeomAbs_Cone,
-    GeomAbs_Cylinder,
-    GeomAbs_Plane,
-    GeomAbs_Sphere,
-    GeomAbs_Torus,
-)
+from OCP.GeomAbs import GeomAbs_C0
 from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.shell.cad.options import Occ
@@ -27,15 +20,6 @@ SINGULAR = 1e-10
 """Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
 
 
-_SHAPES = {
-    GeomAbs_Plane: ("plane", BRepAdaptor_Surface.Plane),
-    GeomAbs_Cylinder: ("cylinder", BRepAdaptor_Surface.Cylinder),
-    GeomAbs_Cone: ("cone", BRepAdaptor_Surface.Cone),
-    GeomAbs_Sphere: ("sphere", BRepAdaptor_Surface.Sphere),
-    GeomAbs_Torus: ("torus", BRepAdaptor_Surface.Torus),
-}
-
-
 class FaceSurface:
     """The surface below a face: points and derivatives at many places at once."""
 
@@ -49,16 +33,17 @@ class FaceSurface:
         self._lowest = np.where(endless, -np.inf, self.low)
         self._highest = np.where(endless, np.inf, self.high)
         self._scale = 0.0
-        self.flat = surface.GetType() == GeomAbs_Plane
         self._shape = self.shape()
+        self.flat = self._shape[0] == KINDS.index("plane")
         self.kinked = GeomAbs_C0 in (surface.UContinuity(), surface.VContinuity())
 
     def shape(self) -> list[float]:
         """Kind, point, axis and two radii of it, as `CleanedSurface.face_shapes` has them (9,)."""
-        if self._surface.GetType() not in _SHAPES:
+        number = int(self._surface.GetType())  # OpenCASCADE begins with the same kinds
+        if number >= len(KINDS):
             return list(NO_SHAPE)
-        kind, read = _SHAPES[self._surface.GetType()]
-        shape = read(self._surface)
+        kind = KINDS[number]
+        shape = getattr(self._surface, kind.capitalize())()
         radius = second = 0.0
         if kind == "cone":
             radius, second = shape.RefRadius(), shape.SemiAngle()
@@ -74,7 +59,7 @@ class FaceSurface:
             radius = shape.Radius()
         place = shape.Location().Coord()
         axis = (0.0, 0.0, 1.0) if kind == "sphere" else shape.Axis().Direction().Coord()
-        return [float(KINDS.index(kind)), *place, *axis, radius, second]
+        return [float(number), *place, *axis, radius, second]
 
     def nodes(self, uv: Floats) -> tuple[Floats, Floats]:
         """Points and unit normals (n, 3) at parameters uv (n, 2); zero where there is no normal."""

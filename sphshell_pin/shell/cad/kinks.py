@@ -54,10 +54,9 @@ def without_kinks(model: CadModel) -> tuple[CadModel, int]:
 
 def _has_kink(face: Occ) -> bool:
     """Whether the normal of a face jumps along one of its knots."""
-    adaptor = BRepAdaptor_Surface(face)
-    if GeomAbs_C0 not in (adaptor.UContinuity(), adaptor.VContinuity()):
+    surface, adaptor = FaceSurface(face), BRepAdaptor_Surface(face)
+    if not surface.kinked:
         return False
-    surface = FaceSurface(face)
     for column, count, fill in (
         (0, adaptor.NbUIntervals, adaptor.UIntervals),
         (1, adaptor.NbVIntervals, adaptor.VIntervals),

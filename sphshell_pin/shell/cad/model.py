@@ -25,6 +25,10 @@ LARGEST = 1
 """Makes ShapeAnalysis_ShapeTolerance return the largest tolerance, not the mean."""
 
 
+Part = tuple[str, Occ]
+"""A name and a shape."""
+
+
 @dataclass(frozen=True)
 class CadFace:
     """One trimmed face.
@@ -47,16 +51,14 @@ class CadModel:
     ----------
     path : of the file
     faces : in the order of the file
-    bodies : name of each body
-    solids : shape of each body, a solid if the file has one
+    bodies : name and shape of each body, a solid if the file has one
     unit : what the header says about the unit of length, and in what `shape` came
     notes : sentences about the reading
     """
 
     path: Path
     faces: tuple[CadFace, ...]
-    bodies: tuple[str, ...]
-    solids: tuple[Occ, ...]
+    bodies: tuple[Part, ...]
     unit: HeaderUnit
     notes: tuple[str, ...] = ()
 
@@ -85,10 +87,11 @@ class CadModel:
         """
         kept = self.faces
         if bodies is not None:
+            names = [name for name, _ in self.bodies]
             for name in bodies:
-                if name not in self.bodies:
-                    raise NameNotFound("body", name, self.path.name, self.bodies)
-            kept = tuple(face for face in kept if self.bodies[face.body] in bodies)
+                if name not in names:
+                    raise NameNotFound("body", name, self.path.name, names)
+            kept = tuple(face for face in kept if names[face.body] in bodies)
         if faces is not None:
             valid = list(dict.fromkeys(face.name for face in kept))
             numbers = {face.number for face in kept}

@@ -17,12 +17,12 @@ import sys
 import tempfile
 import time
 import warnings
-from multiprocessing import spawn
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError, SphshellError
+from sphshell_pin.limits import child_command, last_line
 from sphshell_pin.shell.cad.messages import ALIVE, unpack
 from sphshell_pin.shell.cad.options import CadOptions
 
@@ -129,8 +129,7 @@ class _Child:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the child)
         # The child ends when its standard input closes, even if this process is killed.
         self._process = subprocess.Popen(
-            [os.fsdecode(spawn.get_executable() or sys.executable), "-P", "-c", _START]
-            + self.paths,
+            child_command(_START),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -166,8 +165,7 @@ class _Child:
         except subprocess.TimeoutExpired:
             return _NO_ANSWER
         self._errors.seek(0)
-        lines = self._errors.read().decode(errors="replace").split("\n")
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "no reason given")
+        last = last_line(self._errors.read())
         if "bad_alloc" in last or "MemoryError" in last:
             return _short_of_memory(memory_limit)
         if code < 0:

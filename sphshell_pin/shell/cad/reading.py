@@ -25,7 +25,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.cad.framing import check_frame
-from sphshell_pin.shell.cad.model import CadFace, CadModel, compound, subshapes
+from sphshell_pin.shell.cad.model import CadFace, CadModel, Part, compound, subshapes
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.units import NO_UNIT, iges_unit, step_unit
 from sphshell_pin.shell.readers.text import read_bytes
@@ -41,7 +41,6 @@ _STEP_NAMES = re.compile(
 )
 """Names of faces and bodies: to find the entity of a shape takes long, so not without need."""
 
-Part = tuple[str, Occ]
 Namer = Callable[[Occ], str]
 
 
@@ -93,9 +92,9 @@ def _read_step(path: Path, data: bytes) -> CadModel:
         return "" if text is None else _name(text.ToCString())
 
     named = any(_name(text.decode(errors="replace")) for text in _STEP_NAMES.findall(data))
-    faces, bodies, solids = _sort(parts, name_of if named else _no_name)
+    faces, bodies = _sort(parts, name_of if named else _no_name)
     notes = _lost(len(re.findall(rb"=\s*(?:ADVANCED_|)FACE(?:_SURFACE|)\s*\(", data)), faces)
-    return CadModel(path, faces, bodies, solids, unit, notes)
+    return CadModel(path, faces, bodies, unit, notes)
 
 
 def _walk(label: Occ, location: Occ, parts: list[Part]) -> None:
@@ -140,18 +139,17 @@ def _read_iges(path: Path, data: bytes) -> CadModel:
     parts: list[Part] = [] if shape is None or shape.IsNull() else [("", shape)]
     entities = range(1, model.NbEntities() + 1)
     named = any(model.Entity(k).HasName() for k in entities)
-    faces, bodies, solids = _sort(parts, name_of if named else _no_name)
+    faces, bodies = _sort(parts, name_of if named else _no_name)
     held = (model.Entity(k).TypeNumber() for k in entities)
     notes = _lost(sum(kind in IGES_FACES for kind in held), faces)
-    return CadModel(path, faces, bodies, solids, unit, notes)
+    return CadModel(path, faces, bodies, unit, notes)
 
 
 def _read_brep(path: Path, data: bytes) -> CadModel:
     shape = TopoDS_Shape()
     if not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
         raise ShellFileError(path, "is damaged, its BREP shape cannot be read")
-    faces, bodies, solids = _sort([("", shape)], _no_name)
-    return CadModel(path, faces, bodies, solids, NO_UNIT)
+    return CadModel(path, *_sort([("", shape)], _no_name), NO_UNIT)
 
 
 def _no_name(_: Occ) -> str:
@@ -172,17 +170,14 @@ def _lost(held: int, faces: tuple[CadFace, ...]) -> tuple[str, ...]:
     return (f"{lost} of the {held} faces of the file could not be read and are missing",)
 
 
-def _sort(
-    parts: list[Part], name_of: Namer
-) -> tuple[tuple[CadFace, ...], tuple[str, ...], tuple[Occ, ...]]:
+def _sort(parts: list[Part], name_of: Namer) -> tuple[tuple[CadFace, ...], tuple[Part, ...]]:
     """Sort faces into bodies: each solid, each shell outside of solids, all loose faces of a part.
 
-    Returns faces, names of the bodies and their shapes. Names of bodies are made unique; those of
-    faces are as the file has them, or "Face 12".
+    Returns faces and bodies. Names of bodies are made unique; those of faces are as the file has
+    them, or "Face 12".
     """
     faces: list[CadFace] = []
-    bodies: list[str] = []
-    found: list[Occ] = []
+    bodies: list[Part] = []
     for part, shape in parts:
         solids = list(subshapes(shape, TopAbs_SOLID))
         shells = list(subshapes(shape, TopAbs_SHELL, TopAbs_SOLID))
@@ -191,13 +186,12 @@ def _sort(
         for group in groups:
             own = part if len(groups) == 1 else name_of(group)
             name = own or (f"{part} {len(bodies) + 1}" if part else f"Body {len(bodies) + 1}")
-            bodies.append(_unique(name, bodies))
-            found.append(group)
+            bodies.append((_unique(name, [taken for taken, _ in bodies]), group))
             for face in subshapes(group, TopAbs_FACE):
                 number = len(faces) + 1
                 called = name_of(face) or f"Face {number}"
                 faces.append(CadFace(TopoDS.Face(face), called, number, len(bodies) - 1))
-    return tuple(faces), tuple(bodies), tuple(found)
+    return tuple(faces), tuple(bodies)
 
 
 def _unique(name: str, taken: list[str]) -> str:

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.shell.cad.face_mesh import FaceMesh
 from sphshell_pin.shell.cad.kinks import without_kinks
 from sphshell_pin.shell.cad.model import CadModel, box_size
 from sphshell_pin.shell.cad.options import CadOptions
 from sphshell_pin.shell.cad.reading import read_model
 from sphshell_pin.shell.cad.tessellation import Sewn, Tessellation, sew, tessellate
 from sphshell_pin.shell.cad.units import take_unit
-from sphshell_pin.shell.raw import (
-    NO_SHAPE,
-    Floats,
-    Ints,
-    Longs,
-    RawSurface,
-    area_vectors,
-    moved_shapes,
-)
+from sphshell_pin.shell.raw import NO_SHAPE, RawSurface, moved_shapes
 
 CHORD_ERROR = 1e-3
 """Share of the box diagonal that the elements may be off the exact surface, unless stated."""
@@ -59,7 +48,35 @@ class CadSurface:
 
     def notes(self) -> tuple[str, ...]:
         """Sentences about what was read and how near it was met."""
-        return (*self.model.notes, *_notes(self))
+        model, sewn, found, meters = self.model, self.sewn, self.found, self.model.meters
+        count = len(model.faces)
+        notes = [
+            *model.notes,
+            f"{count} CAD face{'' if count == 1 else 's'}, tolerance of the file "
+            f"{model.tolerance * meters:.3g} m",
+        ]
+        if sewn.tolerance > 0.0:
+            notes.append(
+                f"borders of faces joined within {sewn.tolerance * meters:.3g} m: open edges of "
+                f"the faces {sewn.before} before, {sewn.after} after"
+            )
+        notes += [
+            f"face '{face.name}' could not be given triangles: it is missing"
+            for face, mesh in zip(model.faces, found.meshes, strict=True)
+            if mesh is None
+        ]
+        held = (
+            "held"
+            if found.error <= self.stated
+            else f"not held, by a factor {found.error / self.stated:.3g}; finer elements bring no "
+            "less, the faces do not meet more exactly"
+        )
+        return (
+            *notes,
+            f"chord error {self.stated * meters:.3g} m stated, {found.error * meters:.3g} m "
+            f"measured ({found.interior * meters:.3g} m from the surfaces, "
+            f"{found.border * meters:.3g} m from their borders): {held}",
+        )
 
     def polygons(self) -> RawSurface:
         """Triangles of all faces side by side [m], outer sides out; each face has its own points.
@@ -78,6 +95,8 @@ class CadSurface:
             faces.append(np.full(len(mesh.triangles), row, np.int32))
             count += len(mesh.points)
         triangles = np.concatenate(corners)
+        meshes = self.found.meshes
+        shapes = np.array([NO_SHAPE if mesh is None else mesh.surface.shape() for mesh in meshes])
         return RawSurface(
             vertices=np.concatenate(points) * self.model.meters,
             offsets=3 * np.arange(len(triangles) + 1, dtype=np.int64),
@@ -85,52 +104,8 @@ class CadSurface:
             normals=np.concatenate(normals).reshape(-1, 3),
             faces=np.concatenate(faces),
             face_names=tuple(face.name for face in self.model.faces),
-            face_shapes=moved_shapes(self._shapes(), self.model.meters, np.eye(3), np.zeros(3)),
+            face_shapes=moved_shapes(shapes, self.model.meters, np.eye(3), np.zeros(3)),
         )
-
-    def _shapes(self) -> Floats:
-        """(f, 9) shapes of the faces [units of the model]."""
-        return np.array(
-            [NO_SHAPE if mesh is None else mesh.surface.shape() for mesh in self.found.meshes]
-        )
-
-    @cached_property
-    def starts(self) -> Longs:
-        """(f + 1,) polygon with which each face begins."""
-        counts = [0 if mesh is None else len(mesh.triangles) for mesh in self.found.meshes]
-        return np.cumsum([0, *counts])
-
-    def face_of(self, polygons: Ints | Longs) -> Longs:
-        """(n,) face of each of the `polygons` (n,)."""
-        return np.searchsorted(self.starts, polygons, side="right") - 1
-
-    def locate(
-        self, polygons: Ints | Longs, points: Floats
-    ) -> Iterator[tuple[int, FaceMesh, Longs, Floats]]:
-        """Find the parameters of points (n, 3) near `polygons` (n,) [units of the model].
-
-        Yields, face by face: the face, its mesh, the rows (k,) of the points on it, and the
-        parameters (k, 2) at which these rows are.
-        """
-        face = self.face_of(polygons)
-        for one in np.unique(face).tolist():
-            mesh = self.found.meshes[one]
-            assert mesh is not None  # it has triangles
-            own = np.flatnonzero(face == one)
-            nodes = mesh.triangles[polygons[own] - self.starts[one]]
-            weights = corner_weights(mesh.points[nodes], points[own])
-            yield one, mesh, own, np.einsum("nk,nkx->nx", weights, mesh.parameters(nodes))
-
-
-def corner_weights(corners: Floats, points: Floats) -> Floats:
-    """Barycentric weights (n, 3) of points in the planes of their triangles (n, 3, 3)."""
-    spans = area_vectors(corners)
-    square = np.maximum(np.einsum("nx,nx->n", spans, spans), np.finfo(float).tiny)
-    offset, one, two = (place - corners[:, 0] for place in (points, corners[:, 1], corners[:, 2]))
-    second = np.einsum("nx,nx->n", np.cross(offset, two), spans) / square
-    third = np.einsum("nx,nx->n", np.cross(one, offset), spans) / square
-    weights = np.clip(np.stack([1.0 - second - third, second, third], axis=1), 0.0, 1.0)
-    return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12))
 
 
 def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
@@ -159,36 +134,3 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     sewn = sew(model, size, None if options.sew is None else options.sew / model.meters)
     found = tessellate(sewn.shape, sewn.faces, size, stated, model.meters)
     return CadSurface(whole, model, size, taken, sewn, found, stated)
-
-
-def _notes(surface: CadSurface) -> list[str]:
-    """Say what was found about sewing and chord error."""
-    model, sewn, found, stated = surface.model, surface.sewn, surface.found, surface.stated
-    meters = model.meters
-    count = len(model.faces)
-    notes = [
-        f"{count} CAD face{'' if count == 1 else 's'}, tolerance of the file "
-        f"{model.tolerance * meters:.3g} m"
-    ]
-    if sewn.tolerance > 0.0:
-        notes.append(
-            f"borders of faces joined within {sewn.tolerance * meters:.3g} m: open edges of the "
-            f"faces {sewn.before} before, {sewn.after} after"
-        )
-    for k, mesh in enumerate(found.meshes):
-        if mesh is None:
-            notes.append(
-                f"face '{model.faces[k].name}' could not be given triangles: it is missing"
-            )
-    held = (
-        "held"
-        if found.error <= stated
-        else f"not held, by a factor {found.error / stated:.3g}; finer elements bring no less, the "
-        "faces do not meet more exactly"
-    )
-    notes.append(
-        f"chord error {stated * meters:.3g} m stated, {found.error * meters:.3g} m measured "
-        f"({found.interior * meters:.3g} m from the surfaces, {found.border * meters:.3g} m from "
-        f"their borders): {held}"
-    )
-    return notes

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
@@ -20,6 +22,7 @@ from sphshell_pin.errors import InvalidParameter, InvalidShell
 from sphshell_pin.shell.cad.face_mesh import FaceMesh, take_mesh
 from sphshell_pin.shell.cad.model import CadModel, count_open_edges
 from sphshell_pin.shell.cad.options import Occ
+from sphshell_pin.shell.raw import Floats, Ints, Longs
 
 ANGLE = 0.35
 """Neighbouring elements on a face turn by about this at most [rad]: less than the crease angle."""
@@ -63,7 +66,31 @@ class Tessellation:
     @property
     def count(self) -> int:
         """Number of triangles."""
-        return sum(len(mesh.triangles) for mesh in self.meshes if mesh is not None)
+        return int(self.starts[-1])
+
+    @cached_property
+    def starts(self) -> Longs:
+        """(f + 1,) triangle with which each face begins, if all stand side by side."""
+        return np.cumsum([0, *(0 if mesh is None else len(mesh.triangles) for mesh in self.meshes)])
+
+    def face_of(self, triangles: Ints | Longs) -> Longs:
+        """(n,) face of each of the `triangles` (n,)."""
+        return np.searchsorted(self.starts, triangles, side="right") - 1
+
+    def locate(
+        self, triangles: Ints | Longs, points: Floats
+    ) -> Iterator[tuple[int, FaceMesh, Longs, Floats]]:
+        """Find the parameters of points (n, 3) near `triangles` (n,) [units of the model].
+
+        Yields, face by face: the face, its mesh, the rows (k,) of the points on it, and the
+        parameters (k, 2) at which these rows are.
+        """
+        face = self.face_of(triangles)
+        for one in np.unique(face).tolist():
+            mesh = self.meshes[one]
+            assert mesh is not None  # it has triangles
+            own = np.flatnonzero(face == one)
+            yield one, mesh, own, mesh.parameters_at(triangles[own] - self.starts[one], points[own])
 
 
 @dataclass(frozen=True)

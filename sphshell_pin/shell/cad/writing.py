@@ -31,7 +31,7 @@ from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
 from sphshell_pin.errors import InvalidParameter, ShellFileError
-from sphshell_pin.shell.cad.model import CadModel, compound
+from sphshell_pin.shell.cad.model import CadModel, Part, compound
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES, Occ
 from sphshell_pin.shell.cad.units import MILLIMETER
 from sphshell_pin.units import metres_per_unit
@@ -49,16 +49,14 @@ IGES_UNITS = {"mm": "MM", "m": "M", "cm": "CM", "in": "IN", "ft": "FT", "km": "K
 BREP_OF_SOLIDS = 1
 """IGES entities of solids and shells, whose faces share their borders, not of loose faces."""
 
-Part = tuple[str, Occ]
-
 
 def parts_of(model: CadModel, whole: bool) -> list[Part]:
     """Names and shapes of the bodies of a model; unless `whole`, of the faces chosen alone."""
     used = sorted({face.body for face in model.faces})
     if whole:
-        return [(model.bodies[k], model.solids[k]) for k in used]
+        return [model.bodies[k] for k in used]
     return [
-        (model.bodies[k], compound([face.shape for face in model.faces if face.body == k]))
+        (model.bodies[k][0], compound([face.shape for face in model.faces if face.body == k]))
         for k in used
     ]
 

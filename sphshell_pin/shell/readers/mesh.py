@@ -1,55 +1,47 @@
-"""Mesh files without a unit: stl through trimesh, obj and off by readers of our own.
+"""Mesh files without a unit: .stl, .obj and .off.
 
-trimesh triangulates the quads and larger polygons of obj files and drops the normals of their
-corners, and it loses the quads of off files altogether; here elements must stay what they are.
+The readers are our own: trimesh triangulates the quads and larger polygons of obj files and drops
+the normals of their corners, and it loses the quads of off files altogether; here elements must
+stay what they are.
 """
 
 from __future__ import annotations
 
-import io
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, RawSurface
 from sphshell_pin.shell.readers.text import finish, indices, pack_polygons, read_bytes, read_text
 
+STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
+"""A triangle of a binary .stl file."""
+
+_VERTEX = re.compile(rb"(?i)\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+_END_OF_FACET = re.compile(rb"(?i)\bendfacet\b")
+
 
 def read_stl(path: Path) -> RawSurface:
     """Read a binary or text .stl file: a soup of triangles."""
-    with interrupts_delayed():
-        import trimesh
-
-    # From memory: so a file that cannot be opened is not reported as damaged.
-    data = io.BytesIO(_few_solids(read_bytes(path)))
-    try:
-        mesh: Any = trimesh.load(data, file_type="stl", process=False, force="mesh")
-    except ImportError as error:  # it fails to guess the encoding of what is no text
-        why = "it is neither a whole binary file nor text"
-        raise ShellFileError(path, f"is not a readable .stl file ({why})") from error
-    except Exception as error:  # whatever a damaged file makes the parser raise
-        raise ShellFileError(path, f"is not a readable .stl file ({error})") from error
-    if len(mesh.faces) == 0:
+    data = read_bytes(path)
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) == 84 + STL_RECORD.itemsize * count:
+        vertices = np.frombuffer(data, STL_RECORD, count, 84)["corners"].reshape(-1, 3)
+    else:
+        vertices = _reals(path, _VERTEX.findall(data))
+        count = len(_END_OF_FACET.findall(data))
+        if len(vertices) != 3 * count:
+            raise ShellFileError(
+                path, "is not a readable .stl file (neither a whole binary file nor whole text)"
+            )
+    if count == 0:
         raise ShellFileError(path, "is not a readable .stl file (it holds no triangles)")
-    triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
-    offsets, corners = pack_polygons(np.full(len(triangles), 3), triangles.ravel())
-    return finish(path, np.asarray(mesh.vertices, np.float64), offsets, corners)
-
-
-_BETWEEN_SOLIDS = re.compile(rb"(?im)^[ \t]*endsolid\b[^\r\n]*[\r\n]\s*solid\b[^\r\n]*")
-_MANY_SOLIDS = 1000
-
-
-def _few_solids(data: bytes) -> bytes:
-    """Join the solids of a text file of very many: trimesh takes the square of their number."""
-    binary = len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
-    if binary or len(_BETWEEN_SOLIDS.findall(data)) < _MANY_SOLIDS:
-        return data
-    return _BETWEEN_SOLIDS.sub(b"", data)
+    offsets, corners = pack_polygons(np.full(count, 3), np.arange(3 * count))
+    return finish(path, vertices.astype(np.float64), offsets, corners)
 
 
 def read_obj(path: Path) -> RawSurface:
@@ -104,7 +96,7 @@ def read_obj(path: Path) -> RawSurface:
         raise ShellFileError(
             path, f"a face uses normal {which.max() + 1}, but the file has {len(table) - 1} normals"
         )
-    return RawSurface(raw.vertices, raw.offsets, raw.corners, table[which])
+    return replace(raw, normals=table[which])
 
 
 def _obj_index(path: Path, line: int, word: str, latest: int, what: str) -> int:
@@ -129,7 +121,7 @@ def _check_reals(path: Path, line: int, words: list[str]) -> None:
         raise ShellFileError(path, f"'{' '.join(words)}': {error}", line) from None
 
 
-def _reals(path: Path, words: list[str], width: int = 3) -> Floats:
+def _reals(path: Path, words: Sequence[object], width: int = 3) -> Floats:
     try:
         return np.array(words, np.float64).reshape(-1, width)
     except ValueError as error:
@@ -188,7 +180,7 @@ def read_off(path: Path) -> RawSurface:
     raw = finish(path, np.ascontiguousarray(table[:, :3]), offsets, corners)
     if "N" not in kind.replace("OFF", ""):
         return raw
-    return RawSurface(raw.vertices, raw.offsets, raw.corners, table[corners, 3:6])
+    return replace(raw, normals=table[corners, 3:6])
 
 
 def _off_faces(words: list[str], count: int, all_words: bool) -> list[list[int]] | None:

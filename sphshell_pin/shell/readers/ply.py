@@ -6,7 +6,7 @@ and accepts truncated text files.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +89,7 @@ def read_ply(path: Path) -> RawSurface:
     if any(axis not in table for axis in ("nx", "ny", "nz")):
         return raw
     normals = np.stack([table[axis] for axis in ("nx", "ny", "nz")], axis=1)
-    return RawSurface(raw.vertices, raw.offsets, raw.corners, normals[raw.corners])
+    return replace(raw, normals=normals[raw.corners])
 
 
 def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:

@@ -7,8 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.errors import ShellFileError
-from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurface, offsets_of
+from sphshell_pin.errors import InvalidShell, ShellFileError
+from sphshell_pin.shell.raw import (
+    LARGEST_COUNT,
+    Floats,
+    Ints,
+    Longs,
+    RawSurface,
+    check_indices,
+    check_vertices,
+    offsets_of,
+)
+from sphshell_pin.shell.rounding import rounding
 
 
 def read_text(path: Path) -> str:
@@ -22,15 +32,6 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
-
-
-def check_finite(path: Path, vertices: Floats) -> None:
-    """Raise ShellFileError for the first vertex that is not finite."""
-    wrong = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
-    if wrong.size:
-        raise ShellFileError(
-            path, f"vertex {int(wrong[0]) + 1} is not finite: {vertices[wrong[0]].tolist()}"
-        )
 
 
 def pack_polygons(
@@ -58,25 +59,18 @@ def finish(
     notes: tuple[str, ...] = (),
 ) -> RawSurface:
     """Check what every file must fulfil: enough points, all finite, indices in range."""
-    count = len(vertices)
-    if count < 3 or len(offsets) < 2:
-        raise ShellFileError(
-            path, f"holds {count} vertices and {len(offsets) - 1} elements: no surface"
-        )
-    check_finite(path, vertices)
-    few = np.flatnonzero(np.diff(offsets) < 3)
-    if few.size:
-        raise ShellFileError(
-            path,
-            f"element {int(few[0]) + 1} has {int(np.diff(offsets)[few[0]])} corners; it needs at "
-            "least three",
-        )
-    wrong = np.flatnonzero((corners < 0) | (corners >= count))
-    if wrong.size:
-        element = int(np.searchsorted(offsets, wrong[0], side="right"))
-        raise ShellFileError(
-            path,
-            f"element {element} uses vertex {int(corners[wrong[0]]) + 1} (counted from 1), but the "
-            f"file has {count} vertices",
-        )
-    return RawSurface(np.ascontiguousarray(vertices, np.float64), offsets, corners, normals, notes)
+    counts = np.diff(offsets)
+    try:
+        if len(counts) == 0:
+            raise InvalidShell("holds no elements")
+        check_vertices(vertices, 1)
+        if counts.min() < 3:
+            row = int(np.argmax(counts < 3))
+            raise InvalidShell(
+                f"element {row + 1} has {int(counts[row])} corners; it needs at least three"
+            )
+        check_indices(offsets, corners, len(vertices), 1)
+    except InvalidShell as error:
+        raise ShellFileError(path, str(error)) from None
+    points = np.ascontiguousarray(vertices, np.float64)
+    return RawSurface(points, offsets, corners, normals, notes, rounding=rounding(points))

@@ -11,7 +11,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
 from sphshell_pin.benchmarks import convergence, hard_cases, queries, step, timing, work_precision
@@ -28,20 +27,16 @@ Tell = Callable[[str, float], None]
 """Called with the section's title and the share of all that is done."""
 
 
-class Measure(Protocol):
-    """Measures a section."""
-
-    def __call__(self, *, quick: bool, progress: Progress) -> Section:
-        """Return the section."""
-
-
 @dataclass(frozen=True)
 class Part:
-    """A section to be: `seconds` it takes, about, with --quick and in full; `pinned` to a core."""
+    """A section to be, of measure(quick=, progress=).
+
+    `seconds` it takes, about, with --quick and in full; `pinned` to a core.
+    """
 
     key: str
     title: str
-    measure: Measure
+    measure: Callable[..., Section]
     seconds: tuple[float, float]
     pinned: bool = True
 

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.models import model_of
+from sphshell_pin.benchmarks.rolling import turned
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.result.result import Result
@@ -112,18 +113,11 @@ def _run(
     result = sp.Simulation(scene, sp.Adaptive(PRECISE)).run(q0, v0, duration, record_dt=every)
     times = {kind: [e.t for e in result.events if e.kind == kind] for kind in ("touch", "lift_off")}
     (touch,), (left,) = times["touch"], times["lift_off"]
-    q, v = result.q[-1], result.v[-1]
-    turns = [
-        pin.Quaternion(*q[[7 * k + 6, 7 * k + 3, 7 * k + 4, 7 * k + 5]]) for k in range(len(balls))
-    ]
+    quaternions, v = result.q[-1].reshape(-1, 7)[:, 3:], result.v[-1].reshape(-1, 6)
     log = result.contacts
     return Impact(
-        velocities=np.array(
-            [R.toRotationMatrix() @ v[6 * k : 6 * k + 3] for k, R in enumerate(turns)]
-        ),
-        spins=np.array(
-            [R.toRotationMatrix() @ v[6 * k + 3 : 6 * k + 6] for k, R in enumerate(turns)]
-        ),
+        velocities=turned(quaternions, v[:, :3]),
+        spins=turned(quaternions, v[:, 3:]),
         duration=left - touch,
         t=log.t - touch,
         depth=log.depth,

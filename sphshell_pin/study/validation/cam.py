@@ -10,9 +10,8 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.models import model_of
-from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Array, Outcome, case, read
+from sphshell_pin.study.validation.cases import Array, Outcome, case, read, within
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 ECCENTRICITY = 0.05  # [m]: half the published displacement
@@ -68,24 +67,14 @@ def cam_and_follower() -> Outcome:
         "displacement": ECCENTRICITY * (1 - np.cos(phase)),
     }
     seen = dict(zip(exact, (ours.acceleration, ours.speed, ours.lift), strict=True))
-    findings = [
-        Finding(
-            name,
-            f"largest {name}, relative to the published one",
-            abs(np.abs(seen[name]).max() / published[name] - 1),
-            aim=BOUND,
-        )
-        for name in exact
-    ]
-    findings += [
-        Finding(
-            f"{name}_curve",
-            f"{name} over the turn, largest distance from the closed form, over its largest",
-            np.abs(seen[name] - exact[name]).max() / published[name],
-            aim=BOUND,
-        )
-        for name in exact
-    ]
+    largest, curves = [], []
+    curve = "over the turn, largest distance from the closed form, over its largest"
+    for name, form in exact.items():
+        error = np.abs(seen[name]).max() / published[name] - 1
+        apart = np.abs(seen[name] - form).max() / published[name]
+        largest.append((name, f"largest {name}, relative to the published one", error))
+        curves.append((f"{name}_curve", f"{name} {curve}", apart))
+    findings = within(BOUND, *largest, *curves)
     panels = [
         Panel(
             "angle of the cam [deg]",

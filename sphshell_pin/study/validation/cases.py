@@ -135,6 +135,11 @@ class Case:
         )
 
 
+def within(aim: float, *errors: tuple[str, str, float], unit: str = "") -> list[Finding]:
+    """Return findings of errors (key, what, error), of which only the size counts."""
+    return [Finding(key, what, abs(float(error)), unit, aim=aim) for key, what, error in errors]
+
+
 def explanations(found: Outcome) -> list[str]:
     """Return why findings are out of their bounds, a text for those that have the same reason."""
     reasons: dict[str, list[str]] = {}
@@ -144,18 +149,9 @@ def explanations(found: Outcome) -> list[str]:
     return [f"Out of bounds: {'; '.join(names)}. {text}" for text, names in reasons.items()]
 
 
-CASES: Register[Case] = Register(__package__, MODULES)
-collect = CASES.collect
-
-
-def case(key: str) -> Callable[[Callable[[], Outcome]], Callable[[], Outcome]]:
-    """Decorate the function that runs a case; what it states of itself is in cases.toml."""
-
-    def register(run: Callable[[], Outcome]) -> Callable[[], Outcome]:
-        CASES.add(key, Case(key=key, run=run, **STATED[key]))
-        return run
-
-    return register
+# What a case states of itself is in cases.toml.
+CASES = Register(__package__, MODULES, lambda key, run: Case(key=key, run=run, **STATED[key]))
+case, collect = CASES.case, CASES.collect
 
 
 def make_validation(

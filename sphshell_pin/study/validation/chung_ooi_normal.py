@@ -7,10 +7,9 @@ import numpy as np
 import sphshell_pin as sp
 from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import Ball, Impact, head_on, on_plane
-from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
+from sphshell_pin.study.validation.cases import Data, Outcome, case, read, within
+from sphshell_pin.study.validation.oblique import RIGID, rms
 from sphshell_pin.study.validation.pictures import Panel, draw
-
-RIGID = 1e20  # Young's modulus [Pa] of what the benchmark calls rigid
 
 
 def _outcome(name: str, data: Data, impact: Impact) -> Outcome:
@@ -21,32 +20,14 @@ def _outcome(name: str, data: Data, impact: Impact) -> Outcome:
     at_depth = np.interp(1e-6 * depth["x"], impact.depth[loading], impact.force[loading])
     at_time = np.interp(1e-6 * time["x"], impact.t, impact.force, left=0.0, right=0.0)
     lasted = 1e-6 * time["x"][-1]
-    findings = [
-        Finding(
-            "force",
-            "largest force, relative to the published one",
-            abs(impact.force.max() / peak - 1),
-            aim=0.02,
-        ),
-        Finding(
-            "duration",
-            "time in touch, relative to the published one",
-            abs(impact.duration / lasted - 1),
-            aim=0.02,
-        ),
-        Finding(
-            "depth",
-            "rms of force against depth, over the largest",
-            _rms(at_depth - 1e3 * depth["force"]) / peak,
-            aim=0.02,
-        ),
-        Finding(
-            "time",
-            "rms of force against time, over the largest",
-            _rms(at_time - 1e3 * time["force"]) / peak,
-            aim=0.02,
-        ),
-    ]
+    apart = rms(at_depth - 1e3 * depth["force"]), rms(at_time - 1e3 * time["force"])
+    findings = within(
+        0.02,
+        ("force", "largest force, relative to the published one", impact.force.max() / peak - 1),
+        ("duration", "time in touch, relative to the published one", impact.duration / lasted - 1),
+        ("depth", "rms of force against depth, over the largest", apart[0] / peak),
+        ("time", "rms of force against time, over the largest", apart[1] / peak),
+    )
     micro, kilo = 1e6, 1e-3
     force = kilo * impact.force
     panels = [
@@ -65,10 +46,6 @@ def _outcome(name: str, data: Data, impact: Impact) -> Outcome:
     ]
     caption = "Force of the contact against the approach and against time."
     return Outcome(findings, [draw(name, panels, caption)])
-
-
-def _rms(errors: Array) -> float:
-    return float(np.sqrt(np.mean(errors**2)))
 
 
 @case("chung_ooi_1")
@@ -105,14 +82,9 @@ def restitution() -> Outcome:
             law = sp.HertzLaw(young, poisson, RIGID, poisson, stated, 3.9)
             seen = on_plane(Ball(2.5e-3, density, (0, 0, -3.9)), law)
             back.append(float(seen.velocities[0, 2]) / 3.9)
-        findings.append(
-            Finding(
-                name.replace(" ", "_"),
-                f"largest error of the restitution, {name}",
-                float(np.abs(np.array(back) - STATED).max()),
-                aim=1e-6,
-            )
-        )
+        what = f"largest error of the restitution, {name}"
+        error = np.abs(np.array(back) - STATED).max()
+        findings += within(1e-6, (name.replace(" ", "_"), what, error))
         ours.append((f"ours, {name}", STATED, back))
     panel = Panel("restitution stated", "speed back over speed", [("stated", STATED, STATED)], ours)
     return Outcome(findings, [draw("chung_ooi_3", [panel], "Speed back over speed, as stated.")])

@@ -9,7 +9,7 @@ import numpy as np
 from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation import maw
 from sphshell_pin.study.validation.balls import Ball, head_on
-from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
+from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read, within
 from sphshell_pin.study.validation.kharaz import RINGS, THEORY
 from sphshell_pin.study.validation.oblique import Setting, rms
 from sphshell_pin.study.validation.pictures import Panel, draw
@@ -38,21 +38,15 @@ def sliding() -> Outcome:
     rings = dataclasses.replace(STEEL, rings=RINGS)
     x = np.concatenate([np.linspace(0.05, 6.0, 25), [8.0, 10.0, 13.0]])
     findings: list[Finding] = []
-    panels, explained = [], {}
+    panels = []
     for quantity in ("recoil", "spin"):
         chosen = data.where("quantity", quantity)
         for name, compared in (("fem", rings), *spheres.items()):
             points = chosen.where("sphere", name)
             incident, value = points["incident"], points["value"]
-            finding = Finding(
-                f"{quantity}_{name}",
-                f"rms of the {quantity}, " + ("finite elements" if name == "fem" else name),
-                rms(after_sliding(compared, incident, quantity) - value),
-                aim=0.1,
-            )
-            findings.append(finding)
-            if not finding.met and name != "fem":
-                explained[finding.key] = CONTRADICTED
+            title = f"rms of the {quantity}, " + ("finite elements" if name == "fem" else name)
+            error = rms(after_sliding(compared, incident, quantity) - value)
+            findings += within(0.1, (f"{quantity}_{name}", title, error))
         panels.append(
             Panel(
                 "tangential over mu normal velocity",
@@ -65,6 +59,8 @@ def sliding() -> Outcome:
                 [(THEORY, x, by_theory(STEEL, x, quantity))],
             )
         )
+    out = [f.key for f in findings if not f.met and not f.key.endswith("_fem")]
+    explained = dict.fromkeys(out, CONTRADICTED)
     caption = "Points of finite elements (fem) and of the codes; our lines; with micro-slip."
     return Outcome(findings, [draw("chung_ooi_5", panels, caption)], explained=explained)
 
@@ -115,7 +111,7 @@ def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
     """Compare beta and recoil; the sliding points for themselves, as there only mu counts."""
     data = read(key)
     findings: list[Finding] = []
-    panels, explained = [], {}
+    panels = []
     for quantity, bound in (("beta", 0.02), ("recoil", 0.05)):
         chosen = data.where("quantity", quantity)
         for name, one in spheres.items():
@@ -124,15 +120,8 @@ def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
             errors = after_spinning(one, x, quantity) - value
             slides = x < 1 if quantity == "beta" else x > 3.5 * one.mu * 1.5
             for part, which in (("sliding", slides), ("sticking", ~slides)):
-                finding = Finding(
-                    f"{quantity}_{name}_{part}",
-                    f"rms of {quantity}, {name}, {part}",
-                    rms(errors[which]),
-                    aim=bound,
-                )
-                findings.append(finding)
-                if not finding.met and part == "sticking":
-                    explained[finding.key] = DAMPED + HOW_MUCH
+                title = f"rms of {quantity}, {name}, {part}"
+                findings += within(bound, (f"{quantity}_{name}_{part}", title, rms(errors[which])))
         x = np.geomspace(0.15, 24.0, 26) if quantity == "beta" else np.linspace(0.07, 7.0, 29)
         panels.append(
             Panel(
@@ -144,6 +133,8 @@ def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
                 ],
             )
         )
+    out = [f.key for f in findings if not f.met and f.key.endswith("_sticking")]
+    explained = dict.fromkeys(out, DAMPED + HOW_MUCH)
     caption = "Points of Chung and Ooi, and our lines."
     return Outcome(findings, [draw(key, panels, caption)], explained=explained)
 
@@ -182,14 +173,11 @@ def opposite() -> Outcome:
         ]
         spins = np.array([one.spins[0, 1] for one in seen])
         along = np.array([one.velocities[0, 0] for one in seen])
-        error = float(np.abs(spins / data["after"] - 1).max())
-        slip = float(np.abs(along - data["tangential"]).max())
-        findings += [
-            Finding(
-                f"spin_{name}", f"largest change of the spin, relative, {name}", error, aim=1e-3
-            ),
-            Finding(f"along_{name}", f"largest tangential velocity, {name}", slip, "m/s", aim=1e-3),
-        ]
+        error = np.abs(spins / data["after"] - 1).max()
+        slip = np.abs(along - data["tangential"]).max()
+        spun, moved = f"largest change of the spin, relative, {name}", "largest tangential velocity"
+        findings += within(1e-3, (f"spin_{name}", spun, error))
+        findings += within(1e-3, (f"along_{name}", f"{moved}, {name}", slip), unit="m/s")
         panels.append(
             Panel(
                 "spin before [rad/s]",

@@ -10,10 +10,10 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.models import model_of
-from sphshell_pin.cases.contents import Finding, Table, columns
+from sphshell_pin.cases.contents import Table, columns
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
+from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read, within
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 FILE = "elliptical_contacts"
@@ -120,30 +120,20 @@ def elliptical_contacts() -> Outcome:
         return max(abs(errors[n][q]) for n in names for q in quantities if q in errors[n])
 
     contact = [name for name in errors if name != "bearing"]
+    axes, numerical = (
+        worst(contact, ("a", "b")),
+        "largest error relative to CONTACT's numerical one",
+    )
+    bearing = "bearing 6206, half axes and pressure relative to those of approximate formulas"
     findings = [
-        Finding(
-            "axes", "half axes, largest error relative to CONTACT's", worst(contact, ("a", "b")),
-            aim=5e-4,
+        *within(5e-4, ("axes", "half axes, largest error relative to CONTACT's", axes)),
+        *within(
+            4e-3,
+            ("approach", f"approach, {numerical}", worst(contact, ("approach",))),
+            ("pressure", f"largest pressure, {numerical}", worst(contact, ("pressure",))),
         ),
-        Finding(
-            "approach",
-            "approach, largest error relative to CONTACT's numerical one",
-            worst(contact, ("approach",)),
-            aim=4e-3,
-        ),
-        Finding(
-            "pressure",
-            "largest pressure, largest error relative to CONTACT's numerical one",
-            worst(contact, ("pressure",)),
-            aim=4e-3,
-        ),
-        Finding(
-            "bearing",
-            "bearing 6206, half axes and pressure relative to those of approximate formulas",
-            worst(["bearing"], QUANTITIES),
-            aim=0.03,
-        ),
-    ]  # fmt: skip
+        *within(0.03, ("bearing", bearing, worst(["bearing"], QUANTITIES))),
+    ]
     panels = []
     for one, unit in (("a", "mm"), ("b", "mm"), ("pressure", "MPa")):
         published = data[one]
@@ -176,15 +166,9 @@ def hertz_coefficients() -> Outcome:
         found["eta"].append(touch.b / unit)
         found["zeta"].append(2 * touch.approach / (total * unit**2))
     names = {"xi": "half axis a", "eta": "half axis b", "zeta": "approach"}
-    findings = [
-        Finding(
-            key,
-            f"{name}, largest error relative to the printed coefficient",
-            float(np.abs(np.array(found[key]) / data[key] - 1).max()),
-            aim=0.006,
-        )
-        for key, name in names.items()
-    ]
+    what = "largest error relative to the printed coefficient"
+    errors = {key: np.abs(np.array(found[key]) / data[key] - 1).max() for key in names}
+    findings = within(0.006, *((key, f"{names[key]}, {what}", errors[key]) for key in names))
     # From a circle at the right to slender ellipses at the left.
     x = 1 - data["cos_tau"]
     panel = Panel(

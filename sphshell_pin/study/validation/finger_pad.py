@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Outcome, case, read
+from sphshell_pin.study.validation.cases import Outcome, case, read, within
 from sphshell_pin.study.validation.ellipses import Touch, press
 from sphshell_pin.study.validation.pictures import Panel, draw
 
@@ -47,26 +46,19 @@ def finger_pad() -> Outcome:
     for name, found in touches.items():
         last = found[-1]
         ratio = last.pressure * np.pi * last.a * last.b / last.force
-        findings += [
-            Finding(
-                f"{name}_shape",
-                f"{name}: largest over mean pressure, relative to that of a paraboloid",
-                abs(ratio / published["peak_over_mean"] - 1),
-                aim=BOUND,
-            ),
-            Finding(
-                f"{name}_exponent",
-                f"{name}: exponent of displacement over force, relative to the measured 2/3",
-                abs(exponent(found) / published["displacement_exponent"] - 1),
-                aim=BOUND,
-            ),
-        ]
+        shape = f"{name}: largest over mean pressure, relative to that of a paraboloid"
+        power = f"{name}: exponent of displacement over force, relative to the measured 2/3"
+        measured = published["displacement_exponent"]
+        findings += within(
+            BOUND,
+            (f"{name}_shape", shape, ratio / published["peak_over_mean"] - 1),
+            (f"{name}_exponent", power, exponent(found) / measured - 1),
+        )
     x = np.linspace(-1, 1, 201)
     # The definition of FoundationLaw on a plane, at the largest approach.
     height = RADIUS - approaches[-1]
     from_center = np.hypot(height, x * np.sqrt(RADIUS**2 - height**2))
     pressure = (RADIUS**2 / from_center - from_center) / (RADIUS**2 / height - height)
-    power = published["displacement_exponent"]
     panels = [
         Panel(
             "place / half width of the contact",
@@ -87,7 +79,7 @@ def finger_pad() -> Outcome:
                 )
                 for name, found in touches.items()
             ],
-            [("power of 2/3, as measured", line := np.geomspace(1e-3, 1, 9), line**power)],
+            [("power of 2/3, as measured", line := np.geomspace(1e-3, 1, 9), line**measured)],
             logarithmic=True,
         ),
     ]

@@ -14,9 +14,8 @@ import numpy as np
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.rolling import Ball, state
 from sphshell_pin.benchmarks.swing import GRAVITY
-from sphshell_pin.cases.contents import Finding
 from sphshell_pin.contact.normal_law import bisect
-from sphshell_pin.study.validation.cases import Outcome, case
+from sphshell_pin.study.validation.cases import Outcome, case, within
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 BALL, BIG = Ball(0.1, 0.02), 0.2  # [kg], [m]; radius of the fixed one [m]
@@ -76,14 +75,13 @@ def ball_leaves_ball() -> Outcome:
     """Roll down with every coefficient, from none to one that sticks until the end."""
     left = {mu: roll_off(mu) for mu in COEFFICIENTS}
     errors = [abs(angle / leaving_angle(mu) - 1) for mu, angle in left.items()]
-    findings = [
-        Finding(key, f"{what}, error of the angle, relative", error, aim=1e-4)
-        for key, what, error in (
-            ("rolls", "sticks, acos(10/17)", abs(left[STICKS] / math.acos(10 / 17) - 1)),
-            ("slides", "frictionless, acos(2/3)", abs(left[0.0] / math.acos(2 / 3) - 1)),
-            ("slips", "six coefficients, closed form", max(errors)),
-        )
-    ]
+    off = "error of the angle, relative"
+    findings = within(
+        1e-4,
+        ("rolls", f"sticks, acos(10/17), {off}", left[STICKS] / math.acos(10 / 17) - 1),
+        ("slides", f"frictionless, acos(2/3), {off}", left[0.0] / math.acos(2 / 3) - 1),
+        ("slips", f"six coefficients, closed form, {off}", max(errors)),
+    )
     fine = np.linspace(0.0, 3.5, 141)
     shown = [mu for mu in COEFFICIENTS if mu <= fine[-1]]
     curve = np.degrees([leaving_angle(mu) for mu in fine])

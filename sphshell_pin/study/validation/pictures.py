@@ -33,8 +33,8 @@ class Panel:
     equal: bool = False
 
 
-def draw(name: str, panels: Sequence[Panel], caption: str, description: str = "") -> Picture:
-    """Draw the panels side by side; `description` is for those who cannot see them."""
+def draw(name: str, panels: Sequence[Panel], caption: str) -> Picture:
+    """Draw the panels side by side."""
     wide = 2 if len(panels) == 4 else len(panels)
     tall = len(panels) // wide
     with drawing.canvas(max(4.6, 3.9 * wide), 3.3 * tall) as figure:
@@ -61,4 +61,4 @@ def draw(name: str, panels: Sequence[Panel], caption: str, description: str = ""
             axis.grid(visible=True)
             axis.legend(fontsize=drawing.SMALL - 0.5, edgecolor="none", framealpha=0.85)
         png = drawing.png_of(figure)
-    return Picture(name, png, description or caption, caption)
+    return Picture(name, png, caption, caption)

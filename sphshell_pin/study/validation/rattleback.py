@@ -12,11 +12,11 @@ import math
 
 import numpy as np
 import pinocchio as pin
-from scipy.integrate import solve_ivp
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.cases.contents import Finding
+from sphshell_pin.errors import import_extra
 from sphshell_pin.study.validation.cases import Array, Outcome, case
 from sphshell_pin.study.validation.pictures import Panel, draw
 
@@ -51,7 +51,7 @@ def roll(spin: float, duration: float) -> tuple[Array, Array, Array]:
 
     start = np.concatenate((START[2], [0.0, 0.0, spin]))
     t = np.arange(0.0, duration, 0.001)
-    found = solve_ivp(
+    found = import_extra("scipy.integrate", "fit", "rigid rolling").solve_ivp(
         rates, (0.0, duration), start, "DOP853", t, events=about_vertical, rtol=1e-10, atol=1e-12
     )
     return found.t, np.sum(found.y[:3] * found.y[3:], axis=0), found.t_events[0]

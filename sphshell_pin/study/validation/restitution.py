@@ -16,6 +16,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.cases.contents import Finding
+from sphshell_pin.contact.normal_law import bisect
 from sphshell_pin.study.validation.balls import plane
 from sphshell_pin.study.validation.cases import Outcome, case, read
 from sphshell_pin.study.validation.pictures import Panel, draw
@@ -33,15 +34,10 @@ BODIES = (
 def hunt_crossley_restitution(speed: float, dissipation: float) -> float:
     """Return the restitution at an impact `speed` [m/s] with the `dissipation` b [s/m]."""
     c = dissipation * speed
+    if c == 0:
+        return 1.0
     lost = c - math.log1p(c)
-    low, high = 0.0, min(c, 1.0 - 1e-15)
-    for _ in range(200):
-        x = 0.5 * (low + high)
-        if -x - math.log1p(-x) < lost:
-            low = x
-        else:
-            high = x
-    return 0.5 * (low + high) / c if c > 0 else 1.0
+    return bisect(lambda x: -x - math.log1p(-x) - lost, 0.0, min(c, 1.0 - 1e-15)) / c
 
 
 def bounce(mass: float, law: sp.HuntCrossleyLaw, speed: float) -> float:

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import math
 
+import coal
 import numpy as np
-import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.rolling import Ball, in_bowl, in_cylinder, on_turntable, velocities
 from sphshell_pin.benchmarks.swing import GRAVITY
-from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Outcome, case, read
+from sphshell_pin.study.validation.cases import Outcome, case, read, within
 from sphshell_pin.study.validation.pictures import Panel, Series, draw
 
 WOOD = 1e10  # Young's modulus [Pa]
@@ -24,20 +23,17 @@ SHARE = 3e-5  # depth under the weight, over the radius: it does not count
 FILE = "rolling_balls"
 
 
-def wall(radius: float, angle: float, length: float, columns: int, rows: int = 1) -> sp.Shell:
+def wall(radius: float, angle: float, length: float, columns: int) -> sp.Shell:
     """Return the inside of a cylinder of `radius` and `length` [m] about y, `angle` [rad] from -z.
 
-    It goes to both sides; with pi it is closed.
+    It goes to both sides.
     """
-    turn = np.linspace(-angle, angle, columns + 1)[: columns + (angle < math.pi)]
+    turn = np.linspace(-angle, angle, columns + 1)
     inward = np.stack([-np.sin(turn), np.zeros(turn.size), np.cos(turn)], axis=1)
-    along = np.linspace(-length / 2, length / 2, rows + 1)
-    vertices = [-radius * inward + [0.0, y, 0.0] for y in along]
-    k, line = np.arange(columns), turn.size * np.arange(rows)[:, None]
-    a, b = line + k, line + (k + 1) % turn.size
-    elements = np.stack([a, b, b + turn.size, a + turn.size], axis=-1).reshape(-1, 4)
-    normals = np.concatenate([inward] * (rows + 1))
-    return sp.Shell(np.concatenate(vertices), elements, normals=normals)
+    vertices = [-radius * inward + [0.0, y, 0.0] for y in (-length / 2, length / 2)]
+    k = np.arange(columns)
+    elements = np.stack([k, k + 1, k + 1 + turn.size, k + turn.size], axis=-1)
+    return sp.Shell(np.concatenate(vertices), elements, normals=np.tile(inward, (2, 1)))
 
 
 @case("turntable")
@@ -70,20 +66,12 @@ def turntable() -> Outcome:
         ours.append((f"ours, {radius * 1e3:g} mm, {rpm:.3g} rpm", *(1e3 * path.T)))
         circle = center[:, None] + size * np.array([np.cos(around), np.sin(around)])
         theory.append(("circles at 2/7" if not theory else "_circle", *(1e3 * circle)))
-    findings = [
-        Finding(
-            "ratio",
-            "orbit over table, largest error relative to 2/7",
-            max(abs(seen / ratio - 1) for seen in ratios),
-            aim=1e-4,
-        ),
-        Finding(
-            "circle",
-            "largest distance of a path from its circle, over the radius",
-            max(misses),
-            aim=1e-4,
-        ),
-    ]
+    error = max(abs(seen / ratio - 1) for seen in ratios)
+    findings = within(
+        1e-4,
+        ("ratio", "orbit over table, largest error relative to 2/7", error),
+        ("circle", "largest distance of a path from its circle, over the radius", max(misses)),
+    )
     panel = Panel("x [mm]", "y [mm]", (), ours, theory, equal=True)
     caption = "Paths of three balls on a turntable; the circles are those of the closed form."
     return Outcome(findings, [draw("turntable", [panel], caption)])
@@ -94,37 +82,21 @@ def golf_ball() -> Outcome:
     """Roll the ball three times down and up again."""
     given = read(FILE).where("case", "cylinder").published
     radius, cup, orbit = given["ball radius [m]"], given["cup radius [m]"], 30.0
-    upright = pin.SE3(pin.utils.rotate("x", math.pi / 2), np.zeros(3))
-    shell = wall(cup, math.pi, 0.2, columns=60, rows=30).transformed(upright)
+    shell = sp.Shell.from_geometry(coal.Cylinder(cup, 0.2), side="inside")
     run = in_cylinder(Ball(0.046, radius), shell, cup, orbit, stiffness=1e6)
     t, height = run.result.t, run.result.q[:, 2] - run.swing
     exact = run.swing * (np.cos(run.expected * orbit * t) - 1)
+    bobbing = "frequency of bobbing over that of the orbit, error relative to sqrt(2/7)"
+    fall = "height, largest distance from the closed form, over the depth of the fall"
     findings = [
-        Finding(
-            "ratio",
-            "frequency of bobbing over that of the orbit, error relative to sqrt(2/7)",
-            abs(run.ratio / given["ratio"] - 1),
-            aim=1e-4,
-        ),
-        Finding(
-            "height",
-            "height, largest distance from the closed form, over the depth of the fall",
-            float(np.abs(height - exact).max()) / (2 * run.swing),
-            aim=1e-3,
-        ),
-        Finding("lost", "speed around that is lost in three swings", abs(run.lost), aim=1e-4),
+        *within(1e-4, ("ratio", bobbing, run.ratio / given["ratio"] - 1)),
+        *within(1e-3, ("height", fall, np.abs(height - exact).max() / (2 * run.swing))),
+        *within(1e-4, ("lost", "speed around that is lost in three swings", run.lost)),
     ]
-    panels = [
-        Panel(
-            "time [s]",
-            "height over the rim [mm]",
-            (),
-            [("ours", t, 1e3 * height)],
-            [("closed form", t, 1e3 * exact)],
-        )
-    ]
+    ours, form = ("ours", t, 1e3 * height), ("closed form", t, 1e3 * exact)
+    panel = Panel("time [s]", "height over the rim [mm]", (), [ours], [form])
     caption = "The height of the ball's center over three swings, in six turns."
-    return Outcome(findings, [draw("golf_ball", panels, caption)])
+    return Outcome(findings, [draw("golf_ball", [panel], caption)])
 
 
 @case("curved_track")
@@ -156,38 +128,20 @@ def curved_track() -> Outcome:
         # The work of the resistance for each radian, to second order of the angle.
         swings.append(swings[-1] - 2 * RESISTANCE * (1 + 10 / 21 * (swings[-1] - RESISTANCE) ** 2))
     expected = bend * np.array(swings[1:])
+    published, off = given["normal force over weight"], np.abs(force - exact)[20:].max()
+    turned = "normal force over weight where the ball turns, relative to the published one"
+    way = "normal force over weight on the way, largest distance from the closed form"
+    damping = "amplitudes with rolling resistance, largest distance from {}, over the first"
+    straight, lost = (np.abs(heights - one).max() / heights[0] for one in (line(count), expected))
     findings = [
-        Finding(
-            "force",
-            "normal force over weight where the ball turns, relative to the published one",
-            abs(force[turning] / given["normal force over weight"] - 1),
-            aim=0.005 / given["normal force over weight"],
+        *within(0.005 / published, ("force", turned, force[turning] / published - 1)),
+        *within(
+            1e-4, ("period", "period, relative to the closed form", run.period / run.expected - 1)
         ),
-        Finding(
-            "period", "period, relative to the closed form", abs(run.period / run.expected - 1),
-            aim=1e-4,
-        ),
-        Finding(
-            "forces",
-            "normal force over weight on the way, largest distance from the closed form",
-            float(np.abs(force - exact)[20:].max()),
-            aim=1e-3,
-        ),
-        Finding(
-            "linear",
-            "amplitudes with rolling resistance, largest distance from a straight line, over the "
-            "first",
-            float(np.abs(heights - line(count)).max() / heights[0]),
-            aim=0.01,
-        ),
-        Finding(
-            "loss",
-            "amplitudes with rolling resistance, largest distance from the closed form, over the "
-            "first",
-            float(np.abs(heights - expected).max() / heights[0]),
-            aim=1e-3,
-        ),
-    ]  # fmt: skip
+        *within(1e-3, ("forces", way, off)),
+        *within(0.01, ("linear", damping.format("a straight line"), straight)),
+        *within(1e-3, ("loss", damping.format("the closed form"), lost)),
+    ]
     panels = [
         Panel(
             "time [s]",

@@ -20,6 +20,7 @@ Point = list[float]
 """Time [s] and the value of each curve there."""
 
 MOST_KEPT = 40_000  # rows of a run in memory: at 5 ms, those of 200 s
+MOST_PIECES = 100  # in which they are: joining copies all
 MOST_POINTS = 4_000  # of an earlier run as a curve
 
 
@@ -31,28 +32,23 @@ class History:
 
     def add(self, rows: Rows) -> None:
         """Keep `rows`, which follow the others."""
-        if not len(rows):
-            return
-        pieces = self._pieces
-        pieces.append(rows)
-        # As in a binary counter, so that each row is copied a few times only.
-        while len(pieces) > 1 and len(pieces[-1]) >= len(pieces[-2]):
-            pieces[-2:] = [rows.joined(pieces[-2:])]
-        excess = sum(map(len, pieces)) - MOST_KEPT
-        while excess > 0:
-            first = pieces.pop(0)
-            if len(first) > excess:
-                pieces.insert(0, first.select(slice(excess, None)))
-            excess -= len(first)
+        if len(rows):
+            self._pieces.append(rows)
+        if len(self._pieces) > MOST_PIECES:
+            self._join()
 
     def since(self, t: float) -> Rows | None:
         """Return the rows from time `t` [s] on; None where there are none."""
         if not self._pieces:
             return None
-        rows = self._pieces[0].joined(self._pieces)
-        self._pieces = [rows]
+        rows = self._join()
         first = int(np.searchsorted(rows.t, t))
         return rows.select(slice(first, None)) if first < len(rows) else None
+
+    def _join(self) -> Rows:
+        rows = self._pieces[0].joined(self._pieces).select(slice(-MOST_KEPT, None))
+        self._pieces = [rows]
+        return rows
 
     def copy(self) -> History:
         """Return a history of the same rows."""

@@ -99,12 +99,7 @@ FIELDS: dict[str, _Fields] = {
     "reset": {},
     "speed": {"value": _not_negative},
     "parameter": {"key": _text, "value": _number_or_word},
-    "push": {
-        "body": _text,
-        "direction": _direction,
-        "newtons": _number,
-        "seconds": _not_negative,
-    },
+    "push": {"body": _text, "direction": _direction, "newtons": _number, "seconds": _not_negative},
     "hold": {"body": _text, "direction": _direction, "newtons": _number},
     "drag": {"node": _text, "point": _point, "target": _point, "stiffness": _positive},
     "release": {},

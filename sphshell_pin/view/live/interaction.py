@@ -8,14 +8,16 @@ import numpy as np
 
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import NameNotFound
+from sphshell_pin.view.arrows import Forces
 from sphshell_pin.view.live.events import BadMessage, Client, Event
-from sphshell_pin.view.live.picture import Picture, PushShown, frame_point
+from sphshell_pin.view.live.picture import Picture, frame_point
 from sphshell_pin.view.live.player import Interactive
 from sphshell_pin.view.live.window import LiveWindow
 from sphshell_pin.view.nodes import FloatArray, Json
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario.live.drag import Dragged
+    from sphshell_pin.scenario.live.joint_targets import Target
     from sphshell_pin.view.live.player import Player
 
 G = 9.81
@@ -39,7 +41,7 @@ class Interaction:
         self._pushed: tuple[str, FloatArray, float] | None = None  # until a time [s]
 
     @property
-    def push(self) -> PushShown | None:
+    def push(self) -> Forces | None:
         """The push of now."""
         if self._pushed is None or self._player.time > self._pushed[2]:
             self._pushed = None
@@ -47,7 +49,7 @@ class Interaction:
         body, force, _ = self._pushed
         display = self._picture.display
         point = frame_point(display.scene.model, display.data, body)
-        return None if point is None else PushShown.at(point, force)
+        return None if point is None else Forces(point[None], force[None], np.zeros((1, 3)))
 
     @property
     def drag(self) -> Dragged | None:
@@ -67,18 +69,15 @@ class Interaction:
         if self._interactive is not None and self._window is not None:
             stiffness = float(f"{G / (SAG * self._picture.view.distance):.2g}")
             drag = {"nodes": self._picture.display.grips(), "stiffness": stiffness}
-        targets = () if self._interactive is None else self._interactive.targets
         names = ("joint", "rotates", "low", "high", "limited", "value")
-        return {
-            "drag": drag,
-            "targets": [{name: getattr(one, name) for name in names} for one in targets],
-        }
+        targets = [{name: getattr(one, name) for name in names} for one in self._targets()]
+        return {"drag": drag, "targets": targets}
 
     def state(self) -> Json:
         """Return what is done now, for the panel."""
-        drag, targets = self.drag, () if self._interactive is None else self._interactive.targets
+        drag = self.drag
         return {
-            "targets": {one.joint: one.value for one in targets},
+            "targets": {one.joint: one.value for one in self._targets()},
             "drag": drag
             and {
                 "body": drag.frame,
@@ -86,6 +85,9 @@ class Interaction:
                 "target": drag.target_world,
             },
         }
+
+    def _targets(self) -> tuple[Target, ...]:
+        return () if self._interactive is None else self._interactive.targets
 
     def do(self, client: Client, event: Event) -> None:
         """Push or drag a body, or move the target of a joint."""

@@ -15,13 +15,7 @@ from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.view.live.charts import Charts, Point
 from sphshell_pin.view.live.events import BadMessage, Client, Event, newest
 from sphshell_pin.view.live.foreign import ForeignWindow, window_of
-from sphshell_pin.view.live.greeting import (
-    FASTEST,
-    SLOWEST,
-    STRIP_SECONDS,
-    check_speed,
-    greeting,
-)
+from sphshell_pin.view.live.greeting import FASTEST, SLOWEST, STRIP_SECONDS, check_speed, greeting
 from sphshell_pin.view.live.interaction import Interaction
 from sphshell_pin.view.live.panel import Panel, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture
@@ -92,7 +86,7 @@ class Live:
         self._thread: threading.Thread | None = None
         # First of all the port: a picture takes time.
         framed = None if self._foreign is None else self._foreign.url
-        self.server = Server(self, host, port, framed)
+        self.server = Server(self._window, self._panel, host, port, framed)
         try:
             canvas = new_visualizer(self._foreign or self._window)
             self.picture = Picture(player, canvas)
@@ -231,14 +225,6 @@ class Live:
             )
             self._points, self._clear_points = [], False
         self.server.wake()
-
-    def scene_news(self, since: int) -> tuple[int, bytes | None]:
-        """Return for the server what changed in the scene after frame `since`."""
-        return self._window.news(since)
-
-    def panel_news(self, since: int) -> tuple[int, list[str]]:
-        """Return for the server the messages of the panel that are newer than `since`."""
-        return self._panel.news(since)
 
     def _follow(self, due: float) -> None:
         """Go on by what is `due` [s], less what an earlier frame went too far."""

@@ -78,13 +78,7 @@ def preview(
     player = player_of(what, changes=changes, scenario=scenario)
     _warn(player)
     live = Live(
-        player,
-        visualizer,
-        host=host,
-        port=port,
-        speed=speed,
-        running=not paused,
-        wait=True,
+        player, visualizer, host=host, port=port, speed=speed, running=not paused, wait=True
     )
     if color != "surface":
         live.picture.show(color, True)

@@ -8,19 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.view.arrows import ArrowPool, ArrowScale, ForceColumns
-from sphshell_pin.view.camera import View, look, set_surroundings
-from sphshell_pin.view.display import HIDDEN_AT_FIRST, PARTS, Display, choose_view
+from sphshell_pin.view.arrows import ArrowPool, ArrowScale, Forces, arrow_length
+from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
+from sphshell_pin.view.display import HIDDEN_AT_FIRST, PARTS, Display
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
     FloatArray,
     Move,
+    hidden_at,
     material,
     mover,
     on_top,
     pose,
     rod,
-    rotation_to,
+    rod_along,
     set_object,
     show,
     sphere,
@@ -96,7 +97,7 @@ class Picture:
             empty = empty | {"pressure"}
         return {part: on for part, on in self.shown.items() if part not in empty}
 
-    def update(self, player: Player, push: PushShown | None, drag: Dragged | None = None) -> None:
+    def update(self, player: Player, push: Forces | None, drag: Dragged | None = None) -> None:
         """Show the state of `player`, a `push` on a body, and a `drag`."""
         if player.scene.pairs is not self._pairs:
             self._pairs = player.scene.pairs
@@ -121,9 +122,8 @@ class Picture:
             self._drag = DragLine(self.display.visualizer["drag"], self.view.distance)
         if self._drag is not None:
             self._drag.update(drag)
-        self.cut = scale.cuts(contacts.normal_force) or (
-            push is not None and scale.cuts(push.normal_force)
-        )
+        pushed = () if push is None else np.linalg.norm(push.normal, axis=1)
+        self.cut = scale.cuts(np.append(contacts.normal_force, pushed))
 
     def show(self, part: str, on: bool) -> None:
         """Show or hide one of LIVE_PARTS."""
@@ -155,17 +155,6 @@ class Picture:
         self._scale.forget()
 
 
-class PushShown(ForceColumns):
-    """A push as an arrow pool draws it: one force at one point."""
-
-    @classmethod
-    def at(cls, point_world: FloatArray, force_world: FloatArray) -> PushShown:
-        """Build from a point (3,) [m] and a force (3,) [N] other than zero."""
-        size = float(np.linalg.norm(force_world))
-        direction = (force_world / size)[None]
-        return cls(point_world[None], direction, np.array([size]), np.zeros((1, 3)))
-
-
 class DragLine:
     """The spring of a drag below `visualizer`: from a point of the body to the cursor."""
 
@@ -183,14 +172,10 @@ class DragLine:
         """Show `drag`, or nothing."""
         points = (np.zeros(3),) * 2 if drag is None else (drag.point_world, drag.target_world)
         span = points[1] - points[0]
-        length = float(np.linalg.norm(span))
         for move, point in zip(self._ends, points, strict=True):
-            move(pose(np.eye(3), point, HIDDEN_SCALE if drag is None else 1.0))
-        if length <= self._width:
-            self._line(pose(np.eye(3), points[0], HIDDEN_SCALE))
-            return
-        shape = np.array([self._width, length, self._width])
-        self._line(pose(rotation_to(span), points[0] + 0.5 * span, shape))
+            move(hidden_at(point) if drag is None else pose(np.eye(3), point))
+        short = np.linalg.norm(span) <= self._width
+        self._line(hidden_at(points[0]) if short else rod_along(points[0], span, self._width))
 
 
 class ConePool:
@@ -207,7 +192,7 @@ class ConePool:
             look = material("MeshBasic", CONE_COLOR, 0.22, depthTest=False, depthWrite=False)
             set_object(node, rod(0.0, 1.0), look, order=8)
             self._moves.append(mover(node))
-            self._moves[-1](pose(np.eye(3), np.zeros(3), HIDDEN_SCALE))
+            self._moves[-1](hidden_at(np.zeros(3)))
 
     def update(
         self, contacts: SceneContacts, pairs: tuple[ContactPair, ...], scale: ArrowScale
@@ -215,33 +200,24 @@ class ConePool:
         """Show the cones of `contacts`, the largest forces first; hide the others."""
         order = np.argsort(-contacts.normal_force, kind="stable")
         for slot, move in enumerate(self._moves):
-            matrix = None
+            matrix = hidden_at(np.zeros(3))
             if slot < len(order):
                 k = int(order[slot])
                 law = pairs[int(contacts.pair[k])].friction
-                limit = 0.0 if law is None else law.largest_coefficient
-                matrix = self._cone(contacts, k, limit, scale)
-            move(pose(np.eye(3), np.zeros(3), HIDDEN_SCALE) if matrix is None else matrix)
-
-    @staticmethod
-    def _cone(contacts: SceneContacts, k: int, mu: float, scale: ArrowScale) -> FloatArray | None:
-        height = min(contacts.normal_force[k] * scale.metres_per_newton, scale.longest)
-        if not (mu > 0.0 and height > 0.0):
-            return None
-        normal = contacts.normal_world[k]
-        middle = contacts.point_world[k] + 0.5 * height * normal
-        shape = np.array([mu * height, height, mu * height])
-        matrix: FloatArray = pose(rotation_to(normal), middle, np.maximum(shape, HIDDEN_SCALE))
-        return matrix
+                mu = 0.0 if law is None else law.largest_coefficient
+                height = min(contacts.normal_force[k] * scale.metres_per_newton, scale.longest)
+                if min(mu, 1.0) * height > HIDDEN_SCALE:
+                    along = height * contacts.normal_world[k]
+                    matrix = rod_along(contacts.point_world[k], along, mu * height)
+            move(matrix)
 
 
 class _Scale:
     """Chooses the length of arrows from the first forces that appear, and then keeps it."""
 
     def __init__(self, scene: Scene, view: View) -> None:
-        radii = [one.radius for pair in scene.pairs for one in pair.spheres]
         self._size = view.distance
-        self._length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
+        self._length = arrow_length(scene, view.distance)
         self.factor = 1.0
         self.forget()
 

@@ -12,23 +12,20 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 from sphshell_pin.view.live.access import Access
-from sphshell_pin.view.live.events import (
-    LARGEST_MESSAGE,
-    BadMessage,
-    Client,
-    Event,
-    read_event,
-)
+from sphshell_pin.view.live.events import LARGEST_MESSAGE, BadMessage, Client, Event, read_event
 from sphshell_pin.view.nodes import viewer_script
 
 if TYPE_CHECKING:
     from types import TracebackType
 
     from tornado.iostream import IOStream
+
+    from sphshell_pin.view.live.panel import Panel
+    from sphshell_pin.view.live.window import LiveWindow
 
 PAGE = Path(__file__).with_name("page")
 MOST_EVENTS = 2_000  # waiting to be handled; more are refused
@@ -47,25 +44,17 @@ PATIENCE = 1.0
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 
-class Source(Protocol):
-    """Where the server gets its messages from; called in the server's thread."""
-
-    def scene_news(self, since: int) -> tuple[int, bytes | None]:
-        """Return the last frame's number, and what changed in the scene after frame `since`."""
-
-    def panel_news(self, since: int) -> tuple[int, list[str]]:
-        """Return the last panel's number, and the texts that lead there from panel `since`."""
-
-
 class Server:
     """Serves the page and one websocket per browser at `url`, until `stop`.
 
-    Events of all browsers are gathered by `events`. `framed` is the address of a picture that the
-    page has in a frame. Raises MissingExtra without meshcat, SphshellError where the port is taken.
+    What changed it takes from `window` and `panel`, in its thread. Events of all browsers are
+    gathered by `events`. `framed` is the address of a picture that the page has in a frame.
+
+    Raises MissingExtra without meshcat, SphshellError where the port is taken.
     """
 
     def __init__(
-        self, source: Source, host: str = "127.0.0.1", port: int = 0, framed: str | None = None
+        self, window: LiveWindow, panel: Panel, host: str, port: int, framed: str | None
     ) -> None:
         viewer = viewer_script()
         try:
@@ -74,7 +63,7 @@ class Server:
             raise MissingExtra("tornado", "view", "the live page") from missing
         if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
             raise InvalidParameter("port", port, "must be a port number from 0 (any free) to 65535")
-        self.source = source
+        self.window, self.panel = window, panel
         self.clients: set[Client] = set()
         self.arrived = threading.Event()
         """Set when there is something for the simulation to do."""
@@ -206,10 +195,7 @@ class Server:
         files |= {"": PAGE / "index.html", "viewer.js": viewer}
         shared = {"server": self, "files": files}
         application = tornado.web.Application(
-            [
-                (r"/(?:[^/]*/)?socket", socket_handler, shared),
-                (r".*", file_handler, shared),
-            ],
+            [(r"/(?:[^/]*/)?socket", socket_handler, shared), (r".*", file_handler, shared)],
             websocket_max_message_size=4 * LARGEST_MESSAGE,
             websocket_ping_interval=15,
             websocket_ping_timeout=15,
@@ -353,11 +339,11 @@ def _handlers() -> tuple[type, type]:
             try:
                 while True:
                     await self._turn()
-                    number, texts = self._server.source.panel_news(self._panel)
+                    number, texts = self._server.panel.news(self._panel)
                     self._panel = number
                     for text in texts:
                         await self.write_message(text)
-                    frame, scene = self._server.source.scene_news(self._scene)
+                    frame, scene = self._server.window.news(self._scene)
                     self._scene = frame
                     if scene is not None:
                         self._sent += 1

@@ -46,7 +46,7 @@ class LiveWindow:
         data: Json = command.lower()
         kind, path = data["type"], data.get("path", "")
         if kind == "set_transform":
-            self._place(path, np.asarray(data["matrix"]))
+            self._place(path, data["matrix"])
             return
         with self._lock:
             if kind == "delete":
@@ -58,14 +58,7 @@ class LiveWindow:
 
     def mover(self, path: str) -> Move:
         """Return a routine that places the node at `path` without a command for each matrix."""
-
-        def move(matrix: FloatArray) -> None:
-            row = self._row_of.get(path)
-            if row is None:
-                row = self._add(path)
-            self._drawn[row] = matrix.T.reshape(16)
-
-        return move
+        return lambda matrix: self._place(path, matrix.T.reshape(16))
 
     def matrix(self, path: str) -> FloatArray | None:
         """Return where the node at `path` was last placed (4, 4); None if it was not."""
@@ -113,7 +106,7 @@ class LiveWindow:
             return frame, None
         return frame, b"\xdd" + len(messages).to_bytes(4, "big") + b"".join(messages)
 
-    def _place(self, path: str, matrix: FloatArray) -> None:
+    def _place(self, path: str, matrix: FloatArray | list[float]) -> None:
         """Place the node at `path` at `matrix` (16,), column by column."""
         row = self._row_of.get(path)
         if row is None:

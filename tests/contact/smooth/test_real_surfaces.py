@@ -1,7 +1,8 @@
 """Spheres on surfaces that others made: what every answer must be, how it changes, what it costs.
 
 1500 spheres touch each file of the corpus, of radii from a fifth of to twenty mean sides;
-SPHSHELL_SPHERES=10000 takes more. Skipped where the corpus is absent.
+SPHSHELL_SPHERES=10000 takes more. Skipped where the corpus is absent. SPHSHELL_FOLDER takes the
+files of another folder, in millimeters.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,14 +26,16 @@ from sphshell_pin.shell.faces import Face
 from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import mean_edge
 from tests.contact.walks import narrowed
+from tests.shell import test_corpus as corpus
 from tests.shell.surfaces import DATA
-from tests.shell.test_corpus import FILES, load
 
 Array = NDArray[np.float64]
 
 COUNT = int(os.environ.get("SPHSHELL_SPHERES", "1500"))
 WALKS = COUNT // 10
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
+CAD = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
+FOLDER = os.environ.get("SPHSHELL_FOLDER")
 
 LONG_WALKS = int(os.environ.get("SPHSHELL_WALKS", "1"))
 
@@ -49,10 +53,16 @@ CROSSED = {
 }
 
 
+def load(name: str) -> Shell:
+    return Shell.from_file(Path(FOLDER, name), unit="mm") if FOLDER else corpus.load(name)
+
+
 def cases(known: dict[str, str]):
     """All files, most as studies, those in `known` (name: reason) expected to fail."""
+    if FOLDER:
+        return sorted(p.name for p in Path(FOLDER).iterdir() if p.suffix.lower() in SUFFIXES + CAD)
     out = []
-    for name in FILES:
+    for name in corpus.FILES:
         marks = [] if name in SOME else [pytest.mark.study]
         if name in known:
             marks.append(pytest.mark.xfail(strict=True, raises=AssertionError, reason=known[name]))
@@ -182,7 +192,7 @@ def test_the_corpus_is_known() -> None:
             Shell.from_file(path, unit="mm")
         except SphshellError as error:
             refused[path.name] = str(error)
-        assert path.name in FILES or path.name in refused
+        assert path.name in corpus.FILES or path.name in refused
     assert not [said for said in refused.values() if len(said) > 300 or "\n" in said]
 
 

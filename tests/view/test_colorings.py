@@ -1,6 +1,6 @@
-"""Shells coloured by how far curved elements stand off the flat ones."""
+"""Shells coloured by how far curved elements stand off the flat ones, and by kinds of faces."""
 
-import meshcat
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,11 +10,11 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.curved import curved_mesh
 from sphshell_pin.view.display import Display
 from sphshell_pin.view.distance import RAMP, check_coloring, draw_distance
-from sphshell_pin.view.page import FilmWindow
 from sphshell_pin.view.recording import render_recording
-from sphshell_pin.view.surface import ramp_colors
+from sphshell_pin.view.surface import FACE_COLORS, hex_colors, ramp_colors
 from tests.shell.surfaces import plate
 from tests.shell.test_curvature import ball
+from tests.view.drawn import Film, attribute
 
 
 def scene_of(*shells, method="smooth"):
@@ -29,34 +29,21 @@ def scene_of(*shells, method="smooth"):
     return scene
 
 
-class Sheet:
+class Sheet(Film):
     """A display, and what was drawn in it."""
 
     def __init__(self, scene):
-        self.window = FilmWindow()
-        self.display = Display(scene, visualizer=meshcat.Visualizer(window=self.window))
+        super().__init__()
+        self.display = Display(scene, visualizer=self.canvas)
 
     def drawn(self, name):
         """Positions (n, 3) and colours (n, 3) of the objects called `name`."""
-        found = []
-        for command in self.window.commands(np.array([0.0, 1.0])):
-            if command["type"] == "set_object" and command["path"].endswith("/" + name):
-                attributes = command["object"]["geometries"][0]["data"]["attributes"]
-                found.append(
-                    [
-                        np.frombuffer(attributes[key]["array"].data, "<f4").reshape(-1, 3)
-                        for key in ("position", "color")
-                    ]
-                )
-        return found
+        found = [drawn for path, drawn in self.objects.items() if path.endswith("/" + name)]
+        return [(attribute(drawn), attribute(drawn, "color")) for drawn in found]
 
-    def visible(self, name):
-        """Whether the nodes called `name` are shown."""
-        return [
-            command["value"]
-            for command in self.window.commands(np.array([0.0, 1.0]))
-            if command["type"] == "set_property" and command["path"].endswith("/" + name)
-        ]
+    def shown(self):
+        """Which way to color the shell is seen."""
+        return [path.rpartition("/")[2] for path, on in self.visible.items() if on]
 
 
 def test_colours_run_from_none_to_the_largest_distance():
@@ -75,15 +62,16 @@ def test_colours_run_from_none_to_the_largest_distance():
     lightest = colors[:, 1].argmax()
     np.testing.assert_allclose(colors[lightest], most, atol=0.05)
     assert f"{1e3 * largest:.3g} mm" in sheet.display.coloring
-    assert sheet.visible("distance") == [True]
-    assert sheet.visible("surface") == [False]
+    assert sheet.shown() == ["distance"]
     sheet.display.show("patches", True)
-    assert (sheet.visible("distance"), sheet.visible("patches")) == ([True], [False])
+    assert sheet.shown() == ["distance"]
     sheet.display.show("distance", False)
-    assert (sheet.visible("distance"), sheet.visible("patches")) == ([False], [True])
+    assert sheet.shown() == ["patches"]
     assert sheet.display.coloring is None
+    ((_, colors),) = sheet.drawn("patches")
+    assert 0.0 < colors.min() <= colors.max() < 1.0
     sheet.display.show("patches", False)
-    assert sheet.visible("surface") == [True]
+    assert sheet.shown() == ["surface"]
 
 
 def test_all_shells_share_one_range():
@@ -112,24 +100,46 @@ def test_flat_shells_have_one_colour(shell, method):
 def test_many_elements_have_one_colour_each(monkeypatch):
     shell = ball(8)
     monkeypatch.setattr("sphshell_pin.view.surface.MOST_CURVED", 10)
-    window = FilmWindow()
-    draw_distance(meshcat.Visualizer(window=window), shell, shell.curvature_report().largest)
-    (command,) = [c for c in window.commands(np.array([0.0, 1.0])) if c["type"] == "set_object"]
-    data = command["object"]["geometries"][0]["data"]["attributes"]["color"]["array"].data
-    colors = np.frombuffer(data, "<f4").reshape(-1, 3, 3)
+    film = Film()
+    draw_distance(film.canvas, shell, shell.curvature_report().largest)
+    colors = attribute(film.objects["distance"], "color").reshape(-1, 3, 3)
     assert len(colors) == len(shell.triangles)
     assert np.ptp(colors, axis=1).max() == 0.0
     assert np.ptp(colors[:, 0], axis=0).max() > 0.1
 
 
-def test_a_recording_states_the_range():
-    shell = ball(8)
+@pytest.mark.parametrize("method", ["smooth", "facets"])
+def test_each_kind_has_its_color(method):
+    shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3), segments=36)
+    sheet = Sheet(scene_of(shell, method=method))
+    sheet.display.show("faces", True)
+    ((points, colors),) = sheet.drawn("faces")
+    flat = np.isclose(np.abs(points[:, 2]), 0.15)
+    kinds = dict(zip(FACE_COLORS, hex_colors(tuple(FACE_COLORS.values())), strict=True))
+    is_plane = np.isclose(colors, kinds["plane"], atol=1e-6).all(axis=1)
+    is_cylinder = np.isclose(colors, kinds["cylinder"], atol=1e-6).all(axis=1)
+    assert (is_plane ^ is_cylinder).all()
+    assert flat[is_plane].all()
+    assert np.allclose(np.linalg.norm(points[is_cylinder, :2], axis=1), 0.1, rtol=5e-3)
+    assert is_cylinder.any()
+    assert is_plane.any()
+
+
+def test_a_recording_states_range_and_kinds():
+    shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3))
     scene = scene_of(shell)
-    integrator = sp.SemiImplicitEuler(1e-3)
-    result = sp.Simulation(scene, integrator).run(np.array([0.0, 0.0, 2.2]), np.zeros(3), 0.01)
-    text = f"distance of curved from flat: 0 to {1e3 * shell.curvature_report().largest:.3g} mm"
-    assert text in render_recording(result, scene, color="distance")
-    assert text not in render_recording(result, scene)
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
+        [0.0, 0.0, 0.3], np.zeros(3), 0.01
+    )
+    largest = f"0 to {1e3 * shell.curvature_report().largest:.3g} mm"
+    said = {
+        "distance": f"distance of curved from flat: {largest}",
+        "faces": "on no face recognized",
+    }
+    for color in ("surface", *said):
+        page = render_recording(result, scene, color=color)
+        assert {one for one, text in said.items() if text in page} == {color} - {"surface"}
+    assert FACE_COLORS["torus"] in page
     with pytest.raises(InvalidParameter, match="surface, patches, distance"):
         render_recording(result, scene, color="depth")
 
