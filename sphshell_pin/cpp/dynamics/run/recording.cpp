@@ -174,7 +174,7 @@ void Recorder::add_peaks(const Stepping& made) {
           boost::math::tools::brent_find_minima([&](double share) { return -(look(share, k).*of); },
                                                 0.0, 1.0, kPeakBits, looks)
               .first;
-      const Touch top = look(at, k);  // and with it the time of it
+      const TouchState top = look(at, k);  // and with it the time of it
       raise_peaks(summary, top, between_.t);
     }
   }
