@@ -174,7 +174,7 @@ void Recorder::add_peaks(const Stepping& made) {
           boost::math::tools::brent_find_minima([&](double share) { return -(look(share, k).*of); },
                                                 0.0, 1.0, kPeakBits, looks)
               .first;
-      const TouchState top = look(at, k);  // and with it the time of it
+      const TouchState top = look(at, k);  // sets the time, too
       raise_peaks(summary, top, between_.t);
     }
   }
