@@ -223,7 +223,7 @@ class _Evaluations:
         parameters: Sequence[Parameter],
     ) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles, _Doubles]: ...
 
-def model_fault(model: pin.Model) -> str: ...
+def model_fault(model: pin.Model) -> tuple[str, str, str] | None: ...
 
 class SceneState(_Evaluations):
     def copy(self) -> SceneState: ...
@@ -253,9 +253,7 @@ class Scene(_Evaluations):
     @property
     def bristle_size(self) -> int: ...
     def rates(self, q: _Doubles, v: _Doubles, z: _Doubles, tau: _Doubles) -> _Doubles: ...
-    def rate_jacobian(
-        self, q: _Doubles, v: _Doubles, z: _Doubles, tau: _Doubles, repeat: int = 1
-    ) -> _Doubles: ...
+    def rate_jacobian(self, q: _Doubles, v: _Doubles, z: _Doubles, tau: _Doubles) -> _Doubles: ...
 
 class Sensor:
     rate: float
@@ -316,7 +314,6 @@ class Path:
 class CartesianImpedance(Controller):
     def __init__(
         self,
-        num_joints: int,
         joint: int,
         frame: _Doubles,
         path_joint: int,

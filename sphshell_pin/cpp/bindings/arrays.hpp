@@ -43,6 +43,12 @@ Array<T> to_array(std::vector<T> values) {
   return to_array(std::move(values), {n});
 }
 
+// Of several columns.
+template <class... T>
+nb::tuple to_arrays(std::vector<T>... columns) {
+  return nb::make_tuple(to_array(std::move(columns))...);
+}
+
 // nanobind's own conversion of small vectors and matrices calls numpy.copy, which is written in
 // Python: a daemon thread may end in it when the interpreter does (see gil.hpp).
 inline Array<double> to_array(const Eigen::VectorXd& x) {

@@ -20,10 +20,10 @@ namespace {
 // A family whose member `law` holds one of its kinds.
 // A law by its name and the numbers of its dataclass, and the names of all: what a new kind needs
 // on this side.
-template <class Law, class... Extra>
-nb::class_<Law> bind_family(nb::module_& m, const char* name, const Extra&... extra) {
+template <class Law>
+nb::class_<Law> bind_family(nb::module_& m, const char* name, nb::type_slots parts) {
   using Family = Kinds<decltype(Law::law)>;
-  return nb::class_<Law>(m, name, extra...)
+  return nb::class_<Law>(m, name, parts)
       .def(
           "__init__",
           [](Law* self, const std::string& kind, const Numbers& numbers) {
@@ -60,17 +60,11 @@ void translate_fault(const std::exception_ptr& thrown, void*) {
   }
 }
 
-PyType_Slot law_slots[] = {
-    {Py_tp_traverse, reinterpret_cast<void*>(&traverse<NormalLaw, visit_law>)}, {0, nullptr}};
-PyType_Slot friction_slots[] = {
-    {Py_tp_traverse, reinterpret_cast<void*>(&traverse<FrictionLaw, visit_friction>)},
-    {0, nullptr}};
-
 }  // namespace
 
 void bind_contact(nb::module_& m) {
   nb::register_exception_translator(translate_fault);
-  bind_family<NormalLaw>(m, "NormalLaw", nb::type_slots(law_slots))
+  bind_family<NormalLaw>(m, "NormalLaw", slots<NormalLaw, visit_law>())
       .def_static("of_function", &of_function, "parameters"_a, "force"_a, "of_force"_a, "energy"_a,
                   "of_energy"_a.none())
       .def_prop_ro("needs_rate", &NormalLaw::needs_rate)
@@ -87,7 +81,7 @@ void bind_contact(nb::module_& m) {
       .def("energy",
            [](const NormalLaw& law, double depth) { return depth > 0 ? law.energy(depth) : 0.0; });
   // The same for friction; no friction is null in Python.
-  bind_family<FrictionLaw>(m, "FrictionLaw", nb::type_slots(friction_slots))
+  bind_family<FrictionLaw>(m, "FrictionLaw", slots<FrictionLaw, visit_friction>())
       .def_static("of_function", &friction_of_function, "parameters"_a, "force"_a, "of_force"_a)
       .def_prop_ro("has_state", &FrictionLaw::has_state)
       .def_prop_ro("torsional", &FrictionLaw::torsional)

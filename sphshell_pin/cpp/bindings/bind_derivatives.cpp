@@ -18,12 +18,12 @@ void bind(nb::class_<T>& bound) {
       .def(
           "dynamics_derivatives",
           [](T& self, nb::handle given_q, nb::handle given_v, nb::handle given_tau,
-             const std::vector<const Parameter*>& parameters, int repeat) {
+             std::vector<Parameter> parameters, int repeat) {
             const auto [q, v, tau] = self.arguments(given_q, given_v, given_tau);
             return self.at(
                 q, v, [&, &q = q, &v = v, &tau = tau](SceneData& scene, auto&& evaluate) {
                   Linearization& linearization = evaluate.linearization();
-                  linearization.set_parameters(copies(parameters));
+                  linearization.set_parameters(std::move(parameters));
                   const VectorX z = self.bristles(scene);
                   MatrixX jacobian;
                   VectorX acceleration;
@@ -46,12 +46,11 @@ void bind(nb::class_<T>& bound) {
           "q"_a, "v"_a.none(), "tau"_a.none(), "parameters"_a, "repeat"_a = 1)
       .def(
           "contact_force_derivatives",
-          [](T& self, nb::handle given_q, nb::handle given_v,
-             const std::vector<const Parameter*>& parameters) {
+          [](T& self, nb::handle given_q, nb::handle given_v, std::vector<Parameter> parameters) {
             const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
             return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
               Linearization& linearization = evaluate.linearization();
-              linearization.set_parameters(copies(parameters));
+              linearization.set_parameters(std::move(parameters));
               evaluate();
               ContactForceSlopes out;
               linearization.contact_forces(q, v, out);
@@ -67,13 +66,12 @@ void bind(nb::class_<T>& bound) {
       .def(
           "step_derivatives",
           [](T& self, const std::string& integrator, double dt, nb::handle given_q,
-             nb::handle given_v, nb::handle given_tau,
-             const std::vector<const Parameter*>& parameters) {
+             nb::handle given_v, nb::handle given_tau, std::vector<Parameter> parameters) {
             const auto [q, v, tau] = self.arguments(given_q, given_v, given_tau);
             return self.at(q, v, [&, &q = q, &v = v, &tau = tau](SceneData& scene, auto&&) {
               const Eigen::Index nv = v.size(), first = Eigen::Index(parameters.size());
               // Made before the scene is evaluated: it asks contacts for their derivatives.
-              StepSlopes slopes(scene, copies(parameters));
+              StepSlopes slopes(scene, std::move(parameters));
               HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
               const State& end = step.take();
               const Tangent tangent = step.derivatives(slopes);

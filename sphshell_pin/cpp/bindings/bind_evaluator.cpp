@@ -139,9 +139,6 @@ struct Frame {
   int joint;
   pinocchio::SE3 placement, reference;
 
-  Frame(int joint, const Eigen::Matrix4d& placement, const Eigen::Matrix4d& reference)
-      : joint(joint), placement(placement), reference(reference) {}
-
   pinocchio::SE3 place(const Multibody& body) const { return body.world_from(joint, placement); }
 };
 
@@ -198,8 +195,8 @@ void bind_evaluator(nanobind::module_& m) {
   m.def("differentiate_into", &differentiate_into, "scene"_a, "q"_a, "v"_a, "tau"_a,
         "by_state"_a.noconvert(), "by_tau"_a.noconvert(), "forces_by_state"_a.noconvert());
   nb::class_<Frame>(m, "Frame")
-      .def(nb::init<int, const Eigen::Matrix4d&, const Eigen::Matrix4d&>(), "joint"_a,
-           "placement"_a, "reference"_a);
+      .def(nb::init<int, pinocchio::SE3, pinocchio::SE3>(), "joint"_a, "placement"_a,
+           "reference"_a);
   m.def("frame_into", &frame_into, "scene"_a, "frame"_a, "q"_a, "residual"_a.noconvert());
   m.def("differentiate_frame_into", &differentiate_frame_into, "scene"_a, "frame"_a, "q"_a,
         "by_q"_a.noconvert());

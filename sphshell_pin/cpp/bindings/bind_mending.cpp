@@ -74,8 +74,7 @@ void bind_mending(nanobind::module_& module) {
           return duplicate_polygons(view(offsets, corners), slot_edge.data(), users.data(),
                                     users.shape(0));
         });
-        return nb::make_tuple(to_array(std::move(result.first)),
-                              to_array(std::move(result.opposite)));
+        return to_arrays(std::move(result.first), std::move(result.opposite));
       },
       "offsets"_a, "corners"_a, "slot_edge"_a, "users"_a,
       "(first polygon with the same corners (m,), wound the other way (m,)).");
@@ -105,9 +104,8 @@ void bind_mending(nanobind::module_& module) {
                                 polygon ? polygon->data() : nullptr, triangles.shape(0),
                                 component.data(), flip.data(), components, center.data());
         });
-        return nb::make_tuple(to_array(std::move(sums.volume)), to_array(std::move(sums.area)),
-                              to_array(std::move(sums.turned_area)),
-                              to_array(std::move(sums.largest)));
+        return to_arrays(std::move(sums.volume), std::move(sums.area), std::move(sums.turned_area),
+                         std::move(sums.largest));
       },
       "points"_a, "triangles"_a, "triangle_polygon"_a.none(), "component"_a, "flip"_a,
       "components"_a, "center"_a,
@@ -135,8 +133,8 @@ void bind_mending(nanobind::module_& module) {
           return find_t_junctions(view(offsets, corners), points.data(), copy(open_slots),
                                   copy(open_polygons), copy(candidates), tolerance, most);
         });
-        return nb::make_tuple(to_array(std::move(result.slot)), to_array(std::move(result.vertex)),
-                              to_array(std::move(result.parameter)));
+        return to_arrays(std::move(result.slot), std::move(result.vertex),
+                         std::move(result.parameter));
       },
       "offsets"_a, "corners"_a, "points"_a, "open_slots"_a, "open_polygons"_a, "candidates"_a,
       "tolerance"_a, "most"_a,
@@ -150,9 +148,8 @@ void bind_mending(nanobind::module_& module) {
         auto result = without_gil([&] {
           return flood_fill(view(offsets, corners), slot_edge.data(), users.data(), users.shape(0));
         });
-        return nb::make_tuple(to_array(std::move(result.component)),
-                              to_array(std::move(result.flip)),
-                              to_array(std::move(result.one_sided)));
+        return to_arrays(std::move(result.component), std::move(result.flip),
+                         std::move(result.one_sided));
       },
       "offsets"_a, "corners"_a, "slot_edge"_a, "users"_a,
       "(component (m,), flip (m,), one-sided (components,)) across edges of two polygons.");

@@ -2,9 +2,8 @@
 
 #include <memory>
 
-#include "bindings/arrays.hpp"
+#include "bindings/evaluations.hpp"
 #include "bindings/gil.hpp"
-#include "bindings/own_errors.hpp"
 #include "bindings/records.hpp"
 #include "dynamics/run/rollout.hpp"
 
@@ -40,22 +39,14 @@ nb::list through(const Outcome& outcome) {
 void bind_rollout(nanobind::module_& m) {
   using namespace sphshell;
   // What a run of a rollout leaves behind; its record is converted only when it is asked for.
-  nb::class_<Outcome>(m, "Outcome")
-      .def_prop_ro("status", [](const Outcome& self) { return static_cast<int>(self.status); })
+  nb::class_<Outcome> outcome(m, "Outcome");
+  outcome.def_prop_ro("status", [](const Outcome& self) { return as_python(self.status); })
       .def_ro("fault", &Outcome::fault)
-      .def_prop_ro("deep_start", [](const Outcome& self) { return to_python(self.deep_start); })
-      .def_ro("time", &Outcome::time)
-      .def_ro("last_step", &Outcome::last_step)
-      .def_ro("wall_time", &Outcome::wall_time)
-      .def_prop_ro("counts", [](const Outcome& self) { return to_dict(self.counts); })
-      .def_prop_ro(
-          "q", [](const Outcome& self) { return to_array(self.q); }, nb::rv_policy::automatic)
-      .def_prop_ro(
-          "v", [](const Outcome& self) { return to_array(self.v); }, nb::rv_policy::automatic)
-      .def_prop_ro("summaries", [](const Outcome& self) { return to_list(self.summaries); })
-      .def_prop_ro("limits", [](const Outcome& self) { return to_list(self.limits); })
+      .def_prop_ro("deep_start", [](const Outcome& self) { return as_python(self.deep_start); })
       .def_prop_ro("residual", [](const Outcome& self) { return residual(self.record.energy); })
       .def_prop_ro("through", &through);
+  bind_figures<Outcome>(outcome,
+                        [](const Outcome& self, auto figure) { return as_python(self.*figure); });
 
   // Runs of one model on threads of their own.
   nb::class_<Rollout>(m, "Rollout")
@@ -67,14 +58,12 @@ void bind_rollout(nanobind::module_& m) {
           "model"_a, "threads"_a)
       .def(
           "add",
-          [](Rollout& self, const std::vector<const Pair*>& pairs,
-             std::shared_ptr<JointEffects> joints, std::shared_ptr<Controller> controller,
-             VectorX q0, VectorX v0, const RunSettings& settings,
-             const std::vector<const Sensor*>& sensors) {
-            check_count("q0", q0.size(), self.model().nq);
-            check_count("v0", v0.size(), self.model().nv);
-            self.add({copies(pairs), std::move(joints), settings, std::move(controller),
-                      std::move(q0), std::move(v0), copies(sensors)});
+          [](Rollout& self, std::vector<Pair> pairs, JointForces::Effects joints,
+             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+             const RunSettings& settings, std::vector<Sensor> sensors) {
+            check_state(self.model(), q0, v0);
+            self.add({std::move(pairs), std::move(joints), settings, std::move(controller),
+                      std::move(q0), std::move(v0), std::move(sensors)});
           },
           "pairs"_a, "joints"_a.none(), "controller"_a.none(), "q0"_a, "v0"_a, "settings"_a,
           "sensors"_a)

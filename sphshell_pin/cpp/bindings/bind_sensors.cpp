@@ -15,41 +15,24 @@ void bind_sensors(nb::module_& m) {
   nb::class_<Sensor>(m, "Sensor")
       .def_static(
           "force_torque",
-          [](int joint, const Eigen::Matrix4d& frame, const Parameters& inertia,
-             std::vector<int> children, std::vector<int> pairs_i, std::vector<int> pairs_j,
-             std::vector<int> frames) {
-            ForceTorque kind;
-            kind.joint = joint;
-            kind.frame = SE3(Eigen::Matrix3d(frame.topLeftCorner<3, 3>()),
-                             Vec3(frame.topRightCorner<3, 1>()));
+          [](int joint, const SE3& frame, const Parameters& inertia, std::vector<int> children,
+             std::vector<int> pairs_i, std::vector<int> pairs_j, std::vector<int> frames) {
             // Mass, first and second moments, as of Pinocchio's dynamic parameters; no mass:
             // nothing is beyond the sensor.
-            kind.inertia = inertia[0] > 0 ? pinocchio::Inertia::FromDynamicParameters(inertia)
-                                          : pinocchio::Inertia::Zero();
-            kind.children = std::move(children);
-            kind.pairs_i = std::move(pairs_i);
-            kind.pairs_j = std::move(pairs_j);
-            kind.frames = std::move(frames);
-            Sensor sensor;
-            sensor.kind = std::move(kind);
-            return sensor;
+            const auto beyond = inertia[0] > 0 ? pinocchio::Inertia::FromDynamicParameters(inertia)
+                                               : pinocchio::Inertia::Zero();
+            return Sensor{ForceTorque{joint, frame, beyond, std::move(children), std::move(pairs_i),
+                                      std::move(pairs_j), std::move(frames)}};
           },
           nb::kw_only(), "joint"_a, "frame"_a, "inertia"_a, "children"_a, "pairs_i"_a, "pairs_j"_a,
           "frames"_a)
       .def_static(
-          "joint_torque",
-          [](int index) {
-            Sensor sensor;
-            sensor.kind = JointTorque{index};
-            return sensor;
-          },
-          nb::kw_only(), "index"_a)
+          "joint_torque", [](int index) { return Sensor{JointTorque{index}}; }, nb::kw_only(),
+          "index"_a)
       .def_static(
           "contact_switch",
           [](std::vector<int> pairs, double threshold, double release) {
-            Sensor sensor;
-            sensor.kind = ContactSwitch{std::move(pairs), threshold, release};
-            return sensor;
+            return Sensor{ContactSwitch{std::move(pairs), threshold, release}};
           },
           nb::kw_only(), "pairs"_a, "threshold"_a, "release"_a)
       .def_prop_ro("size", &Sensor::size)

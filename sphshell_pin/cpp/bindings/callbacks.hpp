@@ -90,4 +90,13 @@ int traverse(PyObject* self, visitproc visit, void* arg) {
   return visit_parts(*nb::inst_ptr<T>(self), visit, arg);
 }
 
+// Lets Python's garbage collector see what the object holds, so that cycles through callbacks are
+// freed.
+template <class T, int (*visit_parts)(const T&, visitproc, void*)>
+nb::type_slots slots() {
+  static PyType_Slot all[] = {{Py_tp_traverse, reinterpret_cast<void*>(&traverse<T, visit_parts>)},
+                              {0, nullptr}};
+  return nb::type_slots(all);
+}
+
 }  // namespace sphshell

@@ -12,9 +12,9 @@
 namespace sphshell {
 
 // Sizes only: values were checked where they came from Python.
-inline void check_state(const SceneData& scene, const VectorX& q, const VectorX& v) {
-  check_count("q", q.size(), scene.body().model().nq);
-  check_count("v", v.size(), scene.body().model().nv);
+inline void check_state(const pinocchio::Model& model, const VectorX& q, const VectorX& v) {
+  check_count("q", q.size(), model.nq);
+  check_count("v", v.size(), model.nv);
 }
 
 // What a state answers at (q, v): its forces, when it is called.
@@ -29,9 +29,10 @@ struct Evaluate {
 // itself, may begin another. The interpreter's lock guards the fields.
 class Evaluations {
  public:
-  Evaluations(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
-              StateArguments arguments)
-      : arguments(std::move(arguments)), first_(model, std::move(pairs), std::move(joints)) {}
+  Evaluations(nb::object model, nb::object shown, std::vector<Pair> pairs,
+              JointForces::Effects joints, nb::object convert)
+      : arguments(model, std::move(shown), std::move(convert)),
+        first_(model_of(model), std::move(pairs), std::move(joints)) {}
 
   Evaluations(const Evaluations&) = delete;
   Evaluations& operator=(const Evaluations&) = delete;
@@ -41,7 +42,7 @@ class Evaluations {
   // work(scene, evaluate) at a state whose sizes are checked.
   template <class Work>
   auto at(const VectorX& q, const VectorX& v, Work&& work) {
-    check_state(first_.scene(), q, v);
+    check_state(model(), q, v);
     std::unique_ptr<SceneState> state;
     if (idle_.empty()) {
       state = std::make_unique<SceneState>(first_);
@@ -85,16 +86,17 @@ struct OwnState {
   const StateArguments arguments;
   SceneState state;
 
-  OwnState(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
-           StateArguments arguments)
-      : arguments(std::move(arguments)), state(model, std::move(pairs), std::move(joints)) {}
+  OwnState(nb::object model, nb::object shown, std::vector<Pair> pairs, JointForces::Effects joints,
+           nb::object convert)
+      : arguments(model, std::move(shown), std::move(convert)),
+        state(model_of(model), std::move(pairs), std::move(joints)) {}
   OwnState(const OwnState& other) : arguments(other.arguments), state(other.state) {}
 
   // As Evaluations::at, with what the state remembers.
   template <class Work>
   auto at(const VectorX& q, const VectorX& v, Work&& work) {
     const Use use(user, "evaluation");
-    check_state(state.scene(), q, v);
+    check_state(state.scene().body().model(), q, v);
     return work(state.scene(), Evaluate{state, q, v});
   }
   VectorX bristles(const SceneData&) const { return state.bristles(); }

@@ -50,7 +50,7 @@ nb::dict to_dict(Record record, int nq, int nv) {
   return out;
 }
 
-nb::dict to_dict(SensitivityRecord record) {
+nb::dict as_python(SensitivityRecord record) {
   nb::dict out;
   out["q"] = to_array(std::move(record.q));
   out["v"] = to_array(std::move(record.v));
@@ -60,7 +60,7 @@ nb::dict to_dict(SensitivityRecord record) {
   return out;
 }
 
-nb::dict to_dict(const Counts& counts) {
+nb::dict as_python(const Counts& counts) {
   nb::dict out;
   out["steps"] = counts.steps;
   out["rejected"] = counts.rejected;
@@ -70,13 +70,12 @@ nb::dict to_dict(const Counts& counts) {
   return out;
 }
 
-// (pair, depth) or None.
-nb::object to_python(const std::optional<DeepStart>& start) {
+nb::object as_python(const std::optional<DeepStart>& start) {
   if (!start) return nb::none();
   return nb::make_tuple(start->pair, start->depth);
 }
 
-nb::list to_list(const std::vector<PairSummary>& summaries) {
+nb::list as_python(const std::vector<PairSummary>& summaries) {
   nb::list out;
   for (const PairSummary& s : summaries) {
     nb::dict d;
@@ -92,7 +91,7 @@ nb::list to_list(const std::vector<PairSummary>& summaries) {
   return out;
 }
 
-nb::list to_list(const std::vector<LimitSummary>& limits) {
+nb::list as_python(const std::vector<LimitSummary>& limits) {
   nb::list out;
   for (const LimitSummary& s : limits) {
     nb::dict d;

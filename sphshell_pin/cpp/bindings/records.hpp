@@ -26,17 +26,34 @@ nb::dict row_type(const RowField (&fields)[count]) {
 }
 // Columns by their names, moved and not copied.
 nb::dict to_dict(Record record, int nq, int nv);
-nb::dict to_dict(SensitivityRecord record);
-nb::dict to_dict(const Counts& counts);
+
+// What a run answers, as Python has it: columns and figures by their names.
+nb::dict as_python(SensitivityRecord record);
+nb::dict as_python(const Counts& counts);
+nb::list as_python(const std::vector<PairSummary>& summaries);
+nb::list as_python(const std::vector<LimitSummary>& limits);
 // (pair, depth [m]), or None.
-nb::object to_python(const std::optional<DeepStart>& start);
-nb::list to_list(const std::vector<PairSummary>& summaries);
-nb::list to_list(const std::vector<LimitSummary>& limits);
-template <class T>
-std::vector<T> copies(const std::vector<const T*>& all) {
-  std::vector<T> out;
-  for (const T* one : all) out.push_back(*one);
-  return out;
+nb::object as_python(const std::optional<DeepStart>& start);
+inline int as_python(Simulation::Status status) { return static_cast<int>(status); }
+inline Array<double> as_python(const VectorX& x) { return to_array(x); }
+inline double as_python(double x) { return x; }
+inline bool as_python(bool x) { return x; }
+
+// What a run, while it goes on, and what is left of one tell alike: members of `Of`, functions or
+// fields, as read(self, member) has them.
+template <class Of, class T, class Read>
+void bind_figures(nb::class_<T>& bound, Read read) {
+  const auto figure = [&](const char* name, auto member) {
+    bound.def_prop_ro(name, [=](T& self) { return read(self, member); }, nb::rv_policy::automatic);
+  };
+  figure("time", &Of::time);
+  figure("last_step", &Of::last_step);
+  figure("wall_time", &Of::wall_time);
+  figure("counts", &Of::counts);
+  figure("q", &Of::q);
+  figure("v", &Of::v);
+  figure("summaries", &Of::summaries);
+  figure("limits", &Of::limits);
 }
 
 }  // namespace sphshell

@@ -6,14 +6,10 @@
 namespace sphshell_pin {
 namespace {
 
-void check_power(double stiffness, double exponent) {
-  check_positive("stiffness", stiffness, " [N/m^exponent]");
-  check_positive("exponent", exponent, "");
-}
-
-void check_poisson(const char* name, double nu) {
+double check_poisson(const char* name, double nu) {
   if (!(check_finite(name, nu) > -1 && nu <= 0.5))
     throw InvalidParameter(name, shown(nu), "must lie in (-1, 0.5]");
+  return nu;
 }
 
 // Young's modulus and Poisson's ratio of the sphere, and of the shell.
@@ -23,42 +19,38 @@ struct Both {
 
 // Without a second material both bodies are of the first one.
 Both checked(const Materials& m) {
-  check_positive("young", m.young, " [Pa]");
-  check_poisson("poisson", m.poisson);
+  const double young = check_positive("young", m.young, " [Pa]");
+  const double poisson = check_poisson("poisson", m.poisson);
   if (m.young_2.has_value() != m.poisson_2.has_value()) {
     const auto text = [](const std::optional<double>& x) { return x ? shown(*x) : "none"; };
     throw InvalidParameter("young_2, poisson_2", text(m.young_2) + ", " + text(m.poisson_2),
                            "must be given together, or neither");
   }
-  if (!m.young_2) return {{m.young, m.young}, {m.poisson, m.poisson}};
-  check_positive("young_2", *m.young_2, " [Pa]");
-  check_poisson("poisson_2", *m.poisson_2);
-  return {{m.young, *m.young_2}, {m.poisson, *m.poisson_2}};
+  if (!m.young_2) return {{young, young}, {poisson, poisson}};
+  return {{young, check_positive("young_2", *m.young_2, " [Pa]")},
+          {poisson, check_poisson("poisson_2", *m.poisson_2)}};
 }
 
 // numbers(): the parameters in the order of the core's laws, checked as Python's dataclasses check
 // them.
 core::Numbers numbers(const ImpactLaw& law) {
-  check_power(law.stiffness, law.exponent);
-  check_not_negative("damping", law.damping, " [N s/m]");
-  check_positive("full_damping_depth", law.full_damping_depth, " [m]");
-  return {law.stiffness, law.exponent, law.damping, law.full_damping_depth};
+  return {check_positive("stiffness", law.stiffness, " [N/m^exponent]"),
+          check_positive("exponent", law.exponent, ""),
+          check_not_negative("damping", law.damping, " [N s/m]"),
+          check_positive("full_damping_depth", law.full_damping_depth, " [m]")};
 }
 
 core::Numbers numbers(const HuntCrossleyLaw& law) {
-  check_power(law.stiffness, law.exponent);
-  check_not_negative("dissipation", law.dissipation, " [s/m]");
-  return {law.stiffness, law.exponent, law.dissipation};
+  return {check_positive("stiffness", law.stiffness, " [N/m^exponent]"),
+          check_positive("exponent", law.exponent, ""),
+          check_not_negative("dissipation", law.dissipation, " [s/m]")};
 }
 
 core::Numbers numbers(const HertzLaw& law) {
-  const double modulus = law.materials.modulus();
-  check_not_negative("dissipation", law.dissipation, " [s/m]");
-  check_not_negative("relaxation_time", law.relaxation_time, " [s]");
-  check_not_negative("radius", law.radius, " [m]");
   // 4/3 sqrt(R): Hertz's scale of a sphere of that radius on a plane; 0: the gap's own.
-  const double scale = law.radius > 0 ? 4.0 / 3.0 * std::sqrt(law.radius) : 0.0;
-  return {modulus, law.dissipation, law.relaxation_time, scale};
+  return {law.materials.modulus(), check_not_negative("dissipation", law.dissipation, " [s/m]"),
+          check_not_negative("relaxation_time", law.relaxation_time, " [s]"),
+          4.0 / 3.0 * std::sqrt(check_not_negative("radius", law.radius, " [m]"))};
 }
 
 // Starts at zero and rises from row to row.
@@ -89,10 +81,9 @@ core::Numbers numbers(const TableLaw& law) {
 }
 
 core::Numbers numbers(const FoundationLaw& law) {
-  check_positive("modulus", law.modulus, " [Pa]");
-  check_positive("thickness", law.thickness, " [m]");
-  check_not_negative("dissipation", law.dissipation, " [s/m]");
-  return {law.modulus, law.thickness, law.dissipation, 0.0};
+  return {check_positive("modulus", law.modulus, " [Pa]"),
+          check_positive("thickness", law.thickness, " [m]"),
+          check_not_negative("dissipation", law.dissipation, " [s/m]"), 0.0};
 }
 
 void check_coefficients(double mu_static, double mu_dynamic) {
@@ -115,20 +106,17 @@ core::Numbers numbers(const CoulombFriction& law) {
 
 core::Numbers numbers(const BristleFriction& law) {
   check_coefficients(law.mu_static, law.mu_dynamic);
-  check_positive("stiffness", law.stiffness, " [N/m]");
-  check_not_negative("damping", law.damping, " [N s/m]");
-  check_positive("v_stribeck", law.v_stribeck, " [m/s]");
-  return {law.mu_static, law.mu_dynamic, law.stiffness,
-          law.damping,   law.v_stribeck, law.torsional ? 1.0 : 0.0};
+  return {law.mu_static,
+          law.mu_dynamic,
+          check_positive("stiffness", law.stiffness, " [N/m]"),
+          check_not_negative("damping", law.damping, " [N s/m]"),
+          check_positive("v_stribeck", law.v_stribeck, " [m/s]"),
+          law.torsional ? 1.0 : 0.0};
 }
 
 core::Numbers numbers(const MindlinFriction& law) {
   check_coefficients(law.mu_static, law.mu_dynamic);
   const Both both = checked(law.materials);
-  check_positive("v_stribeck", law.v_stribeck, " [m/s]");
-  check_not_negative("damping_time", law.damping_time, " [s]");
-  check_not_negative("rolling", law.rolling, "");
-  check_positive("rolling_speed", law.rolling_speed, " [m/s]");
   if (law.rings < 1 || law.rings > core::kMostRings)
     throw InvalidParameter(
         "rings", std::to_string(law.rings),
@@ -144,11 +132,11 @@ core::Numbers numbers(const MindlinFriction& law) {
           law.mu_dynamic,
           8 / along,
           16.0 / 3 / about,
-          law.v_stribeck,
-          law.damping_time,
+          check_positive("v_stribeck", law.v_stribeck, " [m/s]"),
+          check_not_negative("damping_time", law.damping_time, " [s]"),
           law.torsional ? 1.0 : 0.0,
-          law.rolling,
-          law.rolling_speed,
+          check_not_negative("rolling", law.rolling, ""),
+          check_positive("rolling_speed", law.rolling_speed, " [m/s]"),
           static_cast<double>(law.rings)};
 }
 

@@ -18,51 +18,6 @@ constexpr std::size_t kMostNames = 20;  // in a message
 
 std::string in_quotes(const std::string& name) { return "'" + name + "'"; }
 
-// As check_model of sphshell_pin/dynamics/scene/models.py.
-// Pinocchio's algorithms read these arrays without looking at their lengths.
-void check_model(const Model& model) {
-  const auto count = static_cast<std::size_t>(model.njoints);
-  const auto check_length = [&](const char* name, std::size_t found) {
-    if (found != count)
-      throw InvalidParameter(std::string("model.") + name, std::to_string(found),
-                             "must have " + std::to_string(count) + " entries");
-  };
-  check_length("names", model.names.size());
-  check_length("joints", model.joints.size());
-  check_length("parents", model.parents.size());
-  check_length("inertias", model.inertias.size());
-  check_length("jointPlacements", model.jointPlacements.size());
-  check_length("nqs", model.nqs.size());
-  check_length("nvs", model.nvs.size());
-  for (std::size_t j = 0; j < count; ++j) {
-    const std::string at = "[" + std::to_string(j) + "]", joint = in_quotes(model.names[j]);
-    // Also excludes cycles: a parent has a lower number.
-    if (model.parents[j] >= std::max<std::size_t>(j, 1))
-      throw InvalidParameter("model.parents" + at, std::to_string(model.parents[j]),
-                             "must come before joint " + joint);
-    const auto& inertia = model.inertias[j];
-    if (!std::isfinite(inertia.mass()) || !inertia.lever().allFinite() ||
-        !inertia.inertia().matrix().allFinite())
-      throw InvalidParameter("model.inertias" + at, shown(inertia.mass()) + ", ...",
-                             "must be finite: joint " + joint);
-    const SE3& placement = model.jointPlacements[j];
-    if (!placement.rotation().allFinite() || !placement.translation().allFinite())
-      throw InvalidParameter("model.jointPlacements" + at, shown_all(placement.translation()),
-                             "must be finite: joint " + joint);
-    check_not_negative("the mass of joint " + joint, inertia.mass(), " [kg]");
-  }
-  const Eigen::VectorXd gravity = model.gravity.toVector();
-  if (!gravity.allFinite())
-    throw InvalidParameter("model.gravity", shown_all(gravity), "must be finite");
-  for (const pinocchio::Frame& frame : model.frames)
-    if (frame.parentJoint >= count || !frame.placement.rotation().allFinite() ||
-        !frame.placement.translation().allFinite())
-      throw InvalidParameter("model's frame " + in_quotes(frame.name),
-                             std::to_string(frame.parentJoint), "must be on a joint of it");
-  const std::string fault = core::model_fault(model);
-  if (!fault.empty()) throw InvalidParameter("model", "a pinocchio::Model", "is damaged: " + fault);
-}
-
 // Names may repeat (a link called as its joint): a body's frame comes first, then an operational
 // frame, then any other.
 const pinocchio::Frame& find_frame(const Model& model, const std::string& name) {
@@ -138,7 +93,8 @@ struct Scene::Impl {
 };
 
 Scene::Scene(const Model& model) {
-  check_model(model);
+  if (const auto fault = core::model_fault(model))
+    throw InvalidParameter(fault->name, fault->value, fault->must);
   impl_.reset(new Impl{model, {}});
 }
 Scene::Scene(const Scene& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}

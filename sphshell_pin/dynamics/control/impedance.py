@@ -171,7 +171,6 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
                 curve = replace(curve, normals=-curve.normals)
         offset = pin.SE3(np.eye(3), np.array(self.offset, dtype=float))
         return _core.CartesianImpedance(
-            num_joints=model.njoints,
             joint=int(frame.parentJoint),
             frame=(frame.placement * offset).homogeneous,
             path_joint=int(carrier.parentJoint),

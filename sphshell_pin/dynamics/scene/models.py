@@ -100,38 +100,10 @@ def check_model(model: pin.Model) -> None:
     That is one whose joints are not in the order parents first, whose lists differ in length, or
     whose inertias, placements or gravity are not finite, or whose joints have indices out of range.
     """
-    count = int(model.njoints)
-    for name in ("names", "joints", "parents", "inertias", "jointPlacements", "nqs", "nvs"):
-        found = len(getattr(model, name))
-        if found != count:
-            raise InvalidParameter(f"model.{name}", found, f"must have {count} entries")
-    for joint, (name, parent) in enumerate(zip(model.names, model.parents, strict=True)):
-        if parent >= max(joint, 1):
-            raise InvalidParameter(
-                f"model.parents[{joint}]", int(parent), f"must come before joint '{name}'"
-            )
-        for what, values in (
-            ("inertias", model.inertias[joint].toDynamicParameters()),
-            ("jointPlacements", model.jointPlacements[joint].homogeneous),
-        ):
-            if not np.isfinite(values).all():
-                raise InvalidParameter(
-                    f"model.{what}[{joint}]", values.tolist(), f"must be finite: joint '{name}'"
-                )
-        if model.inertias[joint].mass < 0:
-            mass = float(model.inertias[joint].mass)
-            raise InvalidParameter(f"the mass of joint '{name}'", mass, "must not be negative [kg]")
-    gravity = model.gravity.vector
-    if not np.isfinite(gravity).all():
-        raise InvalidParameter("model.gravity", gravity.tolist(), "must be finite")
-    for frame in model.frames:
-        if frame.parentJoint >= count or not np.isfinite(frame.placement.homogeneous).all():
-            raise InvalidParameter(
-                f"model's frame '{frame.name}'", int(frame.parentJoint), "must be on a joint of it"
-            )
     fault = _core.model_fault(model)
-    if fault:
-        raise InvalidParameter("model", type(model).__name__, f"is damaged: {fault}")
+    if fault is not None:
+        name, value, must = fault
+        raise InvalidParameter(name, value, must, f"= {value}")
 
 
 def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:

@@ -34,15 +34,15 @@ void JointPd::torque(SceneData& scene, double, const VectorX& q, const VectorX& 
   tau.array() *= actuated_.array();
 }
 
-CartesianImpedance::CartesianImpedance(ImpedanceSettings settings, int num_joints)
+CartesianImpedance::CartesianImpedance(ImpedanceSettings settings)
     : s_(std::move(settings)),
       path_(std::move(s_.path)),
-      opposed_(static_cast<std::size_t>(num_joints), pinocchio::Force::Zero()),
       error_(VectorX::Zero(s_.actuated.size())) {}
 
 void CartesianImpedance::prepare(SceneData& scene) {
   scene.need_velocity_of(s_.joint);
   scene.need_velocity_of(s_.path_joint);
+  opposed_.assign(scene.body().model().joints.size(), pinocchio::Force::Zero());
   started_ = false;
 }
 

@@ -72,7 +72,7 @@ struct ImpedanceSettings {
 // and posture and joint damping act where they do not accelerate the frame (Khatib 1987).
 class CartesianImpedance : public Controller {
  public:
-  explicit CartesianImpedance(ImpedanceSettings settings, int num_joints);
+  explicit CartesianImpedance(ImpedanceSettings settings);
   void prepare(SceneData& scene) override;
   void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
               VectorX& tau) override;

@@ -26,22 +26,23 @@ TargetPath::Target TargetPath::at(double t) {
   const double length = along[j] - along[i];
   // Share of the piece of the path, in arc length.
   const double u = length > 0 ? std::clamp((place - along[i]) / length, 0.0, 1.0) : 0.0;
-  const Vec3 chord = s_.points[j] - s_.points[i];
+  const Vec3 point = s_.points.row(i), chord = s_.points.row(j) - s_.points.row(i);
   Target target;
-  target.normal = s_.normals[i] + u * (s_.normals[j] - s_.normals[i]);
+  target.normal = s_.normals.row(i) + u * (s_.normals.row(j) - s_.normals.row(i));
   if (length <= 0) {
-    target.point = s_.points[i];
+    target.point = point;
     target.velocity.setZero();
     target.acceleration.setZero();
-  } else if (s_.tangents.empty()) {
-    target.point = s_.points[i] + u * chord;
+  } else if (s_.tangents.rows() == 0) {
+    target.point = point + u * chord;
     target.velocity = speed * (chord / length);
     target.acceleration = rate * (chord / length);
   } else {
     // The chord's line, plus what the tangents at both ends add to it.
-    const Vec3 from = length * s_.tangents[i] - chord, to = length * s_.tangents[j] - chord;
+    const Vec3 from = length * s_.tangents.row(i).transpose() - chord;
+    const Vec3 to = length * s_.tangents.row(j).transpose() - chord;
     const double w = 1 - u;
-    target.point = s_.points[i] + u * (chord + w * (w * from - u * to));
+    target.point = point + u * (chord + w * (w * from - u * to));
     const Vec3 tangent = (chord + w * (w - 2 * u) * from + u * (u - 2 * w) * to) / length;
     const Vec3 bend = ((2 * u - 4 * w) * from + (4 * u - 2 * w) * to) / (length * length);
     target.velocity = speed * tangent;

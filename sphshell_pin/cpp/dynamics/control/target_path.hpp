@@ -7,12 +7,15 @@
 
 namespace sphshell {
 
+// Vectors in rows, as NumPy's arrays have them.
+using PathPoints = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
 // The curve by points, and the place along it by phases of constant jerk.
 struct PathSettings {
   std::vector<double> along;          // arc length at the points, increasing from 0 [m]
-  std::vector<Vec3> points;           // [m]
-  std::vector<Vec3> tangents;         // d point / d arc length; none: straight pieces
-  std::vector<Vec3> normals;          // of a surface, else zero
+  PathPoints points;                  // [m]
+  PathPoints tangents;                // d point / d arc length; none: straight pieces
+  PathPoints normals;                 // of a surface, else zero
   std::vector<double> times;          // at which a phase of constant jerk begins [s]
   std::vector<double> places;         // arc length there [m]
   std::vector<double> speeds;         // [m/s]

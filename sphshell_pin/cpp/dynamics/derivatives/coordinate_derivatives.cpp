@@ -11,11 +11,6 @@ namespace {
 using Group = CurvedSegment::Group;
 using Vec2 = Eigen::Vector2d;
 
-Mat3 turn_by(const Vec3& angle) {
-  const double a = angle.norm();
-  return a > 0 ? Eigen::AngleAxisd(a, angle / a).toRotationMatrix() : Mat3(Mat3::Identity());
-}
-
 // c of u' = w + [u, w] / 2 + c [u, [u, w]], and its derivative by the square of |u|.
 struct Curve {
   double c, slope;
@@ -37,6 +32,14 @@ const Eigen::Matrix2d& right_angle() {
 
 }  // namespace
 
+MatrixX applied(const MatrixX& slopes, const Tangent& by, const Eigen::Ref<const MatrixX>& own) {
+  const Eigen::Index nv = by.q.rows(), nz = by.z.rows();
+  MatrixX out = slopes.leftCols(nv) * by.q + slopes.middleCols(nv, nv) * by.v;
+  out.noalias() += slopes.middleCols(2 * nv, nz) * by.z;
+  out.leftCols(own.cols()) += own;
+  return out;
+}
+
 void ChartSlopes::begin(Chart& chart, const VectorX& y) {
   segments_.clear();
   const int nv = chart.nv();
@@ -56,7 +59,7 @@ void ChartSlopes::begin(Chart& chart, const VectorX& y) {
     const Curve curve(u.squaredNorm());
     const Mat3 cross = cross_matrix(u);
     const Vec3 once = u.cross(w);
-    s.turn = turn_by(u);
+    s.turn = rotation_of(u);
     // u' = (I + [u] / 2 + c [u]^2) w, and its derivative by u.
     s.rate_by_w = Mat3::Identity() + 0.5 * cross + curve.c * cross * cross;
     s.angle = s.rate_by_w.inverse();

@@ -10,6 +10,9 @@ struct Tangent {
   MatrixX q, v, z;
 };
 
+// The change of what has `slopes` by (u, v, z), and `own` by the first columns' parameters.
+MatrixX applied(const MatrixX& slopes, const Tangent& by, const Eigen::Ref<const MatrixX>& own);
+
 // Of the parts u and w of y and of their rates, at one y of a chart. The chart moves with its
 // origin: `origin` is the change of that, in its tangent space.
 class ChartSlopes {

@@ -130,7 +130,8 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     const ContactSite site = site_of(active, chain.twist());
     find_slopes(active, site);
     const Vec3 normal = site.contact.normal, force = slopes_.wrench.head<3>();
-    const double weight = site.contact.weight;
+    // Of a row's depth, as whole_of() takes it: a saddle by itself counts as its own depth.
+    const double weight = site.contact.group < 0 ? 1 : site.contact.weight;
     const double side = pair.on_plane() ? -1 : 1;  // as in SceneData::log
     auto world = out.force_world.middleRows<3>(3 * row_of[i]);
     auto along = out.normal_force.row(row_of[i]);

@@ -17,15 +17,6 @@ constexpr double kStretchDifference = 1e-4;
 // changes there at least, where it jumps, relative to its size and to the velocity over 1 s.
 constexpr double kBefore = 1 - 1e-5, kJump = 1e-3;
 
-// The change of what has `slopes` by (u, v, z, parameters).
-MatrixX applied(const MatrixX& slopes, const Tangent& by, Eigen::Index parameters) {
-  const Eigen::Index nv = by.q.rows(), nz = by.z.rows();
-  MatrixX out = slopes.leftCols(nv) * by.q + slopes.middleCols(nv, nv) * by.v;
-  out.noalias() += slopes.middleCols(2 * nv, nz) * by.z;
-  out.leftCols(parameters) += slopes.rightCols(parameters);
-  return out;
-}
-
 void append(std::vector<double>& to, const MatrixX& rows) {
   for (Eigen::Index i = 0; i < rows.rows(); ++i)
     for (Eigen::Index k = 0; k < rows.cols(); ++k) to.push_back(rows(i, k));
@@ -36,11 +27,11 @@ void append(std::vector<double>& to, const MatrixX& rows) {
 Sensitivities::Sensitivities(SceneData& scene, SensitivitySettings settings)
     : scene_(scene), slopes_(scene, std::move(settings.parameters)) {
   const Eigen::Index nv = scene.body().model().nv, nz = scene.bristle_size();
-  const auto first = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
-  const Eigen::Index last = first + (settings.by_q0 ? nv : 0);
+  parameters_ = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
+  const Eigen::Index last = parameters_ + (settings.by_q0 ? nv : 0);
   columns_ = last + (settings.by_v0 ? nv : 0);
   now_ = {MatrixX::Zero(nv, columns_), MatrixX::Zero(nv, columns_), MatrixX::Zero(nz, columns_)};
-  if (settings.by_q0) now_.q.middleCols(first, nv).setIdentity();
+  if (settings.by_q0) now_.q.middleCols(parameters_, nv).setIdentity();
   if (settings.by_v0) now_.v.middleCols(last, nv).setIdentity();
   torque_.setZero(nv, columns_);
 }
@@ -50,10 +41,11 @@ void Sensitivities::hold(const TorqueAt& torque, const State& state) {
   torque_ = slopes_.held(now_);
 }
 
-void Sensitivities::step(Chart& chart, const Stepper& stepper, const State& from, const State& to) {
+void Sensitivities::step(Stepping& made) {
+  const State& to = made.next();
   next_ = now_;
-  chart_ = &chart, stepper_ = &stepper, h_ = to.t - from.t;
-  slopes_.carry(chart, stepper, h_, torque_, next_);
+  made_ = &made, h_ = to.t - made.state().t;
+  slopes_.carry(made.chart(), made.stepper(), h_, torque_, next_);
   scene_.restart();
   scene_.evaluate(to.q, to.v, to.z);
 }
@@ -61,7 +53,7 @@ void Sensitivities::step(Chart& chart, const Stepper& stepper, const State& from
 void Sensitivities::accept(const State& to, bool located) {
   std::swap(now_, next_);
   if (located) jump(to);
-  chart_ = nullptr;
+  made_ = nullptr;
   if (now_.z.rows() == 0) return;
   if (located) begin_contacts(to);
   reorder_bristles(to.z);
@@ -72,15 +64,13 @@ void Sensitivities::accept(const State& to, bool located) {
 // jump times the time by which the event comes earlier (Hiskens and Pai, IEEE Trans. Circuits
 // Syst. I 47 (2000) 204).
 void Sensitivities::jump(const State& to) {
-  Torques& torques = chart_->torques();
+  Torques& torques = made_->chart().torques();
   const auto acceleration = [&](const State& at) -> VectorX {
     scene_.evaluate(at.q, at.v, at.z, true);
     return scene_.acceleration(at.q, at.v, torques.torque(at.t, at.q, at.v));
   };
   State before;
-  VectorX y;
-  stepper_->interpolate(kBefore, y);
-  chart_->finish(to.t - (1 - kBefore) * h_, y, before);
+  made_->interpolate(kBefore, to.t - (1 - kBefore) * h_, before);
   const VectorX first = acceleration(before);
   const std::vector<char> touching = touching_pairs();
   const Eigen::RowVectorXd end = time_of(before, touching, true);
@@ -112,11 +102,10 @@ Eigen::RowVectorXd Sensitivities::time_of(const State& at, const std::vector<cha
   slopes_.linearization().contact_forces(at.q, at.v, contacts_);
   std::vector<int> row_of;
   scene_.rows_of_contacts(row_of);
-  const auto parameters = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
-  const auto row = contacts_.plain_depth.row(row_of[found]);
-  const double rate = row.head(at.v.size()).dot(at.v);
+  const MatrixX row = contacts_.plain_depth.row(row_of[found]);
+  const double rate = row.row(0).head(at.v.size()).dot(at.v);
   if (rate == 0) return {};
-  return applied(row, now_, parameters) / -rate;
+  return changed(row, now_) / -rate;
 }
 
 // The time of a touch changes with the parameters. A stretch that begins there with a rate jumps
@@ -128,8 +117,7 @@ void Sensitivities::begin_contacts(const State& to) {
   slopes_.linearization().contact_forces(to.q, to.v, contacts_);
   std::vector<int> row_of;
   scene_.rows_of_contacts(row_of);
-  const auto parameters = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
-  const MatrixX depth_by = applied(contacts_.plain_depth, now_, parameters);
+  const MatrixX depth_by = changed(contacts_.plain_depth, now_);
   for (std::size_t i = 0; i < active.size(); ++i) {
     if (!is_new(active[i])) continue;
     const double rate = contacts_.plain_depth.row(row_of[i]).head(to.v.size()).dot(to.v);
@@ -167,20 +155,20 @@ void Sensitivities::reorder_bristles(const VectorX& z) {
 
 // Within a step the changes are carried to the row anew, from the start of the step.
 void Sensitivities::add_row(const State& state, double share) {
-  const Tangent* at = chart_ ? &next_ : &now_;
-  if (chart_ && share < 1) {
-    slopes_.along(*chart_, *stepper_, h_, share, torque_, now_, between_);
+  const Tangent* at = made_ ? &next_ : &now_;
+  if (made_ && share < 1) {
+    between_ = now_;
+    slopes_.carry(made_->chart(), made_->stepper(), h_, torque_, between_, share);
     scene_.restart();
     scene_.evaluate(state.q, state.v, state.z, true);
     at = &between_;
   }
   append(record_.q, at->q);
   append(record_.v, at->v);
-  const auto parameters = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
   slopes_.linearization().contact_forces(state.q, state.v, contacts_);
-  append(record_.force_world, applied(contacts_.force_world, *at, parameters));
-  append(record_.normal_force, applied(contacts_.normal_force, *at, parameters));
-  append(record_.depth, applied(contacts_.depth, *at, parameters));
+  append(record_.force_world, changed(contacts_.force_world, *at));
+  append(record_.normal_force, changed(contacts_.normal_force, *at));
+  append(record_.depth, changed(contacts_.depth, *at));
 }
 
 }  // namespace sphshell

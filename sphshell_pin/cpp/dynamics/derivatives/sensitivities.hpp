@@ -24,8 +24,8 @@ class Sensitivities : public RowFollower {
 
   // The torques that are held from now on are those of a controller at this state.
   void hold(const TorqueAt& torque, const State& state);
-  // A step was made to `to`, where it leaves the scene evaluated.
-  void step(Chart& chart, const Stepper& stepper, const State& from, const State& to);
+  // A step was made; leaves the scene evaluated at its end.
+  void step(Stepping& made);
   // The step is accepted next; `located`: it ends at an event.
   void accept(const State& to, bool located);
   // A row of what is recorded. Leaves the scene evaluated there.
@@ -43,15 +43,18 @@ class Sensitivities : public RowFollower {
   // Stretches of bristles that begin, and their new order.
   void begin_contacts(const State& to);
   void reorder_bristles(const VectorX& z);
+  // The change, as the state changes, of what has these slopes of contacts.
+  MatrixX changed(const MatrixX& slopes, const Tangent& by) const {
+    return applied(slopes, by, slopes.rightCols(parameters_));
+  }
 
   SceneData& scene_;
   StepSlopes slopes_;
-  Eigen::Index columns_;
+  Eigen::Index columns_, parameters_;
   Tangent now_, next_, between_;  // at the state; at the end of the step that was made
   MatrixX torque_;                // held
   ContactForceSlopes contacts_;
-  Chart* chart_ = nullptr;  // of the step that was made, until it is accepted
-  const Stepper* stepper_ = nullptr;
+  Stepping* made_ = nullptr;  // the step that was made, until it is accepted
   double h_ = 0;
   SensitivityRecord record_;
 };

@@ -30,10 +30,13 @@ StepSlopes::StepSlopes(SceneData& scene, std::vector<Parameter> parameters)
 }
 
 void StepSlopes::carry(Chart& chart, const Stepper& stepper, double h, const MatrixX& torque,
-                       Tangent& tangent) {
+                       Tangent& tangent, double share) {
   const Tangent from = tangent;
   origin_ = &from, torque_ = &torque;
-  stepper.carry(*this, chart, h, tangent);
+  if (share < 1)
+    along(chart, stepper, h, share, tangent);
+  else
+    stepper.carry(*this, chart, h, tangent);
   origin_ = nullptr, torque_ = nullptr;
 }
 
@@ -77,64 +80,59 @@ void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& 
   const VectorX rates = scene_.bristle_rates(), here = torque(t, q, v);
   const std::size_t contacts = scene_.active().size();
   // Torques may jump where a contact begins or ends: they are differenced on this side of it.
-  // Central; where the set of contacts changes on one side, one-sided.
-  const auto difference = [&](Eigen::Index column, double step, const auto& move) {
+  // Central; where the set of contacts changes on one side, one-sided. move(sign) makes a step and
+  // returns its length, move(0) takes it back.
+  const auto difference = [&](auto&& column, const auto& move) {
     VectorX sum = VectorX::Zero(nv);
     double span = 0;
     for (const double sign : {1.0, -1.0}) {
-      move(sign * step);
+      const double step = move(sign);
       scene_.evaluate(q_, v_, z_, true);
       if (scene_.active().size() != contacts) continue;
       sum += sign * (torque(t, q_, v_) - here);
       span += step;
     }
-    move(0);
-    if (span > 0) torque_slopes_.col(column) = sum / span;
+    move(0.0);
+    if (span > 0) column = sum / span;
   };
   for (Eigen::Index k = 0; k < nv; ++k) {
-    difference(k, kTorqueDifference, [&](double step) {
-      u_[k] = step;
+    difference(torque_slopes_.col(k), [&](double sign) {
+      u_[k] = sign * kTorqueDifference;
       scene_.body().integrate(q, u_, q_);
       u_[k] = 0;
+      return kTorqueDifference;
     });
     q_ = q;
-    difference(nv + k, kTorqueDifference * std::max(1.0, std::abs(v[k])),
-               [&](double step) { v_[k] = v[k] + step; });
+    const double step = kTorqueDifference * std::max(1.0, std::abs(v[k]));
+    difference(torque_slopes_.col(nv + k), [&](double sign) {
+      v_[k] = v[k] + sign * step;
+      return step;
+    });
   }
   // Slots without a contact change nothing; stretches are short.
   for (Eigen::Index k = 0; k < z.size(); ++k)
     if (rates[k] != 0)
-      difference(2 * nv + k, 1e-3 * kTorqueDifference, [&](double step) { z_[k] = z[k] + step; });
+      difference(torque_slopes_.col(2 * nv + k), [&](double sign) {
+        constexpr double kStep = 1e-3 * kTorqueDifference;
+        z_[k] = z[k] + sign * kStep;
+        return kStep;
+      });
   // What a controller makes of forces that the parameters change at a held state.
+  q_ = q, v_ = v, z_ = z;
   const std::vector<Parameter>& parameters = linearization_.parameters();
   torque_by_parameters_.setZero(nv, static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t c = 0; c < parameters.size(); ++c) {
     const Parameter& one = parameters[c];
-    VectorX sum = VectorX::Zero(nv);
-    double span = 0;
-    for (const double sign : {1.0, -1.0}) {
-      const auto [pair, step] = one.changed(scene_.pairs()[one.pair], sign, kTorqueDifference);
-      const Pair kept = scene_.exchange(one.pair, pair);
-      scene_.evaluate(q, v, z, true);
-      if (scene_.active().size() == contacts) {
-        sum += sign * (torque(t, q, v) - here);
-        span += step;
-      }
-      scene_.exchange(one.pair, kept);
-    }
-    if (span > 0) torque_by_parameters_.col(c) = sum / span;
+    const Pair kept = scene_.pairs()[one.pair];
+    difference(torque_by_parameters_.col(c), [&](double sign) {
+      const auto [pair, step] =
+          sign == 0 ? std::pair(kept, 0.0) : one.changed(kept, sign, kTorqueDifference);
+      scene_.exchange(one.pair, pair);
+      return step;
+    });
   }
   scene_.evaluate(q, v, z, true);
   if (torque(t, q, v) != here) remembers_ = true;
-}
-
-// By the chain rule through (u, v, z), and the parameters directly.
-MatrixX StepSlopes::held(const Tangent& at) const {
-  const Eigen::Index nv = at.q.rows();
-  MatrixX out = torque_slopes_.leftCols(nv) * at.q + torque_slopes_.middleCols(nv, nv) * at.v;
-  out.noalias() += torque_slopes_.rightCols(at.z.rows()) * at.z;
-  out.leftCols(torque_by_parameters_.cols()) += torque_by_parameters_;
-  return out;
 }
 
 // Of (v', z').
@@ -183,13 +181,6 @@ const MatrixX& StepSlopes::bristle_rates(Chart& chart, const VectorX& v, const M
   const MatrixX& by = linearization_.by_parameters();
   rates_.leftCols(by.cols()) += by.bottomRows(nz);
   return rates_;
-}
-
-void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double share,
-                       const MatrixX& torque, const Tangent& from, Tangent& out) {
-  origin_ = &from, torque_ = &torque;
-  along(chart, stepper, h, share, out);
-  origin_ = nullptr, torque_ = nullptr;
 }
 
 // Errors are measured in units of the parameters: each column times its scale.

@@ -23,10 +23,11 @@ class StepSlopes {
     MatrixX u, w, z;
   };
 
-  // Moves `tangent` from the chart's origin to the end of the last step of `stepper`, h long, where
-  // held torques change by `torque` (nv). Leaves the scene evaluated elsewhere.
+  // Moves `tangent` from the chart's origin to the end of the last step of `stepper`, h long, or to
+  // a share of it by its dense output, where held torques change by `torque` (nv). Leaves the scene
+  // evaluated elsewhere.
   void carry(Chart& chart, const Stepper& stepper, double h, const MatrixX& torque,
-             Tangent& tangent);
+             Tangent& tangent, double share = 1);
 
   // What carry() is made of. The changes of the rates at y that go with those of y.
   void rates(Chart& chart, double t, const VectorX& y, const Coordinates& by, Coordinates& out);
@@ -38,16 +39,15 @@ class StepSlopes {
   // Moves the changes at the origin to the share of the step's dense output, by the Radau method of
   // order 5 for the equations of the changes, which are linear, in steps as short as they need.
   void along(Chart& chart, const Stepper& stepper, double h, double share, Tangent& out);
-  // Along a step made by carry() before: the same, from the changes at its start.
-  void along(Chart& chart, const Stepper& stepper, double h, double share, const MatrixX& torque,
-             const Tangent& from, Tangent& out);
 
   // Differences torques at a state by (u, v, z), (nv, 2 nv + nz), and by the parameters.
   void torque_slopes(const TorqueAt& torque, double t, const VectorX& q, const VectorX& v,
                      const VectorX& z);
 
   // The changes of torques whose slopes were found last.
-  MatrixX held(const Tangent& at) const;
+  MatrixX held(const Tangent& at) const {
+    return applied(torque_slopes_, at, torque_by_parameters_);
+  }
 
   // Whether torques asked for twice at a state were not the same: they cannot be differenced.
   bool torques_remember() const { return remembers_; }

@@ -8,12 +8,6 @@ namespace {
 using Group = CurvedSegment::Group;
 using Vec2 = Eigen::Vector2d;
 
-// exp of a rotation vector [rad].
-Eigen::Matrix3d rotation(const Vec3& angle) {
-  const double a = angle.norm();
-  return a > 0 ? Eigen::AngleAxisd(a, angle / a).toRotationMatrix() : Eigen::Matrix3d::Identity();
-}
-
 // The rate of u where exp(u) turns with the angular velocity w, in turning axes.
 Vec3 angle_rate(const Vec3& u, const Vec3& w) {
   // u' = w + [u, w] / 2 + c [u, [u, w]], c = (1 - |u| / 2 cot(|u| / 2)) / |u|^2, by its series near
@@ -26,6 +20,11 @@ Vec3 angle_rate(const Vec3& u, const Vec3& w) {
 }
 
 }  // namespace
+
+Eigen::Matrix3d rotation_of(const Vec3& angle) {
+  const double a = angle.norm();
+  return a > 0 ? Eigen::AngleAxisd(a, angle / a).toRotationMatrix() : Eigen::Matrix3d::Identity();
+}
 
 Chart::Chart(SceneData& scene, Torques& torques)
     : scene_(scene),
@@ -52,7 +51,7 @@ void Chart::place(const VectorX& y, VectorX& q, VectorX& v) const {
       // couple it with the rotation. Velocity: from the axes R0 into the body's.
       const Eigen::Quaterniond axes(Eigen::Map<const Eigen::Vector4d>(origin_->q.data() + k + 3));
       q.segment<3>(k) = origin_->q.segment<3>(k) + axes * Vec3(u_.segment<3>(i));
-      v.segment<3>(i) = (rotation(-u_.segment<3>(i + 3)) * v.segment<3>(i)).eval();
+      v.segment<3>(i) = (rotation_of(-u_.segment<3>(i + 3)) * v.segment<3>(i)).eval();
     } else if (s.group == Group::Planar) {
       // The same in the plane; q holds cosine and sine.
       Eigen::Matrix2d axes;
@@ -110,7 +109,7 @@ void Chart::rate(double t, const VectorX& y, VectorX& out) {
       const Vec3 u = y.segment<3>(i + 3), w = y.segment<3>(nv_ + i + 3);
       out.segment<3>(i + 3) = angle_rate(u, w);
       // Into the axes of the chart, where the step began.
-      out.segment<3>(nv_ + i) = (rotation(u) * out.segment<3>(nv_ + i)).eval();
+      out.segment<3>(nv_ + i) = (rotation_of(u) * out.segment<3>(nv_ + i)).eval();
     } else if (s.group == Group::Rotation) {
       out.segment<3>(i) = angle_rate(y.segment<3>(i), y.segment<3>(nv_ + i));
     } else {

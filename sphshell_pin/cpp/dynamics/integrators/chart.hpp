@@ -35,6 +35,9 @@ class Torques {
   virtual bool follow_time() const = 0;
 };
 
+// exp of a rotation vector [rad].
+Eigen::Matrix3d rotation_of(const Vec3& angle);
+
 // Makes a plain system of the motion,
 //
 //   y = (u, w, z, work),   y' = rate(t, y),

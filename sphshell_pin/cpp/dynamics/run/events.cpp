@@ -30,13 +30,9 @@ double clamp_gauge(const NormalLaw& law, double depth, double gap_rate, double f
 }  // namespace
 
 Events::Start Events::now(std::size_t k) const {
-  const std::size_t pairs = scene_.pairs().size();
-  if (k < pairs) {
-    const PairState& pair = scene_.states()[k];
-    return {pair.pieces, pair.clamped, pair.center};
-  }
-  const StopState& stop = scene_.joints().stops()[k - pairs];
-  return {stop.touching, stop.clamped, Vec3::Zero()};
+  const TouchState& at = scene_.touch(k);
+  const bool is_pair = k < scene_.pairs().size();
+  return {at.pieces, at.clamped, is_pair ? scene_.states()[k].center : Vec3(Vec3::Zero())};
 }
 
 void Events::begin() {
@@ -69,12 +65,12 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
   // Behind the pairs come the stops of joints.
   if (k >= scene_.pairs().size()) {
     const std::size_t i = k - scene_.pairs().size();
-    const StopState& state = scene_.joints().stops()[i];
+    const TouchState& state = scene_.touch(k);
     const JointStop& stop = scene_.joints().effects()->stops[i];
     out[Minimum].push_back(state.depth);
-    if (state.touching)
+    if (state.count > 0)
       out[Clamp].push_back(
-          clamp_gauge(stop.law, state.depth, -stop.sign * state_.v[stop.v], state.force));
+          clamp_gauge(stop.law, state.depth, -stop.sign * state_.v[stop.v], state.normal_force));
     return;
   }
   const Pair& pair = scene_.pairs()[k];

@@ -18,8 +18,7 @@ using Motion = std::function<void(double share, VectorX& y)>;
 // dynamics.
 class Events {
  public:
-  explicit Events(SceneData& scene)
-      : scene_(scene), at_begin_(scene.pairs().size() + scene.joints().stops().size()) {}
+  explicit Events(SceneData& scene) : scene_(scene), at_begin_(scene.num_touches()) {}
 
   // A step begins where the scene was last evaluated.
   void begin();

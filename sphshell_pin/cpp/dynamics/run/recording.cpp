@@ -24,11 +24,12 @@ constexpr std::uintmax_t kMostPeakLooks = 50;
 }  // namespace
 
 // Summaries of the pairs, then of the joints' stops.
-Recorder::Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches)
-    : start_(start),
+Recorder::Recorder(SceneData& scene, double start, double end, double record_dt, bool patches)
+    : scene_(scene),
+      start_(start),
       end_(end),
       record_dt_(record_dt),
-      summaries_(scene.pairs().size() + scene.joints().stops().size()),
+      summaries_(scene.num_touches()),
       status_(summaries_.size()),
       touches_(summaries_.size()) {
   const JointEffects* joints = scene.joints().effects();
@@ -60,17 +61,17 @@ Record Recorder::take() {
 }
 
 // A row of its own; what was recorded before is put back.
-Record Recorder::snapshot(SceneData& scene, const State& state) {
+Record Recorder::snapshot(const State& state) {
   Record recorded = take();
   const long rows = std::exchange(rows_, 0);
   RowFollower* follower = std::exchange(follower_, nullptr);
-  add_row(scene, state);
+  add_row(state);
   rows_ = rows, follower_ = follower;
   return std::exchange(record_, std::move(recorded));
 }
 
-void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& stepper,
-                        const State& from, const State& to) {
+void Recorder::add_rows(const Stepping& made) {
+  const State &from = made.state(), &to = made.next();
   if (record_dt_ > 0) {
     // The end is a row, and none stands a round-off before it.
     const double last = end_ - 1e-9 * record_dt_;
@@ -78,34 +79,33 @@ void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& ste
     // Rows between accepted steps are evaluated on the dense output.
     for (; due() < to.t && due() < last; ++next_row_) {
       const double share = (due() - from.t) / (to.t - from.t);
-      stepper.interpolate(share, y_);
-      chart.finish(due(), y_, between_);
-      scene.evaluate(between_.q, between_.v, between_.z, true);
-      add_row(scene, between_, share);
+      made.interpolate(share, due(), between_);
+      scene_.evaluate(between_.q, between_.v, between_.z, true);
+      add_row(between_, share);
       moved = true;
     }
     if (moved) {
-      scene.restart();
-      scene.evaluate(to.q, to.v, to.z);
+      scene_.restart();
+      scene_.evaluate(to.q, to.v, to.z);
     }
     if (to.t < (due() < last ? due() : end_)) return;
     ++next_row_;
   }
-  scene.evaluate(to.q, to.v, to.z, true);
-  add_row(scene, to);
+  scene_.evaluate(to.q, to.v, to.z, true);
+  add_row(to);
 }
 
 // Contacts, state, energies, torques and sensitivities at one time.
-void Recorder::add_row(SceneData& scene, const State& state, double share) {
-  scene.log(state.q, state.v, record_.contacts, record_.patches ? &*record_.patches : nullptr);
+void Recorder::add_row(const State& state, double share) {
+  scene_.log(state.q, state.v, record_.contacts, record_.patches ? &*record_.patches : nullptr);
   record_.contact_row.resize(record_.contacts.size(), double(rows_));
   record_.t.push_back(state.t);
   record_.q.insert(record_.q.end(), state.q.begin(), state.q.end());
   record_.v.insert(record_.v.end(), state.v.begin(), state.v.end());
-  const Powers& powers = scene.powers();
+  const Powers& powers = scene_.powers();
   // Columns of Record::energy, in this order [J]; the energy that bristles hold is not lost yet.
-  const double kinetic = scene.body().kinetic_energy(state.q, state.v);
-  const double potential = scene.body().potential_energy(state.q);
+  const double kinetic = scene_.body().kinetic_energy(state.q, state.v);
+  const double potential = scene_.body().potential_energy(state.q);
   const Ledger& ledger = state.ledger;
   for (double e : {kinetic, potential, powers.elastic + powers.bristles, ledger.damping,
                    ledger.friction - powers.bristles, ledger.control})
@@ -119,59 +119,48 @@ void Recorder::add_row(SceneData& scene, const State& state, double share) {
 }
 
 // Begin and end of touch; `begin` is the kind of the first, that of the end follows it.
-void Recorder::add_touch(std::size_t k, const Touch& now, double t, double h, int number,
-                         Event::Kind begin) {
+void Recorder::add_touch(std::size_t k, double t, double h, int number, Event::Kind begin) {
   PairSummary& summary = summaries_[k];
   PairStatus& status = status_[k];
-  const Touch before = std::exchange(status.touch, now);
+  const TouchState &now = scene_.touch(k), before = std::exchange(status.touch, now);
+  const bool touches = now.count > 0, touched = before.count > 0;
   // Over a step that begins in touch; the impulse by the trapezoidal rule.
-  if (before.touching) summary.contact_time += h;
+  if (touched) summary.contact_time += h;
   summary.impulse += 0.5 * h * (before.normal_force + now.normal_force);
-  if (now.touching != before.touching) {
-    const int kind = static_cast<int>(begin) + (now.touching ? 0 : 1);
+  if (touches != touched) {
+    const int kind = static_cast<int>(begin) + (touches ? 0 : 1);
     record_.events.push_back({t, number, static_cast<Event::Kind>(kind)});
     status.deep = false;
-    if (now.touching) ++summary.touches;
+    if (touches) ++summary.touches;
   }
   raise_peaks(summary, now, t);
 }
 
-void Recorder::raise_peaks(PairSummary& summary, const Touch& now, double t) {
-  if (!now.touching) return;
+void Recorder::raise_peaks(PairSummary& summary, const TouchState& now, double t) {
+  if (now.count == 0) return;
   if (now.normal_force > summary.peak_force)
     summary.peak_force = now.normal_force, summary.peak_force_time = t;
   if (now.depth > summary.max_depth) summary.max_depth = now.depth, summary.max_depth_time = t;
 }
 
-Recorder::Touch Recorder::touch_of(const SceneData& scene, std::size_t k) const {
-  const std::size_t pairs = scene.pairs().size();
-  if (k < pairs) {
-    const PairState& now = scene.states()[k];
-    return {now.count > 0, now.normal_force, now.depth};
-  }
-  const StopState& now = scene.joints().stops()[k - pairs];
-  return {now.touching, now.force, now.depth};
-}
-
 // Peaks between the ends of a step, on its dense output: looked for only where the rate at the
 // higher end says that there is one.
-void Recorder::add_peaks(SceneData& scene, const Chart& chart, const Stepper& stepper,
-                         const State& from, const State& to) {
+void Recorder::add_peaks(const Stepping& made) {
+  const State &from = made.state(), &to = made.next();
   bool moved = false;
-  const auto look = [&](double share, std::size_t k) {
+  const auto look = [&](double share, std::size_t k) -> const TouchState& {
     moved = true;
-    stepper.interpolate(share, y_);
-    chart.finish(from.t + share * (to.t - from.t), y_, between_);
-    scene.evaluate(between_.q, between_.v, between_.z);
-    return touch_of(scene, k);
+    made.interpolate(share, from.t + share * (to.t - from.t), between_);
+    scene_.evaluate(between_.q, between_.v, between_.z);
+    return scene_.touch(k);
   };
-  for (std::size_t k = 0; k < summaries_.size(); ++k) touches_[k] = touch_of(scene, k);
+  for (std::size_t k = 0; k < summaries_.size(); ++k) touches_[k] = scene_.touch(k);
   for (std::size_t k = 0; k < summaries_.size(); ++k) {
     PairSummary& summary = summaries_[k];
-    const Touch &first = status_[k].touch, &last = touches_[k];
-    if (!first.touching && !last.touching) continue;
-    for (const auto& [of, most] : {std::pair(&Touch::normal_force, &PairSummary::peak_force),
-                                   std::pair(&Touch::depth, &PairSummary::max_depth)}) {
+    const TouchState &first = status_[k].touch, &last = touches_[k];
+    if (first.count == 0 && last.count == 0) continue;
+    for (const auto& [of, most] : {std::pair(&TouchState::normal_force, &PairSummary::peak_force),
+                                   std::pair(&TouchState::depth, &PairSummary::max_depth)}) {
       // Towards its higher end a rate that has changed its sign falls.
       // A quantity that still grows backwards from its higher end has its peak within the step.
       const bool rises = last.*of > first.*of;
@@ -185,28 +174,29 @@ void Recorder::add_peaks(SceneData& scene, const Chart& chart, const Stepper& st
           boost::math::tools::brent_find_minima([&](double share) { return -(look(share, k).*of); },
                                                 0.0, 1.0, kPeakBits, looks)
               .first;
-      raise_peaks(summary, look(at, k), between_.t);
+      const TouchState top = look(at, k);  // sets the time, too
+      raise_peaks(summary, top, between_.t);
     }
   }
   if (!moved) return;
-  scene.restart();
-  scene.evaluate(to.q, to.v, to.z);
+  scene_.restart();
+  scene_.evaluate(to.q, to.v, to.z);
 }
 
 // Events and sums of an accepted step of length h that ends at t.
-void Recorder::add_step(const SceneData& scene, double t, double h) {
-  const std::size_t pairs = scene.pairs().size();
+void Recorder::add_step(double t, double h) {
+  const std::size_t pairs = scene_.pairs().size();
   for (std::size_t k = 0; k < pairs; ++k) {
-    const PairState& now = scene.states()[k];
+    const PairState& now = scene_.states()[k];
     const int number = static_cast<int>(k);
     const auto add_event = [&](Event::Kind kind) { record_.events.push_back({t, number, kind}); };
     PairStatus& status = status_[k];
-    add_touch(k, touch_of(scene, k), t, h, number, Event::Kind::Touch);
+    add_touch(k, t, h, number, Event::Kind::Touch);
     // Warnings, once each time a threshold is passed.
     const bool beyond = now.conformity > kMostConformal || now.half_axis > kLargestEllipse;
     if (beyond && !status.beyond_hertz) add_event(Event::Kind::BeyondHertz);
     status.beyond_hertz = beyond;
-    const double radius = scene.pairs()[k].least_radius();
+    const double radius = scene_.pairs()[k].least_radius();
     const bool through = now.pushed_through || (radius > 0 && now.depth > radius);
     if (through && !status.through) add_event(Event::Kind::Through);
     status.through = through;
@@ -216,15 +206,14 @@ void Recorder::add_step(const SceneData& scene, double t, double h) {
     }
   }
   for (std::size_t k = pairs; k < summaries_.size(); ++k)
-    add_touch(k, touch_of(scene, k), t, h, static_cast<int>(k - pairs), Event::Kind::Stop);
+    add_touch(k, t, h, static_cast<int>(k - pairs), Event::Kind::Stop);
 }
 
 // Of the velocities that have a limit: times during which efforts were cut, peak speeds, and events
 // where either begins or ends.
-void Recorder::add_limits(const SceneData& scene, const VectorX& v, const std::vector<char>& cut,
-                          double t, double h) {
+void Recorder::add_limits(const VectorX& v, const std::vector<char>& cut, double t, double h) {
   for (std::size_t i = 0; i < limits_.size(); ++i) {
-    const JointEffects& joints = *scene.joints().effects();
+    const JointEffects& joints = *scene_.joints().effects();
     LimitSummary& summary = limits_[i];
     LimitStatus& status = limit_status_[i];
     const int number = static_cast<int>(i);

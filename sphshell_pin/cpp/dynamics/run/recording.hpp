@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "dynamics/integrators/stepper.hpp"
+#include "dynamics/run/stepping.hpp"
 
 namespace sphshell {
 
@@ -82,7 +82,7 @@ class RowFollower {
 class Recorder {
  public:
   // Rows every `record_dt` from `start` to `end` [s], and at `end`; 0: at the end of every step.
-  Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches);
+  Recorder(SceneData& scene, double start, double end, double record_dt, bool patches);
 
   // Whether the rows from now on have the patches of their contacts; those of rows that are
   // recorded already are unknown.
@@ -94,37 +94,28 @@ class Recorder {
   void record_torques(TorquesAt torques, Eigen::Index nv);
 
   // The scene's last evaluate() was at the state; `share`: see RowFollower.
-  void add_row(SceneData& scene, const State& state, double share = 1);
-  // The rows due in the last step of `stepper`, which is from `from` to `to`, and at its end.
-  // Leaves the forces evaluated at `to`.
-  void add_rows(SceneData& scene, const Chart& chart, const Stepper& stepper, const State& from,
-                const State& to);
+  void add_row(const State& state, double share = 1);
+  // The rows due in the step that was made, and at its end, where it leaves the forces evaluated.
+  void add_rows(const Stepping& made);
   // The largest force and depth of each pair and stop within the same step, where its dense output
-  // has them between its ends. The scene's last evaluate() was at `to`, and it is left there.
-  void add_peaks(SceneData& scene, const Chart& chart, const Stepper& stepper, const State& from,
-                 const State& to);
+  // has them between its ends. The scene's last evaluate() was at its end, and it is left there.
+  void add_peaks(const Stepping& made);
   // Events and figures of a step of h [s] that ends at t; the scene has accepted its end.
-  void add_step(const SceneData& scene, double t, double h);
+  void add_step(double t, double h);
 
   // The same of limits of torque and speed; `cut`: which torques were cut.
-  void add_limits(const SceneData& scene, const VectorX& v, const std::vector<char>& cut, double t,
-                  double h);
+  void add_limits(const VectorX& v, const std::vector<char>& cut, double t, double h);
 
   // Hands over what was recorded since the last call.
   Record take();
   // The state as the only row of a record; the scene's last evaluate() was there.
-  Record snapshot(SceneData& scene, const State& state);
+  Record snapshot(const State& state);
   const std::vector<PairSummary>& summaries() const { return summaries_; }
   const std::vector<LimitSummary>& limits() const { return limits_; }
 
  private:
-  // A pair or a stop at one state.
-  struct Touch {
-    bool touching = false;
-    double normal_force = 0, depth = 0;
-  };
   struct PairStatus {
-    Touch touch;  // at the end of the last step
+    TouchState touch;  // at the end of the last step
     bool deep = false, through = false, beyond_hertz = false;
   };
   struct LimitStatus {
@@ -132,23 +123,21 @@ class Recorder {
   };
 
   // Of pair or stop k at the state of the scene; and peaks that it raises.
-  Touch touch_of(const SceneData& scene, std::size_t k) const;
-  static void raise_peaks(PairSummary& summary, const Touch& now, double t);
-  void add_touch(std::size_t k, const Touch& now, double t, double h, int number,
-                 Event::Kind begin);
+  static void raise_peaks(PairSummary& summary, const TouchState& now, double t);
+  void add_touch(std::size_t k, double t, double h, int number, Event::Kind begin);
 
   double due() const { return start_ + double(next_row_) * record_dt_; }
 
+  SceneData& scene_;
   double start_, end_, record_dt_;
   Record record_;
   std::vector<PairSummary> summaries_;
   std::vector<PairStatus> status_;
-  std::vector<Touch> touches_;  // at the end of the step that was made
+  std::vector<TouchState> touches_;  // at the end of the step that was made
   std::vector<LimitSummary> limits_;
   std::vector<LimitStatus> limit_status_;
   long rows_ = 0, next_row_ = 1;
   State between_;
-  VectorX y_;
   RowFollower* follower_ = nullptr;
   TorquesAt torques_;  // empty unless asked for
 };

@@ -49,7 +49,9 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
       cut_(static_cast<std::size_t>(model.nv), 0),
       next_control_(settings_.start_time) {
   if (!sensors.empty())
-    sensors_ = std::make_unique<Sensors>(std::move(sensors), model, settings_.start_time);
+    // The base is private: no other function could convert to it.
+    sensors_ = std::make_unique<Sensors>(std::move(sensors), scene_, static_cast<Torques&>(*this),
+                                         push_, settings_.start_time);
   if (settings_.torques) record_torques();
   if (controller_) controller_->prepare(scene_);
   if (controller_ && sensors_) controller_->read(sensors_->readings());
@@ -108,16 +110,16 @@ Simulation::Status Simulation::advance(double wall_seconds, double until,
 void Simulation::start() {
   started_ = true;
   stepping_.restart();
-  recorder_.add_step(scene_, time(), 0);
-  recorder_.add_limits(scene_, v(), cut_, time(), 0);
-  recorder_.add_row(scene_, stepping_.state());
+  recorder_.add_step(time(), 0);
+  recorder_.add_limits(v(), cut_, time(), 0);
+  recorder_.add_row(stepping_.state());
 }
 
 // The first sample needs the first torque, for which a controller may read the sensors.
 void Simulation::begin_sensors() {
-  sensors_->hold_still(scene_, stepping_.state(), push_);
+  sensors_->hold_still(stepping_.state());
   hold_torques();
-  sensors_->begin(scene_, *this, stepping_.state(), push_);
+  sensors_->begin(stepping_.state());
 }
 
 Record Simulation::take() {
@@ -141,7 +143,7 @@ double Simulation::end_of_step() const {
 // One step, or a part of a fixed step that had to be divided: the next call goes on.
 Simulation::Status Simulation::step() {
   if (fine_steps_ == 0) hold_torques();
-  if (sensors_) sensors_->begin_step(scene_, *this, stepping_.state(), push_);
+  if (sensors_) sensors_->begin_step(stepping_.state());
   const double end = end_of_step();
   Status status = Status::Running;
   if (settings_.dt == 0) {
@@ -163,7 +165,7 @@ Simulation::Status Simulation::step() {
     const long every =
         settings_.record_dt > 0 ? std::max(1L, std::lround(settings_.record_dt / settings_.dt)) : 1;
     if (status == Status::Running && (grid_ % every == 0 || at_end()))
-      recorder_.add_row(scene_, stepping_.state());
+      recorder_.add_row(stepping_.state());
   }
   return is_finite() ? status : Status::Diverged;
 }
@@ -192,15 +194,12 @@ bool Simulation::make_controlled(double end) {
   if (settings_.dt == 0) {
     if (sensors_) {
       const KeptCuts kept(cut_);
-      sensors_->add_dense(scene_, *this, stepping_.chart(), stepping_.stepper(), stepping_.state(),
-                          stepping_.next(), push_);
+      sensors_->add_dense(stepping_);
     }
-    recorder_.add_rows(scene_, stepping_.chart(), stepping_.stepper(), stepping_.state(),
-                       stepping_.next());
+    recorder_.add_rows(stepping_);
     ++steps_;
   }
-  recorder_.add_peaks(scene_, stepping_.chart(), stepping_.stepper(), stepping_.state(),
-                      stepping_.next());
+  recorder_.add_peaks(stepping_);
   accept();
   return true;
 }
@@ -208,7 +207,7 @@ bool Simulation::make_controlled(double end) {
 // Before the step is accepted, as the scene must still know where it began.
 void Simulation::differentiate_step() {
   const KeptCuts kept(cut_);
-  sensitivities_->step(stepping_.chart(), stepping_.stepper(), stepping_.state(), stepping_.next());
+  sensitivities_->step(stepping_);
 }
 
 // Sensors, derivatives and recording see the step, each at its place in this order.
@@ -216,7 +215,7 @@ void Simulation::accept() {
   const double before = time();
   if (sensors_ && settings_.dt > 0) {
     const KeptCuts kept(cut_);
-    sensors_->add_fixed(scene_, *this, stepping_.state(), stepping_.next(), settings_.dt, push_);
+    sensors_->add_fixed(stepping_, settings_.dt);
   }
   if (sensitivities_) {
     const KeptCuts kept(cut_);
@@ -224,8 +223,8 @@ void Simulation::accept() {
     sensitivities_->accept(stepping_.next(), controlled && stepping_.at_event());
   }
   stepping_.accept();
-  recorder_.add_step(scene_, time(), time() - before);
-  recorder_.add_limits(scene_, v(), cut_, time(), time() - before);
+  recorder_.add_step(time(), time() - before);
+  recorder_.add_limits(v(), cut_, time(), time() - before);
 }
 
 // Not-a-number fails every comparison.
@@ -302,7 +301,7 @@ bool Simulation::follow_time() const {
 
 Record Simulation::snapshot() {
   if (!started_) start();
-  return recorder_.snapshot(scene_, stepping_.state());
+  return recorder_.snapshot(stepping_.state());
 }
 
 void Simulation::push(int joint, const Vec3& point, const PointForce& force, int frame) {
@@ -340,7 +339,7 @@ void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
   stepping_.restart();
   // A change of stiffness adds the change of stored energy.
   state.ledger.control += scene_.powers().elastic - before;
-  recorder_.add_step(scene_, state.t, 0);
+  recorder_.add_step(state.t, 0);
   if (sensors_) sensors_->jump();
 }
 

@@ -40,6 +40,11 @@ class Stepping {
   const Stepper& stepper() const { return *active_; }
   const Chart& chart() const { return chart_; }
   Chart& chart() { return chart_; }
+  // The state at time t, a share of the step that was made, by its dense output.
+  void interpolate(double share, double t, State& out) const {
+    active_->interpolate(share, dense_);
+    chart_.finish(t, dense_, out);
+  }
   // Whether the controlled step that was made ends at an event.
   bool at_event() const { return after_event_; }
   // Steps of the fixed length are replaced by controlled ones where a sphere moves too far.
@@ -76,7 +81,7 @@ class Stepping {
   State state_, next_;
   Powers last_;
   VectorX probe_, rate_;
-  mutable VectorX sizes_;
+  mutable VectorX sizes_, dense_;
   double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one
   bool after_event_ = false;              // the last step ended at one
   bool free_ = false;                     // nothing touches at the state

@@ -28,8 +28,7 @@ bool Cluster::is_far(const Pair& pair, const Vec3& center_in_shell) const {
 // As find_contacts() does it with the center of one sphere.
 Vec3 Cluster::center_in_shell(const Multibody& body, const Pair& pair,
                               const SE3& world_from_j) const {
-  return world_from_j.actInv(pair.joint_i == 0 ? center
-                                               : body.world_from_joint(pair.joint_i).act(center));
+  return world_from_j.actInv(body.world_from(pair.joint_i, center));
 }
 
 std::vector<Cluster> clusters_of(const std::vector<Pair>& pairs) {

@@ -28,14 +28,15 @@ void JointForces::evaluate(const VectorX& q, const VectorX& v, const VectorRef& 
   }
   for (std::size_t k = 0; k < stops_.size(); ++k) {
     const JointStop& stop = effects_->stops[k];
-    StopState& state = stops_[k];
-    state = {stop.depth(q)};
-    state.touching = state.depth > 0;
-    if (!state.touching) continue;
+    TouchState& state = stops_[k];
+    state = {};
+    state.depth = stop.depth(q);
+    if (!(state.depth > 0)) continue;
+    state.count = state.pieces = 1;
     // As a gap rate: negative while moving farther beyond the end.
     const double rate = -stop.sign * v[stop.v];
     const NormalForce<double> push = stop.law.force(state.depth, rate);
-    state.force = push.total;
+    state.normal_force = push.total;
     state.clamped = push.total == 0;
     torque_[stop.v] -= stop.sign * push.total;
     powers_.damping -= (push.total - push.elastic) * rate;

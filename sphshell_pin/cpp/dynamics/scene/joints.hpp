@@ -40,17 +40,19 @@ struct DryFriction {
 
 // The constant description, shared by all states of a scene.
 struct JointEffects {
-  std::vector<JointStop> stops;
-  std::vector<DryFriction> friction;
   VectorX damping;                           // (nv) [N m s/rad or N s/m], or empty
   VectorX least_effort, most_effort, speed;  // (nv), infinite where there is no limit, or empty
+  std::vector<JointStop> stops = {};
+  std::vector<DryFriction> friction = {};
 };
 
-// Of a stop at one state: depth [rad or m], force [N m or N].
-struct StopState {
-  double depth = 0, force = 0;
-  bool touching = false;
-  bool clamped = false;  // in touch, and the law's clamp holds it at no force
+// A pair, or a stop of a joint, at one state.
+struct TouchState {
+  int count = 0;            // of contacts, saddles not counted
+  int pieces = 0;           // of contacts, less saddles: changes where a depth goes through zero
+  int clamped = 0;          // of contacts that the law's clamp holds at no force
+  double depth = 0;         // largest [m]; that of a stop is negative before its end [rad or m]
+  double normal_force = 0;  // sum [N], of a stop [N m or N]
 };
 
 // The effects at one state. Without any, nothing is computed.
@@ -74,7 +76,7 @@ class JointForces {
   const VectorX& torque() const { return torque_; }
   const Powers& powers() const { return powers_; }
   const VectorX& rates() const { return rates_; }
-  const std::vector<StopState>& stops() const { return stops_; }
+  const std::vector<TouchState>& stops() const { return stops_; }
   // tau with the torques of the last evaluate().
   const VectorX& added(const VectorX& tau);
 
@@ -91,7 +93,7 @@ class JointForces {
   bool act_;
   VectorX torque_, rates_, sum_;
   Powers powers_;
-  std::vector<StopState> stops_;
+  std::vector<TouchState> stops_;
 };
 
 }  // namespace sphshell

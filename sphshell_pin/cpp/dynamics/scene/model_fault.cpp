@@ -1,6 +1,8 @@
 #include "dynamics/scene/model_fault.hpp"
 
-#include <stdexcept>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
 
 namespace sphshell {
 namespace {
@@ -19,9 +21,9 @@ bool add_joint(const pinocchio::Model& from, int j, pinocchio::Model& to) {
   return true;
 }
 
-}  // namespace
-
-std::string model_fault(const pinocchio::Model& model) {
+// What is wrong with the indices of a model; empty if nothing is. Its lists have one entry per
+// joint, parents first.
+std::string index_fault(const pinocchio::Model& model) {
   const std::string again = ": build the model anew with addJoint";
   // Built as Pinocchio does it, and compared: composite joints and those that mimic others too.
   pinocchio::Model right;
@@ -55,6 +57,69 @@ std::string model_fault(const pinocchio::Model& model) {
       return std::string(name) + " has " + std::to_string(values->size()) + " numbers, nq is " +
              std::to_string(model.nq);
   return "";
+}
+
+bool is_finite(const pinocchio::SE3& placement) {
+  return placement.rotation().allFinite() && placement.translation().allFinite();
+}
+
+template <class Value>
+std::string text_of(const Value& value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+std::string text_of(const Eigen::VectorXd& x) {
+  const Eigen::IOFormat row(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "", "", "", "[",
+                            "]");
+  return text_of(x.transpose().format(row));
+}
+
+}  // namespace
+
+std::optional<ModelFault> model_fault(const pinocchio::Model& model) {
+  const auto count = static_cast<std::size_t>(model.njoints);
+  // Pinocchio's algorithms read these arrays without looking at their lengths.
+  for (const auto& [name, found] : {std::pair("names", model.names.size()),
+                                    {"joints", model.joints.size()},
+                                    {"parents", model.parents.size()},
+                                    {"inertias", model.inertias.size()},
+                                    {"jointPlacements", model.jointPlacements.size()},
+                                    {"nqs", model.nqs.size()},
+                                    {"nvs", model.nvs.size()}})
+    if (found != count)
+      return ModelFault{std::string("model.") + name, text_of(found),
+                        "must have " + text_of(count) + " entries"};
+  for (std::size_t j = 0; j < count; ++j) {
+    const std::string at = "[" + text_of(j) + "]", joint = "joint '" + model.names[j] + "'";
+    // Also excludes cycles: a parent has a lower number.
+    if (model.parents[j] >= std::max<std::size_t>(j, 1))
+      return ModelFault{"model.parents" + at, text_of(model.parents[j]),
+                        "must come before " + joint};
+    const pinocchio::Inertia& inertia = model.inertias[j];
+    const pinocchio::SE3& placement = model.jointPlacements[j];
+    if (!std::isfinite(inertia.mass()) || !inertia.lever().allFinite() ||
+        !inertia.inertia().matrix().allFinite())
+      return ModelFault{"model.inertias" + at, text_of(inertia.mass()) + ", ...",
+                        "must be finite: " + joint};
+    if (!is_finite(placement))
+      return ModelFault{"model.jointPlacements" + at,
+                        text_of(Eigen::VectorXd(placement.translation())) + ", ...",
+                        "must be finite: " + joint};
+    if (inertia.mass() < 0)
+      return ModelFault{"the mass of " + joint, text_of(inertia.mass()),
+                        "must not be negative [kg]"};
+  }
+  const Eigen::VectorXd gravity = model.gravity.toVector();
+  if (!gravity.allFinite()) return ModelFault{"model.gravity", text_of(gravity), "must be finite"};
+  for (const pinocchio::Frame& frame : model.frames)
+    if (frame.parentJoint >= count || !is_finite(frame.placement))
+      return ModelFault{"model's frame '" + frame.name + "'", text_of(frame.parentJoint),
+                        "must be on a joint of it"};
+  const std::string fault = index_fault(model);
+  if (fault.empty()) return {};
+  return ModelFault{"model", "a pinocchio::Model", "is damaged: " + fault};
 }
 
 }  // namespace sphshell

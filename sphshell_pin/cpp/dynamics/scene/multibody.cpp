@@ -89,21 +89,16 @@ const VectorX& Multibody::solve(const VectorX& tau, const VectorX& bias) {
   return solution_;
 }
 
-const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
-  if (mimics_) {
-    pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
-    return solve(tau, pinocchio::rnea(model_, data_, q, v, zero_));
-  }
-  return pinocchio::aba(model_, data_, VectorRef(q), VectorRef(v), VectorRef(tau));
-}
-
 const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
-                                       const Forces& external) {
+                                       const Forces* external) {
   if (mimics_) {
     pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
-    return solve(tau, pinocchio::rnea(model_, data_, q, v, zero_, external));
+    return solve(tau, external ? pinocchio::rnea(model_, data_, q, v, zero_, *external)
+                               : pinocchio::rnea(model_, data_, q, v, zero_));
   }
-  return pinocchio::aba(model_, data_, VectorRef(q), VectorRef(v), VectorRef(tau), external);
+  const VectorRef at(q), rate(v), torque(tau);
+  return external ? pinocchio::aba(model_, data_, at, rate, torque, *external)
+                  : pinocchio::aba(model_, data_, at, rate, torque);
 }
 
 void Multibody::acceleration_derivatives(const VectorX& q, const VectorX& v, const VectorX& tau,

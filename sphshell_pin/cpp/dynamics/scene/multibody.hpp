@@ -41,10 +41,10 @@ class Multibody {
   // From now on kinematics() places this joint, and those that carry it.
   void need(int joint);
 
-  // Forward dynamics (nv); `external`: forces on the joints' bodies, in the joints' frames.
-  const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau);
+  // Forward dynamics (nv); `external`: forces on the joints' bodies, in the joints' frames, or
+  // null.
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
-                              const Forces& external);
+                              const Forces* external = nullptr);
   // Derivatives (nv, nv) of acceleration(q, v, tau), with respect to q in its tangent space, v and
   // tau. Pinocchio's derivatives leave out how axes turn, and want joints in depth-first order: for
   // other models they are central differences, right to nine digits.
@@ -92,6 +92,9 @@ class Multibody {
   // Where something at `placement` in the joint is in the world.
   pinocchio::SE3 world_from(int joint, const pinocchio::SE3& placement) const {
     return joint == 0 ? placement : data_.oMi[joint] * placement;
+  }
+  Eigen::Vector3d world_from(int joint, const Eigen::Vector3d& point) const {
+    return joint == 0 ? point : data_.oMi[joint].act(point);
   }
   const pinocchio::Motion& velocity(int joint) const { return data_.v[joint]; }
   // Of the joint's body, in the world [m/s], [rad/s].

@@ -130,17 +130,13 @@ void SceneData::accept(VectorX& z) {
     const Vec3& center = states_[k].center;
     excursions_[k].from = center;
     ContactTracker& tracker = trackers_[k];
+    assign_bristles(bristles_, k, z);
     // The common case of a pair far away.
     if (contacts.empty() && tracker.places().empty()) {
       tracker.move_to(center);
-      bristles_.assign_none(k);
       continue;
     }
-    const std::vector<int>& at = tracker.match(contacts, center, pair.radius);
-    if (pair.friction.has_state())
-      bristles_.assign(k, contacts, at, tracker, z, pair.friction.torsional(), pair.has_dn_dc());
-    else
-      bristles_.assign_none(k);
+    if (!pair.friction.has_state()) tracker.match(contacts, center, pair.radius);
     tracker.accept(contacts, center, pair.radius);
     for (std::size_t i = 0; i < contacts.size(); ++i)
       active_[next++].contact_id = tracker.places()[i].number;
@@ -160,17 +156,20 @@ void SceneData::reorder_bristles(VectorX& z) {
   if (!bristles_.any()) return;
   Bristles bristles = bristles_;
   bristles.begin();
-  for (std::size_t k = 0; k < pairs_.size(); ++k) {
-    const Pair& pair = pairs_[k];
-    std::vector<Contact>& contacts = queries_[k].contacts;
-    if (!pair.friction.has_state() || (contacts.empty() && trackers_[k].places().empty())) {
-      bristles.assign_none(k);
-      continue;
-    }
-    const std::vector<int>& at = trackers_[k].match(contacts, states_[k].center, pair.radius);
-    bristles.assign(k, contacts, at, trackers_[k], z, pair.friction.torsional(), pair.has_dn_dc());
-  }
+  for (std::size_t k = 0; k < pairs_.size(); ++k) assign_bristles(bristles, k, z);
   end_bristles(bristles, z);
+}
+
+void SceneData::assign_bristles(Bristles& bristles, std::size_t k, const VectorX& z) {
+  const Pair& pair = pairs_[k];
+  std::vector<Contact>& contacts = queries_[k].contacts;
+  ContactTracker& tracker = trackers_[k];
+  if (!pair.friction.has_state() || (contacts.empty() && tracker.places().empty())) {
+    bristles.assign_none(k);
+    return;
+  }
+  const std::vector<int>& at = tracker.match(contacts, states_[k].center, pair.radius);
+  bristles.assign(k, contacts, at, tracker, z, pair.friction.torsional(), pair.has_dn_dc());
 }
 
 // Stretches of joints stay behind those of contacts.
@@ -186,11 +185,9 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
   const Pair& pair = pairs_[k];
   PairState& state = states_[k];
   Query& query = queries_[k];
-  if (pair.has_sphere()) {
-    const Vec3& center = pair.placement_i.translation();
-    state.center = state.world_from_j.actInv(
-        pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
-  }
+  if (pair.has_sphere())
+    state.center =
+        state.world_from_j.actInv(body_.world_from(pair.joint_i, pair.placement_i.translation()));
   if (far) {
     query.contacts.clear();
     return query.contacts;
@@ -399,7 +396,7 @@ Vec3 SceneData::relative_spin(const Pair& pair) const {
 // Without touching contacts ABA without external forces, which is faster.
 const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
   const VectorX& all = joints_.act() ? joints_.added(tau) : tau;
-  return touching_ ? body_.acceleration(q, v, all, external_) : body_.acceleration(q, v, all);
+  return body_.acceleration(q, v, all, touching_ ? &external_ : nullptr);
 }
 
 }  // namespace sphshell

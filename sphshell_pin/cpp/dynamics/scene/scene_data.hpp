@@ -16,12 +16,7 @@
 namespace sphshell {
 
 // One pair at one state.
-struct PairState {
-  int count = 0;            // of contacts, saddles not counted
-  int pieces = 0;           // of contacts, less saddles: changes where a depth goes through zero
-  int clamped = 0;          // of contacts that the law's clamp holds at no force
-  double depth = 0;         // largest [m]
-  double normal_force = 0;  // sum [N]
+struct PairState : TouchState {
   // Of the shapes of gaps that were asked for: the largest conformity, and half axis over radius.
   double conformity = -1, half_axis = 0;
   bool pushed_through = false;
@@ -139,6 +134,11 @@ class SceneData {
   // Per joint, in its frame and about its origin; holds old values unless touching().
   const Forces& external() const { return external_; }
   const std::vector<PairState>& states() const { return states_; }
+  // Of pair k or, behind the pairs, of a joint's stop.
+  const TouchState& touch(std::size_t k) const {
+    return k < pairs_.size() ? states_[k] : joints_.stops()[k - pairs_.size()];
+  }
+  std::size_t num_touches() const { return pairs_.size() + joints_.stops().size(); }
   const std::vector<Excursion>& excursions() const { return excursions_; }
   const Powers& powers() const { return powers_; }
   // How the contact's pair makes forces of contacts.
@@ -158,6 +158,8 @@ class SceneData {
   // Contacts of pair k in the frame of body j, merged where friction acts; none where it is `far`.
   std::vector<Contact>& find_contacts(std::size_t k, bool far);
   void find_shapes(std::size_t k);
+  // Slots for the contacts of pair k, which are matched with the known ones; then for all.
+  void assign_bristles(Bristles& bristles, std::size_t k, const VectorX& z);
   void end_bristles(Bristles& bristles, VectorX& z) const;
   void evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z);
   // Appends to active_, without forces yet.

@@ -66,8 +66,13 @@ double normal_noise(std::uint64_t seed, std::uint64_t sample, std::uint64_t valu
   return sum / kDeviation;
 }
 
-Sensors::Sensors(std::vector<Sensor> sensors, const pinocchio::Model& model, double start)
-    : start_(start), external_(model.joints.size(), pinocchio::Force::Zero()) {
+Sensors::Sensors(std::vector<Sensor> sensors, SceneData& scene, Torques& torques, const Push& push,
+                 double start)
+    : scene_(scene),
+      torques_(torques),
+      push_(push),
+      start_(start),
+      external_(scene.body().model().joints.size(), pinocchio::Force::Zero()) {
   int size = 0;
   for (Sensor& sensor : sensors) {
     shortest_ = std::min(shortest_, 1 / sensor.rate);
@@ -84,9 +89,9 @@ Sensors::Sensors(std::vector<Sensor> sensors, const pinocchio::Model& model, dou
 }
 
 // Before the first torque: at rest, without noise or delay.
-void Sensors::hold_still(SceneData& scene, const State& state, const Push& push) {
+void Sensors::hold_still(const State& state) {
   acceleration_.setZero(state.v.size());
-  read_all(scene, state, push);
+  read_all(state);
   smooth_ = measured_;
   for (Channel& channel : channels_)
     for (int i = 0; i < channel.sensor.size(); ++i)
@@ -94,9 +99,9 @@ void Sensors::hold_still(SceneData& scene, const State& state, const Push& push)
 }
 
 // The first sample, with the first acceleration.
-void Sensors::begin(SceneData& scene, Torques& torques, const State& state, const Push& push) {
+void Sensors::begin(const State& state) {
   begun_ = true;
-  measure(scene, torques, state, push);
+  measure(state);
   smooth_ = before_ = measured_;
   known_ = true;
   jumped_ = false;
@@ -105,21 +110,21 @@ void Sensors::begin(SceneData& scene, Torques& torques, const State& state, cons
 }
 
 // Where a torque has jumped, the signal before the step is measured anew.
-void Sensors::begin_step(SceneData& scene, Torques& torques, const State& state, const Push& push) {
+void Sensors::begin_step(const State& state) {
   if (!std::exchange(jumped_, false) || !known_) return;
-  measure(scene, torques, state, push);
+  measure(state);
   before_ = measured_;
 }
 
 // Between the ends of a fixed step signals are linear in time.
-void Sensors::add_fixed(SceneData& scene, Torques& torques, const State& from, const State& to,
-                        double dt, const Push& push) {
+void Sensors::add_fixed(const Stepping& made, double dt) {
+  const State &from = made.state(), &to = made.next();
   const double next = next_due(), margin = hair(to.t);
   const bool used = filtered_ || next <= to.t + margin;
   // The next step begins where this one ends.
   const bool needed = used || next < to.t + dt - margin;
   if (needed) {
-    measure(scene, torques, to, push);
+    measure(to);
     if (used) {
       const double h = to.t - from.t;
       // measured_ is overwritten by what march() asks for.
@@ -137,24 +142,19 @@ void Sensors::add_fixed(SceneData& scene, Torques& torques, const State& from, c
 }
 
 // Signals at any time within the step come from the dense output.
-void Sensors::add_dense(SceneData& scene, Torques& torques, const Chart& chart,
-                        const Stepper& stepper, const State& from, const State& to,
-                        const Push& push) {
+void Sensors::add_dense(const Stepping& made) {
+  const State &from = made.state(), &to = made.next();
   if (filtered_ || next_due() <= to.t + hair(to.t)) {
-    scene.restart();
+    scene_.restart();
     march(from.t, to.t, [&](double t, std::vector<double>& out) {
-      const State* state = &to;
-      if (t < to.t) {
-        stepper.interpolate((t - from.t) / (to.t - from.t), y_);
-        chart.finish(t, y_, between_);
-        state = &between_;
-      }
-      scene.evaluate(state->q, state->v, state->z);
-      measure(scene, torques, *state, push);
+      if (t < to.t) made.interpolate((t - from.t) / (to.t - from.t), t, between_);
+      const State& state = t < to.t ? between_ : to;
+      scene_.evaluate(state.q, state.v, state.z);
+      measure(state);
       out = measured_;
     });
-    scene.restart();
-    scene.evaluate(to.q, to.v, to.z);
+    scene_.restart();
+    scene_.evaluate(to.q, to.v, to.z);
   }
   known_ = filtered_;
   deliver(to.t);
@@ -257,32 +257,30 @@ double Sensors::hair(double t) const {
   return std::max(1e-9 * shortest_, 4 * std::numeric_limits<double>::epsilon() * std::abs(t));
 }
 
-void Sensors::measure(SceneData& scene, Torques& torques, const State& state, const Push& push) {
+void Sensors::measure(const State& state) {
   if (dynamic_) {
-    const VectorX& tau = torques.torque(state.t, state.q, state.v);
-    acceleration_ = scene.acceleration(state.q, state.v, tau);
+    const VectorX& tau = torques_.torque(state.t, state.q, state.v);
+    acceleration_ = scene_.acceleration(state.q, state.v, tau);
   }
-  read_all(scene, state, push);
+  read_all(state);
 }
 
 // With the acceleration as it is.
-void Sensors::read_all(SceneData& scene, const State& state, const Push& push) {
+void Sensors::read_all(const State& state) {
   if (dynamic_) {
-    if (scene.touching())
-      external_ = scene.external();
+    if (scene_.touching())
+      external_ = scene_.external();
     else
       std::fill(external_.begin(), external_.end(), pinocchio::Force::Zero());
-    if (push.active()) external_[push.joint()] += push.on_joint(scene.body());
-    scene.body().transmit(state.q, state.v, acceleration_, external_);
+    if (push_.active()) external_[push_.joint()] += push_.on_joint(scene_.body());
+    scene_.body().transmit(state.q, state.v, acceleration_, external_);
   }
   for (const Channel& channel : channels_)
-    std::visit([&](const auto& kind) { read(kind, scene, push, &measured_[channel.at]); },
-               channel.sensor.kind);
+    std::visit([&](const auto& kind) { read(kind, &measured_[channel.at]); }, channel.sensor.kind);
 }
 
-void Sensors::read(const ForceTorque& sensor, SceneData& scene, const Push& push,
-                   double* out) const {
-  const Multibody& body = scene.body();
+void Sensors::read(const ForceTorque& sensor, double* out) const {
+  const Multibody& body = scene_.body();
   const int joint = sensor.joint;
   const pinocchio::Motion& v = body.transmitted_velocity(joint);
   // Newton and Euler for what moves with this joint; its acceleration holds gravity's.
@@ -297,28 +295,28 @@ void Sensors::read(const ForceTorque& sensor, SceneData& scene, const Push& push
     sum.angular() -= pose.actInv(wrench.point).cross(force) +
                      sign * (pose.rotation().transpose() * wrench.moment);
   };
-  if (scene.touching())
-    for (const ActiveContact& active : scene.active()) {
-      if (has(sensor.pairs_i, active.pair)) take_off(scene.wrench(active), 1);
-      if (has(sensor.pairs_j, active.pair)) take_off(scene.wrench(active), -1);
+  if (scene_.touching())
+    for (const ActiveContact& active : scene_.active()) {
+      if (has(sensor.pairs_i, active.pair)) take_off(scene_.wrench(active), 1);
+      if (has(sensor.pairs_j, active.pair)) take_off(scene_.wrench(active), -1);
     }
-  if (push.active() && has(sensor.frames, push.frame())) sum -= push.on_joint(body);
+  if (push_.active() && has(sensor.frames, push_.frame())) sum -= push_.on_joint(body);
   const pinocchio::Force seen = sensor.frame.actInv(sum);
   Eigen::Map<Vec3>{out} = seen.linear();
   Eigen::Map<Vec3>{out + 3} = seen.angular();
 }
 
 // Behind the gear: without the motor's own inertia.
-void Sensors::read(const JointTorque& sensor, SceneData& scene, const Push&, double* out) const {
-  const Multibody& body = scene.body();
+void Sensors::read(const JointTorque& sensor, double* out) const {
+  const Multibody& body = scene_.body();
   const int k = sensor.index;
   *out = body.transmitted()[k] - body.model().armature[k] * acceleration_[k];
 }
 
 // The sum of the normal forces of its pairs [N].
-void Sensors::read(const ContactSwitch& sensor, SceneData& scene, const Push&, double* out) const {
+void Sensors::read(const ContactSwitch& sensor, double* out) const {
   double sum = 0;
-  for (int pair : sensor.pairs) sum += scene.states()[pair].normal_force;
+  for (int pair : sensor.pairs) sum += scene_.states()[pair].normal_force;
   *out = sum;
 }
 

@@ -6,7 +6,6 @@
 #include <variant>
 #include <vector>
 
-#include "dynamics/integrators/stepper.hpp"
 #include "dynamics/control/push.hpp"
 #include "dynamics/run/recording.hpp"
 
@@ -39,9 +38,10 @@ struct ContactSwitch {
 // What is measured, and what becomes of the signal on its way.
 struct Sensor {
   std::variant<ForceTorque, JointTorque, ContactSwitch> kind;
-  double rate = 1000, delay = 0;     // [Hz], [s]
-  double cutoff = 0;                 // of the low-pass filter before the sampling [Hz]; 0: none
-  std::vector<double> range, noise;  // of each value: largest, and standard deviation of a sample
+  double rate = 1000, delay = 0;  // [Hz], [s]
+  double cutoff = 0;              // of the low-pass filter before the sampling [Hz]; 0: none
+  // Of each value: largest, and standard deviation of a sample.
+  std::vector<double> range = {}, noise = {};
   std::uint64_t seed = 0;
 
   int size() const {
@@ -57,23 +57,23 @@ double normal_noise(std::uint64_t seed, std::uint64_t sample, std::uint64_t valu
 class Sensors {
  public:
   // Samples are due at start + k / rate [s].
-  Sensors(std::vector<Sensor> sensors, const pinocchio::Model& model, double start);
+  Sensors(std::vector<Sensor> sensors, SceneData& scene, Torques& torques, const Push& push,
+          double start);
 
   // What controllers read before the first sample: the scene's last state without acceleration.
-  void hold_still(SceneData& scene, const State& state, const Push& push);
+  void hold_still(const State& state);
   // The first sample, where the run begins; filters begin settled.
-  void begin(SceneData& scene, Torques& torques, const State& state, const Push& push);
+  void begin(const State& state);
   bool begun() const { return begun_; }
   // Torques, forces or laws have changed where the next step begins.
   void jump() { jumped_ = true; }
   // A step begins at a state, at which the scene was last evaluated.
-  void begin_step(SceneData& scene, Torques& torques, const State& state, const Push& push);
-  // A step of the fixed length `dt` or a part of it; the scene was last evaluated at its end.
-  void add_fixed(SceneData& scene, Torques& torques, const State& from, const State& to, double dt,
-                 const Push& push);
-  // The last step of `stepper`. Leaves the forces evaluated at its end.
-  void add_dense(SceneData& scene, Torques& torques, const Chart& chart, const Stepper& stepper,
-                 const State& from, const State& to, const Push& push);
+  void begin_step(const State& state);
+  // The step that was made, of the fixed length `dt` or a part of it; the scene was last evaluated
+  // at its end.
+  void add_fixed(const Stepping& made, double dt);
+  // The same of any length, with its dense output. Leaves the forces evaluated at its end.
+  void add_dense(const Stepping& made);
 
   // The latest of all sensors, one after the other.
   const std::vector<double>& readings() const { return readings_; }
@@ -94,11 +94,11 @@ class Sensors {
   };
 
   // The signals at a state, into measured_: with the acceleration there, or with the last one.
-  void measure(SceneData& scene, Torques& torques, const State& state, const Push& push);
-  void read_all(SceneData& scene, const State& state, const Push& push);
-  void read(const ForceTorque& sensor, SceneData& scene, const Push& push, double* out) const;
-  void read(const JointTorque& sensor, SceneData& scene, const Push& push, double* out) const;
-  void read(const ContactSwitch& sensor, SceneData& scene, const Push& push, double* out) const;
+  void measure(const State& state);
+  void read_all(const State& state);
+  void read(const ForceTorque& sensor, double* out) const;
+  void read(const JointTorque& sensor, double* out) const;
+  void read(const ContactSwitch& sensor, double* out) const;
   template <class Signal>
   void march(double from, double to, const Signal& signal);
   // Moves the filters on by h; takes samples that are due at t; one value of a sample; hands over
@@ -114,6 +114,9 @@ class Sensors {
   double next_due() const;
   double hair(double t) const;
 
+  SceneData& scene_;
+  Torques& torques_;
+  const Push& push_;
   std::vector<Channel> channels_;
   double start_, shortest_ = kInfinity;  // period of sampling [s]
   double piece_ = kInfinity;             // filters are integrated over pieces no longer [s]
@@ -124,7 +127,7 @@ class Sensors {
   std::vector<double> measured_, before_, middle_, after_, smooth_, readings_;
   SensorRows rows_;
   Forces external_;
-  VectorX acceleration_, y_;
+  VectorX acceleration_;
   State between_;
 };
 
