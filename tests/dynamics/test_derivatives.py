@@ -185,7 +185,10 @@ def test_a_cluster_shown_as_one(friction: str, tolerance: float) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["in a bowl, impact", "moving, hunt-crossley", "two spheres, impact, mindlin", "two pairs"],
+    [
+        *("in a bowl, impact", "moving, hunt-crossley", "two spheres, impact, mindlin"),
+        *("two pairs", "in a groove, coulomb"),
+    ],
 )
 def test_derivatives_of_rows(name: str) -> None:
     assert_rows(*SCENES[name]())
