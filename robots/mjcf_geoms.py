@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.robots.mjcf_values import number, numbers, text_of, turned_to
 from sphshell_pin.robots.packages import Folders
 
@@ -91,7 +92,8 @@ class Meshes:
 
     def solid(self, name: str, body: str) -> tuple[float, pin.Inertia]:
         """Return volume [m^3] and inertia at a density of 1 of a mesh, in its own frame."""
-        import trimesh
+        with interrupts_delayed():
+            import trimesh
 
         path, scale = self.files[name]
         why = f"the mass of body '{body}' would be that of mesh '{name}', "

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def end_at_once(*_: Any) -> None:
+def end_at_once(*_: object) -> None:
     """End the process: the handler of Ctrl-C while a command has nothing to lose."""
     os.write(2, b"interrupted\n")
     os._exit(130)  # as shells have it

@@ -34,7 +34,7 @@ class Known(Protocol):
 
 
 K = TypeVar("K", bound=Known)
-F = TypeVar("F", bound=Callable[..., Any])
+F = TypeVar("F", bound=Callable[..., object])
 
 
 class Register(Generic[K]):
@@ -48,7 +48,7 @@ class Register(Generic[K]):
         self._make = make
         self._known: dict[str, K] = {}
 
-    def case(self, name: str, **facts: Any) -> Callable[[F], F]:
+    def case(self, name: str, **facts: object) -> Callable[[F], F]:
         """Decorate the function that runs a case; ValueError where the name is taken."""
 
         def register(run: F) -> F:

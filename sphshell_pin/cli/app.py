@@ -168,7 +168,7 @@ def _faults() -> Iterator[None]:
         if _debug.get():
             raise
         known = isinstance(error, SphshellError)
-        # Any other fault is a defect, or comes from the user's routines: say where to look.
+        # Another fault is a defect, or comes from the user's routines: say where to look.
         text = str(error) if known else f"{type(error).__name__}: {error}"
         text = ", ".join([text, *getattr(error, "__notes__", ())])
         typer.echo(f"error: {text}{'' if known else ' (see it with --debug)'}", err=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sphshell_pin.patches.placed import poses_along
 
 if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result.contact_patches import Patches
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.result.result_parts import ContactLog
     from sphshell_pin.dynamics.scene.scene import Scene
@@ -33,10 +34,10 @@ class ContactRows:
     normal_world: FloatArray
     normal_force: FloatArray
     friction_force_world: FloatArray
-    patches: NDArray[Any] | None = None
+    patches: Patches | None = None
 
     @classmethod
-    def of(cls, log: ContactLog, patches: NDArray[Any] | None = None) -> ContactRows:
+    def of(cls, log: ContactLog, patches: Patches | None = None) -> ContactRows:
         """Take the columns of a Result's contact log, and its patches, ordered by row.
 
         The end of a run that diverged may hold numbers no picture can show: they are left out.

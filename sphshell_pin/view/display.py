@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, Contacts, pushing
 from sphshell_pin.view.bodies import (
@@ -30,7 +31,7 @@ from sphshell_pin.view.nodes import (
     show,
     triangle_mesh,
 )
-from sphshell_pin.view.patches import PatchPool, PatchRows, PatchScale
+from sphshell_pin.view.patches import PatchPool, PatchScale
 from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, frame_of_body
 from sphshell_pin.view.surface import FACE_COLORS, tube
 
@@ -121,7 +122,7 @@ class Display:
         self.update(neutral)
 
     def update(
-        self, q: ArrayLike, contacts: Contacts | None = None, patches: PatchRows | None = None
+        self, q: ArrayLike, contacts: Contacts | None = None, patches: Patches | None = None
     ) -> None:
         """Show configuration `q` (nq,) and `contacts` (of `scene.contacts`, or None for none).
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.view.arrows import Contacts, strongest
 from sphshell_pin.view.nodes import (
     FloatArray,
@@ -30,8 +30,6 @@ LEVELS = 8
 """Peak pressures that differ in color: the page cannot change the colors of a mesh in a film."""
 SEEN = 0.014  # half axis of the largest patch in the picture, over its size, at least
 
-PatchRows = NDArray[Any]
-
 
 @dataclass(frozen=True)
 class PatchScale:
@@ -41,7 +39,7 @@ class PatchScale:
     factor: float = 1.0
 
     @classmethod
-    def of(cls, patches: PatchRows, size: float) -> PatchScale:
+    def of(cls, patches: Patches, size: float) -> PatchScale:
         """Choose the scale for `patches` (k,) in a picture of this size [m].
 
         A peak far above the rest would leave no color for the rest: the pressure is 1.6 times the
@@ -86,7 +84,7 @@ class PatchPool:
             self._moves.append(moves)
         self._hidden = hidden_at(np.zeros(3))
 
-    def update(self, contacts: Contacts | None, patches: PatchRows, scale: PatchScale) -> None:
+    def update(self, contacts: Contacts | None, patches: Patches, scale: PatchScale) -> None:
         """Show `patches` (k,) of `contacts` at `scale`: the largest forces, if there are many."""
         force = np.zeros(0) if contacts is None else contacts.normal_force
         shown = strongest(force, self.size)
@@ -101,7 +99,7 @@ class PatchPool:
                 move(matrix if number == level else waiting)
 
     def _place(
-        self, contacts: Contacts, k: int, patches: PatchRows, scale: PatchScale
+        self, contacts: Contacts, k: int, patches: Patches, scale: PatchScale
     ) -> tuple[int, FloatArray]:
         patch = patches[k]
         normal, axis = contacts.normal_world[k], patch["axis_world"]

@@ -12,6 +12,7 @@ from sphshell_pin.scenario.drafting.new import new_scenario
 from tests.command import call
 from tests.scenario.files import DROP, write
 from tests.scenario.test_new import arm_urdf
+from tests.test_import import EXTRAS
 
 
 def told(*arguments):
@@ -111,7 +112,7 @@ def test_noise_is_no_stl(tmp_path):
 
 
 def test_a_new_scenario_needs_no_extra_package(tmp_path):
-    program = "import sys; sys.modules |= {'scipy': None, 'scipy.spatial': None}\n"
+    program = f"import sys; sys.modules |= dict.fromkeys({EXTRAS})\n"
     program += "from sphshell_pin.scenario.drafting.new import new_scenario as new\n"
     program += "new(sys.argv[1], radius=0.01, out=sys.argv[2])"
     command = [sys.executable, "-c", program, arm_urdf(tmp_path), tmp_path / "a.toml"]

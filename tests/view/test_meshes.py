@@ -125,6 +125,7 @@ def stl(corners, title=b"", normals=None):
     parts = [title.ljust(80, b" "), len(corners).to_bytes(4, "little")]
     if normals is None:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     for normal, facet in zip(normals, corners, strict=True):
         parts += [np.vstack((normal, facet)).astype("<f4").tobytes(), b"\0\0"]
     return b"".join(parts)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-import trimesh
 
+from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, load_file
@@ -39,6 +39,9 @@ class Part:
                 f"the surface '{shell.name}' is open, so it has no weight: --tips all holds a "
                 "closed part"
             )
+        with interrupts_delayed():
+            import trimesh
+
         mesh = trimesh.Trimesh(shell.vertices, shell.triangles, process=False)
         mesh.density = material.density
         return cls(float(mesh.mass), np.array(mesh.center_mass), np.array(mesh.moment_inertia))

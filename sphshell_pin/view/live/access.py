@@ -86,7 +86,7 @@ class Access:
     def is_own(self, host: str) -> bool:
         """Tell whether `host`, of a request's header, is a name of this server.
 
-        Any other name that leads here was made to, by a page that wants to listen in; an IP
+        Another name that leads here was made to, by a page that wants to listen in; an IP
         address cannot be. The port may differ: a tunnel ends at one of its own.
         """
         from tornado.httputil import split_host_and_port

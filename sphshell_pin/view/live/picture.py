@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.view.arrows import ArrowPool, ArrowScale, Forces, arrow_length
 from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
 from sphshell_pin.view.display import HIDDEN_AT_FIRST, PARTS, Display
@@ -26,7 +27,7 @@ from sphshell_pin.view.nodes import (
     show,
     sphere,
 )
-from sphshell_pin.view.patches import PatchRows, PatchScale
+from sphshell_pin.view.patches import PatchScale
 from sphshell_pin.view.surface import is_curved
 
 if TYPE_CHECKING:
@@ -225,10 +226,10 @@ class _Scale:
         """Choose the scale again."""
         self._seen: list[float] = []
         self._found = ArrowScale.from_forces(np.zeros(0), self._length)
-        self._patches: list[PatchRows] = []
+        self._patches: list[Patches] = []
         self._patch_scale = PatchScale(1.0)
 
-    def of_patches(self, patches: PatchRows) -> PatchScale:
+    def of_patches(self, patches: Patches) -> PatchScale:
         if len(self._patches) < FRAMES_TO_SCALE and len(patches):
             self._patches.append(patches)
             self._patch_scale = PatchScale.of(np.concatenate(self._patches), self._size)

@@ -9,12 +9,12 @@ from sphshell_pin.view.nodes import FloatArray
 if TYPE_CHECKING:
     import pinocchio as pin
 
+    from sphshell_pin.dynamics.result.contact_patches import Patches
     from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
     from sphshell_pin.scenario.format.sliders import LiveParameter
     from sphshell_pin.scenario.live.drag import Dragged
     from sphshell_pin.scenario.live.joint_targets import Target
     from sphshell_pin.scenario.running.player import Rows
-    from sphshell_pin.view.patches import PatchRows
 
 
 class Player(Protocol):
@@ -52,7 +52,7 @@ class Player(Protocol):
         """The contacts at this state."""
 
     @property
-    def patches(self) -> PatchRows | None:
+    def patches(self) -> Patches | None:
         """The patches of `contacts`, None where they are not recorded."""
 
     @property
