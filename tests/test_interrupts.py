@@ -41,7 +41,8 @@ def test_the_import_is_interrupted_without_a_crash(delay):
 def test_a_library_that_swallows_it_does_not():
     """Trimesh takes any exception for a sign that a package is missing."""
     code = HEARS + WHEN.format(name="networkx", action=PRESS)
-    code += "import coal, sphshell_pin as sp\nfrom sphshell_pin.scenario.drafting.part import Part\n"
+    code += "import coal, sphshell_pin as sp\n"
+    code += "from sphshell_pin.scenario.drafting.part import Part\n"
     code += "shell, steel = sp.Shell.from_geometry(coal.Sphere(1.0)), sp.find_material('steel')\n"
     code += "try: Part.of(shell, steel)\nexcept KeyboardInterrupt: print('heard')\n"
     told, errors = start(code).communicate(timeout=60)
