@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import *  # noqa: F403
     from sphshell_pin.contact.laws import *  # noqa: F403
     from sphshell_pin.dynamics import *  # noqa: F403
+    from sphshell_pin.dynamics.control.controllers import *  # noqa: F403
+    from sphshell_pin.dynamics.run.integrators import *  # noqa: F403
+    from sphshell_pin.dynamics.sensing.sensors import *  # noqa: F403
     from sphshell_pin.errors import InvalidParameter as InvalidParameter
     from sphshell_pin.errors import SphshellError as SphshellError
     from sphshell_pin.patches import *  # noqa: F403
@@ -52,11 +55,14 @@ _NAMES = {
     "MindlinFriction NormalLaw Plane Sphere TableLaw contact_wrench find_material "
     "foundation_pressure friction_between restitution_between",
     "contact.laws": "HuntCrossleyLaw ImpactLaw",
-    "dynamics": "Adaptive CartesianImpedance ContactForceDerivatives ContactLog ContactPair "
-    "ContactSwitch DynamicsDerivatives EnergyAudit Event ForceTorqueSensor GravityCompensation "
-    "Implicit JointComponents JointFigures JointFriction JointLimits JointPD JointTorqueSensor "
-    "LinearlyImplicitEuler PairFigures Readings Result Rollout RunStats RungeKutta4 Scene "
-    "SceneContacts SceneState SemiImplicitEuler Sensitivities SensorLog Simulation StepDerivatives",
+    "dynamics": "CartesianImpedance ContactForceDerivatives ContactLog ContactPair "
+    "DynamicsDerivatives EnergyAudit Event JointComponents JointFigures JointFriction "
+    "JointLimits PairFigures Readings Result Rollout RunStats Scene SceneContacts "
+    "SceneState Sensitivities SensorLog Simulation StepDerivatives",
+    "dynamics.control.controllers": "GravityCompensation JointPD",
+    "dynamics.run.integrators": "Adaptive Implicit LinearlyImplicitEuler RungeKutta4 "
+    "SemiImplicitEuler",
+    "dynamics.sensing.sensors": "ContactSwitch ForceTorqueSensor JointTorqueSensor",
     "errors": "InvalidParameter SphshellError",
     "patches": "ShellTaxels TaxelGrid TaxelImages WearMap wear_maps",
     "shell": "CleanedSurface ClosestPoints Face Shell ShellHealth",

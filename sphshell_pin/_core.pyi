@@ -262,74 +262,17 @@ class Sensor:
     range: Sequence[float]
     noise: Sequence[float]
     seed: int
-    @staticmethod
-    def force_torque(
-        *,
-        joint: int,
-        frame: _Doubles,
-        inertia: _Doubles,
-        children: Sequence[int],
-        pairs_i: Sequence[int],
-        pairs_j: Sequence[int],
-        frames: Sequence[int],
-    ) -> Sensor: ...
-    @staticmethod
-    def joint_torque(*, index: int) -> Sensor: ...
-    @staticmethod
-    def contact_switch(*, pairs: Sequence[int], threshold: float, release: float) -> Sensor: ...
+    def __init__(self, kind: str, fields: dict[str, _Doubles]) -> None: ...
     @property
     def size(self) -> int: ...
 
 def normal_noise(seed: int, sample: int, value: int) -> float: ...
 
-class Controller: ...
-
-class GravityCompensation(Controller):
-    def __init__(self, actuated: _Doubles) -> None: ...
-
-class JointPd(Controller):
-    def __init__(
-        self, kp: _Doubles, kd: _Doubles, q_ref: _Doubles, gravity: bool, actuated: _Doubles
-    ) -> None: ...
+class Controller:
+    def __init__(self, kind: str, fields: dict[str, _Doubles]) -> None: ...
 
 class PythonController(Controller):
     def __init__(self, callable: Callable[..., Any]) -> None: ...
-
-class Path:
-    def __init__(
-        self,
-        *,
-        along: Sequence[float],
-        points: _Doubles,
-        tangents: _Doubles,
-        normals: _Doubles,
-        times: Sequence[float],
-        places: Sequence[float],
-        speeds: Sequence[float],
-        accelerations: Sequence[float],
-        jerks: Sequence[float],
-        kinks: Sequence[float],
-    ) -> None: ...
-
-class CartesianImpedance(Controller):
-    def __init__(
-        self,
-        joint: int,
-        frame: _Doubles,
-        path_joint: int,
-        path_placement: _Doubles,
-        path: Path,
-        stiffness: float,
-        damping: float,
-        normal_force: float,
-        rotational_stiffness: float,
-        rotational_damping: float,
-        posture_stiffness: _Doubles,
-        joint_damping: _Doubles,
-        q_ref: _Doubles,
-        actuated: _Doubles,
-        decoupled: bool,
-    ) -> None: ...
 
 class RunSettings:
     def __init__(

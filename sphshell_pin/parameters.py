@@ -15,6 +15,9 @@ from dataclasses import MISSING, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from sphshell_pin.checks import check_finite, check_type
 from sphshell_pin.deprecation import former_names
 from sphshell_pin.errors import InvalidParameter
@@ -105,6 +108,11 @@ def parameter(
     # Pydantic reads the bounds and the description in a field's metadata.
     metadata = {_KEY: about, "description": help, **about.bounds, **more}
     return field(default=default, metadata=metadata)
+
+
+def flat_fields(fields: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
+    """Return the fields of a compiled class as it takes them: flat arrays, in the order of rows."""
+    return {name: np.ravel(np.asarray(value, np.float64)) for name, value in fields.items()}
 
 
 def same_parameter(kind: type, name: str, default: object = None) -> Any:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.control.target_path import Curve, Timing, core_path
+from sphshell_pin.dynamics.control.target_path import Curve, Timing, path_fields
 from sphshell_pin.errors import InvalidParameter
 from tests import meshes, models
 
@@ -84,8 +84,8 @@ def test_a_spline_that_turns_back_stops_there() -> None:
     ends = [Timing.along(one, 0.0, 0.036, 0.14, 0.58).times[-1] for one in (chords, curve)]
     assert ends[1] == pytest.approx(ends[0], rel=1e-6)
     assert curve.corners == pytest.approx(chords.corners, rel=1e-6)
-    core = core_path(curve, Timing.along(curve, 0.0, 0.036, 0.14, 0.58))
-    assert core is not None
+    kinks = path_fields(curve, Timing.along(curve, 0.0, 0.036, 0.14, 0.58))["kinks"]
+    assert set(ends[1:]) <= set(np.asarray(kinks))
     # Without limits the velocity jumps at the corner: a kink, for integrators with error control.
     jumps = Timing.along(curve, 0.0, 0.036, None, None)
     assert jumps.reaching(curve.corners)[1] == pytest.approx(curve.corners[1] / 0.036)

@@ -14,6 +14,7 @@
 #include "dynamics/run/simulation.hpp"
 
 #include <nanobind/eigen/dense.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
@@ -30,11 +31,6 @@ Geometry geometry_of(double ball, std::shared_ptr<Shell> shell, nb::object sourc
   if (plane) return PlaneBelow{{}, std::move(shell)};
   return ShellSurface{{}, std::move(shell), static_cast<Method>(method)};
 }
-
-// A constructor from the fields of an aggregate, in their order.
-template <class T, class Settings, class... Fields>
-constexpr auto from_fields =
-    [](T* self, Fields... fields) { new (self) T(Settings{std::move(fields)...}); };
 
 // A run for one user at a time.
 struct Run {
@@ -276,29 +272,15 @@ void bind_dynamics(nanobind::module_& m) {
           "q"_a, "v"_a.none(), "dt"_a);
   bind_derivatives(m, scene, state);
 
-  // Controllers by their parameters, checked in dynamics/control/.
-  nb::class_<Controller>(m, "Controller");
-  nb::class_<GravityCompensation, Controller>(m, "GravityCompensation")
-      .def(nb::init<VectorX>(), "actuated"_a);
-  nb::class_<JointPd, Controller>(m, "JointPd")
-      .def(nb::init<VectorX, VectorX, VectorX, bool, VectorX>(), "kp"_a, "kd"_a, "q_ref"_a,
-           "gravity"_a, "actuated"_a);
+  // Controllers by kind and fields, which dynamics/control/ has checked.
+  nb::class_<Controller>(m, "Controller")
+      .def(nb::new_([](const std::string& kind, std::map<std::string, VectorX> fields) {
+             return make_controller(kind, {std::move(fields)});
+           }),
+           "kind"_a, "fields"_a);
   nb::class_<PythonController, Controller>(m, "PythonController",
                                            slots<PythonController, visit_controller>())
       .def(nb::init<nb::object>(), "callable"_a);
-  nb::class_<PathSettings>(m, "Path").def(
-      nb::init<Numbers, PathPoints, PathPoints, PathPoints, Numbers, Numbers, Numbers, Numbers,
-               Numbers, Numbers>(),
-      nb::kw_only(), "along"_a, "points"_a, "tangents"_a, "normals"_a, "times"_a, "places"_a,
-      "speeds"_a, "accelerations"_a, "jerks"_a, "kinks"_a);
-  nb::class_<CartesianImpedance, Controller>(m, "CartesianImpedance")
-      .def("__init__",
-           from_fields<CartesianImpedance, ImpedanceSettings, int, SE3, int, SE3, PathSettings,
-                       double, double, double, double, double, VectorX, VectorX, VectorX, VectorX,
-                       bool>,
-           "joint"_a, "frame"_a, "path_joint"_a, "path_placement"_a, "path"_a, "stiffness"_a,
-           "damping"_a, "normal_force"_a, "rotational_stiffness"_a, "rotational_damping"_a,
-           "posture_stiffness"_a, "joint_damping"_a, "q_ref"_a, "actuated"_a, "decoupled"_a);
 
   // Times in seconds; by keyword only.
   nb::class_<RunSettings>(m, "RunSettings")

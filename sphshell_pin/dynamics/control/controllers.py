@@ -24,7 +24,7 @@ from sphshell_pin.dynamics.scene.models import find_joint, set_joint
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import Readings
 from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
-from sphshell_pin.parameters import Component, parameter
+from sphshell_pin.parameters import Component, flat_fields, parameter
 from sphshell_pin.shell import Shell
 
 if TYPE_CHECKING:
@@ -63,6 +63,10 @@ class Controller(Component):
 
     def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller for `scene`, started at q0 (nq,)."""
+        return _core.Controller(self.kind, flat_fields(self._fields(scene, q0)))
+
+    def _fields(self, scene: Scene, q0: Array) -> dict[str, ArrayLike]:
+        """Return what the C++ class of this kind is made of, by name."""
         raise NotImplementedError
 
     def actuated(self, model: pin.Model) -> Array:
@@ -148,9 +152,8 @@ class GravityCompensation(Controller, kind="gravity-compensation"):
 
     joints: Iterable[str] | None = None
 
-    def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
-        """Build the C++ controller."""
-        return _core.GravityCompensation(self.actuated(scene.model))
+    def _fields(self, scene: Scene, q0: Array) -> dict[str, ArrayLike]:
+        return {"actuated": self.actuated(scene.model)}
 
 
 @dataclass(frozen=True)
@@ -169,16 +172,14 @@ class JointPD(Controller, kind="joint-pd"):
     gravity_compensation: bool = parameter(True, help="add the torques that carry the weight")
     joints: Iterable[str] | None = None
 
-    def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
-        """Build the C++ controller."""
+    def _fields(self, scene: Scene, q0: Array) -> dict[str, ArrayLike]:
         model = scene.model
-        return _core.JointPd(
-            self.gain("kp", model),
-            self.gain("kd", model),
-            self.posture(model, q0),
-            bool(self.gravity_compensation),
-            self.actuated(model),
-        )
+        return {
+            **{name: self.gain(name, model) for name in ("kp", "kd")},
+            "q_ref": self.posture(model, q0),
+            "gravity": self.gravity_compensation,
+            "actuated": self.actuated(model),
+        }
 
 
 def wrap_callable(

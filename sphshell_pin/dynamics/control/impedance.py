@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin import _core
 from sphshell_pin.checks import (
     check_name,
     check_placement,
@@ -20,7 +19,7 @@ from sphshell_pin.checks import (
     check_vector,
 )
 from sphshell_pin.dynamics.control.controllers import Controller, Gain, Posture, ShellPlace
-from sphshell_pin.dynamics.control.target_path import Curve, Timing, core_path
+from sphshell_pin.dynamics.control.target_path import Curve, Timing, path_fields
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter
@@ -42,6 +41,13 @@ OFF_PATH, OUT_OF_REACH = 0.1, 0.05
 JUMP, SLOW = 0.05, 0.2
 # Of the rows of a run, how many are looked at.
 _MOST_ROWS = 200
+
+
+# What the C++ class takes as it is.
+_NUMBERS = (
+    *("stiffness", "damping", "normal_force"),
+    *("rotational_stiffness", "rotational_damping", "decoupled"),
+)
 
 
 @dataclass(frozen=True)
@@ -147,8 +153,8 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         shell, frame, placement = find_shell(self.shell)
         return replace(self, shell=shell, shell_frame=frame, placement=placement)
 
-    def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
-        """Build the C++ controller: resample the path, project it, find the frames."""
+    def _fields(self, scene: Scene, q0: Array) -> dict[str, ArrayLike]:
+        """Resample the path, project it, find the frames."""
         model = scene.model
         frame_index = find_frame(model, self.frame)
         if isinstance(self.shell, str):
@@ -170,23 +176,17 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             if float((at - curve.points[0]) @ curve.normals[0]) < 0:
                 curve = replace(curve, normals=-curve.normals)
         offset = pin.SE3(np.eye(3), np.array(self.offset, dtype=float))
-        return _core.CartesianImpedance(
-            joint=int(frame.parentJoint),
-            frame=(frame.placement * offset).homogeneous,
-            path_joint=int(carrier.parentJoint),
-            path_placement=(carrier.placement * placement).homogeneous,
-            path=core_path(curve, timing),
-            stiffness=self.stiffness,
-            damping=self.damping,
-            normal_force=self.normal_force,
-            rotational_stiffness=self.rotational_stiffness,
-            rotational_damping=self.rotational_damping,
-            posture_stiffness=self.gain("posture_stiffness", model),
-            joint_damping=self.gain("joint_damping", model),
-            q_ref=self.posture(model, q0),
-            actuated=self.actuated(model),
-            decoupled=self.decoupled,
-        )
+        return {
+            **path_fields(curve, timing),
+            **{name: getattr(self, name) for name in _NUMBERS},
+            **{name: self.gain(name, model) for name in ("posture_stiffness", "joint_damping")},
+            "joint": int(frame.parentJoint),
+            "frame": (frame.placement * offset).homogeneous,
+            "path_joint": int(carrier.parentJoint),
+            "path_placement": (carrier.placement * placement).homogeneous,
+            "q_ref": self.posture(model, q0),
+            "actuated": self.actuated(model),
+        }
 
     def _shell_place(self, scene: Scene) -> tuple[str, pin.SE3]:
         """Return the frame that carries the path, and where the path's own frame is in it."""

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin import _core
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 
-__all__ = ["Curve", "Timing", "core_path"]
+__all__ = ["Curve", "Timing", "path_fields"]
 
 Array = NDArray[np.float64]
 
@@ -189,23 +188,13 @@ class Timing:
         return np.asarray(np.where(even, self.times[k] + since, high))
 
 
-def core_path(curve: Curve, timing: Timing) -> _core.Path:
-    """Build the C++ path; steps of integrators with error control meet its kinks."""
+def path_fields(curve: Curve, timing: Timing) -> dict[str, ArrayLike]:
+    """Return what the C++ path is made of; integrators with error control meet its kinks."""
     # The ends are times of phases already.
     bends = curve.along if len(curve.tangents) == 0 else curve.corners[1:-1]
     kinks = np.unique(np.concatenate([timing.times, timing.reaching(bends)]))
-    return _core.Path(
-        along=curve.along.tolist(),
-        points=curve.points,
-        tangents=curve.tangents,
-        normals=curve.normals,
-        times=timing.times.tolist(),
-        places=timing.places.tolist(),
-        speeds=timing.speeds.tolist(),
-        accelerations=timing.accelerations.tolist(),
-        jerks=timing.jerks.tolist(),
-        kinks=kinks.tolist(),
-    )
+    curved = {name: getattr(curve, name) for name in ("along", "points", "tangents", "normals")}
+    return {**curved, **vars(timing), "kinks": kinks}
 
 
 Row = tuple[float, float, float, float, float]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_name, check_type
@@ -20,7 +20,7 @@ from sphshell_pin.dynamics.scene.scene_contacts import Columns
 from sphshell_pin.dynamics.sensing.sensor_log import Readings, SensorLog, split_logs
 from sphshell_pin.dynamics.sensing.subtree_inertia import frames_of_subtree, subtree_of
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, parameter
+from sphshell_pin.parameters import Component, flat_fields, parameter
 
 __all__ = ["ContactSwitch", "ForceTorqueSensor", "JointTorqueSensor"]
 
@@ -56,11 +56,12 @@ class Sensor(Component):
 
         Raises FrameNotFound, NameNotFound and InvalidParameter for what the scene does not have.
         """
-        core = self._measured(scene)
+        core = _core.Sensor(self.kind, flat_fields(self._measured(scene)))
         core.rate, core.delay = self.rate, self.delay
         return core
 
-    def _measured(self, scene: Scene) -> _core.Sensor:
+    def _measured(self, scene: Scene) -> dict[str, ArrayLike]:
+        """Return what the C++ class of this kind is made of, by name."""
         raise NotImplementedError
 
     def reading(self, values: NDArray[np.float64]) -> NDArray[np.float64] | float | bool:
@@ -86,12 +87,18 @@ class _Analog(Sensor):
         super().__post_init__()
         check_type("seed", self.seed, int, "must be a whole number")
 
-    def _set(self, core: _core.Sensor, ranges: list[float | None], noise: list[float]) -> None:
+    def _bind(self, scene: Scene) -> _core.Sensor:
+        core = super()._bind(scene)
         core.cutoff = self.cutoff or 0.0
-        core.range = [math.inf if one is None else one for one in ranges]
-        core.noise = noise
+        core.range = [math.inf if most is None else most for most, _ in self._spread()]
+        core.noise = [noise for _, noise in self._spread()]
         digest = hashlib.sha256(f"{self.seed} {self.name}".encode()).digest()
         core.seed = int.from_bytes(digest[:8], "little")
+        return core
+
+    def _spread(self) -> list[tuple[float | None, float]]:
+        """Return the range and the noise of each value."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +131,7 @@ class ForceTorqueSensor(_Analog, kind="force-torque"):
         parts = (("force", "N"), ("torque", "N m"))
         return tuple(f"{part}_{axis} [{unit}]" for part, unit in parts for axis in "xyz")
 
-    def _measured(self, scene: Scene) -> _core.Sensor:
+    def _measured(self, scene: Scene) -> dict[str, ArrayLike]:
         part = subtree_of(scene, self.frame)
         pairs_i, pairs_j = (
             [
@@ -141,21 +148,19 @@ class ForceTorqueSensor(_Analog, kind="force-torque"):
                 "has nothing beyond it: no mass, no joint and no contact, so that it would always "
                 "read zero",
             )
-        core = _core.Sensor.force_torque(
-            joint=part.joint,
-            frame=part.placement.homogeneous,
-            inertia=part.inertia.toDynamicParameters(),
-            children=list(part.children),
-            pairs_i=pairs_i,
-            pairs_j=pairs_j,
-            frames=sorted(part.frames),
-        )
-        self._set(
-            core,
-            3 * [self.force_range] + 3 * [self.torque_range],
-            3 * [self.force_noise] + 3 * [self.torque_noise],
-        )
-        return core
+        return {
+            "joint": part.joint,
+            "frame": part.placement.homogeneous,
+            "inertia": part.inertia.toDynamicParameters(),
+            "children": list(part.children),
+            "pairs_i": pairs_i,
+            "pairs_j": pairs_j,
+            "frames": sorted(part.frames),
+        }
+
+    def _spread(self) -> list[tuple[float | None, float]]:
+        force = self.force_range, self.force_noise
+        return [*3 * [force], *3 * [(self.torque_range, self.torque_noise)]]
 
     def reading(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the force [N] and the torque [N m] (6,)."""
@@ -180,7 +185,7 @@ class JointTorqueSensor(_Analog, kind="joint-torque"):
         slides = joint_slides(find_joint(scene.model, self.joint))
         return ("force [N]" if slides else "torque [N m]",)
 
-    def _measured(self, scene: Scene) -> _core.Sensor:
+    def _measured(self, scene: Scene) -> dict[str, ArrayLike]:
         check_name("joint", self.joint)
         joint = find_joint(scene.model, self.joint)
         if joint.nv != 1:
@@ -190,9 +195,10 @@ class JointTorqueSensor(_Analog, kind="joint-torque"):
                 f"must have one degree of freedom, this has {joint.nv}"
                 + (": it follows another joint, measure that one" if joint.nv == 0 else ""),
             )
-        core = _core.Sensor.joint_torque(index=joint.idx_v)
-        self._set(core, [self.range], [self.noise])
-        return core
+        return {"index": joint.idx_v}
+
+    def _spread(self) -> list[tuple[float | None, float]]:
+        return [(self.range, self.noise)]
 
     def reading(self, values: NDArray[np.float64]) -> float:
         """Return the torque [N m], or force [N]."""
@@ -229,7 +235,7 @@ class ContactSwitch(Sensor, kind="contact-switch"):
         """Return the names of the values of a reading, with their units."""
         return ("closed",)
 
-    def _measured(self, scene: Scene) -> _core.Sensor:
+    def _measured(self, scene: Scene) -> dict[str, ArrayLike]:
         if self.contact is not None:
             # A name may be that of several pairs that were stated together.
             names = [{pair.name, pair.group} for pair in scene.pairs]
@@ -249,7 +255,7 @@ class ContactSwitch(Sensor, kind="contact-switch"):
                     "frame", self.frame, "has no contact on it or on what is fixed to it"
                 )
         release = self.threshold if self.release is None else self.release
-        return _core.Sensor.contact_switch(pairs=pairs, threshold=self.threshold, release=release)
+        return {"pairs": pairs, "threshold": self.threshold, "release": release}
 
     @staticmethod
     def _frames(scene: Scene, name: str) -> frozenset[int]:

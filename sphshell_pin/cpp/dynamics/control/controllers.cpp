@@ -3,41 +3,115 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <pinocchio/spatial.hpp>
+#include <stdexcept>
 #include <utility>
+
+#include "dynamics/control/target_path.hpp"
 
 namespace sphshell {
 namespace {
 
 constexpr double kMobility = 1e-9;  // of the largest: directions in which a frame cannot move
 
-}  // namespace
+// `actuated` is 1 where a joint's velocity is driven, else 0 (a free-floating base or object).
+class GravityCompensation : public Controller {
+ public:
+  explicit GravityCompensation(const Fields& fields) : actuated_(fields.vector("actuated")) {}
+  void torque(SceneData& scene, double, const VectorX& q, const VectorX&, VectorX& tau) override {
+    tau = scene.body().gravity(q).cwiseProduct(actuated_);
+  }
 
-GravityCompensation::GravityCompensation(VectorX actuated) : actuated_(std::move(actuated)) {}
+ private:
+  VectorX actuated_;
+};
 
-void GravityCompensation::torque(SceneData& scene, double, const VectorX& q, const VectorX&,
-                                 VectorX& tau) {
-  tau = scene.body().gravity(q).cwiseProduct(actuated_);
+// kp (q_ref - q) - kd v, and the gravity torque where asked for.
+class JointPd : public Controller {
+ public:
+  explicit JointPd(const Fields& fields)
+      : kp_(fields.vector("kp")),
+        kd_(fields.vector("kd")),
+        q_ref_(fields.vector("q_ref")),
+        actuated_(fields.vector("actuated")),
+        error_(VectorX::Zero(kd_.size())),
+        gravity_(fields.number("gravity") != 0) {}
+
+  void torque(SceneData& scene, double, const VectorX& q, const VectorX& v, VectorX& tau) override {
+    scene.body().difference(q, q_ref_, error_);
+    tau = kp_.cwiseProduct(error_) - kd_.cwiseProduct(v);
+    if (gravity_) tau += scene.body().gravity(q);
+    tau.array() *= actuated_.array();
+  }
+
+ private:
+  VectorX kp_, kd_, q_ref_, actuated_, error_;
+  bool gravity_;
+};
+
+// Parameters of CartesianImpedance; units as in dynamics/control/impedance.py.
+struct ImpedanceSettings {
+  explicit ImpedanceSettings(const Fields& f)
+      : joint(f.integer("joint")),
+        path_joint(f.integer("path_joint")),
+        frame(f.frame("frame")),
+        path_placement(f.frame("path_placement")),
+        stiffness(f.number("stiffness")),
+        damping(f.number("damping")),
+        normal_force(f.number("normal_force")),
+        rotational_stiffness(f.number("rotational_stiffness")),
+        rotational_damping(f.number("rotational_damping")),
+        posture_stiffness(f.vector("posture_stiffness")),
+        joint_damping(f.vector("joint_damping")),
+        q_ref(f.vector("q_ref")),
+        actuated(f.vector("actuated")),
+        decoupled(f.number("decoupled") != 0) {}
+
+  int joint, path_joint;                            // that carry the controlled frame, and the path
+  SE3 frame, path_placement;                        // in those joints
+  double stiffness, damping;                        // [N/m], [N s/m]
+  double normal_force;                              // pressed against the normal [N]
+  double rotational_stiffness, rotational_damping;  // [N m], [N m s]
+  VectorX posture_stiffness, joint_damping, q_ref, actuated;
+  bool decoupled;  // the inertia of the robot does not disturb the frame
+};
+
+// In the path's frame.
+PathSettings path_of(const Fields& f) {
+  return {f.list("along"), f.points("points"), f.points("tangents"), f.points("normals"),
+          f.list("times"), f.list("places"),   f.list("speeds"),     f.list("accelerations"),
+          f.list("jerks"), f.list("kinks")};
 }
 
-JointPd::JointPd(VectorX kp, VectorX kd, VectorX q_ref, bool gravity, VectorX actuated)
-    : kp_(std::move(kp)),
-      kd_(std::move(kd)),
-      q_ref_(std::move(q_ref)),
-      actuated_(std::move(actuated)),
-      error_(VectorX::Zero(kd_.size())),
-      gravity_(gravity) {}
+// Cartesian impedance (Hogan 1985): J^T F plus the bias torques, with
+// F = K (x_d - x) + D (xdot_d - xdot); with a normal force, the spring acts in the tangent plane of
+// the path's normal only and the frame is pressed against that normal. Decoupled, the wrench that
+// the target's acceleration takes is added, Lambda (a_d - Jdot v) with Lambda = (J M^-1 J^T)^-1,
+// and posture and joint damping act where they do not accelerate the frame (Khatib 1987).
+class CartesianImpedance : public Controller {
+ public:
+  explicit CartesianImpedance(const Fields& fields)
+      : s_(fields), path_(path_of(fields)), error_(VectorX::Zero(s_.actuated.size())) {}
+  void prepare(SceneData& scene) override;
+  void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
+              VectorX& tau) override;
+  void take_over(const Controller& before, double t) override;
+  bool follows_time() const override { return path_.moves(); }
+  double next_kink(double t) const override { return path_.next_kink(t - late_) + late_; }
 
-void JointPd::torque(SceneData& scene, double, const VectorX& q, const VectorX& v, VectorX& tau) {
-  scene.body().difference(q, q_ref_, error_);
-  tau = kp_.cwiseProduct(error_) - kd_.cwiseProduct(v);
-  if (gravity_) tau += scene.body().gravity(q);
-  tau.array() *= actuated_.array();
-}
+ private:
+  ImpedanceSettings s_;
+  TargetPath path_;
+  double late_ = 0;  // the path is followed so much later than its times say [s]
+  bool started_ = false;
+  Eigen::Matrix3d hold_;  // orientation at the start
+  Forces opposed_;
+  VectorX error_, aside_;  // joint torques besides those of F
+  Matrix6X jacobian_;
+  MatrixX mobility_;
 
-CartesianImpedance::CartesianImpedance(ImpedanceSettings settings)
-    : s_(std::move(settings)),
-      path_(std::move(s_.path)),
-      error_(VectorX::Zero(s_.actuated.size())) {}
+  pinocchio::Force wrench_of_motion(Multibody& body, const VectorX& q, const VectorX& v,
+                                    const TargetPath::Target& target, const SE3& path);
+};
 
 void CartesianImpedance::prepare(SceneData& scene) {
   scene.need_velocity_of(s_.joint);
@@ -157,6 +231,31 @@ void CartesianImpedance::take_over(const Controller& before, double t) {
   const double place = other->path_.place_at(t - other->late_);
   // Where it still waits it sets out at once if its time has come, from the start of the path.
   late_ = place > 0 ? t - path_.time_of(place) : std::max(other->late_, t - path_.begin());
+}
+
+template <class Kind>
+std::shared_ptr<Controller> make(const Fields& fields) {
+  return std::make_shared<Kind>(fields);
+}
+
+struct Entry {
+  const char* kind;
+  std::shared_ptr<Controller> (*make)(const Fields&);
+};
+
+// A new controller is its class above and one line here, and a class of that kind in Python.
+constexpr Entry kControllers[] = {
+    {"gravity-compensation", make<GravityCompensation>},
+    {"joint-pd", make<JointPd>},
+    {"cartesian-impedance", make<CartesianImpedance>},
+};
+
+}  // namespace
+
+std::shared_ptr<Controller> make_controller(const std::string& kind, const Fields& fields) {
+  for (const Entry& entry : kControllers)
+    if (kind == entry.kind) return entry.make(fields);
+  throw std::invalid_argument("controller '" + kind + "' does not exist");
 }
 
 }  // namespace sphshell

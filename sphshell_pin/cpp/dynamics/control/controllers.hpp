@@ -3,10 +3,11 @@
 
 #include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
+#include "dynamics/control/fields.hpp"
 #include "dynamics/scene/scene_data.hpp"
-#include "dynamics/control/target_path.hpp"
 
 namespace sphshell {
 
@@ -28,71 +29,7 @@ class Controller {
   virtual double next_kink(double /*t*/) const { return std::numeric_limits<double>::infinity(); }
 };
 
-// `actuated` is 1 where a joint's velocity is driven, else 0 (a free-floating base or object).
-class GravityCompensation : public Controller {
- public:
-  explicit GravityCompensation(VectorX actuated);
-  void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
-              VectorX& tau) override;
-
- private:
-  VectorX actuated_;
-};
-
-// kp (q_ref - q) - kd v, and the gravity torque where asked for.
-class JointPd : public Controller {
- public:
-  JointPd(VectorX kp, VectorX kd, VectorX q_ref, bool gravity, VectorX actuated);
-  void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
-              VectorX& tau) override;
-
- private:
-  VectorX kp_, kd_, q_ref_, actuated_, error_;
-  bool gravity_;
-};
-
-// Parameters of CartesianImpedance; units as in dynamics/control/impedance.py.
-struct ImpedanceSettings {
-  int joint = 0;                // that carries the controlled frame
-  SE3 frame = SE3::Identity();  // in that joint
-  int path_joint = 0;           // that carries the path
-  SE3 path_placement = SE3::Identity();
-  PathSettings path;                                        // in the path's frame
-  double stiffness = 0, damping = 0;                        // [N/m], [N s/m]
-  double normal_force = 0;                                  // pressed against the normal [N]
-  double rotational_stiffness = 0, rotational_damping = 0;  // [N m], [N m s]
-  VectorX posture_stiffness, joint_damping, q_ref, actuated;
-  bool decoupled = false;  // the inertia of the robot does not disturb the frame
-};
-
-// Cartesian impedance (Hogan 1985): J^T F plus the bias torques, with
-// F = K (x_d - x) + D (xdot_d - xdot); with a normal force, the spring acts in the tangent plane of
-// the path's normal only and the frame is pressed against that normal. Decoupled, the wrench that
-// the target's acceleration takes is added, Lambda (a_d - Jdot v) with Lambda = (J M^-1 J^T)^-1,
-// and posture and joint damping act where they do not accelerate the frame (Khatib 1987).
-class CartesianImpedance : public Controller {
- public:
-  explicit CartesianImpedance(ImpedanceSettings settings);
-  void prepare(SceneData& scene) override;
-  void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
-              VectorX& tau) override;
-  void take_over(const Controller& before, double t) override;
-  bool follows_time() const override { return path_.moves(); }
-  double next_kink(double t) const override { return path_.next_kink(t - late_) + late_; }
-
- private:
-  ImpedanceSettings s_;
-  TargetPath path_;
-  double late_ = 0;  // the path is followed so much later than its times say [s]
-  bool started_ = false;
-  Eigen::Matrix3d hold_;  // orientation at the start
-  Forces opposed_;
-  VectorX error_, aside_;  // joint torques besides those of F
-  Matrix6X jacobian_;
-  MatrixX mobility_;
-
-  pinocchio::Force wrench_of_motion(Multibody& body, const VectorX& q, const VectorX& v,
-                                    const TargetPath::Target& target, const SE3& path);
-};
+// The controller that files call `kind`; the fields are those of its class in dynamics/control/.
+std::shared_ptr<Controller> make_controller(const std::string& kind, const Fields& fields);
 
 }  // namespace sphshell

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <tuple>
 #include <vector>
 
 #include "dynamics/integrators/stepper.hpp"
@@ -11,6 +12,7 @@ namespace sphshell {
 // v += dt a(q, v), then q is moved by dt v: order 1, symplectic for conservative forces.
 class SemiImplicitEuler : public Stepper {
  public:
+  static constexpr const char* kind = "semi-implicit-euler";  // in files
   void begin(Chart& chart) override;
   void step(Chart& chart, double h, State& out) override;
   void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
@@ -41,6 +43,7 @@ class ExplicitRungeKutta : public Stepper {
 // The classical method of order 4.
 class RungeKutta4 : public ExplicitRungeKutta {
  public:
+  static constexpr const char* kind = "runge-kutta-4";  // in files
   RungeKutta4();
   void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
 };
@@ -49,10 +52,14 @@ class RungeKutta4 : public ExplicitRungeKutta {
 // output of order 4 (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.6).
 class DormandPrince : public ExplicitRungeKutta {
  public:
+  static constexpr const char* kind = "adaptive";  // in files
   DormandPrince();
   void step(Chart& chart, double h, State& out) override;
   int order_of_error() const override { return 5; }
   void interpolate(double theta, VectorX& y) const override;
 };
+
+// A new method is a class above, its name here, and a class of its kind in Python.
+using ExplicitMethods = std::tuple<SemiImplicitEuler, RungeKutta4, DormandPrince>;
 
 }  // namespace sphshell

@@ -1,6 +1,8 @@
 // Linearly implicit methods: one Jacobian and one factorization a step, no iteration.
 #pragma once
 
+#include <tuple>
+
 #include <Eigen/LU>
 
 #include "dynamics/integrators/stepper.hpp"
@@ -40,6 +42,7 @@ class ImplicitStepper : public Stepper {
 // One stage, order 1, L-stable: whatever the stiffness, a step of any size is stable.
 class LinearlyImplicitEuler : public ImplicitStepper {
  public:
+  static constexpr const char* kind = "linearly-implicit-euler";  // in files
   using ImplicitStepper::ImplicitStepper;
   void step(Chart& chart, double h, State& out) override;
   void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
@@ -50,6 +53,7 @@ class LinearlyImplicitEuler : public ImplicitStepper {
 // and Wanner, Solving Ordinary Differential Equations II, IV.7.
 class Rodas : public ImplicitStepper {
  public:
+  static constexpr const char* kind = "implicit";  // in files
   using ImplicitStepper::ImplicitStepper;
   void step(Chart& chart, double h, State& out) override;
   void complete(Chart& chart, State& out) override;
@@ -63,5 +67,8 @@ class Rodas : public ImplicitStepper {
                                Vec3::Zero()};  // at the start, the middle and the end
   double h_ = 0;
 };
+
+// As ExplicitMethods.
+using ImplicitMethods = std::tuple<LinearlyImplicitEuler, Rodas>;
 
 }  // namespace sphshell

@@ -2,7 +2,9 @@
 
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 
 #include "dynamics/integrators/explicit.hpp"
 #include "dynamics/integrators/implicit.hpp"
@@ -19,28 +21,25 @@ std::unique_ptr<Stepper> make(SceneData& scene) {
     return std::make_unique<Method>();
 }
 
-struct Entry {
-  std::string_view name;
-  std::unique_ptr<Stepper> (*make)(SceneData&);
-};
-
-// A new method is one line here, and the class of that name in dynamics/run/integrators.py.
-constexpr Entry kIntegrators[] = {
-    {"semi-implicit-euler", make<SemiImplicitEuler>},
-    {"runge-kutta-4", make<RungeKutta4>},
-    {"linearly-implicit-euler", make<LinearlyImplicitEuler>},
-    {"adaptive", make<DormandPrince>},
-    {"implicit", make<Rodas>},
-};
+// The method called `name`, or null, with the names of all.
+template <class... Methods>
+std::unique_ptr<Stepper> find(std::string_view name, SceneData& scene, std::string& names,
+                              const std::tuple<Methods...>*) {
+  std::unique_ptr<Stepper> out;
+  const auto look = [&](auto make_one, const char* kind) {
+    if (kind == name) out = make_one(scene);
+    names += (names.empty() ? "" : ", ") + std::string(kind);
+  };
+  (look(make<Methods>, Methods::kind), ...);
+  return out;
+}
 
 }  // namespace
 
 std::unique_ptr<Stepper> make_stepper(std::string_view integrator, SceneData& scene) {
+  using All = decltype(std::tuple_cat(std::declval<ExplicitMethods>(), std::declval<ImplicitMethods>()));
   std::string names;
-  for (const Entry& entry : kIntegrators) {
-    if (entry.name == integrator) return entry.make(scene);
-    names += (names.empty() ? "" : ", ") + std::string(entry.name);
-  }
+  if (auto found = find(integrator, scene, names, static_cast<const All*>(nullptr))) return found;
   throw std::invalid_argument("integrator '" + std::string(integrator) +
                               "' does not exist; the table has: " + names);
 }

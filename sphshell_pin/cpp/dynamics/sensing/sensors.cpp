@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bitset>
 #include <cmath>
-#include <type_traits>
+#include <stdexcept>
 #include <utility>
 
 namespace sphshell {
@@ -47,7 +47,122 @@ bool has(const std::vector<int>& sorted, int one) {
   return std::binary_search(sorted.begin(), sorted.end(), one);
 }
 
+// The wrench that the parts before a frame exert on those beyond it: in the frame, about its
+// origin.
+class ForceTorque : public Measured {
+ public:
+  explicit ForceTorque(const Fields& f)
+      : joint_(f.integer("joint")),
+        frame_(f.frame("frame")),
+        children_(f.integers("children")),
+        pairs_i_(f.integers("pairs_i")),
+        pairs_j_(f.integers("pairs_j")),
+        frames_(f.integers("frames")) {
+    // Mass, first and second moments, as of Pinocchio's dynamic parameters; no mass: nothing is
+    // beyond the sensor.
+    const VectorX& parameters = f.vector("inertia");
+    inertia_ = parameters[0] > 0 ? pinocchio::Inertia::FromDynamicParameters(parameters)
+                                 : pinocchio::Inertia::Zero();
+  }
+
+  int size() const override { return 6; }
+
+  void read(const Evaluated& at, double* out) const override {
+    const Multibody& body = at.scene.body();
+    const pinocchio::Motion& v = body.transmitted_velocity(joint_);
+    // Newton and Euler for what moves with this joint; its acceleration holds gravity's.
+    pinocchio::Force sum = inertia_ * body.transmitted_acceleration(joint_) + inertia_.vxiv(v);
+    for (int child : children_) sum += body.transmitted_to_parent(child);
+    const SE3& pose = joint_ == 0 ? SE3::Identity() : body.world_from_joint(joint_);
+    const auto take_off = [&](const ContactWrench& wrench, double sign) {
+      // Into the joint's frame, about its origin.
+      const Vec3 force = sign * (pose.rotation().transpose() * wrench.force);
+      sum.linear() -= force;
+      sum.angular() -= pose.actInv(wrench.point).cross(force) +
+                       sign * (pose.rotation().transpose() * wrench.moment);
+    };
+    if (at.scene.touching())
+      for (const ActiveContact& active : at.scene.active()) {
+        if (has(pairs_i_, active.pair)) take_off(at.scene.wrench(active), 1);
+        if (has(pairs_j_, active.pair)) take_off(at.scene.wrench(active), -1);
+      }
+    if (at.push.active() && has(frames_, at.push.frame())) sum -= at.push.on_joint(body);
+    const pinocchio::Force seen = frame_.actInv(sum);
+    Eigen::Map<Vec3>{out} = seen.linear();
+    Eigen::Map<Vec3>{out + 3} = seen.angular();
+  }
+
+ private:
+  int joint_;                   // that carries the frame
+  SE3 frame_;                   // in that joint
+  pinocchio::Inertia inertia_;  // of what is beyond it on this joint, in that joint
+  std::vector<int> children_;   // joints that are beyond it, and hang on this joint
+  std::vector<int> pairs_i_, pairs_j_,
+      frames_;  // whose body i or j, and which, are beyond it on it
+};
+
+// The generalized force that a joint transmits behind the gear: without what its own rotor takes.
+class JointTorque : public Measured {
+ public:
+  explicit JointTorque(const Fields& f) : index_(f.integer("index")) {}
+  int size() const override { return 1; }
+  void read(const Evaluated& at, double* out) const override {
+    const Multibody& body = at.scene.body();
+    *out = body.transmitted()[index_] - body.model().armature[index_] * at.acceleration[index_];
+  }
+
+ private:
+  int index_;  // of its velocity
+};
+
+// The sum of the normal forces of its pairs; 1 once that is above the threshold, 0 once it is below
+// `release` [N].
+class ContactSwitch : public Measured {
+ public:
+  explicit ContactSwitch(const Fields& f)
+      : pairs_(f.integers("pairs")),
+        threshold_(f.number("threshold")),
+        release_(f.number("release")) {}
+  int size() const override { return 1; }
+  void read(const Evaluated& at, double* out) const override {
+    double sum = 0;
+    for (int pair : pairs_) sum += at.scene.states()[pair].normal_force;
+    *out = sum;
+  }
+  std::optional<bool> position(double signal, bool before) const override {
+    return before ? signal >= release_ : signal > threshold_;
+  }
+  bool is_dynamic() const override { return false; }
+
+ private:
+  std::vector<int> pairs_;
+  double threshold_, release_;
+};
+
+template <class Kind>
+std::shared_ptr<const Measured> make(const Fields& fields) {
+  return std::make_shared<const Kind>(fields);
+}
+
+struct Entry {
+  const char* kind;
+  std::shared_ptr<const Measured> (*make)(const Fields&);
+};
+
+// A new sensor is its class above and one line here, and a class of that kind in Python.
+constexpr Entry kSensors[] = {
+    {"force-torque", make<ForceTorque>},
+    {"joint-torque", make<JointTorque>},
+    {"contact-switch", make<ContactSwitch>},
+};
+
 }  // namespace
+
+std::shared_ptr<const Measured> make_measured(const std::string& kind, const Fields& fields) {
+  for (const Entry& entry : kSensors)
+    if (kind == entry.kind) return entry.make(fields);
+  throw std::invalid_argument("sensor '" + kind + "' does not exist");
+}
 
 // The sum of 256 fair bits, whose steps two uniform numbers fill. It calls nothing of the system's
 // mathematical library, whose last digits differ between machines.
@@ -80,7 +195,7 @@ Sensors::Sensors(std::vector<Sensor> sensors, SceneData& scene, Torques& torques
       filtered_ = true;
       piece_ = std::min(piece_, 1 / (kPieces * sensor.cutoff));
     }
-    dynamic_ = dynamic_ || !std::holds_alternative<ContactSwitch>(sensor.kind);
+    dynamic_ = dynamic_ || sensor.signal->is_dynamic();
     channels_.push_back({std::move(sensor), size, 0, false, {}});
     size += channels_.back().sensor.size();
   }
@@ -216,10 +331,8 @@ void Sensors::sample(double t) {
 double Sensors::value(Channel& channel, int i, bool noisy) const {
   const Sensor& sensor = channel.sensor;
   const double signal = smooth_[channel.at + i];
-  if (const auto* contact = std::get_if<ContactSwitch>(&sensor.kind)) {
-    channel.on = channel.on ? signal >= contact->release : signal > contact->threshold;
-    return channel.on ? 1 : 0;
-  }
+  if (const auto position = sensor.signal->position(signal, channel.on))
+    return (channel.on = *position) ? 1 : 0;
   double noise = 0;
   if (noisy && sensor.noise[i] > 0)
     noise = sensor.noise[i] * normal_noise(sensor.seed, static_cast<std::uint64_t>(channel.sample),
@@ -275,49 +388,8 @@ void Sensors::read_all(const State& state) {
     if (push_.active()) external_[push_.joint()] += push_.on_joint(scene_.body());
     scene_.body().transmit(state.q, state.v, acceleration_, external_);
   }
-  for (const Channel& channel : channels_)
-    std::visit([&](const auto& kind) { read(kind, &measured_[channel.at]); }, channel.sensor.kind);
-}
-
-void Sensors::read(const ForceTorque& sensor, double* out) const {
-  const Multibody& body = scene_.body();
-  const int joint = sensor.joint;
-  const pinocchio::Motion& v = body.transmitted_velocity(joint);
-  // Newton and Euler for what moves with this joint; its acceleration holds gravity's.
-  pinocchio::Force sum =
-      sensor.inertia * body.transmitted_acceleration(joint) + sensor.inertia.vxiv(v);
-  for (int child : sensor.children) sum += body.transmitted_to_parent(child);
-  const SE3& pose = joint == 0 ? SE3::Identity() : body.world_from_joint(joint);
-  const auto take_off = [&](const ContactWrench& wrench, double sign) {
-    // Into the joint's frame, about its origin.
-    const Vec3 force = sign * (pose.rotation().transpose() * wrench.force);
-    sum.linear() -= force;
-    sum.angular() -= pose.actInv(wrench.point).cross(force) +
-                     sign * (pose.rotation().transpose() * wrench.moment);
-  };
-  if (scene_.touching())
-    for (const ActiveContact& active : scene_.active()) {
-      if (has(sensor.pairs_i, active.pair)) take_off(scene_.wrench(active), 1);
-      if (has(sensor.pairs_j, active.pair)) take_off(scene_.wrench(active), -1);
-    }
-  if (push_.active() && has(sensor.frames, push_.frame())) sum -= push_.on_joint(body);
-  const pinocchio::Force seen = sensor.frame.actInv(sum);
-  Eigen::Map<Vec3>{out} = seen.linear();
-  Eigen::Map<Vec3>{out + 3} = seen.angular();
-}
-
-// Behind the gear: without the motor's own inertia.
-void Sensors::read(const JointTorque& sensor, double* out) const {
-  const Multibody& body = scene_.body();
-  const int k = sensor.index;
-  *out = body.transmitted()[k] - body.model().armature[k] * acceleration_[k];
-}
-
-// The sum of the normal forces of its pairs [N].
-void Sensors::read(const ContactSwitch& sensor, double* out) const {
-  double sum = 0;
-  for (int pair : sensor.pairs) sum += scene_.states()[pair].normal_force;
-  *out = sum;
+  const Evaluated at{scene_, push_, acceleration_};
+  for (const Channel& channel : channels_) channel.sensor.signal->read(at, &measured_[channel.at]);
 }
 
 }  // namespace sphshell

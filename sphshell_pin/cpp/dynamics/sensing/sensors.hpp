@@ -3,50 +3,50 @@
 
 #include <cstdint>
 #include <deque>
-#include <variant>
+#include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "dynamics/control/fields.hpp"
 #include "dynamics/control/push.hpp"
 #include "dynamics/run/recording.hpp"
 
 namespace sphshell {
 
-// The wrench that the parts before a frame exert on those beyond it: in the frame, about its
-// origin.
-struct ForceTorque {
-  int joint = 0;                              // that carries the frame
-  SE3 frame = SE3::Identity();                // in that joint
-  pinocchio::Inertia inertia;                 // of what is beyond it on this joint, in that joint
-  std::vector<int> children;                  // joints that are beyond it, and hang on this joint
-  std::vector<int> pairs_i, pairs_j, frames;  // whose body i or j, and which, are beyond it on it
-  int size() const { return 6; }
+// What a sensor may look at: a state at which the scene and its inverse dynamics were evaluated.
+struct Evaluated {
+  const SceneData& scene;
+  const Push& push;
+  const VectorX& acceleration;
 };
 
-// The generalized force that a joint transmits, without what its own rotor takes.
-struct JointTorque {
-  int index = 0;  // of its velocity
-  int size() const { return 1; }
+// A kind of signal.
+class Measured {
+ public:
+  virtual ~Measured() = default;
+  virtual int size() const = 0;
+  // Writes size() values.
+  virtual void read(const Evaluated& at, double* out) const = 0;
+  // Of a switch, which has neither noise nor range: its position by the signal and the one before.
+  virtual std::optional<bool> position(double /*signal*/, bool /*before*/) const { return {}; }
+  // Whether it reads what inverse dynamics give.
+  virtual bool is_dynamic() const { return true; }
 };
 
-// 1 once the sum of normal forces is above the threshold, 0 once it is below `release` [N].
-struct ContactSwitch {
-  std::vector<int> pairs;
-  double threshold = 0, release = 0;
-  int size() const { return 1; }
-};
+// The signal that files call `kind`; the fields are those of its class in dynamics/sensing/.
+std::shared_ptr<const Measured> make_measured(const std::string& kind, const Fields& fields);
 
 // What is measured, and what becomes of the signal on its way.
 struct Sensor {
-  std::variant<ForceTorque, JointTorque, ContactSwitch> kind;
+  std::shared_ptr<const Measured> signal;
   double rate = 1000, delay = 0;  // [Hz], [s]
   double cutoff = 0;              // of the low-pass filter before the sampling [Hz]; 0: none
   // Of each value: largest, and standard deviation of a sample.
   std::vector<double> range = {}, noise = {};
   std::uint64_t seed = 0;
 
-  int size() const {
-    return std::visit([](const auto& one) { return one.size(); }, kind);
-  }
+  int size() const { return signal->size(); }
 };
 
 // A normal random number that depends on the three alone: the same bits on every machine.
@@ -96,9 +96,6 @@ class Sensors {
   // The signals at a state, into measured_: with the acceleration there, or with the last one.
   void measure(const State& state);
   void read_all(const State& state);
-  void read(const ForceTorque& sensor, double* out) const;
-  void read(const JointTorque& sensor, double* out) const;
-  void read(const ContactSwitch& sensor, double* out) const;
   template <class Signal>
   void march(double from, double to, const Signal& signal);
   // Moves the filters on by h; takes samples that are due at t; one value of a sample; hands over
