@@ -12,7 +12,8 @@ import pinocchio as pin
 
 from sphshell_pin.atomic import write_whole
 from sphshell_pin.checks import check_positive
-from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.dynamics.result.result_scene import scene_of
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import (
     FRICTION_COLOR,
     NORMAL_COLOR,
@@ -250,9 +251,7 @@ class Shown:
             scene, title = replay.scene, title or replay.title
             visual_model = replay.visual_model if visual_model is None else visual_model
             speed = replay.speed if speed is None else speed
-        scene = result.scene if scene is None else scene
-        if scene is None:
-            raise ResultError("the result", "has no scene to be drawn in: give view(scene=...)")
+        scene = scene_of(result, scene)
         speed = 1.0 if speed is None else speed
         return cls(result, scene, visual_model, title or "A finished run", speed)
 
