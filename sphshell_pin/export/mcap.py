@@ -20,7 +20,7 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_scene import scene_of
+from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
@@ -133,11 +133,7 @@ class _Run:
         check_type("start", start, int, "must be a whole number of nanoseconds since 1970")
         self.result, self.scene, self.start = result, scene, start
         # A run that diverged is written up to where its numbers end.
-        state = np.hstack((result.q, result.v))
-        unsound = np.flatnonzero(~np.isfinite(state).all(axis=1))
-        self.count = int(unsound[0]) if len(unsound) else len(state)
-        if not self.count:
-            raise ResultError("the result", "has no row of finite numbers to write")
+        self.count = sound_rows("the result", result.q, result.v)
         self.times = _nanoseconds(result.t[: self.count], start)
         self.first = int(self.times[0])
         self.stated = _stated_frames(result, scene)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import state_titles
+from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.scenario.running.figures import (
@@ -162,11 +163,7 @@ def measured(label: str, result: Result, scene: Scene | None) -> Measured:
 
     Raises ResultError where no row has finite numbers.
     """
-    state = np.hstack((result.q, result.v))
-    unsound = np.flatnonzero(~np.isfinite(state).all(axis=1))
-    count = int(unsound[0]) if len(unsound) else len(state)
-    if not count:
-        raise ResultError(label, "has no row of finite numbers to compare")
+    count = sound_rows(label, result.q, result.v)
     titles, _ = state_titles(result, scene)
     if scene is None:
         joints = [f"coordinate {title}" for title in titles]

@@ -1,8 +1,11 @@
-"""The scene in which a result moved."""
+"""What a result is shown with: the scene in which it moved, and its rows of finite numbers."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.offered import offered
@@ -32,3 +35,16 @@ def scene_of(result: Result, scene: Scene | None = None) -> Scene:
     if found is None:
         raise ResultError("the result", "has no scene, as it was loaded: give scene=...")
     return found
+
+
+def sound_rows(name: str, *states: NDArray[np.float64], limit: float = np.inf) -> int:
+    """Return how many rows of `states`, (n, k) each, there are up to where their numbers end.
+
+    That is where a run diverged: a number is not finite, or its size not below `limit`. Raises
+    ResultError, about `name`, if there is no row.
+    """
+    sound = np.all(np.abs(np.hstack(states)) < limit, axis=1)
+    count = len(sound) if sound.all() else int(np.argmin(sound))
+    if not count:
+        raise ResultError(name, "has no row of finite numbers")
+    return count
