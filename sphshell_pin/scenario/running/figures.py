@@ -49,7 +49,9 @@ RUN_FIGURES = {
     "stats.duration": "s",
 }
 MORE_STATS = {"stats.rejected": "", "stats.evaluations": "", "stats.dt": "s"}
+"""Of the integrator, for sweeps and comparisons."""
 NOT_REPEATABLE = ("stats.real_time_factor",)
+"""Figures that are no property of the motion: they differ from one time to the next."""
 
 
 @dataclass(frozen=True)

@@ -313,11 +313,6 @@ def _write_summary(
     stopped: SphshellError | None,
     audit: CadAudit | None,
 ) -> None:
-    import coal
-    import pinocchio as pin
-
-    import sphshell_pin
-
     summary = {
         "scenario": built.name,
         "title": built.scenario.title,
@@ -330,16 +325,26 @@ def _write_summary(
             for v in verdicts
         ],
         **({} if audit is None else {"cad_audit": audit.figures()}),
-        "versions": {
-            "sphshell_pin": sphshell_pin.__version__,
-            "pinocchio": pin.__version__,
-            "coal": coal.__version__,
-            "numpy": np.__version__,
-        },
+        "versions": versions(),
         "files": {name: _digest(staging / name) for name in RESULTS if (staging / name).exists()},
         "settings": origin_of(built).settings,
     }
     (staging / SUMMARY).write_text(json_text(summary, indent=2), encoding="utf-8")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what decides a run's numbers."""
+    import coal
+    import pinocchio as pin
+
+    import sphshell_pin
+
+    return {
+        "sphshell_pin": sphshell_pin.__version__,
+        "pinocchio": pin.__version__,
+        "coal": coal.__version__,
+        "numpy": np.__version__,
+    }
 
 
 def _digest(path: Path) -> str:

@@ -23,10 +23,9 @@ from sphshell_pin.scenario.running.figures import (
     figure_names,
     measuring,
 )
-from sphshell_pin.scenario.running.run import simulate
-from sphshell_pin.study.sweep.job import DONE, FAILED, Job, Outcome, Run, digest_files, versions
+from sphshell_pin.scenario.running.run import simulate, versions
+from sphshell_pin.study.sweep.job import DONE, FAILED, Job, Outcome, Run, digest_files
 
-# Figures that are no property of the motion: they differ from one time to the next.
 _MORE_OF_PAIR = ("impulse", "peak_force_time")
 
 # One run at a time: the threads of a Dask worker take turns, as a scenario's own routines may
