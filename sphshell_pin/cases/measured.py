@@ -5,7 +5,6 @@ The site shows it where a page has the line `[data](measured/NAME.json)`.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import sphshell_pin
 from sphshell_pin.atomic import write_whole
 from sphshell_pin.cases.contents import Table
+from sphshell_pin.json_text import json_text
 
 FOLDER = Path(sphshell_pin.__file__).parent.parent / "docs" / "measured"
 
@@ -41,7 +41,7 @@ class Measured:
 def write(name: str, command: str, sections: Sequence[Measured]) -> Path:
     """Write what `command` measured to NAME.json, and return its path."""
     kept = [{key: value for key, value in asdict(one).items() if value} for one in sections]
-    text = json.dumps({"command": command, "sections": kept}, indent=1, ensure_ascii=False)
+    data = {"command": command, "sections": kept}
     path = FOLDER / f"{name}.json"
-    write_whole(path, f"{text}\n".encode())
+    write_whole(path, json_text(data, ensure_ascii=False).encode())
     return path

@@ -10,7 +10,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.scene.models import find_frame
-from sphshell_pin.dynamics.scene.scene import ContactPair, Scene
+from sphshell_pin.dynamics.scene.pairs import shell_key
+from sphshell_pin.dynamics.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -101,11 +102,6 @@ class Frames:
                 name = shells[shell_key(pair)] = free_name(f"shell/{pair.shell.name}", taken)
                 fixed.append(_hung(name, pair.joint_j, pair.placement_j, moving))
         return cls(tuple(moving.values()), tuple(fixed), spheres, others, contacts, shells)
-
-
-def shell_key(pair: ContactPair) -> tuple[int, int, bytes]:
-    """Return a key: pairs with equal keys have the same shell at the same place."""
-    return id(pair.shell), pair.joint_j, pair.placement_j.homogeneous.tobytes()
 
 
 def quaternion(rotation: Array) -> Array:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.export.cdr import Message
-from sphshell_pin.export.frames import WORLD, Frames, shell_key
+from sphshell_pin.export.frames import WORLD, Frames
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR, POINT_COLOR, ArrowScale, pushing
 from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.robot import LINK_COLOR

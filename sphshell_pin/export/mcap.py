@@ -20,6 +20,7 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
@@ -80,7 +81,7 @@ def write_mcap(
     `command` goes into its metadata; `progress` gets the share that is done.
     """
     mcap = import_extra("mcap.writer", "mcap", "Result.to_mcap")
-    run = _Run(result, scene_of(result, scene), start)
+    run = _Run(result, _own_scene(result, scene), start)
     path = Path(path)
     try:
         with atomic_file(path) as stream:
@@ -111,17 +112,9 @@ def write_mcap(
     return path
 
 
-def scene_of(result: Result, scene: Scene | None) -> Scene:
-    """Return the scene in which `result` moved: `scene`, the one that ran, or its scenario's.
-
-    Raises ResultError where there is none, or where it has other coordinates or contacts.
-    """
-    scene = result.scene if scene is None else scene
-    if scene is None:
-        from sphshell_pin.scenario.running.replay import Replay
-
-        return Replay(result).scene
-    check_type("scene", scene, Scene, "must be a Scene")
+def _own_scene(result: Result, scene: Scene | None) -> Scene:
+    """Return `scene_of`; ResultError where it has other coordinates or contacts than `result`."""
+    scene = scene_of(result, scene)
     ran, now = (result.q.shape[1], result.v.shape[1]), (scene.model.nq, scene.model.nv)
     pairs = tuple(pair.name for pair in scene.pairs)
     if ran != now or pairs != tuple(result.pairs):
@@ -140,11 +133,7 @@ class _Run:
         check_type("start", start, int, "must be a whole number of nanoseconds since 1970")
         self.result, self.scene, self.start = result, scene, start
         # A run that diverged is written up to where its numbers end.
-        state = np.hstack((result.q, result.v))
-        unsound = np.flatnonzero(~np.isfinite(state).all(axis=1))
-        self.count = int(unsound[0]) if len(unsound) else len(state)
-        if not self.count:
-            raise ResultError("the result", "has no row of finite numbers to write")
+        self.count = sound_rows("the result", result.q, result.v)
         self.times = _nanoseconds(result.t[: self.count], start)
         self.first = int(self.times[0])
         self.stated = _stated_frames(result, scene)

@@ -10,9 +10,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.checks import check_type
-from sphshell_pin.errors import ResultError
-
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
@@ -88,13 +85,3 @@ def poses_along(
             pose = data.oMi[joint] * placement
         rotations[k], origins[k] = pose.rotation, pose.translation
     return rotations, origins
-
-
-def scene_of(result: Result, scene: Scene | None) -> Scene:
-    """Return `scene`, or the one that ran; ResultError where there is none."""
-    from sphshell_pin.dynamics.scene.scene import Scene as SceneType  # which needs this package
-
-    scene = result.scene if scene is None else scene
-    if scene is None:
-        raise ResultError("the result", "has no scene, as it was loaded: give scene=...")
-    return check_type("scene", scene, SceneType, "must be a Scene")

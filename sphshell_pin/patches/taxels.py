@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_name, check_positive, check_vector, read_only
+from sphshell_pin.dynamics.result.result_scene import scene_of
+from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.offered import offered
 from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
-from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
+from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on
 from sphshell_pin.summary import Summarized
 
 if TYPE_CHECKING:
@@ -282,13 +284,7 @@ class ShellTaxels:
 
 def same_shell(scene: Scene, pair: ContactPair) -> list[int]:
     """Return the numbers of the pairs that have the shell of `pair` in the same place."""
-    return [
-        k
-        for k, other in enumerate(scene.pairs)
-        if other.shell is pair.shell
-        and other.joint_j == pair.joint_j
-        and np.array_equal(other.placement_j.homogeneous, pair.placement_j.homogeneous)
-    ]
+    return [k for k, other in enumerate(scene.pairs) if shell_key(other) == shell_key(pair)]
 
 
 def _pair(scene: Scene, name: str) -> ContactPair:

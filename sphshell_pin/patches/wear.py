@@ -12,11 +12,12 @@ import numpy as np
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, read_only
+from sphshell_pin.dynamics.result.result_scene import scene_of
 from sphshell_pin.errors import ResultError
 from sphshell_pin.offered import offered
 from sphshell_pin.patches.ellipse import stroke
 from sphshell_pin.patches.foundation import Overlap, overlap_of
-from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
+from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on
 from sphshell_pin.patches.sampling import Grid, Samples, divide
 from sphshell_pin.patches.taxels import same_shell
 from sphshell_pin.summary import Fact, Summarized
@@ -114,7 +115,7 @@ def wear_maps(
     ----------
     result : of a run with record=("patch",)
     coefficient : Preston's [1/Pa]
-    scene : by default the one that ran
+    scene : by default the one that ran, or that of the scenario the result came from
     resolution : largest side of the pieces on which the depth is given [m]; by default a fifth
         of the median smaller half axis
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from sphshell_pin.checks import check_name
 from sphshell_pin.dynamics.result.pair_series import PairSeries
-from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.dynamics.result.result_scene import find_scene
+from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
 from sphshell_pin.plot.contact_path import plot_contact_path
 from sphshell_pin.plot.figure import NO_CONTACT, write_figure
@@ -62,9 +63,9 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
     if kind not in KINDS:
         raise NameNotFound("kind of figure", kind, "a result", KINDS)
     if kind == "path":
-        return plot_contact_path(result, scene_of(result, scene))
+        return plot_contact_path(result, scene)
     if kind == "map":
-        return plot_contact_map(result, scene_of(result, scene))
+        return plot_contact_map(result, scene)
     over_time = {
         "overview": plot_overview,
         "force": plot_force_and_depth,
@@ -74,21 +75,6 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
     return over_time[kind](result)
 
 
-def scene_of(result: Result, scene: Scene | None = None) -> Scene | None:
-    """Return `scene`, or the one that ran, or that of the scenario that `result` came from.
-
-    None if there is none of them; ResultError if its scene cannot be built again.
-    """
-    scene = result.scene if scene is None else scene
-    if scene is not None and not hasattr(scene, "pairs"):
-        raise InvalidParameter("scene", scene, "must be a Scene")
-    if scene is not None or result.origin is None:
-        return scene
-    from sphshell_pin.scenario.running.replay import Replay
-
-    return Replay(result).scene
-
-
 def save_figures(
     result: Result, folder: str | PathLike[str], scene: Scene | None = None
 ) -> list[Path]:
@@ -96,10 +82,11 @@ def save_figures(
 
     They are force_and_depth, energy, contact_path, of a result that touched a shell contact_map,
     and of one with sensors sensors. Paths and map are drawn on the shells of `scene` (default: the
-    scene that ran; a loaded result has none: then the path is drawn in the world, and there is no
-    map). Raises MissingExtra without matplotlib, ResultError if a file cannot be written.
+    scene that ran, or that of the scenario the result came from; without any the path is drawn in
+    the world, and there is no map). Raises MissingExtra without matplotlib, ResultError if a file
+    cannot be written or the scene cannot be built again.
     """
-    scene = result.scene if scene is None else scene
+    scene = find_scene(result, scene)
     figures = {
         "force_and_depth.png": plot_force_and_depth(result),
         "energy.png": plot_energy(result),

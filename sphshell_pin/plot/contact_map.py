@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.errors import NameNotFound, ResultError
+from sphshell_pin.dynamics.result.result_scene import scene_of
+from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.figure import INK, NO_CONTACT, only_say, reading_unit
 from sphshell_pin.plot.on_shell import (
     PathGroup,
@@ -69,14 +70,12 @@ def plot_contact_map(
     and colored by their peak pressure. A shell that is touched from opposite sides has
     two pictures; of one much larger than the path the part about the path is shown.
 
-    `scene` is by default the scene that ran. Raises NameNotFound for another quantity, ResultError
-    without a scene, MissingExtra without matplotlib.
+    `scene` is by default the scene that ran, or that of the scenario the result came from. Raises
+    NameNotFound for another quantity, ResultError without a scene, MissingExtra without matplotlib.
     """
     if quantity not in QUANTITIES:
         raise NameNotFound("quantity", quantity, "a contact map", QUANTITIES)
-    scene = result.scene if scene is None else scene
-    if scene is None:
-        raise ResultError("the result", "has no scene to draw a map of: give scene=...")
+    scene = scene_of(result, scene)
     groups = [group for group in group_paths(result, scene) if group.shell is not None]
     views = [
         view

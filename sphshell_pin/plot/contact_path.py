@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.dynamics.result.result_scene import find_scene
 from sphshell_pin.plot.figure import NO_CONTACT, only_say, reading_unit
 from sphshell_pin.plot.on_shell import PathGroup, Picture, group_paths, shell_figure
 from sphshell_pin.view.contact_path import FloatArray
@@ -25,11 +26,11 @@ MOST_NAMES = 8  # beside the paths with the largest forces
 def plot_contact_path(result: Result, scene: Scene | None = None) -> Figure:
     """Return a Figure of the contact points' path colored by normal force.
 
-    There is one picture per shell of `scene` (default: the scene that ran), in the shell's frame
-    and on its elements, seen from the side of the contact normals. A loaded result has no scene:
-    without one, the picture is one of the world.
+    There is one picture per shell of `scene` (default: the scene that ran, or that of the scenario
+    the result came from), in the shell's frame and on its elements, seen from the side of the
+    contact normals. Without a scene the picture is one of the world.
     """
-    groups = group_paths(result, result.scene if scene is None else scene)
+    groups = group_paths(result, find_scene(result, scene))
     if not groups:
         return only_say("Path of the contact", NO_CONTACT)
     forces = np.concatenate([path.force for group in groups for path in group.paths])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.plot.figure import INK, new_figure, reading_unit
 from sphshell_pin.view.contact_path import ContactPath, FloatArray, contact_paths, spaced
 
@@ -51,7 +52,7 @@ def group_paths(result: Result, scene: Scene | None) -> list[PathGroup]:
         if path.on_shell and scene is not None:
             pair = scene.pairs[path.pair]
             shell = pair.shell
-            key = (id(shell), pair.joint_j, pair.placement_j.homogeneous.tobytes())
+            key = shell_key(pair)
         groups.setdefault(key, PathGroup(shell, [])).paths.append(path)
     return list(groups.values())
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -12,15 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_columns import coordinates
-from sphshell_pin.dynamics.result.run_stats import PairFigures
+from sphshell_pin.dynamics.result.result_columns import state_titles
+from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.scenario.running.figures import (
-    JOINT_FIGURES,
-    PAIR_UNITS,
-    SENSOR_FIGURES,
-    measure_energy,
+    NOT_REPEATABLE,
+    recorded_figures,
 )
 from sphshell_pin.tables import Table, column, quantity_of
 
@@ -159,33 +157,28 @@ def compare(runs: Sequence[Measured]) -> Comparison:
 def measured(label: str, result: Result, scene: Scene | None) -> Measured:
     """Return what of `result` is compared; without a `scene` joints have numbers as names.
 
-    The figures are those of its pairs, joints, sensors, energy and cost, and the last position; the
+    The figures are those of its pairs, joints, sensors, energy and cost, and the last state; the
     curves normal force, friction and depth of each pair, the positions of joints with one number,
     and the path of each sphere in the world. A run that diverged is compared up to where it did.
 
     Raises ResultError where no row has finite numbers.
     """
-    state = np.hstack((result.q, result.v))
-    unsound = np.flatnonzero(~np.isfinite(state).all(axis=1))
-    count = int(unsound[0]) if len(unsound) else len(state)
-    if not count:
-        raise ResultError(label, "has no row of finite numbers to compare")
+    count = sound_rows(label, result.q, result.v)
+    titles, _ = state_titles(result, scene)
     if scene is None:
-        titles = [f"q.{k}" for k in range(result.q.shape[1])]
         joints = [f"coordinate {title}" for title in titles]
     else:
-        titles = coordinates(scene.model)[0]
         joints = [f"joint {name}" for name in list(scene.model.names)[1:]]
     parts = [f"contact {name}" for name in result.pairs]
     parts += joints + [f"sensor {name}" for name in result.sensors]
-    t = result.t[:count]
+    t, recorded = result.t[:count], recorded_figures(result, scene, count - 1)
     settings = {} if result.origin is None else dict(_flat(result.origin.settings))
     settings.pop("description", None)  # says what the run is, and changes nothing in it
     return Measured(
         label,
         tuple(parts),
         (float(t[0]), float(t[-1])),
-        _figures(result, titles, count),
+        {name: figure for name, figure in recorded.items() if name not in NOT_REPEATABLE},
         _curves(result, titles, scene, count),
         settings,
     )
@@ -272,32 +265,6 @@ def _curve_difference(
         values,
         float(np.abs(values).max()) / extent if extent else float("nan"),
     )
-
-
-def _figures(result: Result, titles: list[str], count: int) -> dict[str, tuple[float, str]]:
-    found: dict[str, tuple[float, str]] = {}
-    for name, pair in result.stats.pairs.items():
-        for one in fields(PairFigures):
-            found[f"pairs.{name}.{one.name}"] = getattr(pair, one.name), PAIR_UNITS[one.name]
-    for name, joint in result.stats.joints.items():
-        for figure, unit in JOINT_FIGURES.items():
-            found[f"joints.{name}.{figure}"] = getattr(joint, figure), unit
-    for name, log in result.sensors.items():
-        for title, values in zip(log.columns, log.values.T, strict=True):
-            if len(values):
-                label, unit = quantity_of(title)
-                for figure in SENSOR_FIGURES:
-                    value = values[-1] if figure == "last" else getattr(values, figure)()
-                    found[f"sensors.{name}.{label}.{figure}"] = float(value), unit
-    energy = measure_energy(result)
-    units = {"exchanged": "J", "residual": "J", "relative_residual": ""}
-    found |= {f"energy.{name}": (value, units[name]) for name, value in energy.items()}
-    found["stats.steps"] = float(result.stats.steps), ""
-    found["stats.duration"] = result.stats.duration, "s"
-    for title, value in zip(titles, result.q[count - 1], strict=True):
-        name, unit = quantity_of(title)
-        found[f"final.{name}"] = float(value), unit
-    return found
 
 
 def _curves(result: Result, titles: list[str], scene: Scene | None, count: int) -> dict[str, Curve]:

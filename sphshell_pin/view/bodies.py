@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.view.distance import draw_distance
 from sphshell_pin.view.nodes import (
     OnJoint,
@@ -37,10 +38,9 @@ COLORINGS = ("distance", "faces", "patches")
 """Ways to color a shell; of several that are on the first is seen."""
 
 
-def shell_key(pair: ContactPair) -> Hashable:
+def drawn_key(pair: ContactPair) -> Hashable:
     """Return a key: pairs with equal keys share the picture of their shell."""
-    place = pair.placement_j.homogeneous.tobytes()
-    return id(pair.shell), pair.joint_j, place, pair.method == "smooth"
+    return shell_key(pair), pair.method == "smooth"
 
 
 def sphere_key(sphere: PlacedSphere) -> Hashable:

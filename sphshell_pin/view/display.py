@@ -16,8 +16,8 @@ from sphshell_pin.view.bodies import (
     DrawnPlane,
     DrawnShell,
     DrawnSphere,
+    drawn_key,
     plane_key,
-    shell_key,
     sphere_key,
 )
 from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
@@ -213,7 +213,7 @@ class Display:
         """Return the parent node of trails: on the shell of a `pair`, or in the world."""
         if pair is None:
             return self.visualizer["trail"]
-        return self._shells[shell_key(self.scene.pairs[pair])].node["trail"]
+        return self._shells[drawn_key(self.scene.pairs[pair])].node["trail"]
 
     def replace_scene(self, scene: Scene, visual_model: pin.GeometryModel | None) -> bool:
         """Take `scene`, whose model has the same joints, for the one shown; draw what differs.
@@ -293,7 +293,7 @@ class Display:
     def _draw_bodies(self) -> bool:
         """Draw the bodies of the scene where they differ; return whether shells are drawn anew."""
         pairs = self.scene.pairs
-        shells = ((shell_key(pair), pair) for pair in pairs if pair.shell is not None)
+        shells = ((drawn_key(pair), pair) for pair in pairs if pair.shell is not None)
         anew = self._draw("shells", DrawnShell, self._shells, shells)
         for part in PARTS:
             if anew and part in OF_SHELLS and part in self._hidden ^ HIDDEN_AT_FIRST:

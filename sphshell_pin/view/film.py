@@ -24,9 +24,11 @@ import pinocchio as pin
 from sphshell_pin.atomic import write_whole
 from sphshell_pin.atomic.files import write_folder
 from sphshell_pin.checks import check_finite, check_vector
+from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.films import Pixels, check_film, write_film
-from sphshell_pin.view.recording import Shown, check_pace, sound_rows
+from sphshell_pin.view.contact_path import LARGEST
+from sphshell_pin.view.recording import Shown, check_pace
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
@@ -173,7 +175,7 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
 def _times(
     result: Result, span: tuple[float | None, float | None], *, still: bool
 ) -> tuple[float, float]:
-    t = np.asarray(result.t)[: sound_rows(result)]
+    t = np.asarray(result.t)[: sound_rows("the result", result.q, limit=LARGEST)]
     first, last = float(t[0]), float(t[-1])
     name = "time" if still else "span"
     if not isinstance(span, (tuple, list)) or len(span) != 2:

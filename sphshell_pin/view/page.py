@@ -6,6 +6,7 @@ import base64
 import gzip
 import hashlib
 import html
+import re
 import struct
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 
 PARTS = Path(__file__).with_name("recording_page")
 STYLES = ("../live/page/palette.css", "style.css")
-SHARED = ("../live/page/axes.js", "../live/page/materials.js")
-SCRIPTS = (*SHARED, "replay.js", "cameras.js", "chart.js", "panel.js")
+SHARED = tuple(f"../live/page/{one}.js" for one in ("events", "theme", "axes", "pane", "keys"))
+SCRIPTS = ("replay.js", *SHARED, "cameras.js", "chart.js", "panel.js")
 # A mesh file this long may well be used by several links: it is stored once.
 SHARED_TEXT = 20_000
 
@@ -183,7 +184,7 @@ def render_page(commands: list[Json], title: str, legend: list[tuple[str, str]])
         "title": html.escape(title),
         "legend": rows,
         "style": _joined(STYLES),
-        "script": _joined(SCRIPTS),
+        "script": re.sub(r"^import .*\n", "", _joined(SCRIPTS), flags=re.MULTILINE),
         "viewer": _compressed(viewer_script().read_bytes()),
         "scene": _compressed(bytes(packed)),
     }

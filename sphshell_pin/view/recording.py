@@ -12,7 +12,8 @@ import pinocchio as pin
 
 from sphshell_pin.atomic import write_whole
 from sphshell_pin.checks import check_positive
-from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import (
     FRICTION_COLOR,
     NORMAL_COLOR,
@@ -110,11 +111,12 @@ def render_recording(
     the camera takes in all of the robot, else the surroundings of the contacts.
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
-    positive, more than MOST_FRAMES frames, another `color`, or a geometry model that does not fit.
+    positive, more than MOST_FRAMES frames, another `color`, or a geometry model that does not fit,
+    ResultError without a row of finite numbers.
     """
     check_coloring(color)
     check_pace(fps, speed)
-    count = sound_rows(result)
+    count = sound_rows("the result", result.q, limit=LARGEST)
     contacts = ContactRows.of(result.contacts, result.patch_rows)
     contacts = contacts.select(contacts.row < count)
     t = np.asarray(result.t)[:count]
@@ -184,18 +186,6 @@ def check_pace(fps: float, speed: float) -> None:
     check_positive("speed", speed)
 
 
-def sound_rows(result: Result) -> int:
-    """Return how many rows there are up to where the numbers of a run that diverged end.
-
-    Raises InvalidParameter if there is none.
-    """
-    sound = np.all(np.abs(np.asarray(result.q)) < LARGEST, axis=1)
-    count = len(sound) if sound.all() else int(np.argmin(sound))
-    if not count:
-        raise InvalidParameter("result", "0 rows", "must hold at least one row of finite q")
-    return count
-
-
 @dataclass(frozen=True)
 class RecordingView:
     """A recording: `page`, a whole HTML page, to be shown `height` [pixels] high.
@@ -250,9 +240,7 @@ class Shown:
             scene, title = replay.scene, title or replay.title
             visual_model = replay.visual_model if visual_model is None else visual_model
             speed = replay.speed if speed is None else speed
-        scene = result.scene if scene is None else scene
-        if scene is None:
-            raise ResultError("the result", "has no scene to be drawn in: give view(scene=...)")
+        scene = scene_of(result, scene)
         speed = 1.0 if speed is None else speed
         return cls(result, scene, visual_model, title or "A finished run", speed)
 

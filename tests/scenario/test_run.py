@@ -16,7 +16,7 @@ from sphshell_pin.errors import (
     SimulationDiverged,
 )
 from sphshell_pin.scenario import build, run_built, run_scenario
-from sphshell_pin.scenario.running.figures import figure_names, measure
+from sphshell_pin.scenario.running.figures import figure_names, measuring
 from tests.scenario.files import DROP, write
 
 
@@ -183,7 +183,7 @@ def test_an_unknown_figure_is_told_before_the_run(tmp_path):
 
 def test_every_figure_can_be_measured(built):
     result = built.simulation.run(built.q0, built.v0, 0.01)
-    names = figure_names(built)
+    names, measure = figure_names(built), measuring(built, result)
     assert "final.v.root_joint.5" in names
     for name in names:
-        assert isinstance(measure(built, result, name), float)
+        assert isinstance(measure(name), float)

@@ -28,7 +28,7 @@ def report(folder, error=None):
     )
     machine = {"processor": 'a "fast" one', "date": "2026-11-21 20:00", "measured in": "9 s, quick"}
     folder.mkdir()
-    text = making.json_text(making.Report([section], machine), [])
+    text = making.report_json(making.Report([section], machine), [])
     (folder / "report.json").write_text(text, encoding="utf-8")
     return folder
 

@@ -58,7 +58,7 @@ def test_a_robot_without_geometry_is_hinted_where_it_is_seen(result):
 
 def test_a_result_without_a_scene_is_told(result):
     lost = dataclasses.replace(result, origin=None)
-    with pytest.raises(ResultError, match=r"view\(scene=...\)"):
+    with pytest.raises(ResultError, match=r"give scene=\.\.\."):
         lost.view()
     built = build("sphere_on_shell")
     with pytest.raises(InvalidParameter, match="height"):

@@ -89,7 +89,7 @@ def test_a_run_that_diverged_is_shown_up_to_its_end(tmp_path):
                     if track["type"] != "bool":
                         assert np.isfinite(np.frombuffer(track["values"].data, "<f4")).all()
     result.q[:] = np.nan
-    with pytest.raises(InvalidParameter, match="finite"):
+    with pytest.raises(ResultError, match="finite"):
         write_recording(tmp_path / "run.html", result, scene)
 
 

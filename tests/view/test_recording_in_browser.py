@@ -161,7 +161,7 @@ def test_a_mesh_that_the_viewer_cannot_draw_costs_no_more_than_itself(ball_page,
     broken += "MeshCat.Viewer.prototype.handle_command = function (command) { "
     broken += "if (command.type === 'set_object' && first) { first = false; throw Error('no'); } "
     broken += "return parse.call(this, command); };"
-    at = page.index('const pane = element("pane");')
+    at = page.index("return viewer_in(element")
     file = tmp_path / "broken.html"
     file.write_text(page[:at] + broken + page[at:])
     assert "One mesh cannot be drawn" in opened(file).locator("#fault").inner_text()

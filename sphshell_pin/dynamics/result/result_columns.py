@@ -59,13 +59,17 @@ def coordinates(model: pin.Model) -> tuple[list[str], list[str]]:
     return in_q, in_v
 
 
+def state_titles(result: Result, scene: Scene | None) -> tuple[list[str], list[str]]:
+    """Return the `coordinates` of `scene`; without one q.0, q.1, ... and v.0, v.1, ..."""
+    if scene is not None:
+        return coordinates(scene.model)
+    in_q, in_v = result.q.shape[1], result.v.shape[1]
+    return [f"q.{k}" for k in range(in_q)], [f"v.{k}" for k in range(in_v)]
+
+
 def row_columns(result: Result, scene: Scene | None) -> Columns:
     """Return the rows as columns; see `Result.row_columns`."""
-    if scene is None:
-        in_q = [f"q.{k}" for k in range(result.q.shape[1])]
-        in_v = [f"v.{k}" for k in range(result.v.shape[1])]
-    else:
-        in_q, in_v = coordinates(scene.model)
+    in_q, in_v = state_titles(result, scene)
     columns: Columns = {column("t", "s"): result.t}
     columns |= dict(zip(in_q, result.q.T, strict=True))
     columns |= dict(zip(in_v, result.v.T, strict=True))

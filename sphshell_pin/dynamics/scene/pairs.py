@@ -219,5 +219,11 @@ class ContactPair(Summarized):
         return core
 
 
+def shell_key(pair: ContactPair) -> tuple[int, int, bytes]:
+    """Return a key: pairs with equal keys have the same shell at the same place."""
+    place = pair.placement_j.homogeneous + 0.0  # no -0.0
+    return id(pair.shell), pair.joint_j, place.tobytes()
+
+
 def _center(frame: pin.SE3, sphere: Sphere) -> pin.SE3:
     return frame * pin.SE3(np.eye(3), np.array(sphere.offset))

@@ -54,7 +54,7 @@ def draft_text(
         text += _fill("root", root=_rounded(plan.root, digits))
     elif robot.start:
         text += _fill("posture")
-        text += "".join(f"{_key(joint)} = {_toml(q)}\n" for joint, q in robot.start.items())
+        text += "".join(f"{_key(joint)} = {toml(q)}\n" for joint, q in robot.start.items())
     primitive = shell.model_dump()["primitive"]
     text += _fill("shell", shell=shell, primitive=primitive, side=_SIDES[shell.side])
     if plan.root is None:
@@ -88,8 +88,8 @@ def draft_text(
     record_dt, slow = (1e-3, 0.5) if control is None else (5e-3, None)
     text += _fill("run", plan=plan, record_dt=record_dt, slow=slow)
     for key, limits in _parameters(plan, pairs).items():
-        text += f"[[knob]]\nkey = {_toml(key)}\n"
-        text += "".join(f"{bound} = {_toml(value)}\n" for bound, value in limits.items()) + "\n"
+        text += f"[[knob]]\nkey = {toml(key)}\n"
+        text += "".join(f"{bound} = {toml(value)}\n" for bound, value in limits.items()) + "\n"
     # Of several feet a rough surface may leave one in the air.
     return text + _fill("expect", pair=pairs[0], mean_force=mean_force)
 
@@ -151,12 +151,12 @@ def _fill(part: str, **values: object) -> str:
                 not value or (isinstance(value, list | tuple) and not any(value))
             ):
                 break
-            text += literal if name is None else literal + _toml(value)
+            text += literal if name is None else literal + toml(value)
         else:
             start = formatter.format(key, **values)
             text = f"{start} = {text}"
             if isinstance(value, list) and (isinstance(value[0], list) or len(text) > 96):
-                text = f"{start} = [\n" + "".join(f"  {_toml(one)},\n" for one in value) + "]"
+                text = f"{start} = [\n" + "".join(f"  {toml(one)},\n" for one in value) + "]"
             if mark:
                 text = f"{text.ljust(_COLUMN)} # {formatter.format(comment, **values)}"
             lines.append(text)
@@ -171,14 +171,14 @@ def _rounded(values: ArrayLike, digits: int) -> list[float]:
     return rounded
 
 
-def _toml(value: object) -> str:
+def toml(value: object) -> str:
     """Return `value` as TOML writes it; very large and very small numbers in powers of ten."""
     if isinstance(value, bool | str | int):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{_key(k)} = {_toml(one)}' for k, one in value.items())} }}"
+        return f"{{ {', '.join(f'{_key(k)} = {toml(one)}' for k, one in value.items())} }}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
+        return f"[{', '.join(map(toml, value))}]"
     if not isinstance(value, float):
         raise TypeError(f"no TOML for {value!r}")
     if value == 0 or 1e-3 <= abs(value) < 1e5:
@@ -188,4 +188,4 @@ def _toml(value: object) -> str:
 
 
 def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _toml(name)
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml(name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import pinocchio as pin
 
 from sphshell_pin.contact.materials import Material, friction_between
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
+from sphshell_pin.scenario.drafting.draft_text import toml
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.part import Part, part_file
 from sphshell_pin.scenario.drafting.tip_contact import (
@@ -126,13 +126,13 @@ class HandDraft:
         root = [*place.translation.tolist(), *pin.Quaternion(place.rotation).coeffs().tolist()]
         stated = self.built.scenario.robot[0].model_dump(exclude_defaults=True)
         keys = ("name", "urdf", "file", "package_dirs", "xacro_args")
-        source = "\n".join(f"{key} = {_toml(stated[key])}" for key in keys if key in stated)
+        source = "\n".join(f"{key} = {toml(stated[key])}" for key in keys if key in stated)
         if self.lock:
-            source += f"\nlock = {_toml(list(self.lock))} # they move no fingertip"
+            source += f"\nlock = {toml(list(self.lock))} # they move no fingertip"
         surface = self.shell.model_dump(exclude_defaults=True, exclude={"frame", "placement"})
         spheres = "\n".join(
-            f"  {{ frame = {_toml('hand/' + tip.frame)}, radius = {tip.radius!r}, "
-            f"offset = {_toml(tip.offset.tolist())} }},"
+            f"  {{ frame = {toml('hand/' + tip.frame)}, radius = {tip.radius!r}, "
+            f"offset = {toml(tip.offset.tolist())} }},"
             for tip in hand.tips
         )
         strongest = f"tips/hand/{hand.tips[int(np.argmax(grasp.normal_forces()))].frame}"
@@ -143,23 +143,23 @@ class HandDraft:
             part=other,
             contact=self.contact,
             title=title,
-            title_text=_toml(title),
+            title_text=toml(title),
             source=source,
-            joints=_toml(joints),
+            joints=toml(joints),
             gap=1e3 * GAP,
             start=_joints(model, grasp.q, hand.joints, ""),
-            urdf=_toml(part_file(self.name)),
-            root=_toml([round(x, 9) for x in root]),
-            surface="\n".join(f"{key} = {_toml(value)}" for key, value in surface.items()),
+            urdf=toml(part_file(self.name)),
+            root=toml([round(x, 9) for x in root]),
+            surface="\n".join(f"{key} = {toml(value)}" for key, value in surface.items()),
             spheres=spheres,
-            shell=_toml(self.shell.name),
+            shell=toml(self.shell.name),
             radius=float(hand.radii.min()),
             kp=kp,
             kd=kd,
             drawn=_joints(model, drawn, hand.joints, "hand/"),
             duration=DURATION,
-            mean_force=_toml(f"pairs.{strongest}.mean_force"),
-            touches=_toml(f"pairs.{strongest}.touches"),
+            mean_force=toml(f"pairs.{strongest}.mean_force"),
+            touches=toml(f"pairs.{strongest}.touches"),
             force=rounded(self.press, 3),
             held=HELD,
         )
@@ -188,13 +188,5 @@ def _joints(model: pin.Model, q: Array, joints: Sequence[int], prefix: str) -> s
         span, _ = joint_spans(model, model.names[j])
         values = [round(float(x), 6) for x in q[span]]
         stated = values[0] if len(values) == 1 else values
-        lines.append(f"{_toml(prefix + model.names[j])} = {_toml(stated)}")
+        lines.append(f"{toml(prefix + model.names[j])} = {toml(stated)}")
     return "\n".join(lines)
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TypedDict, Unpack
 
 import coal
@@ -31,8 +31,9 @@ class Primitive(Component):
         return Shell.from_geometry(self.geometry(), **options)
 
     def geometry(self) -> coal.ShapeBase:
-        """Return it as Coal has it."""
-        raise NotImplementedError
+        """Return it as Coal has it: its class takes the sizes in the order of the fields."""
+        shape = getattr(coal, type(self).__name__)
+        return shape(*np.hstack([getattr(self, one.name) for one in fields(self)]))
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,6 @@ class Box(Primitive, kind="box"):
     """A box."""
 
     size: Lengths3 = parameter(unit="m", help="edge lengths along x, y, z")
-
-    def geometry(self) -> coal.Box:
-        """Return it as Coal has it."""
-        return coal.Box(*self.size)
 
 
 @dataclass(frozen=True)
@@ -67,27 +64,15 @@ class _Round(Primitive):
 class Cylinder(_Round, kind="cylinder"):
     """A cylinder."""
 
-    def geometry(self) -> coal.Cylinder:
-        """Return it as Coal has it."""
-        return coal.Cylinder(self.radius, self.length)
-
 
 @dataclass(frozen=True)
 class Capsule(_Round, kind="capsule"):
     """A capsule."""
 
-    def geometry(self) -> coal.Capsule:
-        """Return it as Coal has it."""
-        return coal.Capsule(self.radius, self.length)
-
 
 @dataclass(frozen=True)
 class Cone(_Round, kind="cone"):
     """A cone."""
-
-    def geometry(self) -> coal.Cone:
-        """Return it as Coal has it."""
-        return coal.Cone(self.radius, self.length)
 
 
 @dataclass(frozen=True)
@@ -95,10 +80,6 @@ class Ellipsoid(Primitive, kind="ellipsoid"):
     """An ellipsoid."""
 
     radii: Lengths3 = parameter(unit="m", help="half axes along x, y, z")
-
-    def geometry(self) -> coal.Ellipsoid:
-        """Return it as Coal has it."""
-        return coal.Ellipsoid(*self.radii)
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_columns import coordinates
+from sphshell_pin.dynamics.result.result_columns import coordinates, state_titles
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import ScenarioError, add_origin
-from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.tables import quantity_of
 
@@ -47,6 +48,10 @@ RUN_FIGURES = {
     "stats.steps": "",
     "stats.duration": "s",
 }
+MORE_STATS = {"stats.rejected": "", "stats.evaluations": "", "stats.dt": "s"}
+"""Of the integrator, for sweeps and comparisons."""
+NOT_REPEATABLE = ("stats.real_time_factor",)
+"""Figures that are no property of the motion: they differ from one time to the next."""
 
 
 @dataclass(frozen=True)
@@ -65,21 +70,12 @@ def figure_names(built: Built) -> list[str]:
     joints = built.scene.joints
     watched = dict.fromkeys((*joints.limits, *joints.effort, *joints.speed))
     names += [f"joints.{name}.{one}" for name in watched for one in JOINT_FIGURES]
-    names += [
-        f"sensors.{sensor.name}.{_label(column)}.{one}"
-        for sensor in built.simulation.sensors
-        for column in sensor.columns(built.scene)
-        for one in SENSOR_FIGURES
-    ]
+    for sensor in built.simulation.sensors:
+        names += _sensor_units(sensor.name, sensor.columns(built.scene))
     names += RUN_FIGURES
     names += [f"figures.{name}" for name in built.figures]
-    model = built.scene.model
-    for joint in list(model.names)[1:]:
-        for kind, span in zip("qv", joint_spans(model, joint), strict=True):
-            count = span.stop - span.start
-            name = f"final.{kind}.{joint}"
-            names += [f"{name}.{i}" for i in range(count)] if count > 1 else [name] * count
-    return names
+    final = [title for titles in coordinates(built.scene.model) for title in titles]
+    return names + [f"final.{quantity_of(title)[0]}" for title in final]
 
 
 def figure_units(built: Built) -> dict[str, str]:
@@ -89,18 +85,29 @@ def figure_units(built: Built) -> dict[str, str]:
     for pair in built.scene.pairs:
         units |= {f"pairs.{pair.name}.{one}": unit for one, unit in PAIR_UNITS.items()}
     for name in list(model.names)[1:]:
-        slides = joint_slides(model.joints[model.getJointId(name)])
-        units |= {
-            f"joints.{name}.{one}": _SLIDING.get(unit, unit) if slides else unit
-            for one, unit in JOINT_FIGURES.items()
-        }
+        units |= {f"joints.{name}.{one}": unit for one, unit in _joint_units(name, model).items()}
     for sensor in built.simulation.sensors:
-        for title in sensor.columns(built.scene):
-            name = f"sensors.{sensor.name}.{_label(title)}"
-            units |= {f"{name}.{one}": quantity_of(title)[1] for one in SENSOR_FIGURES}
+        units |= _sensor_units(sensor.name, sensor.columns(built.scene))
     for titles in coordinates(model):
         units |= {f"final.{name}": unit for name, unit in map(quantity_of, titles)}
     return {name: unit for name, unit in units.items() if unit not in ("", "1")}
+
+
+def _joint_units(name: str, model: pin.Model | None) -> dict[str, str]:
+    """Return the units of a joint's figures; without a `model` those of one that turns."""
+    if model is None or not joint_slides(model.joints[model.getJointId(name)]):
+        return JOINT_FIGURES
+    return {one: _SLIDING.get(unit, unit) for one, unit in JOINT_FIGURES.items()}
+
+
+def _sensor_units(name: str, columns: Sequence[str]) -> dict[str, str]:
+    """Return the units of the figures of a sensor with these columns, by their names."""
+    quantities = [quantity_of(title) for title in columns]
+    return {
+        f"sensors.{name}.{label}.{one}": unit
+        for label, unit in quantities
+        for one in SENSOR_FIGURES
+    }
 
 
 def check_expectations(built: Built) -> None:
@@ -122,25 +129,54 @@ def check_expectations(built: Built) -> None:
             )
 
 
-def measure(built: Built, result: Result, name: str) -> float:
-    """Return the figure `name` of `result`, in SI units; see PAIR_FIGURES and those after it."""
-    kind, _, rest = name.partition(".")
-    if kind in ("pairs", "joints"):
-        owner, _, figure = rest.rpartition(".")
-        return float(getattr(getattr(result.stats, kind)[owner], figure))
-    if kind == "sensors":
-        return _of_sensor(result, rest)
-    if kind == "figures":
+def recorded_figures(
+    result: Result, scene: Scene | None, row: int = -1
+) -> dict[str, tuple[float, str]]:
+    """Return the figures of `result` by their names, each with its unit, in SI.
+
+    Those of a sensor without readings are nan. The last state is that of the recorded `row`;
+    without a `scene` its coordinates have numbers as names, and no units.
+    """
+    stats, model = result.stats, None if scene is None else scene.model
+    found: dict[str, tuple[float, str]] = {}
+    for name, pair in stats.pairs.items():
+        for one, unit in PAIR_UNITS.items():
+            found[f"pairs.{name}.{one}"] = getattr(pair, one), unit
+    for name, joint in stats.joints.items():
+        for one, unit in _joint_units(name, model).items():
+            found[f"joints.{name}.{one}"] = getattr(joint, one), unit
+    for name, log in result.sensors.items():
+        readings = log.values if len(log.values) else np.full((1, len(log.columns)), np.nan)
+        for title, values in zip(log.columns, readings.T, strict=True):
+            ways = values.min(), values.max(), values.mean(), values[-1]
+            units = _sensor_units(name, [title])
+            found |= zip(units, zip(ways, units.values(), strict=True), strict=True)
+    energy = measure_energy(result)
+    for name, unit in (RUN_FIGURES | MORE_STATS).items():
+        kind, _, one = name.partition(".")
+        found[name] = energy[one] if kind == "energy" else getattr(stats, one), unit
+    for titles, state in zip(state_titles(result, scene), (result.q, result.v), strict=True):
+        for title, number in zip(titles, state[row], strict=True):
+            name, unit = quantity_of(title)
+            found[f"final.{name}"] = number, unit
+    return {name: (float(value), unit) for name, (value, unit) in found.items()}
+
+
+def measuring(built: Built, result: Result) -> Callable[[str], float]:
+    """Return a function of a figure's name that measures it of `result`, in SI."""
+    recorded = recorded_figures(result, built.scene)
+
+    def measure(name: str) -> float:
+        kind, _, own = name.partition(".")
+        if kind != "figures":
+            return recorded[name][0]
         try:
-            return float(built.figures[rest](result, built.scene))
+            return float(built.figures[own](result, built.scene))
         except Exception as error:
-            add_origin(error, f"the scenario's figure '{rest}'")
+            add_origin(error, f"the scenario's figure '{own}'")
             raise
-    if kind == "final":
-        return _final(built.scene.model, result, rest)
-    if kind == "energy":
-        return measure_energy(result)[rest]
-    return float(getattr(result.stats, rest))
+
+    return measure
 
 
 def measure_energy(result: Result) -> dict[str, float]:
@@ -153,38 +189,8 @@ def measure_energy(result: Result) -> dict[str, float]:
 
 def judge(built: Built, result: Result) -> list[Verdict]:
     """Return the verdict on each of the scenario's expectations."""
-    verdicts = []
+    verdicts, measure = [], measuring(built, result)
     for name, expected in built.scenario.expect.items():
-        measured = measure(built, result, name)
+        measured = measure(name)
         verdicts.append(Verdict(name, str(expected), measured, expected.met_by(measured)))
     return verdicts
-
-
-def _label(column: str) -> str:
-    """Return the name of a sensor's column without its unit."""
-    return column.partition(" ")[0]
-
-
-def _of_sensor(result: Result, rest: str) -> float:
-    """Return a figure of the readings: `rest` is a sensor, a column, and one of SENSOR_FIGURES.
-
-    It is nan where no reading arrived.
-    """
-    rest, _, figure = rest.rpartition(".")
-    name, _, label = rest.rpartition(".")
-    log = result.sensors[name]
-    values = log.values[:, [_label(column) for column in log.columns].index(label)]
-    if not len(values):
-        return float("nan")
-    return float(values[-1] if figure == "last" else getattr(values, figure)())
-
-
-def _final(model: pin.Model, result: Result, rest: str) -> float:
-    """Return the last `rest`: q or v, a joint, and an index where it has several."""
-    kind, _, joint = rest.partition(".")
-    index = 0
-    if joint not in list(model.names):
-        joint, _, last = joint.rpartition(".")
-        index = int(last)
-    in_q, in_v = joint_spans(model, joint)
-    return float(result.q[-1, in_q][index] if kind == "q" else result.v[-1, in_v][index])

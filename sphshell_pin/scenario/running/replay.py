@@ -15,6 +15,7 @@ from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
+from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SlowLawWarning, SphshellError
 from sphshell_pin.scenario.format.build import Built, build_scenario
@@ -81,11 +82,7 @@ class Replay:
             raise ResultError(self._name, f"does not say which scene it came from: {HOW}")
         self._check()
         # A run that diverged is shown up to where its numbers end.
-        state = np.hstack((self.result.q, self.result.v))
-        unsound = np.flatnonzero(~np.isfinite(state).all(axis=1))
-        self._count = int(unsound[0]) if len(unsound) else len(state)
-        if not self._count:
-            raise ResultError(self._name, "has no row of finite numbers to show")
+        self._count = sound_rows(self._name, self.result.q, self.result.v)
         self._rows = self._all_rows()
         self._residual = self.result.energy.residual
         self._exchanged = self.result.energy.exchanged_until

@@ -28,6 +28,7 @@ from sphshell_pin.errors import (
     SphshellError,
     WeakLawWarning,
 )
+from sphshell_pin.json_text import json_text, plain
 from sphshell_pin.scenario.format.build import Built, build
 from sphshell_pin.scenario.format.reading import shipped_scenarios
 from sphshell_pin.scenario.running.cad_audit import CadAudit, check_audit
@@ -207,12 +208,11 @@ def origin_of(built: Built) -> Origin:
     """Return the origin that a Result of this scenario records."""
     shipped = shipped_scenarios().get(built.name)
     scenario = built.name if shipped == built.path else str(built.path.absolute())
-    settings = built.scenario.model_dump(mode="json")
-    plain = {key: _plain(value) for key, value in settings.items()}
+    settings = built.scenario.model_dump(mode="json").items()
     folder = built.path.absolute().parent
     return Origin(
         scenario,
-        plain,
+        {key: plain(value) for key, value in settings},
         partial(keep, built.scenario, folder, built.assembly.loaded, dict(built.shells)),
     )
 
@@ -313,11 +313,6 @@ def _write_summary(
     stopped: SphshellError | None,
     audit: CadAudit | None,
 ) -> None:
-    import coal
-    import pinocchio as pin
-
-    import sphshell_pin
-
     summary = {
         "scenario": built.name,
         "title": built.scenario.title,
@@ -330,32 +325,28 @@ def _write_summary(
             for v in verdicts
         ],
         **({} if audit is None else {"cad_audit": audit.figures()}),
-        "versions": {
-            "sphshell_pin": sphshell_pin.__version__,
-            "pinocchio": pin.__version__,
-            "coal": coal.__version__,
-            "numpy": np.__version__,
-        },
+        "versions": versions(),
         "files": {name: _digest(staging / name) for name in RESULTS if (staging / name).exists()},
         "settings": origin_of(built).settings,
     }
-    text = json.dumps(_plain(summary), indent=2, allow_nan=False)
-    (staging / SUMMARY).write_text(text + "\n", encoding="utf-8")
+    (staging / SUMMARY).write_text(json_text(summary, indent=2), encoding="utf-8")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what decides a run's numbers."""
+    import coal
+    import pinocchio as pin
+
+    import sphshell_pin
+
+    return {
+        "sphshell_pin": sphshell_pin.__version__,
+        "pinocchio": pin.__version__,
+        "coal": coal.__version__,
+        "numpy": np.__version__,
+    }
 
 
 def _digest(path: Path) -> str:
     with open(path, "rb") as file:
         return f"sha256:{hashlib.file_digest(file, 'sha256').hexdigest()}"
-
-
-def _plain(value: object) -> object:
-    """Return `value` made of what JSON knows; it has no infinity: null stands for it."""
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value if value is None or isinstance(value, str | int | float) else str(value)

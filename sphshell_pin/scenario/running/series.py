@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.scenario.running.player import Rows
+from sphshell_pin.tables import quantity_of
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -155,6 +156,5 @@ def _split(column: str) -> tuple[str, str]:
 
 
 def _unit(column: str) -> tuple[str, str]:
-    name, _, unit = column.partition(" [")
-    unit = unit.removesuffix("]")
+    name, unit = quantity_of(column)
     return name, "" if unit == "1" else unit

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.atomic import write_whole
+from sphshell_pin.json_text import json_text
 from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.study.fit.parameters import TIE
 from sphshell_pin.study.fit.writing import scenario_text
@@ -173,11 +173,8 @@ class Fit(Summarized):
             "degrees_of_freedom": self.dof,
             "runs": self.runs,
             "converged": self.converged,
-            "parameters": [
-                vars(one) | {"low": _finite(one.low), "high": _finite(one.high)}
-                for one in self.parameters
-            ],
-            "correlation": [[_finite(value) for value in row] for row in self.correlation.tolist()],
+            "parameters": [vars(one) for one in self.parameters],
+            "correlation": self.correlation,
             "series": [
                 {
                     "experiment": one.experiment,
@@ -192,7 +189,7 @@ class Fit(Summarized):
             ],
             "remarks": list(self.remarks),
         }
-        return json.dumps(data, indent=2, allow_nan=False) + "\n"
+        return json_text(data, indent=2)
 
     def __str__(self) -> str:
         """Return a line for each parameter, then the remarks."""
@@ -215,7 +212,3 @@ def interval_text(one: Fitted) -> str:
 def file_number(value: float) -> str:
     """Return a fitted value as a file states it, with nine digits."""
     return repr(float(f"{value:.9g}"))
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

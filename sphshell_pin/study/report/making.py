@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
-import math
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +17,7 @@ from sphshell_pin.benchmarks.peers import section as peers
 from sphshell_pin.cases.contents import Column, Progress, Section, Table, findings_table
 from sphshell_pin.cases.machine import OtherWork, caution_of, describe
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
+from sphshell_pin.json_text import json_text
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report.page import SPEED, Heading, render
 
@@ -165,7 +165,7 @@ def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     pictures = [picture for section in report.sections for picture in section.pictures]
     files = {name: text.encode() for name, text in texts.items()}
     files |= {f"{picture.name}.png": picture.png for picture in pictures}
-    files[DATA] = json_text(report, sorted(files)).encode()
+    files[DATA] = report_json(report, sorted(files)).encode()
     files[PAGE] = render(report.sections, report.machine, report.heading, report.caution).encode()
     try:
         staging = place.staging()
@@ -201,7 +201,7 @@ def _findings(sections: list[Section]) -> Table:
     )
 
 
-def json_text(report: Report, files: list[str]) -> str:
+def report_json(report: Report, files: list[str]) -> str:
     """Return the report's data; its tables as Markdown, with all digits they are in `files`."""
     data = {
         "machine": report.machine,
@@ -226,13 +226,4 @@ def json_text(report: Report, files: list[str]) -> str:
             for section in report.sections
         ],
     }
-    return json.dumps(_finite(data), indent=1, ensure_ascii=False) + "\n"
-
-
-def _finite(data: object) -> object:
-    """Return the data with None for what JSON has no number for."""
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data
+    return json_text(data, ensure_ascii=False)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from sphshell_pin.json_text import json_text
 from sphshell_pin.study.robot_check.checks import CHECKS, Sizes
 from sphshell_pin.testing.finding import Finding
 
@@ -128,11 +128,11 @@ def as_json(reports: Sequence[RobotReport], command: str, seed: int, sizes: Size
     robots: list[dict[str, object]] = []
     for one in reports:
         checks = {
-            key: {"error": _number(found.error), "met": one.met(key), "where": found.where}
+            key: {"error": found.error, "met": one.met(key), "where": found.where}
             for key, found in one.findings.items()
         }
         figures = {name: getattr(one, name) for name in ("name", "nq", "nv", "verdict", "reason")}
-        others = {"frame": one.frame or None, "radius": _number(one.radius), "notes": one.notes}
+        others = {"frame": one.frame or None, "radius": one.radius, "notes": one.notes}
         robots.append(figures | others | {"checks": checks})
     data = {
         "command": command,
@@ -141,8 +141,4 @@ def as_json(reports: Sequence[RobotReport], command: str, seed: int, sizes: Size
         "checks": {key: {"title": key} | vars(check) for key, check in CHECKS.items()},
         "robots": robots,
     }
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return json_text(data)

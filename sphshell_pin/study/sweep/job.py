@@ -117,19 +117,3 @@ def digest_files(folder: Path, names: Iterable[str]) -> dict[str, str]:
         with open(path, "rb") as file:
             found[name] = hashlib.file_digest(file, "sha256").hexdigest()
     return found
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of what decides a run's numbers."""
-    import coal
-    import numpy as np
-    import pinocchio as pin
-
-    import sphshell_pin
-
-    return {
-        "sphshell_pin": sphshell_pin.__version__,
-        "pinocchio": pin.__version__,
-        "coal": coal.__version__,
-        "numpy": np.__version__,
-    }

@@ -19,6 +19,7 @@ from sphshell_pin.scenario.format.build import build_scenario
 from sphshell_pin.scenario.format.reading import full_name, look_up
 from sphshell_pin.scenario.format.sliders import meaning
 from sphshell_pin.scenario.running.figures import check_expectations, figure_units
+from sphshell_pin.scenario.running.run import versions
 from sphshell_pin.study.sweep.curves import curves_of
 from sphshell_pin.study.sweep.distributions import Dist
 from sphshell_pin.study.sweep.grid import HOW, Axis, Value, Vary, axes_of, points_of, text_of
@@ -29,7 +30,6 @@ from sphshell_pin.study.sweep.job import (
     digest_files,
     digest_settings,
     files_of,
-    versions,
 )
 from sphshell_pin.study.sweep.sampling import DRAWN, Design, design_of
 from sphshell_pin.study.sweep.table import frame_of, varied_columns

@@ -17,14 +17,16 @@ from sphshell_pin.scenario.format.build import build_scenario
 from sphshell_pin.scenario.format.reading import change_scenario, find_scenario
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import check_knobs
-from sphshell_pin.scenario.running.figures import figure_names, measure
-from sphshell_pin.scenario.running.run import simulate
-from sphshell_pin.study.sweep.job import DONE, FAILED, Job, Outcome, Run, digest_files, versions
+from sphshell_pin.scenario.running.figures import (
+    MORE_STATS,
+    NOT_REPEATABLE,
+    figure_names,
+    measuring,
+)
+from sphshell_pin.scenario.running.run import simulate, versions
+from sphshell_pin.study.sweep.job import DONE, FAILED, Job, Outcome, Run, digest_files
 
-# Figures that are no property of the motion: they differ from one time to the next.
-NOT_REPEATABLE = ("stats.real_time_factor",)
 _MORE_OF_PAIR = ("impulse", "peak_force_time")
-_MORE_STATS = ("stats.rejected", "stats.evaluations", "stats.dt")
 
 # One run at a time: the threads of a Dask worker take turns, as a scenario's own routines may
 # share what they remember.
@@ -37,7 +39,7 @@ def sweep_figures(built: Built) -> list[str]:
     """Return the names of the figures that a row of a sweep has: all that repeat bit for bit."""
     names = [name for name in figure_names(built) if name not in NOT_REPEATABLE]
     names += [f"pairs.{pair.name}.{one}" for pair in built.scene.pairs for one in _MORE_OF_PAIR]
-    return names + list(_MORE_STATS)
+    return names + list(MORE_STATS)
 
 
 def verdict_names(scenario: Scenario) -> list[str]:
@@ -144,10 +146,10 @@ def _try_run(job: Job, run: Run) -> Outcome:
 
 def _measure(job: Job, built: Built, result: Result) -> tuple[str, str, dict[str, float]]:
     """Return all figures that can be measured; the first that cannot makes the run a failed one."""
-    error, figures = "", {}
+    error, figures, measure = "", {}, measuring(built, result)
     for name in sweep_figures(built):
         try:
-            figures[name] = measure(built, result, name)
+            figures[name] = measure(name)
         except (Exception, SystemExit) as fault:
             error = error or _sentence(fault)
     if job.verdicts and not error:

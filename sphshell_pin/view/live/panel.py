@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import threading
 from collections import deque
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.json_text import plain
 from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 1_500  # points of the charts; the page shows the last seconds
 MOST_LISTED = 40  # contacts
+DIGITS = 9  # of the numbers that a browser gets
 RESTING_SPEED = 5e-6  # [m/s]: slower, and the list of contacts shows 0.00 mm/s
 
 
@@ -133,17 +134,5 @@ def motion(pair: ContactPair, slip: float, normal_force: float = 0.0) -> str | N
 
 
 def dump(value: object) -> str:
-    """Return `value` as JSON; numbers keep nine digits, and null stands for what is no number."""
-    return json.dumps(_plain(value), separators=(",", ":"), allow_nan=False)
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, float):
-        return float(f"{value:.9g}") if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {str(key): _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return value
+    """Return `value` as JSON; numbers keep DIGITS, and null stands for what is no number."""
+    return json.dumps(plain(value, DIGITS), separators=(",", ":"), allow_nan=False)

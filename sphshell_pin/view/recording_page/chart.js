@@ -71,15 +71,13 @@ class Chart {
     const area = blank(canvas);
     if (!area) return;
     const { pen, width, height } = area;
-    const style = getComputedStyle(document.documentElement);
-    const color = (name) => style.getPropertyValue(name).trim();
     const room = height - TOP - BOTTOM - GAP, x = (t) => this.x(t);
     const strips = [
       { columns: ["friction", "normal"], unit: "N", top: TOP, height: FORCE_SHARE * room },
       { columns: ["depth"], unit: "m", top: TOP + FORCE_SHARE * room + GAP, height: (1 - FORCE_SHARE) * room },
     ];
     time_axis(pen, color, width, { start, end, x, top: TOP, bottom: height - BOTTOM });
-    for (const strip of strips) this.strip(pen, color, strip, width);
+    for (const strip of strips) this.strip(pen, strip, width);
     const at = Math.round(x(this.now)) + 0.5;
     stroke(pen, color("--ink"), [at, TOP], [at, height - BOTTOM]);
     if (!curve) return;
@@ -93,7 +91,7 @@ class Chart {
   }
 
   // Draw one quantity; add to the strip its scale y.
-  strip(pen, color, strip, width) {
+  strip(pen, strip, width) {
     const { curve } = this;
     const ranges = curve ? strip.columns.map((column) => curve[`${column}_range`]) : [[0, 0]];
     const most = Math.max(...ranges.map((range) => range[1])), least = Math.min(...ranges.map((range) => range[0]));

@@ -1,7 +1,6 @@
 // The panel: time, speed, cameras, what is shown, keys.
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4]; // of the pace that the recording was made at
 const LEAP = 10; // frames, with the shift key
-const dark = matchMedia("(prefers-color-scheme: dark)");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 const small = matchMedia("(max-width: 900px), (max-height: 600px)");
 
@@ -45,10 +44,6 @@ class Panel {
     }
     speed.onchange = () => { this.rate = Number(speed.value); };
     element("loop").onclick = () => this.set_loop(!this.loop);
-    for (const button of document.querySelectorAll("#dock button")) {
-      // Else the space bar would press it again.
-      button.addEventListener("click", () => button.blur());
-    }
   }
 
   seek(t) {
@@ -129,7 +124,7 @@ class Panel {
       const button = document.createElement("button");
       Object.assign(button, { textContent: label, title: `${title} (${element("views").children.length + 1})` });
       button.dataset.view = name;
-      button.onclick = () => { this.cameras.look(name); button.blur(); };
+      button.onclick = () => this.cameras.look(name);
       element("views").append(button);
     }
     this.cameras.changed = () => {
@@ -170,17 +165,8 @@ class Panel {
   }
 
   follow_surroundings() {
-    const paint = () => {
-      const style = getComputedStyle(document.documentElement);
-      for (const [property, name] of [["top_color", "sky"], ["bottom_color", "earth"]]) {
-        const color = style.getPropertyValue(`--${name}`).trim().match(/[0-9a-f]{2}/gi);
-        this.viewer.set_property(["Background"], property, color.map((part) => parseInt(part, 16) / 255));
-      }
-      this.viewer.set_dirty();
-      this.chart.draw();
-    };
-    dark.addEventListener("change", paint);
-    paint();
+    on("theme", () => this.chart.draw());
+    emit("theme");
     const fit = () => { this.viewer.set_3d_pane_size(); this.cameras.fit_again(); };
     new ResizeObserver(fit).observe(element("pane"));
     this.cameras.look("fit");
@@ -245,37 +231,17 @@ class Panel {
 
   add_keys() {
     const names = this.cameras.names;
-    const keys = [
-      ["space", "play or pause", [" "], () => this.toggle()],
-      ["\u2190 \u2192", "one frame back, on; ten with shift", ["ArrowLeft", "ArrowRight"],
-        (event) => this.go((event.key === "ArrowLeft" ? -1 : 1) * (event.shiftKey ? LEAP : 1))],
-      ["Home End", "to the start, to the end", ["Home", "End"],
-        (event) => this.go_to(event.key === "Home" ? this.clock.start : this.clock.end)],
-      ["\u2191 \u2193", "faster, slower", ["ArrowUp", "ArrowDown"], (event) => this.pace_by(event.key === "ArrowUp" ? 1 : -1)],
-      ["l", "play again and again", ["l"], () => this.set_loop(!this.loop)],
-      [`1 ... ${names.length}`, "cameras", names.map((_, k) => String(k + 1)),
-        (event) => this.cameras.look(names[Number(event.key) - 1])],
-      ["c", "chart", ["c"], () => element("fold").click()],
-      ["?", "this list", ["?"], () => element("help").showModal()],
-    ];
-    const acts = new Map(keys.flatMap(([, , pressed, act]) => pressed.map((key) => [key, act])));
-    for (const [name, meaning] of keys) {
-      const row = element("keys").insertRow();
-      row.insertCell().append(...name.split(" ").flatMap((key, k) => [
-        ...(k ? [" "] : []), Object.assign(document.createElement(key === "..." ? "span" : "kbd"), { textContent: key })]));
-      row.insertCell().textContent = meaning;
-    }
-    element("help-button").onclick = () => element("help").showModal();
-    document.addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey || element("help").open) return;
-      if (event.target.tagName === "SELECT") return;
-      // A button, a switch or a fold that has the focus keeps the space bar.
-      if (event.key === " " && /^(BUTTON|SUMMARY)$|checkbox/.test(event.target.type === "checkbox" ? "checkbox" : event.target.tagName)) return;
-      const act = acts.get(event.key);
-      if (!act) return;
-      event.preventDefault();
-      act(event);
-    });
+    const add = (pressed, says, act, repeats) => add_key({ keys: pressed, says, act, repeats });
+    add([" "], "play or pause", () => this.toggle());
+    add(["ArrowLeft", "ArrowRight"], "one frame back, on; ten with shift",
+      (event) => this.go((event.key === "ArrowLeft" ? -1 : 1) * (event.shiftKey ? LEAP : 1)), true);
+    add(["Home", "End"], "to the start, to the end",
+      (event) => this.go_to(event.key === "Home" ? this.clock.start : this.clock.end));
+    add(["ArrowUp", "ArrowDown"], "faster, slower", (event) => this.pace_by(event.key === "ArrowUp" ? 1 : -1), true);
+    add(["l"], "play again and again", () => this.set_loop(!this.loop));
+    add(names.map((_, k) => String(k + 1)), "cameras", (event) => this.cameras.look(names[Number(event.key) - 1]));
+    add(["c"], "chart", () => element("fold").click());
+    add_help_key();
   }
 
   // For films: draw the time t, or the frame with this number, at once.
@@ -300,7 +266,6 @@ class Panel {
 (async () => {
   try {
     const viewer = await start_viewer();
-    window.viewer = viewer;
     const data = replay(viewer, await (await unpack("scene")).arrayBuffer());
     viewer.set_3d_pane_size();
     const panel = new Panel(viewer, data);

@@ -17,16 +17,7 @@ async function start_viewer() {
   const script = document.createElement("script");
   script.textContent = await (await unpack("viewer")).text();
   document.head.append(script);
-  const pane = element("pane");
-  const viewer = new MeshCat.Viewer(pane);
-  viewer.gui.domElement.style.display = "none";
-  flatten_materials(viewer);
-  // The viewer takes the whole window for its own.
-  const resize = viewer.set_3d_pane_size.bind(viewer);
-  viewer.set_3d_pane_size = () => {
-    if (pane.clientWidth && pane.clientHeight) resize(pane.clientWidth, pane.clientHeight);
-  };
-  return viewer;
+  return viewer_in(element("pane"));
 }
 
 // A list of numbers of a mesh (meshes.py says how it is packed).

@@ -1,22 +1,14 @@
 // The connection with the run: messages of the server, and local ones between the modules.
 "use strict";
 
+import { emit } from "./events.js";
+
+export { emit, on } from "./events.js";
+
 const RETRY = 1000; // [ms]
 const SLOW = 100; // [ms] from a frame to its picture
-const listeners = new Map();
 let socket = null, session = null;
 let frames = 0, seen = 0;
-
-// Calls `act` with each message of a kind. Of the server: "hello" (once), "state", "rows",
-// "earlier", "error"; of this page: "joined" (each connection), "frame", "picture", "theme", "lost".
-export function on(kind, act) {
-  if (!listeners.has(kind)) listeners.set(kind, []);
-  listeners.get(kind).push(act);
-}
-
-export function emit(kind, data) {
-  for (const act of listeners.get(kind) ?? []) act(data);
-}
 
 export function send(event) {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(event));

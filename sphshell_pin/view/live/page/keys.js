@@ -3,10 +3,13 @@
 
 import { element } from "./controls.js";
 
-const NAMES = { " ": "space", ArrowRight: "right arrow" };
+const NAMES = {
+  " ": "space", ArrowLeft: "left arrow", ArrowRight: "right arrow", ArrowUp: "up arrow",
+  ArrowDown: "down arrow",
+};
 const keys = []; // in the order in which the overlay lists them
 
-// { keys: of KeyboardEvent.key, says: what they do, act, repeats: while held down }
+// { keys: of KeyboardEvent.key, says: what they do, act: with the event, repeats: while held down }
 export function add_key(entry) {
   keys.push(entry);
   const row = element("keys").insertRow();
@@ -23,7 +26,8 @@ export function add_key(entry) {
 function belongs_to_control(event) {
   const { target, key } = event;
   if (target.type === "text" || target.tagName === "SELECT") return true;
-  if (target.type === "range") return key === "ArrowRight";
+  // That of the time of a recording goes by frames.
+  if (target.type === "range") return key === "ArrowRight" && target.id !== "scrub";
   // A button that was reached with the keyboard is pressed by it.
   return key === " " && target.closest("button, summary, input[type=checkbox]") !== null;
 }
@@ -34,7 +38,7 @@ document.addEventListener("keydown", (event) => {
   const entry = keys.find((one) => one.keys.includes(event.key));
   if (!entry || (event.repeat && !entry.repeats)) return;
   event.preventDefault();
-  entry.act();
+  entry.act(event);
 });
 
 // After a click, keys belong to the page again: else the space bar would press the button again.

@@ -3,44 +3,24 @@
 
 import { emit, on } from "./connection.js";
 import { element } from "./controls.js";
-import { flatten_materials } from "./materials.js";
 import { notice } from "./notices.js";
-import { parts } from "./theme.js";
+import { paint, viewer_in } from "./pane.js";
 
-const { Viewer, THREE } = globalThis.MeshCat;
+const { THREE } = globalThis.MeshCat;
 const ASPECT = 1.2; // as camera.py has it
 
 export class Picture {
   constructor(pane) {
     this.pane = pane;
-    this.viewer = new Viewer(pane);
-    const viewer = this.viewer;
-    globalThis.viewer = viewer;
-    viewer.gui.domElement.style.display = "none";
-    flatten_materials(viewer);
-    // The viewer takes the whole window for its own.
-    const resize = viewer.set_3d_pane_size.bind(viewer);
-    viewer.set_3d_pane_size = () => {
-      if (!pane.clientWidth || !pane.clientHeight) return;
-      this.fit();
-      resize(pane.clientWidth, pane.clientHeight);
-    };
+    const viewer = viewer_in(pane, () => this.fit());
+    this.viewer = viewer;
     new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane);
     this.eye = null;
     this.target = null;
     this.settled = false; // the camera belongs to the user once it has been placed
     this.take = viewer.handle_command.bind(viewer);
     viewer.handle_command = (command) => this.handle(command);
-    this.paint();
-    on("theme", () => this.paint());
-  }
-
-  // The background has the colors of the page.
-  paint() {
-    for (const [property, name] of [["top_color", "--sky"], ["bottom_color", "--earth"]]) {
-      this.take({ type: "set_property", path: "/Background", property, value: parts(name) });
-    }
-    this.viewer.set_dirty();
+    paint(viewer);
   }
 
   draw(buffer) {

@@ -1,7 +1,7 @@
 // Colors of the style sheet for what is drawn by scripts, light or dark as the user prefers.
 "use strict";
 
-import { emit } from "./connection.js";
+import { emit } from "./events.js";
 
 let style = getComputedStyle(document.documentElement);
 const known = new Map();

@@ -1,0 +1,50 @@
+"""What a result is shown with: the scene in which it moved, and its rows of finite numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.offered import offered
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
+
+
+def find_scene(result: Result, scene: Scene | None = None) -> Scene | None:
+    """Return `scene`, or the one that ran, or that of the scenario that `result` came from.
+
+    None if there is none of them. Raises ResultError if the scenario's cannot be built again,
+    InvalidParameter if `scene` is none.
+    """
+    scene = result.scene if scene is None else scene
+    if scene is None and result.origin is not None:
+        scene = offered("sphshell_pin.scenario.running.replay:Replay")(result).scene
+    if scene is not None and not isinstance(getattr(scene, "pairs", None), tuple):
+        raise InvalidParameter("scene", scene, "must be a Scene")
+    return scene
+
+
+def scene_of(result: Result, scene: Scene | None = None) -> Scene:
+    """Return what `find_scene` finds; ResultError where that is None."""
+    found = find_scene(result, scene)
+    if found is None:
+        raise ResultError("the result", "has no scene, as it was loaded: give scene=...")
+    return found
+
+
+def sound_rows(name: str, *states: NDArray[np.float64], limit: float = np.inf) -> int:
+    """Return how many rows of `states`, (n, k) each, there are up to where their numbers end.
+
+    That is where a run diverged: a number is not finite, or its size not below `limit`. Raises
+    ResultError, about `name`, if there is no row.
+    """
+    sound = np.all(np.abs(np.hstack(states)) < limit, axis=1)
+    count = len(sound) if sound.all() else int(np.argmin(sound))
+    if not count:
+        raise ResultError(name, "has no row of finite numbers")
+    return count
