@@ -9,15 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
-from sphshell_pin.benchmarks.work_precision_cases import (
-    Array,
-    Case,
-    decades,
-    rectangle,
-    steps,
-)
+from sphshell_pin.benchmarks.work_precision_cases import Case, decades, rectangle, steps
 from sphshell_pin.dynamics.run.integrators import Integrator
 
 

@@ -20,16 +20,15 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.timing import one_core
 from sphshell_pin.cases.machine import machine
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "docs" / "examples" / "05_circle_with_5_newtons.py"
 Names = dict[str, Any]
-Array = NDArray[np.float64]
 
 
 def with_euler(folder: Path) -> Names:

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.query import query_contestant
 from sphshell_pin.benchmarks.surfaces import (
     DEPTH,
@@ -44,7 +44,6 @@ from sphshell_pin.cases.contents import (
     number,
 )
 
-Array = NDArray[np.float64]
 PLACES = 300
 EXPONENT = 1.5
 TIMED_PLACES = 2000

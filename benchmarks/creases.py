@@ -8,13 +8,11 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin import Shell
 from sphshell_pin.benchmarks.convergence import EXPONENT
 from sphshell_pin.benchmarks.surfaces import BALL, DEPTH, RADIUS, ball_places, icosphere
 
-Array = NDArray[np.float64]
 LEVEL = 4  # of the icosphere: its sides are 0.3 of the sphere's radius
 SHARES = (0.0, 0.002, 0.005, 0.01, 0.02, 0.05)  # of a side
 PLACES = 300

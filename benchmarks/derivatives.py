@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.step import panda, start_of, with_sheet
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
 from sphshell_pin.benchmarks.timing import one_core, take_turns
@@ -22,7 +22,6 @@ from sphshell_pin.cases.contents import times_table
 from sphshell_pin.cases.machine import machine
 from sphshell_pin.testing.numbers import names_of
 
-Array = NDArray[np.float64]
 CALLS, ROUNDS = 2000, 50
 
 

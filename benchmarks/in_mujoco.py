@@ -13,15 +13,14 @@ from functools import partial
 import mujoco
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin.adapters.mujoco import attach
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.peers.merged import text
 from sphshell_pin.benchmarks.surfaces import Mesh, icosphere, torus
 from sphshell_pin.scenario import build
 
-Array = NDArray[np.float64]
 STATES, ROUNDS, CALLS = 1000, 15, 2000
 
 

@@ -17,9 +17,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import sizes
 from sphshell_pin.benchmarks.sizes import Row
-from sphshell_pin.benchmarks.surfaces import Array
 from sphshell_pin.benchmarks.timing import print_sections
 from sphshell_pin.cases import drawing
 from sphshell_pin.cases.contents import (

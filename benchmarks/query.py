@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 
-Array = NDArray[np.float64]
 RADIUS, DEPTH = 0.010, 0.0005  # [m]
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin import (
     Adaptive,
@@ -23,12 +22,12 @@ from sphshell_pin import (
     Simulation,
     Sphere,
 )
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.swing import GRAVITY, mean_period
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.dynamics import Result
 
-Array = NDArray[np.float64]
 # Damping of springs, as a part of the critical one: their oscillation at the start dies out.
 RATIO = 0.5
 PRECISE = Adaptive(1e-8)

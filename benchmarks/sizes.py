@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.processes import OwnProcess, resident
 from sphshell_pin.benchmarks.query import (
     DEPTH,
@@ -25,7 +26,7 @@ from sphshell_pin.benchmarks.query import (
     query_contestant,
     trimesh_contestant,
 )
-from sphshell_pin.benchmarks.surfaces import Array, touching_centers, wavy_sheet
+from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
 from sphshell_pin.benchmarks.timing import silent
 from sphshell_pin.cases.contents import Progress, Spread
 

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
 from sphshell_pin.benchmarks.timing import measure_import, part, silent, take_turns
 from sphshell_pin.cases import drawing
@@ -35,7 +35,6 @@ from sphshell_pin.cases.contents import (
     times_table,
 )
 
-Array = NDArray[np.float64]
 Times = dict[str, Array]
 DT, STEPS, RADIUS = 1e-5, 5000, 0.012
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")

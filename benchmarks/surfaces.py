@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from sphshell_pin.arrays import Array
 
 AMPLITUDE, WAVE_X, WAVE_Y = 0.03, 9.0, 7.0
 

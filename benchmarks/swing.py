@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
 from sphshell_pin.benchmarks.timing import one_core
@@ -23,7 +23,6 @@ from sphshell_pin.cases.contents import Table, columns
 from sphshell_pin.cases.machine import machine
 from sphshell_pin.dynamics import Result
 
-Array = NDArray[np.float64]
 RADIUS, BOWL = 0.010, 0.040  # of the ball and of the bowl [m]
 ARM = BOWL - RADIUS
 MASS, STIFFNESS, GRAVITY = 0.050, 1e4, 9.81

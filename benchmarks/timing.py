@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.cases.contents import Array, Progress, Section, markdown
+from sphshell_pin.arrays import Array
+from sphshell_pin.cases.contents import Progress, Section, markdown
 from sphshell_pin.cases.machine import machine
 
 

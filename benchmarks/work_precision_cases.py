@@ -9,16 +9,14 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import swing
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.step import RADIUS, START, panda, tip_position
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.integrators import Integrator
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

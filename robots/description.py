@@ -12,13 +12,11 @@ from xml.parsers import expat
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.robots.mjcf_additions import Extras, Site
 from sphshell_pin.robots.packages import Folders
-
-Array = NDArray[np.float64]
 
 DEEPEST = 100
 """Elements of the file one within another; robots need seven."""

@@ -13,15 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.shell.readers.ply import read_ply
-
-Array = NDArray[np.float64]
 
 
 class RobotError(SphshellError, ValueError):

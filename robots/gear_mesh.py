@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 MODULE = 0.005
 """Pitch diameter divided by the number of teeth [m]."""

@@ -8,13 +8,12 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_placement, check_type
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 _PLACES = 800  # of the mesh, at each of which a sphere may touch it
 _COVERED = 4000  # places whose distances from the spheres are made small

@@ -14,8 +14,8 @@ from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.robots.description import MOST_LINKS, Description
 from sphshell_pin.robots.mjcf_additions import Extras, Site
 from sphshell_pin.robots.mjcf_couplings import couplings
@@ -33,8 +33,6 @@ from sphshell_pin.robots.mjcf_values import (
     unit_of_angles,
 )
 from sphshell_pin.robots.packages import Folders
-
-Array = NDArray[np.float64]
 
 _SCALARS = ("damping", "frictionloss", "armature", "stiffness")
 # What makes bodies that this reader does not make.

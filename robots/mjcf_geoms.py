@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin._interrupts import interrupts_delayed
+from sphshell_pin.arrays import Array
 from sphshell_pin.robots.mjcf_values import number, numbers, text_of, turned_to
 from sphshell_pin.robots.packages import Folders
-
-Array = NDArray[np.float64]
 
 _INERTIA = pin.Inertia
 # Numbers in `size` of each kind of geom, its volume by these, and its inertia by mass and these.

@@ -9,11 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.robots.description import DEEPEST, check_size, parsed
-
-Array = NDArray[np.float64]
 
 MOST_FILES = 1000
 """Files that an MJCF may include, one as often as it is named."""

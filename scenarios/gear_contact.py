@@ -15,12 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin import Result, Scene
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics import SceneContacts
-
-Array = NDArray[np.float64]
 
 TEETH_1, TEETH_2 = 20, 40
 MODULE = 0.005  # pitch diameter / teeth [m]

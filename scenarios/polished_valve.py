@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin import Result, Scene
+from sphshell_pin.arrays import Array
 from sphshell_pin.patches import WearMap, wear_maps
-
-Array = NDArray[np.float64]
 
 COEFFICIENT = 1e-12  # run.wear [1/Pa]
 # The raster less 5 mm at each border, where strokes turn: along the barrel [m], about it [rad].

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import InvalidParameter
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.testing.differences import _AHEAD as AHEAD
 from sphshell_pin.testing.differences import _PLACES as PLACES
 from sphshell_pin.testing.differences import differentiated as derivative
@@ -23,7 +23,6 @@ from sphshell_pin.testing.numbers import changed, columns_of, is_place, names_of
 
 __all__ = ["AHEAD", "PLACES", "changed", "columns_of", "is_place", "names_of", "scale_of"]
 
-Array = NDArray[np.float64]
 Function = Callable[[float], Array]
 State = tuple[sp.Scene, Array, Array, Array]
 

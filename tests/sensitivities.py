@@ -8,12 +8,10 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from tests import differences, models
-
-Array = NDArray[np.float64]
 
 R = 0.05
 ADAPTIVE, IMPLICIT = sp.Adaptive(1e-11), sp.Implicit(1e-9)

@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.peers.drake_plant import (
     advance,
     empty,
@@ -28,7 +28,6 @@ from sphshell_pin.benchmarks.peers.shapes import Surface
 from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact
 from sphshell_pin.benchmarks.swing import BOWL
 
-Array = NDArray[np.float64]
 GUIDE = "Drake, Hydroelastic Contact User Guide"
 # The table is light and its motor holds its rate: with a heavy one, the solvers of contact stop too
 # early, their tolerance being a share of the momentum of all bodies together.

@@ -6,12 +6,10 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.peers.engine import CannotDo, Params
 from sphshell_pin.benchmarks.peers.scenes import Scene
-
-Array = NDArray[np.float64]
 
 
 def empty(params: Params, gravity: Any) -> tuple[Any, Any]:

@@ -6,13 +6,11 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from sphshell_pin.arrays import Array
 
 if TYPE_CHECKING:
     from sphshell_pin.benchmarks.peers.scenes import Scene
 
-Array = NDArray[np.float64]
 Params = dict[str, Any]
 
 

@@ -8,13 +8,11 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks.peers.engine import CannotDo, CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import PressScene
 from sphshell_pin.benchmarks.peers.scenes import Scene
 
-Array = NDArray[np.float64]
 HEAVY = 1e4  # moment of inertia of what does not turn, or keeps its rate [kg m^2]
 MOST_CELLS = 40  # of the search tree along a side
 REGULARIZED = 1e-3  # slip below which friction is proportional to it [m/s]: the default

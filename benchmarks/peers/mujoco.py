@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.merged import text
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
@@ -23,7 +23,6 @@ from sphshell_pin.benchmarks.peers.truths import (
     Turntable,
 )
 
-Array = NDArray[np.float64]
 # A contact of impedance d answers the share d of a load by itself and leaves 1 - d to the spring:
 # at the least impedance that MuJoCo has it is the spring of the scene. Friction needs more of it.
 SPRING, FIRM = 1e-4, 0.95

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
@@ -21,7 +21,6 @@ from sphshell_pin.benchmarks.rolling import turned, velocities
 from sphshell_pin.dynamics.run.advance import advance, start_run
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 
-Array = NDArray[np.float64]
 # Bristles are so much stiffer than the contact: what rolls should not slip.
 STIFFER = 100.0
 FULL_DAMPING_DEPTH = 1e-9  # [m]: the dashpot acts from the touch on

@@ -10,15 +10,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import step
 from sphshell_pin.benchmarks.peers import shapes
 from sphshell_pin.benchmarks.peers.engine import Trajectory
 from sphshell_pin.benchmarks.surfaces import height as wavy_height
 from sphshell_pin.errors import MissingExtra
 
-Array = NDArray[np.float64]
 FRAME = "panda_hand_tcp"
 CELLS, SIZE = 316, 1.0  # 2 * 316^2 = 199712 triangles; [m]
 PUSH = 0.015  # [m]

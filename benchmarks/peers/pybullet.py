@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.merged import MeshFiles, merged_urdf
 from sphshell_pin.benchmarks.peers.press import PressScene, at_the_end
@@ -18,7 +18,6 @@ from sphshell_pin.benchmarks.peers.scenes import Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
 from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Impact
 
-Array = NDArray[np.float64]
 SCALE = 10.0  # of lengths; masses and times stay, forces grow as lengths do, torques as squares
 GUIDE = "PyBullet Quickstart Guide"
 HEAVY = 1e6  # moment of inertia of what keeps its rate, in PyBullet's units

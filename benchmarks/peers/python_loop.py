@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
 from sphshell_pin.benchmarks.peers.scenes import Scene
@@ -17,7 +17,6 @@ from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl
 from sphshell_pin.benchmarks.query import coal_tree
 from sphshell_pin.benchmarks.step import bare
 
-Array = NDArray[np.float64]
 MOST = 1000  # contacts asked for
 APART = np.cos(np.deg2rad(30))  # contacts whose normals are closer than this are one
 CREEP = 1e-3  # [m/s]: up to here Coulomb friction grows in proportion to the slip

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import swing
 from sphshell_pin.benchmarks.surfaces import height as wavy_height
 from sphshell_pin.benchmarks.surfaces import random_grid, wavy_sheet
 
-Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
 
 

@@ -17,11 +17,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import swing
 from sphshell_pin.benchmarks.peers import shapes
 from sphshell_pin.benchmarks.peers.engine import Trajectory
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 GRAVITY = 9.81
 RADIUS, MASS, STIFFNESS = swing.RADIUS, swing.MASS, swing.STIFFNESS  # 10 mm, 50 g, 1e4 N/m

@@ -14,10 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sphshell_pin.adapters import imports_of
 from sphshell_pin.adapters.evaluator import check_fixed_step, check_without_history
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_names, check_type
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.dynamics.scene.variations import Variations
@@ -27,8 +28,6 @@ with imports_of("casadi"):
     import casadi
 
 __all__ = ["ForwardDynamics", "Step"]
-
-Array = NDArray[np.float64]
 
 
 class _Found(NamedTuple):

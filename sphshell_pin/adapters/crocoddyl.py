@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
 from sphshell_pin.adapters import imports_of
@@ -29,6 +29,7 @@ from sphshell_pin.adapters.evaluator import (
     check_fixed_step,
     check_without_history,
 )
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_placement, check_type, check_vector
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.errors import InvalidParameter
@@ -37,8 +38,6 @@ with imports_of("crocoddyl"):
     import crocoddyl
 
 __all__ = ["ContactDynamics", "ContactForceResidual", "ContactStep", "FrameResidual"]
-
-Array = NDArray[np.float64]
 
 
 class _Model:

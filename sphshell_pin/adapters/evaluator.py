@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.dynamics.run.advance import step_of
 from sphshell_pin.errors import InvalidParameter
-
-Array = NDArray[np.float64]
 
 FORCES = 4
 """Numbers of a pair: its normal force [N], and its force on the sphere in the world [N]."""

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.adapters import imports_of
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_names, check_placement, check_type
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.normal_law import NormalLaw
@@ -37,7 +38,6 @@ with imports_of("mujoco"):
 
 __all__ = ["MujocoContacts", "attach"]
 
-Array = NDArray[np.float64]
 
 # Stands for a mass that does not move: of bodies that only their partner's mobility counts for.
 _FIXED = 1e9

@@ -15,12 +15,12 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from sphshell_pin.arrays import Array
 
 Progress = Callable[[float], None]
 """Called with the share of a section that is done, 0 to 1."""
 Value = str | float | None
-Array = NDArray[np.float64]
 
 TIMES = "\u00d7"  # the unit of ratios
 

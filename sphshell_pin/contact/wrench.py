@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import (
     check_finite,
     check_not_negative,
@@ -17,8 +18,6 @@ from sphshell_pin.checks import (
 from sphshell_pin.contact.friction import Friction, check_friction
 from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
-
-Array = NDArray[np.float64]
 
 # Of force, moment and rate where nothing touches.
 _NOTHING = (0.0, np.zeros(3), np.zeros(3), np.zeros(3))

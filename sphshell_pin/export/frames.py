@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.dynamics.scene.scene import Scene
-
-Array = NDArray[np.float64]
 
 WORLD = "universe"
 """The root of all frames, as Pinocchio calls it."""

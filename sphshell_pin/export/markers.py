@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.export.cdr import Message
@@ -14,7 +14,6 @@ from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.robot import LINK_COLOR
 from sphshell_pin.view.surface import SURFACE_COLORS, SurfaceMesh
 
-Array = NDArray[np.float64]
 Stamp = tuple[int, int]
 
 # Of visualization_msgs/Marker.

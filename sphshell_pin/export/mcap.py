@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics.result.pair_series import PairSeries
@@ -38,8 +39,6 @@ from sphshell_pin.export.markers import (
 from sphshell_pin.export.messages import full_name, schema_of
 from sphshell_pin.tables import quantity_of
 from sphshell_pin.view.arrows import ArrowScale, largest_force
-
-Array = NDArray[np.float64]
 
 _ARROW = 8.0  # length of a usual force's arrow, in radii of the smallest sphere
 _INFO, _WARN = 20, 30  # of rcl_interfaces/Log

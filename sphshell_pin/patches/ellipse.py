@@ -7,9 +7,8 @@ pressure over the peak is sqrt(1 - |u|^2) in it, zero outside.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from sphshell_pin.arrays import Array
 
 _POINT = 1e-5  # of a half axis: shorter strokes are points, with an error of its square
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, poses_along
+from sphshell_pin.arrays import Array
+from sphshell_pin.patches.placed import Longs, PlacedPatches, patches_on, poses_along
 from sphshell_pin.patches.sampling import Grid, divide
 
 if TYPE_CHECKING:

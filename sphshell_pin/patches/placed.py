@@ -10,11 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
+
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
 
-Array = NDArray[np.float64]
 Longs = NDArray[np.int64]
 
 

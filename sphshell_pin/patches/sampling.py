@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
     from sphshell_pin.shell.shell import Shell
 
-Array = NDArray[np.float64]
 Longs = NDArray[np.int64]
 
 _MOST_SAMPLES = 3_000_000

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, read_only
 from sphshell_pin.dynamics.result.result_scene import scene_of
@@ -17,7 +18,7 @@ from sphshell_pin.errors import ResultError
 from sphshell_pin.offered import offered
 from sphshell_pin.patches.ellipse import stroke
 from sphshell_pin.patches.foundation import Overlap, overlap_of
-from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on
+from sphshell_pin.patches.placed import Longs, PlacedPatches, patches_on
 from sphshell_pin.patches.sampling import Grid, Samples, divide
 from sphshell_pin.patches.taxels import same_shell
 from sphshell_pin.summary import Fact, Summarized

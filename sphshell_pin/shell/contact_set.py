@@ -9,10 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized
-
-Array = NDArray[np.float64]
 
 
 class Feature(IntEnum):

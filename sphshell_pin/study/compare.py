@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import state_titles
@@ -21,8 +22,6 @@ from sphshell_pin.scenario.running.figures import (
     recorded_figures,
 )
 from sphshell_pin.tables import Table, column, quantity_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

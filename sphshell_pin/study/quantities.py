@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.tables import quantity_of
-
-Array = NDArray[np.float64]
 
 # What of a pair has a field of PairSeries.
 _SERIES = {"normal_force": "normal", "friction_force": "friction", "depth": "depth"}

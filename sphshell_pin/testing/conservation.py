@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics import Result, Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.testing.finding import Finding
 from sphshell_pin.testing.forces import mass_matrix
-
-Array = NDArray[np.float64]
 
 
 def momentum(result: Result) -> Finding:

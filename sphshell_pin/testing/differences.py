@@ -6,14 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.testing.finding import Finding, Optional, worst
 from sphshell_pin.testing.forces import accelerations, joint_jacobian, joint_names
 from sphshell_pin.testing.numbers import changed, is_place, names_of, scale_of
-
-Array = NDArray[np.float64]
 
 # Central differences of order 4: places, in steps, and weights.
 _PLACES = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0))

@@ -11,13 +11,12 @@ import math
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.testing.finding import Finding, Optional
-
-Array = NDArray[np.float64]
 
 
 def point_jacobian(model: pin.Model, data: pin.Data, joint: int, point_world: Array) -> Array:

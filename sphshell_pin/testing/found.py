@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_points, check_positive
 from sphshell_pin.dynamics import Result, Scene
 from sphshell_pin.dynamics.scene.models import find_frame
@@ -18,8 +19,6 @@ from sphshell_pin.shell import Shell
 from sphshell_pin.testing.conservation import scene_of
 from sphshell_pin.testing.finding import Finding, Optional, worst
 from sphshell_pin.testing.triangles import closest_inside, crossed, distances, pieces, samples
-
-Array = NDArray[np.float64]
 
 # Points nearer to each other, in radii, count as one; how far off they are is measured separately.
 _SAME = 1e-3

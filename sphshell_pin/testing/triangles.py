@@ -6,7 +6,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from sphshell_pin.arrays import Array
+
 Ints = NDArray[np.int64]
 
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from tests import differences, meshes, models
 from tests.contact.smooth.surfaces import SURFACES, shell_of
 from tests.dynamics.test_external_forces import Case
@@ -16,7 +16,6 @@ from tests.dynamics.test_mimic import CASES as MIMIC
 from tests.dynamics.test_mimic import with_contact
 from tests.models import ARM_Q, free_q
 
-Array = NDArray[np.float64]
 State = tuple[sp.Scene, Array, Array]
 
 DEPTHS = 0.1 * np.linspace(0.0, 1.0, 300) ** 2

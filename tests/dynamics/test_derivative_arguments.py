@@ -6,9 +6,9 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from sphshell_pin import CoulombFriction, Simulation
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import differences
 from tests.dynamics.scenes import (
@@ -20,8 +20,6 @@ from tests.dynamics.scenes import (
     in_touch,
     two_spheres,
 )
-
-Array = NDArray[np.float64]
 
 SCENE = in_bowl(LAWS["impact"], COULOMB)
 

@@ -9,10 +9,10 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin import testing
+from sphshell_pin.arrays import Array
 from tests import differences, meshes, models
 from tests.contact.smooth.surfaces import SURFACES
 from tests.dynamics import scenes
@@ -39,8 +39,6 @@ from tests.dynamics.scenes import (
 from tests.dynamics.test_external_forces import CASES
 from tests.dynamics.test_mimic import CASES as MIMIC
 from tests.models import ARM_Q, TURNING, free_q, two_free_bodies, two_free_state
-
-Array = NDArray[np.float64]
 
 IMPACT = LAWS["impact"]
 WHERE: dict[str, Callable[..., State]] = {

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from tests import differences, meshes
-
-Array = NDArray[np.float64]
 
 # Two fingers of two links each, as those of Robotiq's 2F-85: the knuckles of both sides follow one
 # joint, and the fingertips turn back so that the pads stay parallel.

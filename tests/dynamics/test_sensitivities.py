@@ -10,9 +10,9 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import Interrupted, InvalidParameter, ResultError
 from tests import differences, meshes, models
 from tests.dynamics.scenes import FRICTIONS
@@ -31,8 +31,6 @@ from tests.sensitivities import (
     thrown,
 )
 from tests.studies import mostly_studies
-
-Array = NDArray[np.float64]
 
 NUMBERS = [f"{PAIR}.law.stiffness", f"{PAIR}.sphere.radius", f"{PAIR}.placement", "q0", "v0"]
 

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from tests import models
@@ -22,8 +21,6 @@ from tests.sensitivities import (
     drop,
     every_integrator,
 )
-
-Array = NDArray[np.float64]
 
 
 @every_integrator

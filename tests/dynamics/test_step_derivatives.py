@@ -10,9 +10,9 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import differences, models
 from tests.dynamics import scenes
@@ -32,8 +32,6 @@ from tests.dynamics.scenes import (
 from tests.dynamics.test_mimic import CASES as MIMIC
 from tests.models import two_free_bodies, two_free_state
 from tests.studies import mostly_studies
-
-Array = NDArray[np.float64]
 
 DT = 2e-4
 STEPPERS = {

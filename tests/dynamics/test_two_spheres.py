@@ -8,10 +8,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
 from sphshell_pin import testing
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import DeepStart
 from tests import models
 from tests.dynamics.scenes import (
@@ -27,8 +27,6 @@ from tests.dynamics.scenes import (
     two_bodies,
     two_spheres,
 )
-
-Array = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("turned", [False, True])

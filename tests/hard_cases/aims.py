@@ -9,8 +9,9 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from tests import meshes, models
-from tests.hard_cases.targets import Array, Target, all_targets, borders, sweep
+from tests.hard_cases.targets import Target, all_targets, borders, sweep
 
 # Depth at which the law has taken up all of the sphere's energy, in radii.
 STOPPED_AT = 0.3

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import swing
 from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
 from tests import models
@@ -40,7 +40,6 @@ from tests.hard_cases.balls import (
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 from tests.oracle.mechanics import total_momentum
 
-Array = NDArray[np.float64]
 SPIN = 300.0  # [rad/s]
 SWINGS = 100
 

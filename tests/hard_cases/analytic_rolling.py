@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import rolling
 from sphshell_pin.benchmarks.swing import ball_model
 from sphshell_pin.dynamics import Result
@@ -38,7 +38,6 @@ from tests.hard_cases.balls import (
 )
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
-Array = NDArray[np.float64]
 SOFT = spring(1e5)
 
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import rolling
 from sphshell_pin.benchmarks.swing import ball_model, downward_crossings, mean_period
 from sphshell_pin.dynamics import Result
@@ -35,7 +35,6 @@ from tests.hard_cases.balls import (
 )
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
-Array = NDArray[np.float64]
 STILL = np.zeros(3)
 BOWL = DOME = 0.040
 

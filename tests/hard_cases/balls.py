@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.rolling import PRECISE, RATIO, Ball, state, turned, velocities
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
 from sphshell_pin.dynamics import Result
@@ -21,7 +21,6 @@ __all__ = [
     "center_at", "event_times", "free_ball", "scene_of", "spins", "spring", "state", "tilted",
     "turned", "velocities",
 ]  # fmt: skip
-Array = NDArray[np.float64]
 BALL = Ball(MASS, RADIUS)
 INERTIA = BALL.inertia
 # Stiffness of contacts whose depth should not count [N/m], and of bristles.

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, shipped_scenarios
 from tests import meshes, models
-from tests.hard_cases.targets import Array
 from tests.hard_cases.verdict import Verdicts, at_most, case
 
 RADIUS = 0.01

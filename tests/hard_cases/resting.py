@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact.normal_law import bisect
 from tests import meshes, models
-from tests.hard_cases.targets import Array
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
 RADIUS, MASS, GRAVITY = 0.02, 0.3, 9.81

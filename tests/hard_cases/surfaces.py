@@ -10,16 +10,15 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
 from sphshell_pin.benchmarks.swing import any_turn
 from tests import meshes
 from tests.contact.smooth import surfaces as unit
 from tests.hard_cases.balls import RADIUS
 
-Array = NDArray[np.float64]
 Place = Callable[[Array, Array], tuple[Array, Array]]
 SIDE = 0.15
 

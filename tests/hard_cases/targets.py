@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks import surfaces
 from tests import meshes
 from tests.shell.surfaces import tetrahedron
 
-Array = NDArray[np.float64]
 Mesh = tuple[Array, NDArray[np.int32]]
 
 BOX, TUBE = 4.0, 3.0

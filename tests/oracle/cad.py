@@ -25,12 +25,11 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial import cKDTree
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from sphshell_pin.shell.cad.model import box_size
 from sphshell_pin.shell.curved import curved_mesh, points_at
 from sphshell_pin.shell.raw import area_vectors, random_places
 from tests.parts.occ import faces, parts
-
-Array = NDArray[np.float64]
 
 SEEDS, EDGE_SEEDS = 16, 6
 """How many of the nearest seeds are tried for each point, on faces and on edges."""

@@ -19,9 +19,8 @@ Lengths are in units of the largest depth, times in those of that depth over the
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from sphshell_pin.arrays import Array
 
 # K^2 of a solid ball: a force moves its contact point 1 + 1 / K^2 times as much as its center.
 SOLID = 0.4

@@ -13,9 +13,8 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from tests.oracle.geometry import closest_on_segment, closest_on_triangles
-
-Array = NDArray[np.float64]
 
 
 def potential_and_force(

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from tests.parts.cad_mesh import Array, CadMesh, Ints, area_vectors
+from sphshell_pin.arrays import Array
+from tests.parts.cad_mesh import CadMesh, Ints, area_vectors
 from tests.parts.occ import Rng
 
 Written = tuple[Path, Ints]

@@ -8,7 +8,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from sphshell_pin import ImpactLaw, Shell
-from tests.parts.cad_mesh import MM, Array, CadMesh, Ints, coarse_enough, joined
+from sphshell_pin.arrays import Array
+from tests.parts.cad_mesh import MM, CadMesh, Ints, coarse_enough, joined
 from tests.parts.files import KINDS_OF_FILE
 from tests.parts.found import Found, faces_found, share_recognized
 from tests.parts.solids import family_of, random_solid

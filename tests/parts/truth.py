@@ -17,17 +17,10 @@ from OCP.IntTools import IntTools_FClass2d
 from OCP.TopAbs import TopAbs_IN
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from sphshell_pin.shell.cad.face_mesh import FaceMesh
 from sphshell_pin.shell.cad.tessellation import Tessellation
-from tests.parts.cad_mesh import (
-    KINDS,
-    Array,
-    CadMesh,
-    Ints,
-    area_vectors,
-    joined,
-    meshed_faces,
-)
+from tests.parts.cad_mesh import KINDS, CadMesh, Ints, area_vectors, joined, meshed_faces
 from tests.parts.occ import OccFailed, Rng, Solid
 
 FINE, FINE_ANGLE = 2e-4, 0.2

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from tests.shell import cad_shapes as shapes
-
-Array = NDArray[np.float64]
 
 REAL_FILES = {
     "gmsh_mesh_T106_V3.step": None,

@@ -14,14 +14,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.cases.machine import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.quantities import quantities_of
-
-Array = NDArray[np.float64]
 
 NOISE, STEP = 0.02, 2e-4  # of the largest value of each column; between times [s]
 SCENARIO = """

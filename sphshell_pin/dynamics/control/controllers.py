@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import (
     check_configuration,
     check_names,
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
 
 __all__ = ["GravityCompensation", "JointPD"]
-
-Array = NDArray[np.float64]
 
 
 # One number for all driven joints, one each (nv,), or by joint, 0 for the others.

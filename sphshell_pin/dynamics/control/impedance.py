@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import (
     check_name,
     check_placement,
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CartesianImpedance"]
 
-Array = NDArray[np.float64]
 
 # Of a path's points from their shell, as a part of its size, and of the path from the moved point,
 # as a part of the robot's reach: what is farther is probably a mistake.

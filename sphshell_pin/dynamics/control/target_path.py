@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 
 __all__ = ["Curve", "Timing", "path_fields"]
 
-Array = NDArray[np.float64]
 
 # A path on a shell has a knot each `size` / KNOTS: pieces between points leave a curved surface. A
 # spline has that many on its length, and some between two points.

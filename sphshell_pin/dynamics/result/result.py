@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.result import result_columns
 from sphshell_pin.dynamics.result.contact_patches import PATCH, Patches
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from sphshell_pin.view.film import FilmOptions
     from sphshell_pin.view.recording import RecordingView
 
-Array = NDArray[np.float64]
 
 EVENT_KINDS = get_args(EventKind)
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.result.contact_patches import patch_columns
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import Scene
 
 Columns = dict[str, ArrayLike]
-Array = NDArray[np.float64]
 
 # Of joints with several coordinates: the units of q and of v.
 _SEVERAL = {

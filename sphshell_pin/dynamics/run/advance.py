@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import (
     check_finite,
     check_moved_mass,
@@ -40,7 +41,6 @@ from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 from sphshell_pin.errors import DeepStart, InvalidParameter, SetupWarning, WeakLawWarning
 
-Array = NDArray[np.float64]
 AnyController = Controller | Callback | None
 # A compiled run, or what a rollout keeps of one.
 Ended: TypeAlias = "_core.Simulation | _core.Outcome"

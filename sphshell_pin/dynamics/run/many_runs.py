@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_floats
 from sphshell_pin.dynamics.run.advance import GLANCE, AnyController, CtrlC, bind_controller
 from sphshell_pin.dynamics.run.integrators import Integrator
@@ -18,7 +18,6 @@ from sphshell_pin.dynamics.sensing.sensors import SensorSet
 from sphshell_pin.errors import InvalidParameter, SphshellError
 from sphshell_pin.shell.options import thread_count
 
-Array = NDArray[np.float64]
 Start = tuple[Array, Array]
 
 # So many runs, for each thread, are made ready while others run.

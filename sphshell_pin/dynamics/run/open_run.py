@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_not_negative, check_vector
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.run_stats import RunStats
@@ -27,8 +28,6 @@ from sphshell_pin.dynamics.scene.one_user import one_at_a_time
 from sphshell_pin.dynamics.scene.scene import ContactPair, Scene
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 from sphshell_pin.errors import InvalidParameter, NotPicklable
-
-Array = NDArray[np.float64]
 
 # The compiled loop wants an end [s]; steps of a microsecond can be counted so far.
 _FOR_EVER = 1e6

@@ -10,9 +10,9 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, NoReturn, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.run_stats import PairFigures
@@ -35,7 +35,6 @@ from sphshell_pin.summary import Detail, Fact, Summarized, names
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 _STOPPED = 0
 # What the interpreter tells before the exception itself.

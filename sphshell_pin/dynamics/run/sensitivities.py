@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.control.callables import reads_sensors
 from sphshell_pin.dynamics.scene.derivatives import core_parameters
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
 
-Array = NDArray[np.float64]
 
 # The share of its size by which a row is moved where a figure is differenced.
 _STEP = 1e-6

@@ -7,10 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.explain import explain_pairs, relaxation_time
 from sphshell_pin.dynamics.scene.scene_contacts import Rows, SceneContacts
 from sphshell_pin.errors import InvalidParameter
@@ -21,7 +19,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair
     from sphshell_pin.dynamics.scene.scene import Scene
 
-Array = NDArray[np.float64]
 
 # Of Parameter in C++.
 _FIELD, _RADIUS, _BALL, _OFFSET, _PLACEMENT = range(5)

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair
     from sphshell_pin.dynamics.scene.scene import Scene
 
-Array = NDArray[np.float64]
 
 # Speed of approach where neither v nor a fall gives one [m/s].
 DEFAULT_SPEED = 0.1

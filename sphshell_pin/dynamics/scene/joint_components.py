@@ -9,9 +9,9 @@ from typing import TypeVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import (
     as_floats,
     check_not_negative,
@@ -24,7 +24,6 @@ from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.dynamics.scene.models import find_joint
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 # One number for all velocities of a joint, or one for each.
 Numbers = float | Sequence[float]

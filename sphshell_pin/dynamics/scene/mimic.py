@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import SphshellError
-
-Array = NDArray[np.float64]
 
 # [rad, m] Between a joint's stated position and the one that its mimic rule gives it.
 _OFF = 1e-6

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_name
 from sphshell_pin.dynamics.scene.mimic import group_of, mimics
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.units import size_warning
-
-Array = NDArray[np.float64]
 
 # How far beyond a limit a joint may be for having been rounded [rad or m].
 _BEYOND = 1e-6

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_positive, check_type
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.scene.constraints import ContactConstraints, constraints_of
@@ -26,8 +26,6 @@ from sphshell_pin.dynamics.scene.scene_state import SceneState
 from sphshell_pin.named_numbers import columns_of, names_of_pairs
 
 __all__ = ["ContactPair", "Scene", "SceneContacts", "SceneState"]
-
-Array = NDArray[np.float64]
 
 
 class Scene(SceneParts):

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import read_only
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized
 
-Array = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]  # of numbers of several kinds
 Rows = bytes | bytearray | NDArray[np.uint8]
 

@@ -11,9 +11,10 @@ from typing import Self, TypedDict, TypeVar, Unpack
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import (
     check_configuration,
     check_name,
@@ -40,7 +41,6 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.shell import Shell
 from sphshell_pin.summary import Detail, Fact, Summarized, names
 
-Array = NDArray[np.float64]
 C = TypeVar("C", _core.Scene, _core.SceneState)
 
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import as_floats
 from sphshell_pin.errors import InvalidParameter, add_origin
 
-Array = NDArray[np.float64]
 Find = Callable[[pin.SE3, pin.SE3], tuple[ArrayLike, ArrayLike, ArrayLike]]
 
 # Each takes 0.6 kB in every evaluation: more are, as a rule, a mistake of the routine.

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_points, check_positive, check_vector
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-
-Array = npt.NDArray[np.float64]
 
 PLACES: dict[str, tuple[float, float, float]] = {
     "below": (0.0, 0.0, -1.0),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 import numpy as np
-import numpy.typing as npt
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, come_down
@@ -14,8 +14,6 @@ from sphshell_pin.scenario.drafting.wording import listed
 from sphshell_pin.shell.faces import Face, described
 from sphshell_pin.shell.raw import KINDS
 from sphshell_pin.shell.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 # How far the sphere may touch beside the place asked for, in radii, and a point be from the
 # surface, as a part of its size; radii of faces that are alike, as a part of them.

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import coal
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, held_joints
 from sphshell_pin.scenario.drafting.fingertips import AT_TIP, Tip
 from sphshell_pin.shell.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 # Contacts of the tip's own link that are looked at.
 _MOST_CONTACTS = 1000

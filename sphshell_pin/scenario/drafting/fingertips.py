@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry
-
-Array = npt.NDArray[np.float64]
 
 # Of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's place, as
 # meshes of fingertips stand out of the spheres that stand for them.

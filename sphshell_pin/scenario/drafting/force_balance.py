@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from sphshell_pin.arrays import Array
 
 # Sides of the pyramid that stands for a friction cone, inscribed in it.
 _SIDES = 8

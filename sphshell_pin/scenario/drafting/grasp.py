@@ -7,16 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import leader_of, mimics
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.shell.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 # Hands that are tried: random postures, and how many of them, the best, get a part.
 _POSTURES, _BEST = 8000, 60

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import SphshellError
@@ -28,8 +28,6 @@ from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.schema import RobotSection
 from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.shell.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 # Weights that friction could carry under the forces by default.
 _SAFETY = 3.0

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact.materials import Material, friction_between
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.scenario.drafting.draft_text import toml
@@ -26,8 +26,6 @@ from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.schema import ShellSection
-
-Array = npt.NDArray[np.float64]
 
 GAP = 1e-4
 """Of each fingertip at the start [m]."""

@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 # How far a ball that covers an end may stand out before it, as a part of its radius: else the end
 # is flat, and gets a ball of this part of that radius. Without geometry: as a part of the reach.

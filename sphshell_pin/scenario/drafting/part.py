@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin._interrupts import interrupts_delayed
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, load_file
 from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
 from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, Primitive
 from sphshell_pin.shell.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.placing import Place, nearer
@@ -22,8 +22,6 @@ from sphshell_pin.scenario.drafting.touch_points import (
 )
 from sphshell_pin.scenario.drafting.wording import mm
 from sphshell_pin.shell.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 # The path across a surface: radii long at most, and this part of the reach. It is a path from this
 # number of radii on, and no longer one is looked for from this part of it on.

@@ -6,17 +6,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.poses import Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
 from sphshell_pin.scenario.drafting.wording import axis_name
 from sphshell_pin.scenario.format.build import Built
-
-Array = npt.NDArray[np.float64]
 
 # Turns of the part about the approach, tried in this order [rad].
 _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))

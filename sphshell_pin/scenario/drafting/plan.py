@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.fingertips import Tip
@@ -32,8 +32,6 @@ from sphshell_pin.scenario.drafting.wording import (
     rounded,
 )
 from sphshell_pin.shell import Shell
-
-Array = npt.NDArray[np.float64]
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
@@ -40,8 +40,6 @@ from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.schema import RobotSection
-
-Array = npt.NDArray[np.float64]
 
 # Drafts that are run, in all, before a path is given up, and of a robot that floats.
 _MOST_RUNS, _MOST_SLIDES, _MOST_DROPS = 10, 6, 3

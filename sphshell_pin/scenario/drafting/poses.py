@@ -6,15 +6,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.format.reach import Reach, turn_between
-
-Array = npt.NDArray[np.float64]
 
 # Mobility along the approach and across it, as a part of the best one: below the first a posture is
 # singular; the posture that a robot is known to work in is taken from the second on.

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from sphshell_pin.arrays import Array
 
 if TYPE_CHECKING:
     from sphshell_pin.shell.shell import Shell
 
-Array = npt.NDArray[np.float64]
 
 # A path on a surface ends before a turn this sharp from one of its points to the next.
 _SHARPEST = np.cos(np.deg2rad(35.0))

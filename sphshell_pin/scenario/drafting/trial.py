@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.draft_text import HELD
@@ -19,8 +19,6 @@ from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.running.figures import judge
 from sphshell_pin.scenario.running.run import simulate
-
-Array = npt.NDArray[np.float64]
 
 # Rows at which links are held against the part.
 _MOST_ROWS = 300

@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import off_unit_length
 from sphshell_pin.dynamics.scene.mimic import check_follows, count_of_all, mimics, shortened
 from sphshell_pin.dynamics.scene.models import (
@@ -31,8 +31,6 @@ from sphshell_pin.scenario.format.schema import (
     Scenario,
     TipAt,
 )
-
-Array = npt.NDArray[np.float64]
 
 # Of a tip that is brought somewhere: starts of the search, and how near it comes [m], [rad].
 _SEEDS, _AT_TIP, _ALONG = 40, 1e-6, 1e-4

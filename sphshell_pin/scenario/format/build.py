@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.function_friction import FunctionFrictionFile
 from sphshell_pin.contact.function_law import FunctionFile
@@ -59,7 +59,6 @@ from sphshell_pin.scenario.format.sliders import check_knobs
 from sphshell_pin.scenario.format.sphere_tables import spheres_of, to_end, to_sphere
 from sphshell_pin.summary import Fact, Summarized
 
-Array = npt.NDArray[np.float64]
 # A user's own; what it takes depends on where the scenario names it.
 Function = Callable[..., Any]
 

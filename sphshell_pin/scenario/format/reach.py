@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame
-
-Array = npt.NDArray[np.float64]
 
 # Steps of a solution, the largest turn of a joint in one of them [rad], its least damping, and the
 # residual at which it is found.

@@ -6,17 +6,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.models import apparent_mass, find_frame
 from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.run.open_run import OpenRun
     from sphshell_pin.dynamics.scene.scene import Scene
-
-Array = npt.NDArray[np.float64]
 
 
 def movable_bodies(scene: Scene) -> tuple[str, ...]:

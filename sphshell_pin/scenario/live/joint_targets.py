@@ -7,17 +7,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import model_reach, set_joint
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin import _core
+from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_finite, check_not_negative, check_positive, check_vector
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
@@ -27,8 +28,6 @@ from sphshell_pin.scenario.live.drag import Drag, Dragged, movable_bodies
 from sphshell_pin.scenario.live.joint_targets import Target, aimed, check_aim, targets_of
 from sphshell_pin.scenario.running.player import Rows
 from sphshell_pin.scenario.running.series import Series, held, series_of
-
-Array = npt.NDArray[np.float64]
 
 # Between the rows for a chart [s].
 ROW_DT = 5e-3

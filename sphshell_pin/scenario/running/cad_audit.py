@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import SphshellError, UnitWarning
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result_parts import ContactLog
     from sphshell_pin.scenario.format.schema import ShellSection
 
-Array = npt.NDArray[np.float64]
 
 NOWHERE, ON_FACE = 0, 2
 """Kinds of places next to a contact, as `cad.jobs.stationary_points` returns them."""

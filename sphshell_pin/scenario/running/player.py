@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
+
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import SceneContacts
 
-Array = NDArray[np.float64]
 
 FORCES = ("normal_force", "friction_force", "depth")
 

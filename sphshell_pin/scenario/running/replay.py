@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
@@ -26,8 +27,6 @@ from sphshell_pin.scenario.format.sliders import LiveParameter
 from sphshell_pin.scenario.running.kept_scenario import restore
 from sphshell_pin.scenario.running.player import Rows
 from sphshell_pin.scenario.running.series import Series, held, series_of
-
-Array = npt.NDArray[np.float64]
 
 # What moves the bodies, and what judges the outcome, is not needed to show them.
 UNSHOWN = ("controller", "sensor", "figures", "expect", "knob")

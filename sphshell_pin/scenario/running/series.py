@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.scenario.running.player import Rows
 from sphshell_pin.tables import quantity_of
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
 
-Array = NDArray[np.float64]
 
 # Units of charts, as people read them: the factor from SI units, and the name.
 _SHOWN = {

@@ -14,11 +14,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound
 from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.quantities import Quantity
 
-Array = NDArray[np.float64]
 Source = str | PathLike[str] | Mapping[str, ArrayLike]
 
 TIME, SIGMA = "t", ".sigma"

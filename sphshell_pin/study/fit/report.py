@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.atomic import write_whole
 from sphshell_pin.json_text import json_text
 from sphshell_pin.scenario.format.reading import find_scenario
@@ -21,8 +21,6 @@ from sphshell_pin.summary import Detail, Fact, Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

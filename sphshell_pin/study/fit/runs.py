@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import (
     DataError,
@@ -26,8 +26,6 @@ from sphshell_pin.scenario.format.reading import change_scenario
 from sphshell_pin.study.fit.data import Measured
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.quantities import row_step
-
-Array = NDArray[np.float64]
 
 # Of integrators with a fixed step: differences see rounding and the kinks at touches.
 _FIXED_STEP_TOLERANCE = 1e-9

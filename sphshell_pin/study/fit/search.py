@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.remarks import remarks_on
 from sphshell_pin.study.fit.report import Fit, Fitted, Series
 from sphshell_pin.study.fit.runs import Runs, Trial, central_step, forward_step
 from sphshell_pin.study.fit.statistics import Spread, serial_of, spread_of, student_factor
 
-Array = NDArray[np.float64]
 Progress = Callable[[int, float], object]
 
 # Weights that are estimated change the values, which change the weights.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from sphshell_pin.arrays import Array
 
 # Of a residual that is noise, a test says in so many cases that it is not.
 FALSE_ALARM = 0.01

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics import Adaptive, Result, Scene, SemiImplicitEuler, Simulation
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.errors import SimulationDiverged, SphshellError
@@ -29,8 +29,6 @@ from sphshell_pin.testing.differences import derivatives
 from sphshell_pin.testing.finding import Finding, worst
 from sphshell_pin.testing.forces import balance, reaction
 from sphshell_pin.testing.found import contacts_of_scene, passage
-
-Array = NDArray[np.float64]
 
 # Speed of the sphere in radii per second, and depth in radii where it touches.
 SPEED, _DEPTH = 25.0, 0.1

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
 from sphshell_pin.dynamics.scene.models import reduced_model
 from sphshell_pin.testing.forces import joint_names, mass_matrix
-
-Array = NDArray[np.float64]
 
 # Below this, of mass matrices with a unit diagonal, rounding decides the accelerations.
 _SINGULAR = 1e-9

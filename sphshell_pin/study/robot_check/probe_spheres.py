@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact import Sphere
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.errors import SphshellError
@@ -13,8 +13,6 @@ from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
 from sphshell_pin.study.robot_check.models import Subject
 from sphshell_pin.study.robot_check.postures import random_posture
 from sphshell_pin.testing.forces import point_jacobian
-
-Array = NDArray[np.float64]
 
 # Of spheres whose size nobody knows [m]: least and largest. Smaller ones in a URDF's collision
 # geometry than _DUMMY [m] only keep a place.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
@@ -24,8 +24,6 @@ from sphshell_pin.study.robot_check.probe_spheres import (
     placed_data,
 )
 from sphshell_pin.testing.forces import mass_matrix, point_jacobian
-
-Array = NDArray[np.float64]
 
 PLATE, BASE = "sphshell_check_plate", "sphshell_check_base"
 

@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.rolling import turned
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.study.validation.cases import Array
 
 GAP = 1e-3  # before the touch, over the radius
 PRECISE = 1e-9

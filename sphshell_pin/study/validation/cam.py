@@ -9,9 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Array, Outcome, case, read, within
+from sphshell_pin.study.validation.cases import Outcome, case, read, within
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 ECCENTRICITY = 0.05  # [m]: half the published displacement

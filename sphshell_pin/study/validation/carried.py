@@ -12,12 +12,13 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.rolling import Ball, turned
 from sphshell_pin.benchmarks.swing import GRAVITY
 from sphshell_pin.cases.contents import Finding, Table, columns
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Array, Outcome, case, read
+from sphshell_pin.study.validation.cases import Outcome, case, read
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 BOX, SIDES, FORCE = 10.0, np.array([20.0, 20.0, 1.0]), 150.0  # [kg], [m], [N]

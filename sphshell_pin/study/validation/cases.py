@@ -17,16 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sphshell_pin
+from sphshell_pin.arrays import Array
 from sphshell_pin.cases.contents import Finding, Picture, Progress, Section, Table
 from sphshell_pin.cases.register import Register
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.study.report.making import Part, Report, Tell, make_report
 from sphshell_pin.study.report.page import Heading
-
-Array = NDArray[np.float64]
 
 MODULES = (
     "kharaz",

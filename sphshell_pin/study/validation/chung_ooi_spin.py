@@ -6,10 +6,11 @@ import dataclasses
 
 import numpy as np
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation import maw
 from sphshell_pin.study.validation.balls import Ball, head_on
-from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read, within
+from sphshell_pin.study.validation.cases import Data, Outcome, case, read, within
 from sphshell_pin.study.validation.kharaz import RINGS, THEORY
 from sphshell_pin.study.validation.oblique import Setting, rms
 from sphshell_pin.study.validation.pictures import Panel, draw

@@ -9,11 +9,12 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.cases.contents import Table, columns
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read, within
+from sphshell_pin.study.validation.cases import Data, Outcome, case, read, within
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 FILE = "elliptical_contacts"

@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.arrays import Array
 from sphshell_pin.cases.contents import Finding
 from sphshell_pin.study.validation import maw
-from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read, within
+from sphshell_pin.study.validation.cases import Data, Outcome, case, read, within
 from sphshell_pin.study.validation.oblique import Rebound, Setting, of, rms, thrown
 from sphshell_pin.study.validation.pictures import Panel, draw
 

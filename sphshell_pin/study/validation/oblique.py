@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.study.validation.balls import Ball, Impact, head_on, on_plane
-from sphshell_pin.study.validation.cases import Array
 
 RIGID = 1e20  # Young's modulus [Pa] of what the benchmarks call rigid
 

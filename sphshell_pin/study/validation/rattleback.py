@@ -14,9 +14,10 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.cases.contents import Finding
-from sphshell_pin.study.validation.cases import Array, Outcome, case
+from sphshell_pin.study.validation.cases import Outcome, case
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 AXES = np.array([0.2, 0.03, 0.02])  # [m]

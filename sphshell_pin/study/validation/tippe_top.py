@@ -13,12 +13,13 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.rolling import UP, turned
 from sphshell_pin.cases.contents import Finding
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Array, Outcome, case
+from sphshell_pin.study.validation.cases import Outcome, case
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 MASS, RADIUS, OFF, GRAVITY = 0.02, 0.02, 0.006, 9.82  # kg, m, m, m/s^2

@@ -13,13 +13,14 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.arrays import Array
 from sphshell_pin.benchmarks.models import model_of
 from sphshell_pin.benchmarks.rolling import turned
 from sphshell_pin.benchmarks.swing import GRAVITY
 from sphshell_pin.cases.contents import Finding
 from sphshell_pin.errors import UnitWarning
 from sphshell_pin.study.validation.balls import plane
-from sphshell_pin.study.validation.cases import Array, Outcome, case, data_folder
+from sphshell_pin.study.validation.cases import Outcome, case, data_folder
 from sphshell_pin.study.validation.pictures import Panel, draw
 
 MASS, INERTIA, WIDTH = 0.37, 0.00081, 0.1048  # [kg], [kg m^2], [m], as published with the data

@@ -10,16 +10,13 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from sphshell_pin.cases.measured import Measured, write
 from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import jittered_grid
 from tests.contact.smooth.test_real_surfaces import faults, jump
-
-Array = NDArray[np.float64]
-
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from tests import meshes
 
-Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 

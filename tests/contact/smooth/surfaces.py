@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from tests import meshes
 from tests.contact.helpers import directions
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,19 +7,11 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
 from tests.contact.helpers import energy, force_sum
-from tests.contact.smooth.hard_cases import (
-    DEPTH,
-    UP,
-    Array,
-    assert_no_jump,
-    fails,
-    find,
-    given,
-    push,
-)
+from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, given, push
 from tests.contact.smooth.test_true_edges import cone
 from tests.oracle.pieces import potential_and_force
 

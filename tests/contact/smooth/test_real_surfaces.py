@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 from sphshell_pin.shell.faces import Face
@@ -28,8 +28,6 @@ from tests.contact.smooth.surfaces import mean_edge
 from tests.contact.walks import narrowed
 from tests.shell import test_corpus as corpus
 from tests.shell.surfaces import DATA
-
-Array = NDArray[np.float64]
 
 COUNT = int(os.environ.get("SPHSHELL_SPHERES", "1500"))
 WALKS = COUNT // 10
