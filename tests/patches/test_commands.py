@@ -33,6 +33,9 @@ def test_a_scenario_writes_patches_wear_and_taxels(tmp_path):
         pressed = np.bincount(result.contacts.row, result.contacts.normal_force, len(result.t))
         felt = file["forces"].sum(axis=(1, 2)) + file["outside"]
         np.testing.assert_allclose(felt, pressed, rtol=1e-12, atol=1e-300)
+        # A loaded result finds the scene of its scenario.
+        grid = sp.TaxelGrid("ball-plate", (4, 6), axis=(0, 0, -1))
+        np.testing.assert_array_equal(grid.images(result).forces, file["forces"])
     assert (out / "taxels.gif").is_file()
 
 
