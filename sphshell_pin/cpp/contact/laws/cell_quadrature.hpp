@@ -67,7 +67,8 @@ class CellQuadrature {
     Vec2 a, b;
     bool is_arc;
   };
-  static constexpr int kMostPieces = 64, kMostLevels = 12;
+  // In levels a quarter counts two, a half one.
+  static constexpr int kMostPieces = 64, kMostLevels = 24;
 
   template <class Visit>
   void part(const Part& w, int level, Visit& visit);
@@ -176,10 +177,35 @@ class CellQuadrature::Arc {
   double length_ = 0, lean_ = -1, rise_a_ = 0, rise_b_ = 0;
 };
 
-// Into four similar triangles by the middles of the sides.
+// Into four similar triangles by the middles of the sides. Those of a long one would all be long:
+// it is cut in two, from its longest side to the corner opposite.
 template <class Visit>
 void CellQuadrature::divide(const Part& w, int level, Visit& visit) {
-  for (const Corners& quarter : quarters(w.corner)) part({quarter}, level + 1, visit);
+  int k = 0;
+  double longest2 = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double side2 = to_plane(w.corner[next_corner(i)] - w.corner[i]).squaredNorm();
+    if (side2 > longest2) longest2 = side2, k = i;
+  }
+  const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
+  const Vec2& top = w.corner[next_corner(next_corner(k))];
+  const Vec2 base = to_plane(q - p), up = to_plane(top - p);
+  // No longer than four times its height.
+  if (longest2 <= 4 * (base.x() * up.y() - base.y() * up.x())) {
+    for (const Corners& quarter : quarters(w.corner)) part({quarter}, level + 2, visit);
+    return;
+  }
+  // Halved time and again, a needle falls into ever more and thinner ones side by side. It is cut
+  // at once to the size that is wanted round the point nearest to the center, which is its distance
+  // from the center. Where that vanishes, cuts would leave slivers: a share of the radius instead.
+  const Vec3 from = patch_.point(p.x(), p.y()), along = patch_.point(q.x(), q.y()) - from;
+  const double near = std::clamp(-from.dot(along) / longest2, 0.0, 1.0);
+  const double size = std::max((from + near * along).norm(), radius_ / 16);
+  const double reach = size / (2 * std::sqrt(longest2));
+  const double t = reach > 0.25 ? 0.5 : near < 0.5 ? near + reach : near - reach;
+  const Vec2 cut = p + t * (q - p);
+  part({Corners{p, cut, top}}, level + 1, visit);
+  part({Corners{cut, q, top}}, level + 1, visit);
 }
 
 // Stroud's rule of degree 5, Dunavant's of degree 8 (Int. J. Numer. Methods Eng. 21 (1985) 1129),
@@ -311,7 +337,7 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
   const bool looped = !any;
   if (looped) fails = !add_loop(w, any);
   // Its sides are inside; its middle may not be.
-  if (corners_inside == 3 && count_ == 3 && level < 2) fails = true;
+  if (corners_inside == 3 && count_ == 3 && level < 4) fails = true;
   if (fails && level < kMostLevels) return divide(w, level, visit);
   if (!any) return;
 
