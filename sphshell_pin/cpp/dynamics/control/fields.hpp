@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "dynamics/control/target_path.hpp"
-#include "dynamics/scene/geometry.hpp"  // SE3
+#include "dynamics/scene/geometry.hpp"   // SE3
 #include "dynamics/scene/multibody.hpp"  // VectorX
 
 namespace sphshell {

@@ -37,7 +37,8 @@ std::unique_ptr<Stepper> find(std::string_view name, SceneData& scene, std::stri
 }  // namespace
 
 std::unique_ptr<Stepper> make_stepper(std::string_view integrator, SceneData& scene) {
-  using All = decltype(std::tuple_cat(std::declval<ExplicitMethods>(), std::declval<ImplicitMethods>()));
+  using All =
+      decltype(std::tuple_cat(std::declval<ExplicitMethods>(), std::declval<ImplicitMethods>()));
   std::string names;
   if (auto found = find(integrator, scene, names, static_cast<const All*>(nullptr))) return found;
   throw std::invalid_argument("integrator '" + std::string(integrator) +
