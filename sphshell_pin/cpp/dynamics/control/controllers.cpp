@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <pinocchio/spatial.hpp>
-#include <stdexcept>
 #include <utility>
 
 #include "dynamics/control/target_path.hpp"
@@ -233,29 +232,17 @@ void CartesianImpedance::take_over(const Controller& before, double t) {
   late_ = place > 0 ? t - path_.time_of(place) : std::max(other->late_, t - path_.begin());
 }
 
-template <class Kind>
-std::shared_ptr<Controller> make(const Fields& fields) {
-  return std::make_shared<Kind>(fields);
-}
-
-struct Entry {
-  const char* kind;
-  std::shared_ptr<Controller> (*make)(const Fields&);
-};
-
 // A new controller is its class above and one line here, and a class of that kind in Python.
-constexpr Entry kControllers[] = {
-    {"gravity-compensation", make<GravityCompensation>},
-    {"joint-pd", make<JointPd>},
-    {"cartesian-impedance", make<CartesianImpedance>},
+constexpr KindOf<Controller> kControllers[] = {
+    {"gravity-compensation", make_of<Controller, GravityCompensation>},
+    {"joint-pd", make_of<Controller, JointPd>},
+    {"cartesian-impedance", make_of<Controller, CartesianImpedance>},
 };
 
 }  // namespace
 
 std::shared_ptr<Controller> make_controller(const std::string& kind, const Fields& fields) {
-  for (const Entry& entry : kControllers)
-    if (kind == entry.kind) return entry.make(fields);
-  throw std::invalid_argument("controller '" + kind + "' does not exist");
+  return make_from(kControllers, kind, fields);
 }
 
 }  // namespace sphshell

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <map>
+#include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -36,5 +38,25 @@ struct Fields {
     return SE3(Eigen::Matrix4d(Eigen::Map<const Matrix>(vector(name).data())));
   }
 };
+
+// A line of a table of classes of one base, by the kind that files call them.
+template <class Base>
+struct KindOf {
+  const char* kind;
+  std::shared_ptr<Base> (*make)(const Fields&);
+};
+
+template <class Base, class Class>
+std::shared_ptr<Base> make_of(const Fields& fields) {
+  return std::make_shared<Class>(fields);
+}
+
+template <class Base, std::size_t n>
+std::shared_ptr<Base> make_from(const KindOf<Base> (&table)[n], const std::string& kind,
+                                const Fields& fields) {
+  for (const KindOf<Base>& one : table)
+    if (kind == one.kind) return one.make(fields);
+  throw std::invalid_argument("no class of the kind '" + kind + "'");
+}
 
 }  // namespace sphshell

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bitset>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 namespace sphshell {
@@ -139,29 +138,17 @@ class ContactSwitch : public Measured {
   double threshold_, release_;
 };
 
-template <class Kind>
-std::shared_ptr<const Measured> make(const Fields& fields) {
-  return std::make_shared<const Kind>(fields);
-}
-
-struct Entry {
-  const char* kind;
-  std::shared_ptr<const Measured> (*make)(const Fields&);
-};
-
 // A new sensor is its class above and one line here, and a class of that kind in Python.
-constexpr Entry kSensors[] = {
-    {"force-torque", make<ForceTorque>},
-    {"joint-torque", make<JointTorque>},
-    {"contact-switch", make<ContactSwitch>},
+constexpr KindOf<const Measured> kSensors[] = {
+    {"force-torque", make_of<const Measured, ForceTorque>},
+    {"joint-torque", make_of<const Measured, JointTorque>},
+    {"contact-switch", make_of<const Measured, ContactSwitch>},
 };
 
 }  // namespace
 
 std::shared_ptr<const Measured> make_measured(const std::string& kind, const Fields& fields) {
-  for (const Entry& entry : kSensors)
-    if (kind == entry.kind) return entry.make(fields);
-  throw std::invalid_argument("sensor '" + kind + "' does not exist");
+  return make_from(kSensors, kind, fields);
 }
 
 // The sum of 256 fair bits, whose steps two uniform numbers fill. It calls nothing of the system's
