@@ -4,12 +4,10 @@ import shutil
 import tomllib
 from pathlib import Path
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
-import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import (
     FrameNotFound,
@@ -356,99 +354,3 @@ def test_a_unit_is_asked_for_as_the_command_takes_it():
     wrong = call("new", "--robot", "ball", "--surface", BLADE)
     assert wrong.exit_code == 2
     assert "--unit mm if that is 0.1558 m" in wrong.output
-
-
-def test_feet_come_down_on_what_is_under_them():
-    """Four feet over a plate that only one can reach: that one has the gap."""
-    from sphshell_pin.scenario.drafting.plan import _under
-
-    plate = sp.Shell.from_geometry(coal.Box(0.1, 0.1, 0.02))
-    feet = np.array([[x, y, 0.3] for x in (-0.4, 0.4) for y in (-0.2, 0.2)])
-    radii = np.full(4, 0.02)
-    placement = _under(plate, feet, radii, 0.002)
-    gaps = np.abs(plate.closest_points(feet - placement.translation).distances) - radii
-    assert gaps.min() == pytest.approx(0.002, rel=2e-3)
-    # Over a plate that is large enough all of them have it.
-    large = sp.Shell.from_geometry(coal.Box(2.0, 2.0, 0.02))
-    placement = _under(large, feet, radii, 0.002)
-    gaps = np.abs(large.closest_points(feet - placement.translation).distances) - radii
-    np.testing.assert_allclose(gaps, 0.002, rtol=2e-3)
-
-
-def test_a_spot_avoids_edges_and_grooves():
-    """On a roof the ridge is in the middle: a tip is put beside it, on one side."""
-    from sphshell_pin.scenario.drafting.touch_points import (
-        find_touch_point,
-        touch_points,
-        touches_once,
-    )
-
-    roof = [[x, y, 0.1 - abs(x)] for x in (-0.1, 0.0, 0.1) for y in (-0.2, 0.2)]
-    shell = sp.Shell(roof, [[0, 2, 3, 1], [2, 4, 5, 3]])
-    up = np.array([0.0, 0.0, 1.0])
-    middle = find_touch_point(shell, 0.01, 1e-3, toward=up)
-    assert not touches_once(shell, middle, middle.point[None], 0.01, 1e-3)
-    good = next(
-        spot
-        for spot in touch_points(shell, 0.01, 1e-3, toward=up)
-        if touches_once(shell, spot, spot.point[None], 0.01, 1e-3)
-    )
-    assert abs(good.point[0]) > 0.002
-    np.testing.assert_allclose(np.abs(good.normal), [np.sqrt(0.5), 0, np.sqrt(0.5)], atol=1e-6)
-
-
-def shell_of(geometry) -> sp.Shell:
-    return sp.Shell.from_geometry(geometry)
-
-
-@pytest.mark.parametrize(
-    ("geometry", "toward", "inside", "point", "normal"),
-    [
-        (coal.Box(0.2, 0.2, 0.04), None, False, [0, 0, 0.02], [0, 0, 1]),
-        (coal.Box(0.2, 0.04, 0.2), None, False, [0, 0.02, 0], [0, 1, 0]),
-        (coal.Box(0.1, 0.1, 0.1), None, False, [0, 0, 0.05], [0, 0, 1]),
-        (coal.Box(0.2, 0.2, 0.04), [1, 0, 0], False, [0.1, 0, 0], [1, 0, 0]),
-        (coal.Sphere(0.1), [0, 0, 1], True, [0, 0, -0.1], [0, 0, 1]),
-        (coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), None, False, [0, 0, 0], [0, 0, 1]),
-    ],
-)
-def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
-    geometry, toward, inside, point, normal
-):
-    from sphshell_pin.scenario.drafting.touch_points import find_touch_point
-
-    spot = find_touch_point(shell_of(geometry), 0.01, 1e-3, toward=toward, inside=inside)
-    np.testing.assert_allclose(spot.point, point, atol=1e-4)
-    np.testing.assert_allclose(spot.normal, normal, atol=1e-3)
-    np.testing.assert_allclose(spot.center, spot.point + 0.011 * spot.normal, atol=2e-6)
-
-
-def test_a_sphere_has_room_in_a_groove():
-    """A V of 60 degrees: the sphere rests on both sides, its center at twice the distance."""
-    from sphshell_pin.scenario.drafting.touch_points import find_touch_point
-
-    slope = np.tan(np.deg2rad(60))
-    vertices = [[-0.1, y, 0.1 * slope] for y in (-0.1, 0.1)]
-    vertices += [[0.0, y, 0.0] for y in (-0.1, 0.1)] + [[0.1, y, 0.1 * slope] for y in (-0.1, 0.1)]
-    shell = sp.Shell(vertices, [[0, 2, 3, 1], [2, 4, 5, 3]])
-    spot = find_touch_point(shell, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
-    distance = abs(shell.closest_points(spot.center[None]).distances[0])
-    assert distance == pytest.approx(0.011, rel=1e-3)
-    # From the bottom of the groove the center stands 1 / cos 60 degrees as high.
-    assert spot.center[2] == pytest.approx(0.022, rel=1e-3)
-
-
-def test_a_way_across_stays_on_the_surface_and_ends_at_the_rim():
-    from sphshell_pin.scenario.drafting.touch_points import find_touch_point, paths_on_surface
-
-    ball = shell_of(coal.Sphere(0.1))
-    spot = find_touch_point(ball, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
-    way = next(paths_on_surface(ball, spot, np.array([1.0, 0.0, 0.0]), 0.1, 0.005))
-    assert len(way) == 21
-    np.testing.assert_allclose(np.linalg.norm(way, axis=1), 0.1, atol=2e-4)
-    assert way[-1, 0] > 0.05
-    box = shell_of(coal.Box(0.2, 0.2, 0.04))
-    spot = find_touch_point(box, 0.01, 1e-3)
-    way = next(paths_on_surface(box, spot, np.array([1.0, 0.0, 0.0]), 1.0, 0.005))
-    assert np.abs(way[:, :2]).max() <= 0.1 + 1e-9
-    np.testing.assert_allclose(way[:, 2], 0.02, atol=1e-9)
