@@ -1,4 +1,4 @@
-"""Standard streams on which printing never fails a command: closed, full, or in another encoding."""
+"""Standard streams on which printing never fails a command: closed, full or of another encoding."""
 
 from __future__ import annotations
 

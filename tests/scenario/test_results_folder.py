@@ -316,6 +316,8 @@ def test_of_processes_that_meet_in_a_new_folder_one_wins_and_loses_nothing(name,
         os.close(go)
         codes = [os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children]
         # Who comes after the winner has ended writes anew.
-        assert set(codes) <= {0, 1} and 0 in codes
-        assert os.listdir(out) == [LAST] and os.listdir(out.parent) == ["out"]
+        assert set(codes) <= {0, 1}
+        assert 0 in codes
+        assert os.listdir(out) == [LAST]
+        assert os.listdir(out.parent) == ["out"]
         shutil.rmtree(tmp_path / name.split("/")[0])
