@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
+from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
@@ -316,8 +317,7 @@ def _check_root(model: pin.Model, file: Path) -> None:
     if model.inertias[1].mass > 0.0 or model.nv < 6:
         return
     q = pin.randomConfiguration(model, np.full(model.nq, -1.0), np.full(model.nq, 1.0))
-    mass = np.triu(pin.crba(model, model.createData(), q))
-    least, *_, most = np.linalg.eigvalsh(mass + np.triu(mass, 1).T)
+    least, *_, most = np.linalg.eigvalsh(mass_matrix(model, q))
     if least <= 1e-12 * most:
         bodies = [one.name for one in model.frames if one.parentJoint == 1]
         link = next((name for name in bodies if name != model.names[1]), model.names[1])

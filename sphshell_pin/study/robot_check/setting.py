@@ -11,7 +11,7 @@ from sphshell_pin.arrays import Array
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
-from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell import Shell
 from sphshell_pin.study.robot_check.models import Subject, listed
@@ -23,7 +23,7 @@ from sphshell_pin.study.robot_check.probe_spheres import (
     moved_sphere,
     placed_data,
 )
-from sphshell_pin.testing.forces import mass_matrix, point_jacobian
+from sphshell_pin.testing.forces import point_jacobian
 
 PLATE, BASE = "sphshell_check_plate", "sphshell_check_base"
 
@@ -165,7 +165,7 @@ def meeting_posture(
 
 def random_torques(model: pin.Model, q: Array, rng: np.random.Generator) -> Array:
     """Return random torques (nv,) that move light and heavy joints alike."""
-    weight = np.diag(mass_matrix(model, model.createData(), q))
+    weight = np.diag(mass_matrix(model, q))
     return np.asarray(np.sqrt(weight) * rng.normal(size=model.nv))
 
 
@@ -211,7 +211,7 @@ class _Contact:
         pin.computeJointJacobians(model, data, q)
         jacobian = point_jacobian(model, data, joint, point)
         row = self.normal @ (jacobian - point_jacobian(model, data, other, point))
-        return 1.0 / float(row @ np.linalg.solve(mass_matrix(model, data, q), row))
+        return 1.0 / float(row @ np.linalg.solve(mass_matrix(model, q), row))
 
     def _point(self, model: pin.Model, data: pin.Data, sphere: Sphere) -> tuple[int, Array]:
         joint, center = center_of(model, data, sphere)
@@ -233,7 +233,7 @@ def _motion(
             fast = float(np.linalg.norm(way))
             # A limb stretched out hardly moves its end: another posture says more.
             moves = fast > 0.05 * np.linalg.norm(jacobian) > 0.0
-            if moves and regularity(model, data, q) > wanted:
+            if moves and regularity(model, q) > wanted:
                 carries = np.abs(jacobian).max(axis=0) > 0.0
                 v *= np.where(carries, speed / fast, min(speed / fast, 1.0))
                 return q, v, way / fast
