@@ -328,7 +328,9 @@ def _with_origin(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
     faces = raw.faces[surface.source_element]
     normals = surface.normals
     if normals is not None:
-        normals = settle_joints(normals, surface.triangles, faces[surface.triangle_element])
+        face = faces[surface.triangle_element]
+        plane = None if raw.face_shapes is None else raw.face_shapes[face, 0] == 0
+        normals = settle_joints(normals, surface.triangles, face, plane)
     return replace(
         surface,
         normals=normals,

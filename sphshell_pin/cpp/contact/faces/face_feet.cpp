@@ -108,7 +108,8 @@ void FaceFeet::add(const Shell& shell, int f, const Plane& plane, bool want_dx_d
 
 // Side by side of the facet: the point must be on the inner side of what bounds it there. Inner: a
 // plane between facets of one face. Shared: the other face cuts. Tangent: both faces touch along
-// the side, and the sign of their distance says nothing. Cubic: the curve itself.
+// the side, the sign of their distance says nothing, and one shape upright on both cuts them.
+// Cubic: the curve itself.
 bool holds(const Shell& shell, int f, const Vec3& point, const Vec3& outward, double tolerance) {
   const CurvedShell& surface = *shell.curved();
   const std::vector<Primitive>& shapes = surface.faces().shapes;
@@ -138,8 +139,7 @@ bool holds(const Shell& shell, int f, const Vec3& point, const Vec3& outward, do
       continue;
     }
     if (cell.side[k] == FaceCell::Side::Tangent) {
-      const double turn = cell.turn[k] * turn_between(shapes, cell.face, cell.beyond[k], d, point);
-      if (turn < -kMostGap * d.norm()) return false;
+      if (cell.turn[k] * shapes[cell.across[k]].distance(point) < -tolerance) return false;
       continue;
     }
     const CubicCurve side = surface.facets()[f].side(facet, k);
@@ -170,8 +170,10 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   const Vec3 chord = q - p;
   // Along the half-edge's direction.
   const auto tangent_at = [&](const Vec3& x) -> Vec3 {
-    const Vec3 tangent = intersection_at(shape, other, x).tangent;
-    if (tangent.isZero(0)) return chord.normalized();  // an end where both are tangent
+    const auto [tangent, curvature, offset, sine] = intersection_at(shape, other, x);
+    // An end where both are tangent: the cross product of equal normals is rounding, and only where
+    // Newton's method went says whether the nearest point is beyond it.
+    if (!(sine > kLeastAngle)) return Vec3::Zero();
     return tangent.dot(chord) < 0 ? Vec3(-tangent) : tangent;
   };
   const double most = chord.norm() / 2;
@@ -199,7 +201,8 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   } else {
     if (out.t <= 0 || out.t >= 1) out.t = 0.5;
     out.point = x;
-    out.tangent = tangent_at(x);
+    const Vec3 along = tangent_at(x);
+    out.tangent = along.isZero(0) ? chord : along;
   }
   return out;
 }

@@ -235,6 +235,14 @@ std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions o
                                     shell->crease_angle(), shell->side());
     }
   }
+  // Vertices of CAD files are off the faces by the tolerance of the system that wrote them.
+  if (out == shell && options.known) {
+    std::vector<Vec3> moved =
+        snapped_vertices(*shell, *options.known, kMostMoved * kSinglePrecision * shell->size());
+    if (!moved.empty())
+      out = std::make_shared<Shell>(std::move(moved), shell->triangles(), shell->element(),
+                                    shell->crease_angle(), shell->side());
+  }
   out->curve(std::move(options));
   return out;
 }

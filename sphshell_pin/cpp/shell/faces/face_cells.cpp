@@ -11,8 +11,7 @@ namespace {
 // What is measured at a few places may be larger between them.
 constexpr double kMargin = 1.5;
 constexpr int kMostRepeats = 12;
-// Tangent faces turn from each other within a facet by this at least.
-constexpr double kLeastTurn = 1e-6;
+constexpr int kMostHalvings = 150;
 
 }  // namespace
 
@@ -65,39 +64,60 @@ Primitive cutting(const Vec3& p, const Vec3& middle, const Vec3& q, const Vec3& 
   return {FaceKind::Cylinder, center, axis, (p - center).norm(), 0};
 }
 
-// Whether two faces touch along side k of a facet; sets its bulge and turn.
-bool is_tangent(const Shell& shell, std::vector<Primitive>& shapes, int other, const Facet& facet,
-                int k, FaceCell& cell) {
-  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
-  const Primitive face = shapes[cell.face];
-  const Vec3 inward = facet.normal.cross(q - p).normalized();
-  const double height = inward.dot(facet.corner[previous_corner(k)] - p);
-  double bulge = 0;
-  Vec3 middle;
-  for (const double s : {0.0, 0.25, 0.75, 1.0, 0.5}) {
-    // The border by the rule of false position: the turn grows evenly across it.
-    Vec3 x = face.onto(p + s * (q - p));
-    const Vec3 within = face.onto(x + 0.1 * height * inward);
-    const double here = turn_between(shapes, cell.face, other, q - p, x);
-    const double there = turn_between(shapes, cell.face, other, q - p, within);
-    const double rise = (there - here) / (0.1 * height);
-    const Vec3 start = x;
-    for (int i = 0; i < 4; ++i)
-      x = face.onto(x - turn_between(shapes, cell.face, other, q - p, x) / rise * inward);
-    const double off = (x - start).norm();
-    if (!(std::abs(rise) * height > kLeastTurn * (q - p).norm()) || !(off < 0.9 * height))
-      return false;
-    if (!(std::abs(shapes[other].distance(x)) <= kMostGap * shell.size())) return false;
-    bulge = std::max(bulge, off);
-    middle = x;
-    cell.turn[k] = rise < 0 ? -1 : 1;
+// The middle of the border between two faces that are tangent along it, next to that of a chord: by
+// bisection and the secant, across the chord on one of them. False if their normals are parallel
+// nowhere within the chord's length.
+bool middle_of_tangents(const std::vector<Primitive>& shapes, int face, int other, const Vec3& p,
+                        const Vec3& q, const Vec3& across, Vec3& x) {
+  const Vec3 chord = q - p, start = (p + q) / 2;
+  const double length = chord.norm();
+  const auto at = [&](double u) { return shapes[face].onto(start + u * across); };
+  const auto turn = [&](double u) { return turn_between(shapes, face, other, chord, at(u)); };
+  double a = 0, turn_a = turn(a), b = 0, turn_b = turn_a;
+  for (double u = 1e-6 * length; turn_a * turn_b > 0; u *= 2) {
+    if (!(u < length / 2)) return false;
+    b = u, turn_b = turn(u);
+    if (turn_a * turn_b > 0) b = -u, turn_b = turn(-u);
   }
-  cell.bulge[k] = static_cast<float>(kMargin * bulge + kMostGap * shell.size());
-  cell.across[k] = static_cast<int>(shapes.size());
+  for (int i = 0; i < kMostHalvings && turn_a != 0 && turn_b != 0; ++i) {
+    double u = b - turn_b * (b - a) / (turn_b - turn_a);
+    // In every third step the interval is halved, whatever the slope does.
+    if (i % 3 == 2 || !(std::min(a, b) < u && u < std::max(a, b))) u = (a + b) / 2;
+    const double here = turn(u);
+    (here * turn_a > 0 ? a : b) = u, (here * turn_a > 0 ? turn_a : turn_b) = here;
+    if (std::abs(b - a) < 1e-15 * length) break;
+  }
+  x = at(std::abs(turn_a) < std::abs(turn_b) ? a : b);
+  return x.allFinite();
+}
+
+// The shape that cuts both faces along the border between two vertices, if they touch there all
+// along it: decided once for the facets on both sides. Sets how far the border is from its chord.
+bool is_tangent(const Shell& shell, std::vector<Primitive>& shapes, int face, int other,
+                const Facet& facet, int k, Vec3& middle, double& bulge, Primitive& cut) {
+  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
+  const double gap = kMostGap * shell.size();
+  const auto on_both = [&](const Vec3& x) {
+    return std::abs(shapes[face].distance(x)) <= gap && std::abs(shapes[other].distance(x)) <= gap;
+  };
+  if (!on_both(p) || !on_both(q)) return false;
+  // On a plane the turn grows evenly, and the search is the surest.
+  if (shapes[other].kind == FaceKind::Plane) std::swap(face, other);
+  const Vec3 across = facet.normal.cross(q - p).normalized();
   Vec3 n;
-  face.distance(middle, n);
-  shapes.push_back(cutting(p, middle, q, n));
-  return true;
+  if (!middle_of_tangents(shapes, face, other, p, q, across, middle) || !on_both(middle))
+    return false;
+  shapes[face].distance(middle, n);
+  cut = cutting(p, middle, q, n);
+  const Vec3 rise = middle - (p + q) / 2;
+  bulge = rise.norm();
+  // A circle is between its chord and twice the parabola through its middle.
+  for (const double s : {0.15, 0.3, 0.7, 0.85}) {
+    Vec3 x = p + s * (q - p) + 4 * s * (1 - s) * rise;
+    if (!onto_both(shapes[face], cut, x) || !on_both(x)) return false;
+    bulge = std::max(bulge, (x - p - s * (q - p)).norm());
+  }
+  return bulge < (q - p).norm();
 }
 
 }  // namespace
@@ -130,6 +150,23 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
   // open: faces that do not hold their own facets exactly, and are left to the cubics.
   std::vector<char> open(faces.shapes.size(), 0);
   std::vector<float> off(3 * out.size(), 0);  // of a cubic side from the face [m]
+  // One decision and one cutting shape for both facets of a side: each closest point is on one side
+  // of it, so that neither misses what the other leaves.
+  const auto touch = [&](int h, int beyond, const Vec3& middle, double bulge,
+                         const Primitive& cut) {
+    const int k = side_of(h);
+    FaceCell& cell = out[triangle_of(h)];
+    const Facet& facet = shell.facets()[triangle_of(h)];
+    Vec3 n, away;
+    faces.shapes[cell.face].distance(middle, n);
+    cut.distance(middle, away);
+    const Vec3 in = n.cross(facet.corner[next_corner(k)] - facet.corner[k]);
+    cell.side[k] = FaceCell::Side::Tangent;
+    cell.beyond[k] = beyond;
+    cell.across[k] = static_cast<int>(faces.shapes.size());
+    cell.turn[k] = (in.dot(away) < 0) != (n.dot(facet.normal) < 0) ? -1 : 1;
+    cell.bulge[k] = static_cast<float>(kMargin * bulge + kMostGap * shell.size());
+  };
   for (std::size_t f = 0; f < out.size(); ++f) {
     const Facet& facet = shell.facets()[f];
     const int t = shell.triangle_of_facet(static_cast<int>(f));
@@ -146,12 +183,15 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
       const int g = topology.other_half_edge(3 * t + k);
       const bool wound =
           g >= 0 && shell.triangles()[t][k] != shell.triangles()[triangle_of(g)][side_of(g)];
-      const int beyond = wound ? triangle_of(shell.facet_half_edge(g)) : -1;
+      const int h = wound ? shell.facet_half_edge(g) : -1, beyond = h < 0 ? -1 : triangle_of(h);
       const int other = beyond >= 0 ? out[beyond].face : -1;
       if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
       if (other == cell.face || !(bent[f] || (beyond >= 0 && bent[beyond]))) continue;
+      if (cell.side[k] == FaceCell::Side::Tangent) continue;  // decided from beyond it
       const Vec3 one = facets[f].control_offset(k, 0), two = facets[f].control_offset(k, 1);
       double bulge = std::max(one.norm(), two.norm()), apart = 0;
+      Vec3 middle;
+      Primitive cut;
       bool shared = other >= 0;
       const CubicCurve side = facets[f].side(facet, k);
       for (const Vec3& end : {facet.corner[k], facet.corner[next_corner(k)]})
@@ -169,9 +209,11 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
       if (shared && bulge < length) {
         cell.side[k] = FaceCell::Side::Shared;
         cell.beyond[k] = cell.across[k] = other;
-      } else if (other >= 0 && is_tangent(shell, faces.shapes, other, facet, k, cell)) {
-        cell.side[k] = FaceCell::Side::Tangent;
-        cell.beyond[k] = other;
+      } else if (other >= 0 && h > 3 * static_cast<int>(f) + k &&
+                 is_tangent(shell, faces.shapes, cell.face, other, facet, k, middle, bulge, cut)) {
+        touch(3 * static_cast<int>(f) + k, other, middle, bulge, cut);
+        touch(h, cell.face, middle, bulge, cut);
+        faces.shapes.push_back(cut);
         continue;
       } else if (apart > kMostGap * shell.size()) {
         open[cell.face] = 1;

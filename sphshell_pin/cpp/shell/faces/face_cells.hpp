@@ -33,7 +33,7 @@ struct FaceCell {
   Side side[3] = {Side::Cubic, Side::Cubic, Side::Cubic};
   int beyond[3] = {-1, -1, -1};     // of shared and tangent sides: the other face
   int across[3] = {-1, -1, -1};     // ... and the shape that cuts the face along the border
-  std::int8_t turn[3] = {1, 1, 1};  // of tangent sides: the sign of turn_between() in the facet
+  std::int8_t turn[3] = {1, 1, 1};  // of tangent sides: the sign of the shape across in the facet
   float bulge[3] = {0, 0, 0};       // a border runs within this distance of its chord [m]
 };
 
