@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick studies lint format bench report robots hard-cases work-precision rollouts \
-  real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
+  joints real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
 
 help:
 	@sed -nE 's/^([a-z-]+):.* ## (.*)/make \1\t\2/p' Makefile | expand -t 22

@@ -49,11 +49,10 @@ def test_the_truth_is_that_of_a_grid_of_points(part):
     rng = np.random.default_rng(0)
     asked = spheres(part, 60, rng)
     flat, radii = asked.flat, rng.uniform(0.5, 12.0, len(asked.flat))
-    points = np.concatenate([p.at(np.linspace(0, p.length, 150))[0] for p in part.profile.pieces])
-    # Outside the plane of the center the distance grows to either side.
-    away = np.linalg.norm(points[None] - flat[:, None], axis=2)
     truth = part.profile.truth(flat, radii)
+    away = np.linalg.norm(sampled(part, 5000)[None] - flat[:, None], axis=2)
     assert np.abs(truth.depth - (radii - away.min(axis=1))).max() < 0.01
+    points = sampled(part, 150)
     angles = np.linspace(0, 2 * np.pi, 180, endpoint=False)
     around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     space = np.concatenate(
@@ -67,6 +66,12 @@ def test_the_truth_is_that_of_a_grid_of_points(part):
             assert components(inside, part.profile.closed) == count
             compared += 1
     assert compared > 30
+
+
+def sampled(part: Part, count: int) -> np.ndarray:
+    """Points of an outline, `count` on each piece."""
+    pieces = part.profile.pieces
+    return np.concatenate([piece.at(np.linspace(0, piece.length, count))[0] for piece in pieces])
 
 
 def components(inside: np.ndarray, closed: bool) -> int:
