@@ -409,7 +409,7 @@ def mend_sums(
     flip: _Bytes,
     components: int,
     center: _Doubles,
-) -> tuple[_Doubles, _Doubles, _Doubles, _Ints]: ...
+) -> tuple[_Doubles, _Doubles, _Doubles]: ...
 def mend_clip_ears(
     offsets: _Longs, corners: _Ints, points: _Doubles, tolerance: float
 ) -> tuple[_Longs, _Ints, _Bytes]: ...
@@ -427,13 +427,14 @@ def mend_flood_fill(
     offsets: _Longs, corners: _Ints, slot_edge: _Ints, users: _Ints
 ) -> tuple[_Ints, _Bytes, _Bytes]: ...
 def mend_components(nodes: int, pairs: _Ints) -> _Ints: ...
-def mend_nesting(
+def mend_overlaps(
     points: _Doubles,
     triangles: _Ints,
     triangle_component: _Ints,
-    queries: _Doubles,
-    closed: _Bytes,
-) -> _Ints: ...
+    places: _Doubles,
+    place_component: _Ints,
+    group: _Ints,
+) -> tuple[_Ints, _Doubles]: ...
 def evaluate_into(
     scene: Scene, q: _Doubles, v: _Doubles, tau: _Doubles, acceleration: _Doubles, forces: _Doubles
 ) -> None: ...
