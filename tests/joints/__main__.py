@@ -1,6 +1,7 @@
 """Walk over the joints of parts with spheres, and count what is wrong with their contacts.
 
-python -m tests.joints [--count 1000000] [--seed 1] [--only disc shaft] [--stl] [--show 3]
+python -m tests.joints [--count 1000000] [--seed 1] [--only disc shaft tray] [--stl] [--show 3]
+python -m tests.joints --files part.step ... [--count 4000]
 """
 
 import argparse
@@ -12,101 +13,91 @@ from pathlib import Path
 
 import numpy as np
 
-import sphshell_pin as sp
-from tests.joints.solids import FAMILIES, Part, write_step, write_stl
-from tests.joints.walk import FAULTS, Verdict, chord_error, judge, spheres
-from tests.parts.occ import OccFailed, Rng
+from tests.joints.boxes import BOXES
+from tests.joints.running import TRIMMED, walk_file, walk_part
+from tests.joints.solids import FAMILIES
+from tests.joints.verdict import ALLOWED, FAULTS, Verdict
+from tests.parts.occ import OccFailed
 
-PER_PART = 4000
-CHORD = 3e-4
-"""Deflection of STL files over the size."""
-
-DIGITS = {False: 2e-12, True: 2e-7}
-"""What the digits of STEP files leave open, and the single precision of STL, over the size."""
+NAMES = [*FAMILIES, *BOXES]
 
 
 def main() -> int:
     """Walk, print the faults by part and by kind of joint; return 1 if there are any."""
     options = arguments()
-    begin, names = time.perf_counter(), options.only or list(FAMILIES)
-    by_kind: dict[str, Counter[str]] = {}
-    asked, number = 0, 0
+    begin = time.perf_counter()
+    counts: dict[str, Counter[str]] = {}
+    if options.files:
+        asked = 0
+        for path in options.files:
+            rng = np.random.default_rng(options.seed)
+            asked += take(walk_file(path, path.name, options.count, rng), options.show, counts)
+        number = len(options.files)
+    else:
+        number, asked = walk_families(options, counts)
+    print(f"\n{number} parts, {asked} spheres, {time.perf_counter() - begin:.0f} s")
+    return 1 if table(counts) else 0
+
+
+def walk_families(options: argparse.Namespace, counts: dict[str, Counter[str]]) -> tuple[int, int]:
+    """Walk over random parts until enough spheres were asked."""
+    names, number, asked = options.only or NAMES, 0, 0
     with tempfile.TemporaryDirectory() as folder:
         while asked < options.count:
-            rng = np.random.default_rng([options.seed, number])
             family = names[number % len(names)]
+            rng = np.random.default_rng([options.seed, number])
             number += 1
             try:
-                part = FAMILIES[family](rng)
-                part = part.moved(rng) if options.moved else part
-                shell = load(part, Path(folder), options.stl)
+                verdict = walk_part(
+                    family, Path(folder), rng, options.stl, options.moved, options.count
+                )
             except OccFailed as failure:
                 print(f"{family}: {failure}")
                 continue
-            verdict = walk(shell, part, min(PER_PART, options.count), rng, options.stl)
-            asked += len(verdict.spheres.radii)
-            tell(shell, verdict, options.show)
-            for joint, fault, _ in verdict.rows():
-                by_kind.setdefault(joint, Counter())[fault] += 1
-            for joint in np.array(verdict.joints)[verdict.spheres.joint].tolist():
-                by_kind.setdefault(joint, Counter())["spheres"] += 1
-    print(f"\n{number} parts, {asked} spheres, {time.perf_counter() - begin:.0f} s")
-    print(f"{'joint':32s}" + "".join(f"{name:>9s}" for name in ("spheres", *FAULTS)))
-    total: Counter[str] = Counter()
-    for joint in sorted(by_kind):
-        row(joint, by_kind[joint])
-        total += by_kind[joint]
-    row("all", total)
-    return 1 if any(total[name] for name in FAULTS if name != "bridge") else 0
+            asked += take(verdict, options.show, counts)
+    return number, asked
 
 
-def load(part: Part, folder: Path, stl: bool) -> sp.Shell:
-    solid = part.solid()
-    if not stl:
-        return sp.Shell.from_file(write_step(solid, folder / "part.step"))
-    size = 2 * max(np.abs(piece.begin).max() for piece in part.profile.pieces)
-    return sp.Shell.from_file(write_stl(solid, folder / "part.stl", CHORD * size), unit="mm")
-
-
-def walk(shell: sp.Shell, part: Part, count: int, rng: Rng, stl: bool) -> Verdict:
-    asked = spheres(part, count, rng)
-    return judge(shell, part, asked, DIGITS[stl] * shell.size, chord_error(shell, part))
-
-
-def tell(shell: sp.Shell, verdict: Verdict, show: int) -> None:
-    """Print the faults of one part, and the first spheres of each."""
+def take(verdict: Verdict, show: int, counts: dict[str, Counter[str]]) -> int:
+    """Print the faults of one part, and the first spheres of each; return how many were asked."""
     found = ", ".join(f"{name} {len(rows)}" for name, rows in verdict.faults.items() if rows)
-    exact = f"exact {sum(face.exact for face in shell.faces)}/{len(shell.faces)}"
-    print(
-        f"{verdict.part:44s} {exact:12s} spheres {len(verdict.spheres.radii)} "
-        f"depth {verdict.worst_depth:.0e} {found}",
-        flush=True,
-    )
-    seen: Counter[str] = Counter()
-    for joint, fault, row in verdict.rows():
-        seen[fault] += 1
-        if seen[fault] <= show:
-            center, radius = verdict.spheres.centers[row], verdict.spheres.radii[row]
-            print(f"    {fault} at {joint}: center {center.tolist()}, radius {radius}")
+    print(f"{verdict.part:60s} {len(verdict.radii):6d}  {verdict.worst:.0e}  {found}", flush=True)
+    for name, rows in verdict.found().items():
+        for text in rows[:show]:
+            print(f"    {name} at {text}")
+    for joint, own in verdict.by_joint().items():
+        counts[joint] = counts.get(joint, Counter()) + own
+    return len(verdict.radii)
 
 
-def row(name: str, counts: "Counter[str]") -> None:
-    print(f"{name:32s}" + "".join(f"{counts[key]:9d}" for key in ("spheres", *FAULTS)))
+def table(counts: dict[str, Counter[str]]) -> int:
+    """Print the faults by joint; return how many are not allowed."""
+    columns = ("spheres", *FAULTS)
+    total: Counter[str] = sum(counts.values(), Counter())
+    print(f"{'joint':32s}" + "".join(f"{name:>9s}" for name in columns))
+    for joint, own in [*sorted(counts.items()), ("all", total)]:
+        print(f"{joint:32s}" + "".join(f"{own[name]:9d}" for name in columns))
+    return sum(total[name] for name in FAULTS if name not in ALLOWED)
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tests.joints", description=(__doc__ or "").partition("\n")[0]
     )
-    parser.add_argument("--count", type=int, default=100_000, help="number of spheres")
+    parser.add_argument(
+        "--count", type=int, default=100_000, help="spheres, of each file or of all"
+    )
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="+", default=[], help=f"of {', '.join(FAMILIES)}")
+    parser.add_argument("--only", nargs="+", default=[], help=f"of {', '.join(NAMES)}")
+    parser.add_argument("--files", nargs="+", type=Path, default=[], help="STEP files")
     parser.add_argument("--stl", action="store_true", help="binary STL files instead of STEP")
     parser.add_argument("--moved", action="store_true", help="parts turned at random")
     parser.add_argument("--show", type=int, default=0, help="spheres to print for each fault")
     options = parser.parse_args()
-    if not {*options.only} <= {*FAMILIES}:
-        parser.error(f"--only takes {', '.join(FAMILIES)}")
+    if not {*options.only} <= {*NAMES}:
+        parser.error(f"--only takes {', '.join(NAMES)}")
+    if options.moved and {*options.only} & {*TRIMMED}:
+        parser.error(f"--moved is for {', '.join(FAMILIES)}")
     return options
 
 

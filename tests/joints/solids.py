@@ -26,8 +26,6 @@ from sphshell_pin.arrays import Array
 from tests.joints.profile import Piece, Profile, outline
 from tests.parts.occ import Rng, Solid, checked
 
-MM = 1e-3
-
 
 @dataclass(frozen=True)
 class Part:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy import ndimage, sparse
 
-from tests.joints.__main__ import load, walk
+from tests.joints.running import walk_outline, walk_part
 from tests.joints.solids import Part, bar, cones, d_shaft, disc, dome, ring, shaft, slot
-from tests.joints.walk import FAULTS, spheres
+from tests.joints.trimmed import TrimmedSolid
+from tests.joints.verdict import MM
+from tests.joints.walk import spheres
 
 PARTS = [
     cones(30.0, 0.3),
@@ -23,12 +25,8 @@ PARTS = [
 
 
 def assert_right(part: Part, tmp_path, stl: bool) -> None:
-    shell = load(part, tmp_path, stl)
-    if not stl:
-        assert all(face.exact for face in shell.faces)
-    verdict = walk(shell, part, 3000, np.random.default_rng(1), stl)
-    found = {name: len(verdict.faults[name]) for name in FAULTS if name != "bridge"}
-    assert found == dict.fromkeys(found, 0), verdict.rows()[:3]
+    verdict = walk_outline(part, tmp_path, np.random.default_rng(1), stl, count=3000)
+    assert verdict.found() == {}
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
@@ -39,6 +37,25 @@ def test_no_sphere_is_lost_or_counted_twice(part, tmp_path):
 @pytest.mark.parametrize("part", [cones(30.0, 0.3), dome(20.0, 100.0)], ids=lambda part: part.name)
 def test_none_is_on_meshes_of_single_precision(part, tmp_path):
     assert_right(part, tmp_path, stl=True)
+
+
+@pytest.mark.parametrize("family", ["slots", "chamfered_block"])
+def test_no_contact_is_lost_or_made_up_at_corners(family, tmp_path):
+    verdict = walk_part(family, tmp_path, np.random.default_rng(0), most=1000)
+    assert verdict.found() == {}
+
+
+@pytest.mark.parametrize(
+    "part", [disc(40.0, 2.0), shaft(20.0, 2.0), cones(30.0, 0.3, 4.0), d_shaft(20.0, 0.1)],
+    ids=lambda part: part.name,
+)  # fmt: skip
+def test_the_trimmed_faces_are_those_of_the_outline(part):
+    """The two truths, of different numbers, against each other."""
+    asked = spheres(part, 300, np.random.default_rng(0))
+    truth = part.profile.truth(asked.flat, asked.radii / MM)
+    found = TrimmedSolid(part.solid()).minima(asked.centers / MM, asked.radii / MM)
+    for row, minima in enumerate(found):
+        assert minima.depths.max() == pytest.approx(truth.depth[row], rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
-from tests.joints.solids import MM, Part
+from tests.joints.solids import Part
+from tests.joints.verdict import MM, Verdict, is_exact
 from tests.parts.occ import Rng
 
 SMOOTH = 2
@@ -73,37 +74,6 @@ def spheres(part: Part, count: int, rng: Rng) -> Spheres:
     return Spheres(flat[kept], centers[kept] * MM, radii[kept] * MM, which[kept])
 
 
-FAULTS = {
-    "lost": "no contact where the sphere touches",
-    "shallow": "the deepest contact is too shallow",
-    "deep": "the deepest contact is too deep",
-    "double": "the weights add up to more than the components of the surface inside the sphere",
-    "energy": "one minimum, of the right depth, and another energy",
-    "force": "one minimum, on a plane, and another force",
-    "bridge": "several minima, and another energy or fewer components",
-}
-
-
-@dataclass
-class Verdict:
-    """Spheres that were asked, and rows of those with each fault."""
-
-    part: str
-    spheres: Spheres
-    joints: list[str]
-    faults: dict[str, list[int]] = field(default_factory=lambda: {name: [] for name in FAULTS})
-    worst_depth: float = 0.0
-    worst_force: float = 0.0
-
-    def rows(self) -> list[tuple[str, str, int]]:
-        """Return part, kind of joint, and fault of every faulty sphere."""
-        return [
-            (self.joints[self.spheres.joint[row]], fault, row)
-            for fault, rows in self.faults.items()
-            for row in rows
-        ]
-
-
 def kinds_of(part: Part) -> list[str]:
     """Kinds of the faces that the pieces make."""
     found = []
@@ -133,12 +103,7 @@ def exact_pieces(shell: sp.Shell, part: Part) -> Array:
     """Whether the face of each piece (k,) is exact in the shell."""
     middles = [piece.at(np.array([piece.length / 2]))[0][0] for piece in part.profile.pieces]
     near = shell.closest_points(part.in_space(np.array(middles), 0.3, 0.5) * MM, method="facets")
-    return np.array([_is_exact(shell, element) for element in near.elements.tolist()])
-
-
-def _is_exact(shell: sp.Shell, element: int) -> bool:
-    face = -1 if shell.element_face is None else shell.element_face[element]
-    return bool(face >= 0 and shell.faces[face].exact)
+    return np.array([is_exact(shell, element) for element in near.elements.tolist()])
 
 
 def chord_error(shell: sp.Shell, part: Part) -> float:
@@ -157,10 +122,11 @@ def judge(
     exact : tolerance of depths on exact faces [radii], beside that of the `digits` of the file [m]
     rough : tolerance of depths on other faces [m]
     """
-    kinds, core = kinds_of(part), shell.core_for("smooth")
+    kinds, names, core = kinds_of(part), joints_of(part), shell.core_for("smooth")
     truth = part.profile.truth(asked.flat, asked.radii / MM)
     strict = exact_pieces(shell, part)
-    out = Verdict(part.name, asked, joints_of(part))
+    joints = [names[k] for k in asked.joint.tolist()]
+    out = Verdict(part.name, asked.centers, asked.radii, joints)
     tolerances = np.where(strict[truth.piece], exact * asked.radii + digits, rough)
     # Components that a hair of the radius makes or joins count either way.
     hair = np.maximum(tolerances, 1e-9 * asked.radii) / MM
@@ -173,29 +139,29 @@ def judge(
         deepest, tolerance = truth.depth[row] * MM, tolerances[row]
         if len(depth) == 0:
             if deepest > tolerance:
-                out.faults["lost"].append(row)
+                out.add("lost", row, f"depth {deepest / radius} r")
             continue
         found = depth.max()
         error = abs(found - deepest)
-        if not all(_is_exact(shell, one) for one in element.tolist()):
+        if not all(is_exact(shell, one) for one in element.tolist()):
             tolerance = max(tolerance, rough)
-        out.worst_depth = max(out.worst_depth, error / radius)
         if error > tolerance:
-            out.faults["shallow" if found < deepest else "deep"].append(row)
+            name = "shallow" if found < deepest else "deep"
+            out.add(name, row, f"{found / radius} r instead of {deepest / radius} r")
             continue
+        out.worst = max(out.worst, error / radius)
         if weight.sum() > most[row]:
-            out.faults["double"].append(row)
+            out.add("double", row, f"{weight.sum():g} instead of {most[row]}")
             continue
         # The energy of a law whose force is three times the square of the depth.
         energy, single = truth.energy[row] * MM**3, truth.minima[row] == 1
         slack = 1e-6 + 10 * tolerance / deepest
         off = abs(weight @ depth**3 / energy - 1)
         if off > slack:
-            out.faults["energy" if single else "bridge"].append(row)
+            out.add("energy" if single else "bridge", row, f"off by {off:.1e}")
         elif single and kinds[truth.piece[row]] == "plane":
             push = 3 * (weight * depth**2) @ normal
             off = abs(np.linalg.norm(push) / (np.linalg.norm(truth.force[row]) * MM**2) - 1)
-            out.worst_force = max(out.worst_force, off)
             if off > slack:
-                out.faults["force"].append(row)
+                out.add("force", row, f"off by {off:.1e}")
     return out
