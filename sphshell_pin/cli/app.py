@@ -90,6 +90,14 @@ PackageDirOption = Annotated[
         callback=_search_in,
     ),
 ]
+DensityOption = Annotated[
+    float | None,
+    option(
+        "Of links whose mass the URDF does not state: from their meshes; 2700 is aluminium.",
+        metavar="KG/M^3",
+    ),
+]
+MimicOption = Annotated[bool, option("Joints that mimic others move freely.", "--no-mimic")]
 XacroArgOption = Annotated[
     list[str] | None,
     option(

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from sphshell_pin.cli.app import (
+    DensityOption,
+    MimicOption,
     PackageDirOption,
     RadiusOption,
     XacroArgOption,
@@ -96,6 +98,8 @@ def new(
     free_flyer: Annotated[bool, option("The same as --base floating.", "--free-flyer")] = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
+    density: DensityOption = None,
+    no_mimic: MimicOption = False,
     out: Annotated[
         Path | None, option("The file to write; default: ROBOT_on_SURFACE.toml.")
     ] = None,
@@ -133,6 +137,8 @@ def new(
                 base="floating" if free_flyer else base,
                 package_dirs=package_dir or (),
                 xacro_args=xacro_args_of(xacro_arg),
+                density=density,
+                mimic=not no_mimic,
                 out=out,
                 force=force,
                 # What was tried goes to the error stream, the answer to the other.

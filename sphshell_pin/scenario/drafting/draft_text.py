@@ -51,6 +51,8 @@ def draft_text(
     if plan.left_out:
         left_out = f", without {' and '.join(plan.left_out)}: the tip would not hold its force"
     text = _fill("robot", name=name, title=title, robot=robot, left_out=left_out)
+    if not robot.mimic:
+        text += "mimic = false # joints that mimic others move freely\n"
     if plan.root is not None:
         text += _fill("root", root=_rounded(plan.root, digits))
     elif robot.start:

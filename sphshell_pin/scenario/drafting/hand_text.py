@@ -124,7 +124,7 @@ class HandDraft:
         place = grasp.placement
         root = [*place.translation.tolist(), *pin.Quaternion(place.rotation).coeffs().tolist()]
         stated = self.built.scenario.robot[0].model_dump(exclude_defaults=True)
-        keys = ("name", "urdf", "file", "package_dirs", "xacro_args")
+        keys = ("name", "urdf", "file", "package_dirs", "xacro_args", "density", "mimic")
         source = "\n".join(f"{key} = {toml(stated[key])}" for key in keys if key in stated)
         if self.lock:
             source += f"\nlock = {toml(list(self.lock))} # they move no fingertip"

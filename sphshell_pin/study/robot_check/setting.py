@@ -13,6 +13,7 @@ from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots import mass_fault
 from sphshell_pin.shell import Shell
 from sphshell_pin.study.robot_check.models import Subject, listed
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
@@ -73,7 +74,9 @@ def setting_of(
     """
     model, notes = subject.robot.model, [*subject.notes]
     if model.nv == 0:
-        raise SphshellError(f"the robot '{subject.name}' has no joint that moves")
+        raise SphshellError(
+            f"the robot '{subject.name}' has no joint that moves: let its root float, --free-flyer"
+        )
     postures = [random_posture(model, rng) for _ in range(5)]
     held = massless_joints(model, postures)
     if held:
@@ -82,8 +85,15 @@ def setting_of(
             "joints that move no mass are held here, as `lock` does it in a scene, because forward "
             f"dynamics has no answer for them: {listed(held)}"
         )
-    tip, said = find_sphere(subject, model, rng, frame, radius)
-    sphere, shifted = moved_sphere(model, tip, rng)
+    try:
+        tip, said = find_sphere(subject, model, rng, frame, radius)
+        sphere, shifted = moved_sphere(model, tip, rng)
+    except SphshellError:
+        robot = subject.robot
+        fault = mass_fault(robot.model, postures[0], robot.description) if held else None
+        if fault is None:
+            raise
+        raise SphshellError(fault) from None
     notes += said + shifted
     return Setting(model, sphere, patch(tip.radius), tuple(notes))
 
