@@ -12,8 +12,9 @@ from OCP.STEPControl import STEPControl_Reader
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
 from tests.joints.trimmed import Edge, Minima, TrimmedSolid
-from tests.joints.verdict import MM, Verdict, is_exact
+from tests.joints.verdict import MM, Verdict, exact_elements
 from tests.joints.walk import BESIDE, DEPTHS, SMOOTH
+from tests.parts.cad_mesh import Ints
 from tests.parts.occ import Rng, Solid
 
 RADII = 0.2, 8.0
@@ -122,7 +123,7 @@ def judge_solid(
     digits, rough : tolerances of depths on exact faces, beside 1e-10 r, and on other ones [mm]
     """
     truth = solid.minima(asked.centers, asked.radii)
-    core = shell.core_for("smooth")
+    core, exact = shell.core_for("smooth"), exact_elements(shell)
     out = Verdict(name, asked.centers * MM, asked.radii * MM, asked.joints)
     for row, (center, r) in enumerate(zip(asked.centers, asked.radii.tolist(), strict=True)):
         shown, terms = core.contacts(center * MM, r * MM, SMOOTH)
@@ -136,8 +137,8 @@ def judge_solid(
             if strict:
                 near = [truth[row].points] if len(truth[row].points) else []
                 places = np.concatenate([*near, found.points])
-                elements = [element.tolist(), *(_elements_at(shell, core, p) for p in places)]
-                if all(is_exact(shell, one) for group in elements for one in group):
+                elements = [element, *(_elements_at(core, p, rough) for p in places)]
+                if exact[np.concatenate(elements)].all():
                     break
         if fault:
             out.add(fault, row, detail)
@@ -154,8 +155,9 @@ class Found:
     weights: Array
 
 
-def _elements_at(shell: sp.Shell, core: Any, point: Array) -> list[int]:
-    return list(core.contacts(point * MM, 1e-6 * shell.size, ELEMENTS)[0][3])
+def _elements_at(core: Any, point: Array, radius: float) -> Ints:
+    found: Ints = core.contacts(point * MM, radius * MM, ELEMENTS)[0][3]
+    return found
 
 
 def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str, str]:
@@ -191,20 +193,13 @@ def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str
             return "phantom", f"{found.depths[k]} at {found.points[k].tolist()}"
         for k in np.flatnonzero(truth.depths > tolerance).tolist():
             total = found.weights[same[k]].sum()
-            others = (truth.points[same[:, same[k]].any(axis=1)]) if same[k].any() else []
-            if total > max(1, len(_distinct(others, NEAR * r))):
+            several = (truth.sure & same[:, same[k]].any(axis=1)).sum()
+            if total > max(1, several):
                 return "double", f"weights {total} at {truth.points[k].tolist()}"
-    if len(_distinct(truth.points, NEAR * r)) == 1 and truth.plane[truth.depths.argmax()]:
+    single = (np.abs(truth.depths - deepest) <= 1e-9 * r).all()
+    if single and truth.plane[truth.depths.argmax()]:
         push = np.linalg.norm((found.weights * found.depths**2) @ found.normals)
         off = abs(push / deepest**2 - 1)
         if off > 1e-6 + 4 * tolerance / deepest:
             return "force", f"{off}"
     return "", ""
-
-
-def _distinct(points: Array | list[Array], near: float) -> list[Array]:
-    out: list[Array] = []
-    for point in points:
-        if all(np.linalg.norm(point - one) > near for one in out):
-            out.append(point)
-    return out

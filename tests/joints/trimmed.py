@@ -225,6 +225,7 @@ class TrimmedSolid:
                 explorer.Next()
             for edge in own:
                 if BRep_Tool.Degenerated_s(edge):
+                    _number(places, TopExp.FirstVertex_s(edge))  # an apex or a pole
                     continue
                 if sum(edge.IsSame(other) for other in own) > 1:
                     self.seams.append((row, BRepAdaptor_Curve(edge)))
@@ -353,8 +354,8 @@ class TrimmedSolid:
             away = vertex - centers
             distance = np.linalg.norm(away, axis=1)
             for row in np.flatnonzero(distance < radii).tolist():
-                rise = np.array(ways) @ away[row] / distance[row]
-                if rise.min() > -1e-6:
+                rise = np.array(ways).reshape(-1, 3) @ away[row] / distance[row]
+                if rise.min(initial=0.0) > -1e-6:
                     depth = radii[row] - distance[row]
                     # Between two edges the distance may fall where they turn by more than half.
                     found[row].append((vertex, depth, False, False))

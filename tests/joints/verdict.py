@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
 
@@ -72,7 +75,9 @@ class Verdict:
         return counts
 
 
-def is_exact(shell: sp.Shell, element: int) -> bool:
-    """Whether an element belongs to an exact face."""
-    face = -1 if shell.element_face is None else shell.element_face[element]
-    return bool(face >= 0 and shell.faces[face].exact)
+def exact_elements(shell: sp.Shell) -> NDArray[np.bool_]:
+    """Whether each element belongs to an exact face."""
+    out = np.zeros(len(shell.elements), bool)
+    for face in shell.faces:
+        out[face.elements] = face.exact
+    return out

@@ -9,7 +9,7 @@ import numpy as np
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
 from tests.joints.solids import Part
-from tests.joints.verdict import MM, Verdict, is_exact
+from tests.joints.verdict import MM, Verdict, exact_elements
 from tests.parts.occ import Rng
 
 SMOOTH = 2
@@ -103,7 +103,7 @@ def exact_pieces(shell: sp.Shell, part: Part) -> Array:
     """Whether the face of each piece (k,) is exact in the shell."""
     middles = [piece.at(np.array([piece.length / 2]))[0][0] for piece in part.profile.pieces]
     near = shell.closest_points(part.in_space(np.array(middles), 0.3, 0.5) * MM, method="facets")
-    return np.array([is_exact(shell, element) for element in near.elements.tolist()])
+    return np.asarray(exact_elements(shell)[near.elements])
 
 
 def chord_error(shell: sp.Shell, part: Part) -> float:
@@ -124,7 +124,7 @@ def judge(
     """
     kinds, names, core = kinds_of(part), joints_of(part), shell.core_for("smooth")
     truth = part.profile.truth(asked.flat, asked.radii / MM)
-    strict = exact_pieces(shell, part)
+    strict, known = exact_pieces(shell, part), exact_elements(shell)
     joints = [names[k] for k in asked.joint.tolist()]
     out = Verdict(part.name, asked.centers, asked.radii, joints)
     tolerances = np.where(strict[truth.piece], exact * asked.radii + digits, rough)
@@ -143,7 +143,7 @@ def judge(
             continue
         found = depth.max()
         error = abs(found - deepest)
-        if not all(is_exact(shell, one) for one in element.tolist()):
+        if not known[element].all():
             tolerance = max(tolerance, rough)
         if error > tolerance:
             name = "shallow" if found < deepest else "deep"
