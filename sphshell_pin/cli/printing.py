@@ -8,7 +8,10 @@ import io
 import os
 import sys
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 
 class _LossyFile(io.FileIO):
@@ -16,14 +19,14 @@ class _LossyFile(io.FileIO):
 
     fault: OSError | None = None
 
-    def write(self, data: Any, /) -> int:
+    def write(self, data: ReadableBuffer, /) -> int:
         """Write bytes; return how many are done with."""
         if self.fault is None:
             try:
                 return super().write(data)
             except OSError as fault:
                 self.fault = fault
-        return len(data)
+        return memoryview(data).nbytes
 
 
 @contextlib.contextmanager
