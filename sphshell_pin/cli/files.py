@@ -140,6 +140,8 @@ def _print_against(found: Against, names: tuple[str, str]) -> None:
         print_table((*columns, "force", "lost+extra"), rows)
     if len(found.off) > len(rows):
         say(f"{len(found.off) - len(rows)} more faces differ")
+    if found.unreached:
+        say(f"{found.unreached} faces are not compared: no sphere of this radius touches one alone")
     spheres = f"spheres of radius {found.radius:.3g} m, {found.depth:.3g} m deep"
     say(f"A {names[0]}, B {names[1]}; {spheres}")
     say(found.verdict())

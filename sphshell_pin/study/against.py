@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import permutations, product
@@ -85,6 +86,7 @@ class Against:
     tolerance : share by which forces may differ
     moved : how the second must be moved or scaled to lie on the first, in words, or ""
     faces : of both, those that differ most first; none if the second is elsewhere
+    unreached : faces of both that no sphere touches alone
     """
 
     radius: float
@@ -93,6 +95,7 @@ class Against:
     tolerance: float
     moved: str
     faces: tuple[FaceDifference, ...]
+    unreached: int
 
     @property
     def off(self) -> tuple[FaceDifference, ...]:
@@ -116,10 +119,12 @@ class Against:
             )
         worst = max(self.off, key=lambda face: abs(face.worst))
         lost, extra = (sum(getattr(one, key) for one in self.faces) for key in ("lost", "extra"))
+        kinds = Counter(face.kind for face in self.off).most_common()
         return (
             f"different: {len(self.off)} of {len(self.faces)} faces by more than "
-            f"{self.tolerance:.3g} of the force, {lost} contacts lost, {extra} extra; the depth by "
-            f"up to {abs(worst.worst):.3g} m, on {worst.kind} '{worst.name}'"
+            f"{self.tolerance:.3g} of the force ({', '.join(f'{kind} {n}' for kind, n in kinds)}), "
+            f"{lost} contacts lost, {extra} extra; the depth by up to {abs(worst.worst):.3g} m, on "
+            f"{worst.kind} '{worst.name}'"
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -148,12 +153,17 @@ def compare_shells(
     radius = RADIUS * size if radius is None else check_positive("radius", radius, "m")
     tolerance = check_positive("tolerance", tolerance)
     rng = np.random.default_rng(0)
-    moved, faces = _moved(first, second, rng), []
-    if not moved:
-        for of, (own, other) in enumerate(((first, second), (second, first))):
-            faces += list(_differences(of, own, other, radius, rng))
+    moved = _moved(first, second, rng)
+    pairs = () if moved else ((first, second), (second, first))
+    found = [
+        face
+        for of, (own, other) in enumerate(pairs)
+        for face in _differences(of, own, other, radius, rng)
+    ]
+    faces = [face for face in found if face.places]
     faces.sort(key=lambda face: (not face.off(tolerance), -abs(face.worst)))
-    return Against(radius, DEPTH * radius, size, tolerance, moved, tuple(faces))
+    unreached = len(found) - len(faces)
+    return Against(radius, DEPTH * radius, size, tolerance, moved, tuple(faces), unreached)
 
 
 def _faces_of(shell: Shell) -> Iterator[tuple[str, str, Ints | Longs]]:
@@ -192,7 +202,10 @@ def _differences(
             alone = (contacts == 0) | ((contacts == 1) & (np.abs(deepest - depth) < 0.01 * depth))
             radii = np.where(alone, radii, SMALLER * radii)
         kept = np.flatnonzero(alone)
+        size = float(area[rows].sum())
         if len(kept) == 0:
+            nowhere = (np.nan, np.nan, np.nan)
+            yield FaceDifference(of, name, kind, size, 0, 0.0, 0.0, nowhere, (1.0, 1.0), 0, 0)
             continue
         centers, radii = centers[kept], radii[kept]
         above = centers + 2.0 * depth * found.normals[kept]
@@ -210,7 +223,7 @@ def _differences(
             of,
             name,
             kind,
-            float(area[rows].sum()),
+            size,
             len(kept),
             float(gap[worst]),
             float(np.median(np.abs(gap))),
@@ -235,7 +248,7 @@ def _moved(first: Shell, second: Shell, rng: np.random.Generator) -> str:
     def away(rotation: Floats, scale: float, center: Floats) -> float:
         there = (points - middle) @ rotation.T * scale + center
         found = second.closest_points(there, method="facets")
-        return float(np.median(np.abs(found.distances))) / scale
+        return float(np.mean(np.abs(found.distances))) / scale
 
     here = away(np.eye(3), 1.0, middle)
     if here <= ELSEWHERE * first.size:
