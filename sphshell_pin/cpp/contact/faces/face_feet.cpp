@@ -166,11 +166,51 @@ bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
   return true;
 }
 
+namespace {
+
+// On the line of a face's parameters that divides two facets of it: where the distance stops
+// falling, by the rule of false position (Illinois). False if it has none.
+template <class Probe>
+bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideFoot& out) {
+  const CurvedShell& surface = *shell.curved();
+  const FaceCell& cell = surface.face_cells()[f];
+  if (!cell.closed || cell.side[k] != FaceCell::Side::Inner) return false;
+  const Primitive& shape = surface.faces().shapes[cell.face];
+  const double *p = cell.place[k], *q = cell.place[next_corner(k)];
+  if (!shape.has_parameters() || std::isnan(p[0]) || std::isnan(q[0])) return false;
+  const Eigen::Vector2d begin(p[0], p[1]), along(q[0] - p[0], q[1] - p[1]);
+  const auto pull = [&](double t) {
+    constexpr double kStep = 1e-4;
+    const auto at = [&](double s) { return shape.at(begin + s * along, shell.size()); };
+    out = {t, at(t), (at(t + kStep) - at(t - kStep)) / (2 * kStep)};
+    return probe.pull(out.point).dot(out.tangent);
+  };
+  double low = 0, high = 1, last = pull(1), first = pull(0);
+  if (!(first > 0)) return true;
+  if (!(last < 0)) return pull(1), true;
+  for (int i = 0; i < 40 && high - low > 1e-12; ++i) {
+    const double t = std::clamp(low + first / (first - last) * (high - low), low, high);
+    const double here = pull(t);
+    if (here == 0) break;
+    if (here > 0) {
+      if (low == t) break;
+      low = t, first = here, last *= 0.5;
+    } else {
+      if (high == t) break;
+      high = t, last = here, first *= 0.5;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
 template <class Probe>
 SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   const CurvedShell& surface = *shell.curved();
-  const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
   SideFoot out;
+  if (!surface.face_cells().empty() && nearest_on_line(shell, f, k, probe, out)) return out;
+  const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
   out.t = nearest_on_side(side, probe);
   out.point = side.point(out.t);
   out.tangent = side.tangent(out.t);
