@@ -208,16 +208,6 @@ Eigen::Vector2d Primitive::parameters(const Vec3& x, double size) const {
   return {u, kind == FaceKind::Torus ? std::atan2(at.h, at.off - radius) : at.h / size};
 }
 
-Vec3 Primitive::at(const Eigen::Vector2d& parameters, double size) const {
-  const Vec3 east = axis.unitOrthogonal();
-  const Vec3 e = std::cos(parameters[0]) * east + std::sin(parameters[0]) * axis.cross(east);
-  if (kind == FaceKind::Torus)
-    return point + (radius + second * std::cos(parameters[1])) * e +
-           second * std::sin(parameters[1]) * axis;
-  const double h = parameters[1] * size;
-  return point + radius_at(point + h * axis) * e + h * axis;
-}
-
 // Of the circle about the axis, at the height of x.
 double Primitive::radius_at(const Vec3& x) const {
   if (kind == FaceKind::Cone) return radius + (x - point).dot(axis) * std::tan(second);
