@@ -325,8 +325,9 @@ void Recognizer::add_planes(Faces& faces) const {
     if (!plane[r] || of_[t] >= 0) continue;
     if (number[r] < 0) {
       number[r] = static_cast<int>(faces.shapes.size());
-      faces.shapes.push_back(
-          {FaceKind::Plane, point(corners(some[r])[0]), regions_.normal(r), 0, 0});
+      // A plane has no second number: it says whether the plane is inscribed in a round face.
+      faces.shapes.push_back({FaceKind::Plane, point(corners(some[r])[0]), regions_.normal(r), 0,
+                              double(is_own_plane(int(t)))});
     }
     faces.of[t] = number[r];
   }
