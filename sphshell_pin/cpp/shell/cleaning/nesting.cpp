@@ -81,8 +81,8 @@ Overlaps overlaps(const double* points, const std::int32_t* triangles,
       const double area = ux * vy - uy * vx, scale = area == 0.0 ? 0.0 : 1.0 / area;
       const double s = ((q[0] - a[0]) * vy - (q[1] - a[1]) * vx) * scale;
       const double r = ((q[1] - a[1]) * ux - (q[0] - a[0]) * uy) * scale;
-      const double height = a[2] + std::clamp(s, 0.0, 1.0) * (b[2] - a[2]) +
-                            std::clamp(r, 0.0, 1.0) * (d[2] - a[2]);
+      const double height =
+          a[2] + std::clamp(s, 0.0, 1.0) * (b[2] - a[2]) + std::clamp(r, 0.0, 1.0) * (d[2] - a[2]);
       crossings.push_back({line, height, owner});
       return false;
     });
