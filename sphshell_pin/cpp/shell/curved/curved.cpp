@@ -281,7 +281,10 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   std::vector<Trust>().swap(trust);
   raise_centers(shell);
   normals_ = {};
-  face_cells_ = make_face_cells(shell, faces_, facets_);
+  FaceCells cells = make_face_cells(shell, faces_, facets_);
+  face_cells_ = std::move(cells.of);
+  intruders_ = std::move(cells.intruders);
+  inexact_ = std::move(cells.inexact);
   if (std::any_of(face_cells_.begin(), face_cells_.end(),
                   [](const FaceCell& cell) { return cell.closed; }))
     gap_ = kMostGap * shell.size();
