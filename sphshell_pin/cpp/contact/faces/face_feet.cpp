@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/query/closest_on_side.hpp"
@@ -12,6 +13,7 @@ namespace {
 
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
+constexpr double kNearAxis = 1e-6;
 constexpr int kMostRepeats = 20;
 }  // namespace
 
@@ -166,21 +168,84 @@ bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
   return true;
 }
 
+namespace {
+
+// On the line of a face's parameters that divides two facets of it: where the distance stops
+// falling, by the rule of false position (Illinois). False if it has none.
+template <class Probe>
+bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideFoot& out) {
+  const CurvedShell& surface = *shell.curved();
+  const FaceCell& cell = surface.face_cells()[f];
+  if (!cell.closed || cell.side[k] != FaceCell::Side::Inner) return false;
+  const Primitive& shape = surface.faces().shapes[cell.face];
+  const double *p = cell.place[k], *q = cell.place[next_corner(k)];
+  if (!shape.has_parameters() || std::isnan(p[0]) || std::isnan(q[0])) return false;
+  const double du = q[0] - p[0], dv = q[1] - p[1], size = shell.size();
+  const Vec3 &axis = shape.axis, east = axis.unitOrthogonal(), north = axis.cross(east);
+  const double slope = shape.kind == FaceKind::Cone ? std::tan(shape.second) : 0;
+  const auto pull = [&](double t) {
+    const double u = p[0] + t * du, v = p[1] + t * dv, c = std::cos(u), s = std::sin(u);
+    // The radius and the height, and how they change.
+    double radius = shape.radius + slope * v * size, widens = slope * size;
+    double height = v * size, rises = size;
+    if (shape.kind == FaceKind::Torus) {
+      rises = shape.second * std::cos(v), height = shape.second * std::sin(v);
+      radius = shape.radius + rises, widens = -height;
+    }
+    const Vec3 out_from_axis = c * east + s * north;
+    out.t = t;
+    out.point = shape.point + radius * out_from_axis + height * axis;
+    out.tangent =
+        widens * dv * out_from_axis + radius * du * (c * north - s * east) + rises * dv * axis;
+    return probe.pull(out.point).dot(out.tangent);
+  };
+  double low = 0, high = 1, last = pull(1), first = pull(0);
+  if (!(first > 0)) return true;
+  if (!(last < 0)) return pull(1), true;
+  for (int i = 0, side = 0; i < 40; ++i) {
+    const double t = low + first / (first - last) * (high - low);
+    const double moved = std::min(t - low, high - t), here = pull(t);
+    if (here == 0 || !(moved > 1e-9)) break;
+    if (here > 0) {
+      low = t, first = here;
+      if (side > 0) last /= 2;
+    } else {
+      high = t, last = here;
+      if (side < 0) first /= 2;
+    }
+    side = here > 0 ? 1 : -1;
+  }
+  return true;
+}
+
+}  // namespace
+
 template <class Probe>
 SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   const CurvedShell& surface = *shell.curved();
-  const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
   SideFoot out;
-  out.t = nearest_on_side(side, probe);
-  out.point = side.point(out.t);
-  out.tangent = side.tangent(out.t);
-  if (surface.face_cells().empty() || surface.face_cells()[f].face < 0) return out;
+  if (!surface.face_cells().empty() && nearest_on_line(shell, f, k, probe, out)) return out;
+  const LargeArray<FaceCell>& cells = surface.face_cells();
+  const bool border = !cells.empty() && cells[f].side[k] == FaceCell::Side::Border;
+  const FaceJoint* known = border ? &surface.faces().joints[cells[f].joint[k]] : nullptr;
+  // A line or circle has its closest point in closed form, but from the axis.
+  constexpr bool sphere = std::is_same_v<Probe, Sphere>;
+  bool closed = false;
+  if constexpr (sphere)
+    closed = border && known->kind != FaceJoint::Kind::Crossing &&
+             known->axis.cross(probe.center - known->point).norm() > kNearAxis * known->radius;
+  if (!closed) {
+    const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
+    out.t = nearest_on_side(side, probe);
+    out.point = side.point(out.t);
+    out.tangent = side.tangent(out.t);
+    if (!cells.empty() && cells[f].face >= 0 && cells[f].side[k] == FaceCell::Side::Inner &&
+        out.t > 0 && out.t < 1)
+      out.point = surface.faces().shapes[cells[f].face].onto(out.point);
+    if (!border) return out;
+  }
+  const FaceJoint& joint = *known;
   const std::vector<Primitive>& shapes = surface.faces().shapes;
-  const FaceCell& cell = surface.face_cells()[f];
-  if (cell.side[k] == FaceCell::Side::Inner && out.t > 0 && out.t < 1)
-    out.point = shapes[cell.face].onto(out.point);
-  if (cell.side[k] != FaceCell::Side::Border) return out;
-  const FaceJoint& joint = surface.faces().joints[cell.joint[k]];
   const Vec3 &p = shell.facets()[f].corner[k], &q = shell.facets()[f].corner[next_corner(k)];
   const Vec3 chord = q - p;
   // Along the half-edge's direction.
@@ -193,7 +258,9 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   };
   const double most = chord.norm() / 2;
   Vec3 x = out.point;
-  for (int i = 0; i < kMostRepeats; ++i) {
+  if constexpr (sphere)
+    if (closed) x = joint.nearest(probe.center), out.t = 0.5;
+  for (int i = 0; i < kMostRepeats && !closed; ++i) {
     const Intersection here = joint.at(shapes, x);
     const Vec3 from = -probe.pull(x);
     // Newton's method on the curve that is the intersection of two faces: a step along the tangent
@@ -209,9 +276,13 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   // Beyond an end that end is the nearest.
   // Regions of features overlap by this: no center is between two of them.
   const double gap = surface.gap();
-  if (probe.pull(p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm()) {
+  const bool before =
+      probe.pull(p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm();
+  const bool after =
+      probe.pull(q).dot(tangent_at(q)) >= gap || (q - x).dot(chord) <= -gap * chord.norm();
+  if (before && !(after && probe.depth(q) > probe.depth(p))) {
     out.t = 0, out.point = p;
-  } else if (probe.pull(q).dot(tangent_at(q)) >= gap || (q - x).dot(chord) <= -gap * chord.norm()) {
+  } else if (after) {
     out.t = 1, out.point = q;
   } else {
     if (out.t <= 0 || out.t >= 1) out.t = 0.5;

@@ -197,8 +197,7 @@ class CellMaker {
         const Vec3 x = side.point(s);
         Vec3 on = x;
         if (joint.kind == FaceJoint::Kind::Crossing) {
-          if (s > 0 && s < 1)
-            onto_both(faces_.shapes[joint.face[0]], faces_.shapes[joint.face[1]], on);
+          if (s > 0 && s < 1) onto_both(faces_.shapes[joint.face[0]], joint.across[0], on);
         } else {
           on = joint.nearest(x);
         }
@@ -281,7 +280,7 @@ class CellMaker {
       const FaceJoint& joint = faces_.joints[out_.of[f].joint[k]];
       Vec3 x = facets_[f].side(shell_.facets()[f], k).point(s);
       if (joint.kind != FaceJoint::Kind::Crossing) return joint.nearest(x);
-      onto_both(faces_.shapes[joint.face[0]], faces_.shapes[joint.face[1]], x);
+      onto_both(faces_.shapes[joint.face[0]], joint.across[0], x);
       return x;
     };
     const auto inside = [&](int f, int k, const Vec3& x, double margin) {

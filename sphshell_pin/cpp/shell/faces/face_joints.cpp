@@ -209,6 +209,25 @@ std::optional<FaceJoint> ruling(const Primitive& cone, const Primitive& next, co
   return joint;
 }
 
+// The mitre of two cylinders of one radius: in one of the two planes between their axes, which cuts
+// both at an angle where they are tangent to each other, too.
+std::optional<FaceJoint> mitre(const Primitive& one, const Primitive& two, const Vec3& middle,
+                               double gap) {
+  const Vec3 &a = one.axis, &b = two.axis, up = a.cross(b);
+  const double square = up.squaredNorm();
+  const Vec3 between = two.point - one.point;
+  if (one.kind != FaceKind::Cylinder || two.kind != FaceKind::Cylinder ||
+      !(std::abs(one.radius - two.radius) <= gap) || !(square > kLeastAngle * kLeastAngle) ||
+      !(std::abs(between.dot(up)) <= gap * std::sqrt(square)))
+    return std::nullopt;
+  const Vec3 center = one.point + between.cross(b).dot(up) / square * a;
+  FaceJoint joint;
+  const Vec3 sum = (a + b).normalized(), rest = (a - b).normalized(), x = middle - center;
+  joint.point = center, joint.axis = std::abs(sum.dot(x)) < std::abs(rest.dot(x)) ? sum : rest;
+  joint.across[0] = joint.across[1] = {FaceKind::Plane, center, joint.axis, 0, 0};
+  return joint;
+}
+
 }  // namespace
 
 Vec3 FaceJoint::nearest(const Vec3& x) const {
@@ -219,7 +238,7 @@ Vec3 FaceJoint::nearest(const Vec3& x) const {
 }
 
 Intersection FaceJoint::at(const std::vector<Primitive>& shapes, const Vec3& x) const {
-  if (kind == Kind::Crossing) return intersection_at(shapes[face[0]], shapes[face[1]], x);
+  if (kind == Kind::Crossing) return intersection_at(shapes[face[0]], across[0], x);
   const Vec3 on = nearest(x);
   if (kind == Kind::Line) return {axis, Vec3::Zero(), on - x, 1};
   const Vec3 inward = (point - on) / radius;
@@ -244,7 +263,12 @@ std::optional<FaceJoint> find_joint(const std::vector<Primitive>& shapes, int a,
   const auto is_border = [&](const FaceJoint& joint) {
     if (joint.kind == FaceJoint::Kind::Circle && !(joint.radius > gap)) return false;
     for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-      const Vec3 chord = p + s * (q - p), x = joint.nearest(chord);
+      const Vec3 chord = p + s * (q - p);
+      Vec3 x = chord;
+      if (joint.kind != FaceJoint::Kind::Crossing)
+        x = joint.nearest(chord);
+      else if (!onto_both(one, joint.across[0], x))
+        return false;
       if (!((x - chord).norm() < length) || !(std::abs(one.distance(x)) <= gap) ||
           !(std::abs(two.distance(x)) <= gap))
         return false;
@@ -273,6 +297,7 @@ std::optional<FaceJoint> find_joint(const std::vector<Primitive>& shapes, int a,
   if (two.kind == FaceKind::Torus) add(end_of_tube(two, one, p, true));
   if (one.kind == FaceKind::Cone) add(ruling(one, two, (p + q) / 2));
   if (two.kind == FaceKind::Cone) add(ruling(two, one, (p + q) / 2));
+  add(mitre(one, two, (p + q) / 2, gap));
   for (FaceJoint& joint : found)
     if (is_border(joint)) {
       joint.face[0] = a, joint.face[1] = b;

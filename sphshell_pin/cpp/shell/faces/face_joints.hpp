@@ -27,7 +27,8 @@ struct FaceJoint {
   Vec3 axis = Vec3::UnitZ();  // along a line; of a circle. Unit
   double radius = 0;          // of a circle [m]
   // Per face the shape that its normals on the border span: a center is on one side of it where its
-  // closest point on the face is on that side of the border. Of crossings the other face.
+  // closest point on the face is on that side of the border. Of crossings the other face, or the
+  // plane that the curve lies in.
   Primitive across[2];
 
   int which(int of_face) const { return of_face == face[0] ? 0 : 1; }
