@@ -196,8 +196,9 @@ def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str
             several = (truth.sure & same[:, same[k]].any(axis=1)).sum()
             if total > max(1, several):
                 return "double", f"weights {total} at {truth.points[k].tolist()}"
-    single = (np.abs(truth.depths - deepest) <= 1e-9 * r).all()
-    if single and truth.plane[truth.depths.argmax()]:
+    apart = np.linalg.norm(truth.points - truth.points[truth.depths.argmax()], axis=1)
+    single = (apart <= NEAR * r) & (np.abs(truth.depths - deepest) <= 1e-9 * r)
+    if single.all() and truth.plane[truth.depths.argmax()]:
         push = np.linalg.norm((found.weights * found.depths**2) @ found.normals)
         off = abs(push / deepest**2 - 1)
         if off > 1e-6 + 4 * tolerance / deepest:
