@@ -10,6 +10,7 @@
 // It is a function of x alone, whichever facet holds x: on a border both faces have d = 0. As w is
 // flat at d = 0, the first derivatives agree there too, wherever K_j goes on smoothly.
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "contact/curvature/curvature_field.hpp"
@@ -86,6 +87,12 @@ CurvatureField::Local CurvatureField::on_half_edge(int h, const Vec3& point) {
 CurvatureField::Local CurvatureField::at(const Place& place, double length2) {
   const std::vector<int>& joints = joints_about(place.facet);
   Local sum = own(place);
+  // Towards the tip of a cone the curvature grows without limit. Where it exceeds 1 / (2 a) it goes
+  // on linearly with the distance, to 1 / a at the tip: see at_tip() in curvature.cpp.
+  const Primitive* face = shell_->curved()->face_of(place.facet);
+  if (const double bend = std::abs(sum.head<3>().sum()) * std::sqrt(length2);
+      face && face->kind == FaceKind::Cone && bend > 0.5)
+    sum.head<6>() *= (1 - 0.25 / bend) / bend;
   if (joints.empty()) return sum;
   neighbors_.clear();
   for (int joint : joints) {
