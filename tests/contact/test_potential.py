@@ -20,6 +20,7 @@ import sphshell_pin as sp
 from tests.contact.test_planes import scene_of
 from tests.models import ball
 
+pytestmark = pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
 FOLDER = Path(__file__).parents[2] / "scenarios" / "surfaces"
 C_FORCE = ctypes.CFUNCTYPE(
     ctypes.c_double, ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double)
