@@ -204,9 +204,12 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
   const CurvatureField::Local local = local_at(Vec3::Zero(), length2);
   Eigen::Matrix<double, 7, 3> local_by;
   local_by.setZero();
-  for (int i = 0; i < 3 && moves; ++i)
+  // Along the normal neither place nor normal move.
+  const Vec3 east = normal.unitOrthogonal();
+  for (const Vec3& along : {east, Vec3(normal.cross(east))})
     for (int way : {1, -1})
-      local_by.col(i) += way / (2 * step) * local_at(way * step * Vec3::Unit(i), length2);
+      if (moves)
+        local_by += way / (2 * step) * local_at(way * step * along, length2) * along.transpose();
   // It grows with the depth, which falls along the normal.
   for (int way : {1, -1})
     if (depth > 0 && moves)
