@@ -10,6 +10,7 @@
 // It is a function of x alone, whichever facet holds x: on a border both faces have d = 0. As w is
 // flat at d = 0, the first derivatives agree there too, wherever K_j goes on smoothly.
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "contact/curvature/curvature_field.hpp"
@@ -22,6 +23,12 @@ namespace sphshell {
 namespace {
 
 double square(double x) { return x * x; }
+
+double chord_distance2(const Facet& facet, int side, const Vec3& x) {
+  const Vec3 &p = facet.corner[side], d = facet.corner[next_corner(side)] - p;
+  const double t = std::clamp((x - p).dot(d) / d.squaredNorm(), 0.0, 1.0);
+  return (p + t * d - x).squaredNorm();
+}
 
 }  // namespace
 
@@ -37,8 +44,11 @@ void CurvatureField::look_about(const Vec3& point, double reach) {
 // Breadth first over smooth sides within reach, so that the other side of a thin plate does not
 // count.
 const std::vector<int>& CurvatureField::joints_about(int facet) {
+  // Each of them is of one walk, the last one of the latest: what it came to has the same joints.
   for (std::size_t i = 0; i < looked_; ++i)
-    if (joints_[i].facet == facet) return joints_[i].half_edges;
+    if (joints_[i].facet == facet ||
+        (!visited_.empty() && visited_[facet] == walk_ - std::uint32_t(looked_ - 1 - i)))
+      return joints_[i].half_edges;
   if (joints_.size() == looked_) joints_.emplace_back();
   Joints& found = joints_[looked_++];
   found.facet = facet;
@@ -54,17 +64,23 @@ const std::vector<int>& CurvatureField::joints_about(int facet) {
   add(facet);
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     const int f = corners_[i];
-    const Facet& flat = shell_->facets()[f];
     for (int k = 0; k < 3; ++k) {
-      const Vec3 &p = flat.corner[k], d = flat.corner[next_corner(k)] - p;
-      const double t = std::clamp((about_ - p).dot(d) / d.squaredNorm(), 0.0, 1.0);
       const double reach = reach_ + shell_->curved()->facets()[f].bulge + cells[f].bulge[k];
-      if ((p + t * d - about_).squaredNorm() > reach * reach) continue;
-      const int other = smooth_over(*shell_, f, k);
-      if (other < 0) continue;
-      add(triangle_of(other));
-      if (region_of(f) != region_of(triangle_of(other)) && 3 * f + k < other)
-        found.half_edges.push_back(3 * f + k);
+      if (chord_distance2(shell_->facets()[f], k, about_) > reach * reach) continue;
+      const int h = shell_->topology().other_half_edge(3 * shell_->triangle_of_facet(f) + k);
+      if (h < 0) continue;
+      const int other = shell_->facet_half_edge(h), g = triangle_of(other);
+      const bool within = region_of(f) == region_of(g);
+      // Within a face the normals need not be compared.
+      if (within && (region_of(f) >= 0 || visited_[g] == walk_ ||
+                     shell_->facets()[f].planar_face == shell_->facets()[g].planar_face)) {
+        add(g);
+      } else if ((within || 3 * f + k < other || visited_[g] != walk_) &&
+                 smooth_over(*shell_, f, k) >= 0) {
+        add(g);
+        if (!within && 3 * f + k < other)
+          found.half_edges.insert(found.half_edges.end(), {3 * f + k, other});
+      }
     }
   }
   return found.half_edges;
@@ -86,14 +102,24 @@ CurvatureField::Local CurvatureField::on_half_edge(int h, const Vec3& point) {
 CurvatureField::Local CurvatureField::at(const Place& place, double length2) {
   const std::vector<int>& joints = joints_about(place.facet);
   Local sum = own(place);
+  // Towards the tip of a cone the curvature grows without limit. Where it exceeds 1 / (2 a) it goes
+  // on linearly with the distance, to 1 / a at the tip: see at_tip() in curvature.cpp.
+  const Primitive* face = shell_->curved()->face_of(place.facet);
+  if (const double bend = std::abs(sum.head<3>().sum()) * std::sqrt(length2);
+      face && face->kind == FaceKind::Cone && bend > 0.5)
+    sum.head<6>() *= (1 - 0.25 / bend) / bend;
   if (joints.empty()) return sum;
   neighbors_.clear();
-  for (int joint : joints) {
-    const int beside = smooth_over(*shell_, triangle_of(joint), side_of(joint));
+  for (std::size_t i = 0; i < joints.size(); i += 2) {
+    const int joint = joints[i], beside = joints[i + 1];
     // The face of known shape gives the border.
     const int h = region_of(triangle_of(joint)) < 0 ? beside : joint;
-    const SideFoot foot =
-        nearest_on_side(*shell_, triangle_of(h), side_of(h), Sphere{place.point, 0, 0});
+    const int f = triangle_of(h), k = side_of(h);
+    const double bulge = std::max(double(shell_->curved()->facets()[f].bulge),
+                                  double(shell_->curved()->face_cells()[f].bulge[k]));
+    if (chord_distance2(shell_->facets()[f], k, place.point) > square(std::sqrt(length2) + bulge))
+      continue;
+    const SideFoot foot = nearest_on_side(*shell_, f, k, Sphere{place.point, 0, 0});
     const double d2 = (foot.point - place.point).squaredNorm();
     if (!(d2 < length2)) continue;
     const double weight = square(1 - d2 / length2) / std::max(d2, 1e-24 * length2);

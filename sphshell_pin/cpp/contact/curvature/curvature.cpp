@@ -16,6 +16,8 @@ namespace {
 // Of the radius: a step of the center for derivatives, a distance without direction, and what a
 // place may move by such steps. Of the depth: the largest step that changes it.
 constexpr double kMove = 1e-5, kNoDistance = 1e-6, kAside = 1e-2, kDeeper = 1e-3;
+// Of the size: how near a cone's axis its tip is. Of the distance from the axis: the largest step.
+constexpr double kAtTip = 1e-9, kBesideTip = 1e-3;
 
 // Tangents along one line (the sine of their angle), as at the common corner of two curved sides
 // that go on into each other, are one.
@@ -56,6 +58,21 @@ Eigen::Vector2d parameters_of(const CubicPatch& patch, const Facet& facet, const
     if (step.cwiseAbs().sum() < 1e-13) break;
   }
   return {u, v};
+}
+
+// At the tip of a cone, whose normals are within `most` (the sine) of its axis: from what its side
+// has there, 1 / a around the axis, to as much in all directions where the sphere stands on the
+// tip.
+CurvatureField::Local at_tip(const Primitive& cone, const Vec3& normal, double length2) {
+  CurvatureField::Local out = CurvatureField::Local::Zero();
+  if (!(length2 > 0)) return out;
+  const Vec3 around = normal.cross(cone.axis);
+  const double most = std::cos(cone.second), sine2 = around.squaredNorm();
+  const double x = std::min(sine2 / (most * most), 1.0), share = x * (2 - x);
+  Mat3 bend = (1 - share) / 2 * (Mat3::Identity() - normal * normal.transpose());
+  if (sine2 > 0) bend += share / sine2 * around * around.transpose();
+  out.head<6>() = CurvatureField::tensor(bend / std::sqrt(length2));
+  return out;
 }
 
 }  // namespace
@@ -106,7 +123,9 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
     place.at = parameters_of(place.patch, facet, contact.point);
   Motion motion;
   ContactShape out = shape_at(place, contact.depth, center, contact.normal, radius, motion);
-  const double step = std::min(kMove * radius, kDeeper * contact.depth);
+  double step = std::min(kMove * radius, kDeeper * contact.depth);
+  if (face && face->kind == FaceKind::Cone)
+    step = std::min(step, kBesideTip * std::abs(face->radius_at(contact.point)));
   // Nothing is known of the motion of a center that is on the surface.
   const bool moves = std::abs(radius - contact.depth) > kNoDistance * radius;
   if (!want_second || !moves || !(step > 0)) return out;
@@ -178,13 +197,19 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
     return sign * field_.at({place.facet, there.at, point}, length2);
   };
   // The square of the radius of contact on a plane, over which joints are blended.
-  const double length2 = radius * depth, step = kMove * radius;
+  const double length2 = radius * depth;
+  double step = kMove * radius;
+  if (face && face->kind == FaceKind::Cone)
+    step = std::min(step, kBesideTip * std::abs(face->radius_at(face->onto(center))));
   const CurvatureField::Local local = local_at(Vec3::Zero(), length2);
   Eigen::Matrix<double, 7, 3> local_by;
   local_by.setZero();
-  for (int i = 0; i < 3 && moves; ++i)
+  // Along the normal neither place nor normal move.
+  const Vec3 east = normal.unitOrthogonal();
+  for (const Vec3& along : {east, Vec3(normal.cross(east))})
     for (int way : {1, -1})
-      local_by.col(i) += way / (2 * step) * local_at(way * step * Vec3::Unit(i), length2);
+      if (moves)
+        local_by += way / (2 * step) * local_at(way * step * along, length2) * along.transpose();
   // It grows with the depth, which falls along the normal.
   for (int way : {1, -1})
     if (depth > 0 && moves)
@@ -221,6 +246,11 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
 CurvatureField::Local Curvature::between_walls(const Place& place, const Vec3& normal,
                                                double length2) {
   walls_.clear();
+  const Shell& shell = field_.shell();
+  const Primitive* face = shell.curved()->face_of(place.facet);
+  if (place.feature == Feature::Vertex && face && face->kind == FaceKind::Cone &&
+      std::abs(face->radius_at(place.point())) < kAtTip * shell.size())
+    return at_tip(*face, normal, length2);
   if (place.feature == Feature::Edge)
     find_walls_of_side(place.facet, place.index, place.at[0], length2);
   else
