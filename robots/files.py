@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.errors import ShellFileError, SphshellError
+from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.shell.readers.ply import read_ply
@@ -80,7 +81,7 @@ def read(
         elif xacro_args:
             raise ValueError("arguments are for files that end in .xacro")
         else:
-            text = file.read_bytes()
+            text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
         raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
     return described(text, folders, free_flyer=free_flyer)
@@ -249,6 +250,10 @@ def _check_mesh(description: Description, path: Path) -> None:
     It knows 40 formats; those of robots have been tried, damaged .ply files alone made it crash.
     """
     reason, suffix = "", path.suffix.lower()
+    try:
+        open_regular(path).close()
+    except OSError as error:
+        reason = f"{path}: {error.strerror}"
     if suffix not in MESHES:
         reason = f"{path}: not one of the formats {', '.join(MESHES)}"
     elif suffix == ".ply":
