@@ -17,6 +17,7 @@ import pinocchio as pin
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.mimic import shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
+from sphshell_pin.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.robots.description import Description, check_poses, check_size, parsed
 from sphshell_pin.robots.files import (
     RobotError,
@@ -338,7 +339,7 @@ def _load_poses(model: pin.Model, srdf: str | PathLike[str] | None) -> None:
     if not os.path.isfile(srdf):
         raise RobotError(f"{srdf}: no such SRDF file")
     try:
-        text = Path(srdf).read_bytes()
+        text = read_bytes(srdf, MOST_TEXT)
         check_size(text)
         root = parsed(text)
         check_poses(root, model)

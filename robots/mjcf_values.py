@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.arrays import Array
+from sphshell_pin.regular_file import read_bytes
 from sphshell_pin.robots.description import DEEPEST, check_size, parsed
 
 MOST_FILES = 1000
@@ -99,7 +100,7 @@ def include(
             raise ValueError(f"it includes {stated}, which is not there")
         if found.resolve() in open_files:
             raise ValueError(f"it includes {stated}, which includes itself")
-        text = found.read_bytes()
+        text = read_bytes(found, MOST_INCLUDED)
         sizes.append(len(text))
         if len(sizes) > MOST_FILES or sum(sizes) > MOST_INCLUDED:
             raise ValueError(

@@ -11,6 +11,8 @@ from os import PathLike
 from pathlib import Path
 from urllib.parse import unquote
 
+from sphshell_pin.regular_file import MOST_TEXT, read_bytes
+
 # Folders one within another below one of ROS_PACKAGE_PATH; a workspace has three.
 _DEEPEST = 5
 # Folders that are looked at below one, and above a package, in search of another package.
@@ -106,7 +108,7 @@ def _is_package(folder: Path, name: str) -> bool:
 def _stated_name(package_xml: Path) -> str | None:
     """Return the name that a package.xml states."""
     try:
-        return (ET.parse(package_xml).findtext("name") or "").strip()
+        return (ET.fromstring(read_bytes(package_xml, MOST_TEXT)).findtext("name") or "").strip()
     except (OSError, ET.ParseError, ValueError, LookupError):  # the last: an unknown encoding
         return None
 

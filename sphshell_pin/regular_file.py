@@ -6,19 +6,22 @@ A pipe makes its reader wait for ever, and a device may never end.
 from __future__ import annotations
 
 import errno
+import io
 import os
 import stat
 from os import PathLike
-from typing import BinaryIO
 
 MOST = 4e9
 """Of a file, unless stated [bytes]."""
+
+MOST_TEXT = 100e6
+"""Of a scenario, a robot's description or a package.xml [bytes]."""
 
 SMALL = 1 << 16
 """Files of the system state no size [bytes]."""
 
 
-def open_regular(path: str | PathLike[str], most: float = MOST) -> BinaryIO:
+def open_regular(path: str | PathLike[str], most: float = MOST) -> io.BufferedReader:
     """Open a regular file of at most `most` bytes for reading.
 
     Raises OSError, whose `strerror` says what the file is instead.
@@ -46,5 +49,6 @@ def read_bytes(path: str | PathLike[str], most: float = MOST) -> bytes:
 
 
 def read_text(path: str | PathLike[str], most: float = MOST) -> str:
-    """Return the text of a file in UTF-8, without a byte-order mark, see `open_regular`."""
-    return read_bytes(path, most).decode("utf-8-sig")
+    """Return the text of a file in UTF-8, without its byte-order mark, lines ended as Python's."""
+    with io.TextIOWrapper(io.BytesIO(read_bytes(path, most)), encoding="utf-8-sig") as text:
+        return text.read()

@@ -31,15 +31,22 @@ def quantity_of(title: str) -> tuple[str, str]:
 def csv_text(table: Table) -> str:
     """Return `table` as comma-separated values, the names of the columns in the first line.
 
-    A number is written with the digits that give it back exactly, nan as an empty cell.
+    A number is written with the digits that give it back exactly, nan as an empty cell; a text or
+    name that a spreadsheet would evaluate begins with an apostrophe.
     """
     text = io.StringIO(newline="")
     writer = csv.writer(text)
-    writer.writerow(table)
+    writer.writerow(map(_cell, table))
     columns = (np.asarray(one).tolist() for one in table.values())
     for row in zip(*columns, strict=True):
-        writer.writerow(["" if isinstance(x, float) and math.isnan(x) else x for x in row])
+        writer.writerow(map(_cell, row))
     return text.getvalue()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str):
+        return f"'{value}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+    return "" if isinstance(value, float) and math.isnan(value) else value
 
 
 def write_parquet(file: IO[bytes], table: Table, metadata: Mapping[str, str]) -> None:

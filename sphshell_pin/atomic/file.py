@@ -13,6 +13,7 @@ from typing import IO
 
 from sphshell_pin.atomic.lock import lock_file
 from sphshell_pin.errors import ResultError
+from sphshell_pin.regular_file import open_regular
 
 
 @contextlib.contextmanager
@@ -96,7 +97,7 @@ def _aside(path: str | PathLike[str], suffix: str) -> Iterator[tuple[IO[bytes], 
 
 def sync_file(path: Path) -> None:
     """Make the contents of a file outlast a power cut."""
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         os.fsync(file.fileno())
 
 

@@ -24,6 +24,7 @@ from typing import Self
 from sphshell_pin.atomic.exchange import exchange
 from sphshell_pin.atomic.file import sync_file, sync_folder
 from sphshell_pin.atomic.lock import holder, lock_file, lock_folder, sign
+from sphshell_pin.regular_file import read_text
 
 # End the names of a sweep's database, and of what SQLite keeps beside it while it is changed. As it
 # finds no moved file again, a sweep locks its folder.
@@ -320,7 +321,7 @@ def _write_list(place: Path, new: Iterable[str], old: Iterable[str]) -> None:
 def _read_list(place: Path) -> tuple[list[str], list[str]] | None:
     """Return the names that come and those that go; None if not all of it was written."""
     try:
-        names = json.loads((place / _READY).read_text(encoding="utf-8"))
+        names = json.loads(read_text(place / _READY))
         return list(names["new"]), list(names["old"])
     except (FileNotFoundError, ValueError):
         return None

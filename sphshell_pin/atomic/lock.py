@@ -9,6 +9,8 @@ import socket
 import time
 from pathlib import Path
 
+from sphshell_pin.regular_file import read_text
+
 # Of file systems without locks, such as Lustre as it is often mounted.
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF}
 
@@ -69,7 +71,7 @@ def sign(descriptor: int) -> None:
 def holder(path: Path) -> str:
     """Say who signed the lock at `path`: "process 12 since 2026-01-02 03:04:05"."""
     try:
-        process, host, since = path.read_text(encoding="utf-8").strip().split(" ", 2)
+        process, host, since = read_text(path).strip().split(" ", 2)
     except (OSError, ValueError):
         return "another process"  # which has not signed yet
     where = "" if host == socket.gethostname() else f" on {host}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import ctypes
+import dataclasses
 import sys
 import warnings
 from _ctypes import CFuncPtr
@@ -40,7 +41,9 @@ class OwnFunctions:
 
     @classmethod
     def _checked(cls, name: object, value: object) -> float:
-        if not isinstance(name, str) or not name.isidentifier() or hasattr(cls, name):
+        used = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+        valid = isinstance(name, str) and name.isidentifier() and name not in used
+        if not valid or hasattr(cls, str(name)):
             must = "must be names of Python that a law has no other use for"
             raise InvalidParameter("parameters", name, must)
         return check_finite(f"parameters['{name}']", value)
@@ -147,6 +150,9 @@ def _routine(name: str, function: Any, numbers: list[float], count: int) -> tupl
         answer = function(*where, parameters)
         try:
             return float(answer)
+        except OverflowError:
+            must = "must return a number below 1e308"
+            raise InvalidParameter(name, 0.0, must, "returns a larger one,") from None
         except (TypeError, ValueError):
             must = "must return a number"
             raise InvalidParameter(name, answer, must, f"returns {answer!r},") from None

@@ -12,6 +12,7 @@ from sphshell_pin.checks import check_vector
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Component, parameter
+from sphshell_pin.regular_file import read_text
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class TableLaw(NormalLaw, kind="table"):
         be read, and for its rows as for the arguments.
         """
         try:
-            lines = csv.reader(Path(path).read_text(encoding="utf-8").splitlines())
+            lines = csv.reader(read_text(path).splitlines())
             rows = [(k, row) for k, row in enumerate(lines, 1) if row and row[0].strip()[:1] != "#"]
         except (OSError, UnicodeDecodeError, csv.Error) as error:
             raise InvalidParameter("file", str(path), f"cannot be read: {error}") from None

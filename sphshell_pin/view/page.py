@@ -6,14 +6,17 @@ import base64
 import gzip
 import hashlib
 import html
+import json
 import re
 import struct
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.regular_file import read_text
 from sphshell_pin.view.meshes import pack_facets, take_out_numbers
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
@@ -187,10 +190,22 @@ def render_page(commands: list[Json], title: str, legend: list[tuple[str, str]])
         "script": re.sub(r"^import .*\n", "", _joined(SCRIPTS), flags=re.MULTILINE),
         "viewer": _compressed(viewer_script().read_bytes()),
         "scene": _compressed(bytes(packed)),
+        "licenses": html.escape(_licenses()).replace("--", "- -"),
     }
     page = (PARTS / "page.html").read_text(encoding="utf-8")
     pieces = page.split("@@")
     return "".join(parts[piece] if index % 2 else piece for index, piece in enumerate(pieces))
+
+
+@cache
+def _licenses() -> str:
+    """Return the notices of the viewer and of what is built into it, such as three.js."""
+    script = viewer_script()
+    texts = [f"meshcat\n\n{read_text(script.parent.parent / 'LICENSE')}"]
+    for one in json.loads(read_text(script.with_name(f"{script.name}.THIRD_PARTY_LICENSES.json"))):
+        head = f"{one['name']} {one['version']}, {one['author']}, license {one['license']}"
+        texts.append(f"{head}\n\n{one['licenseText'] or ''}")
+    return "\n\n".join(texts)
 
 
 def _joined(names: tuple[str, ...]) -> str:

@@ -189,6 +189,8 @@ def test_no_number_is_refused(wrong) -> None:
             simulation.run([0.0499], None, 0.01)
     with pytest.raises(errors.InvalidParameter, match="function returns 'a', must return a number"):
         python_law(lambda depth, rate, p: "a", {}).normal_force(1.0)
+    with pytest.raises(errors.InvalidParameter, match="returns a larger one, must return a number"):
+        python_law(lambda depth, rate, p: 10**5000, {}).normal_force(1.0)
 
 
 OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
@@ -205,6 +207,9 @@ OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
         ((C_LAW.function, None, {"k": math.nan}), r"parameters\['k'\] = nan must be finite"),
         ((C_LAW.function, None, {"text": 1.0}), "parameters = 'text' must be names"),
         ((C_LAW.function, None, {"a b": 1.0}), "parameters = 'a b' must be names"),
+        ((C_LAW.function, None, {"function": 1.0}), "parameters = 'function' must be names"),
+        ((C_LAW.function, None, {"parameters": 1.0}), "parameters = 'parameters' must be names"),
+        ((C_LAW.function, None, {"_energy": 1.0}), "parameters = '_energy' must be names"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments, said) -> None:

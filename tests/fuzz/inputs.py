@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sphshell_pin.errors import SphshellError
-from tests.fuzz import folders, readers, tables
+from sphshell_pin.robots.plain_mesh import FORMATS
+from tests.fuzz import folders, readers, strangers, tables
 from tests.fuzz.folders import STRUCTURES, Structure, damaged
 from tests.fuzz.meshes import SHAPES, WRITERS
 
@@ -80,6 +81,19 @@ KINDS: dict[str, Kind] = {
     "packages": _folder("packages", folders.package_corpus, readers.read_robot_in),
     "meshes": _folder("meshes", folders.mesh_corpus, readers.read_robot_in),
     "results": _folder("results", folders.results_corpus, readers.read_run),
+    "expression": Kind(
+        ".expression", strangers.expression_corpus, strangers.expression, strangers.read_expression
+    ),
+    **{
+        f"drawn{suffix}": Kind(
+            f".drawn{suffix}",
+            functools.partial(strangers.mesh_corpus, suffix),
+            STRUCTURES[suffix],
+            strangers.read_drawn(suffix),
+            4,
+        )
+        for suffix in FORMATS
+    },
     # A process for each takes a second.
     "xacro": _folder("xacro", folders.xacro_corpus, readers.read_robot_in, 1),
 }

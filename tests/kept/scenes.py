@@ -3,7 +3,9 @@
 import shutil
 from pathlib import Path
 
+from sphshell_pin.robots.plain_mesh import FORMATS
 from sphshell_pin.scenario import run_scenario, shipped_scenarios
+from tests.fuzz.strangers import mesh_corpus
 from tests.scenario.files import without_pictures
 
 DATA = Path(__file__).parents[1] / "data"
@@ -127,7 +129,12 @@ JOINT = """
 """
 HEAD = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 ARM = (
-    f'{HEAD}<xacro:arg name="angle" default="1"/><link name="base"/>'
+    f'{HEAD}<xacro:arg name="angle" default="1"/><link name="base">'
+    + "".join(
+        f'<visual><geometry><mesh filename="drawn.{suffix}"/></geometry></visual>'
+        for suffix in ("dae", "obj", "ply", "stl")
+    )
+    + "</link>"
     + LINK.replace("NAME", "upper")
     + LINK.replace("NAME", "lower")
     + JOINT.replace("NAME", "shoulder").replace("PARENT", "base").replace("CHILD", "upper")
@@ -143,6 +150,14 @@ def write(home: Path) -> Path:
     shutil.copytree(DATA / "xacro" / "finger_description", home / "arm" / "finger_description")
     (home / "arm" / "arm.urdf.xacro").write_text(ARM)
     (home / "arm" / "arm.srdf").write_text(POSES)
+    # Meshes that name other files, in every format that is kept.
+    for suffix in FORMATS:
+        (home / "arm" / f"drawn{suffix}").write_bytes(
+            mesh_corpus(suffix)[0].replace(b"/dev/zero", b"named")
+        )
+    with (home / "arm" / "drawn.obj").open("ab") as file:
+        file.write(b"\rmtllib named\n\x0cmtllib named\nusemtl a\n")
+    (home / "arm" / "named").write_text("newmtl a\nmap_Kd named\n")
     shutil.copy(DATA / "mjcf" / "meshes.xml", home)
     shutil.copytree(DATA / "mjcf" / "assets", home / "assets")
     shutil.copy(shipped_scenarios()["polished_valve"].parent / "surfaces" / "valve_body.step", home)

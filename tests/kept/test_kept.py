@@ -105,7 +105,7 @@ def test_meshes_beyond_the_limit_are_named(
     monkeypatch.setattr(kept, "MOST_FILES", 100)
     few = kept_of(result)
     assert not [name for name in few.arrays if name.startswith("file.") and len(name) > 100]
-    (digest,) = few.contents["robots"][0]["meshes"].values()
+    digest = few.contents["robots"][0]["meshes"]["package://finger_description/meshes/cube.stl"]
     assert digest == hashlib.sha256(plain_mesh(".stl", CUBE.read_bytes()) or b"").hexdigest()
     assert f"file.{digest}" not in few.arrays
     monkeypatch.undo()
@@ -113,7 +113,7 @@ def test_meshes_beyond_the_limit_are_named(
     assert f"file.{digest}" in whole.arrays
     urdf = whole.contents["robots"][0]
     urdf["meshes"] = dict.fromkeys(urdf["meshes"], "0" * 64)  # of one that is not kept
-    with pytest.warns(RobotWarning, match=r"which the results do not hold: package://finger.*cube"):
+    with pytest.warns(RobotWarning, match=r"which the results do not hold: .*package://finger.*cube"):
         Replay(with_kept(result, whole))
 
 

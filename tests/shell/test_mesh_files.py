@@ -1,12 +1,15 @@
 """stl, obj, ply and off: elements and normals stay what the file says; faults are sentences."""
 
+import contextlib
 import struct
+import time
 
 import numpy as np
 import pytest
 
-from sphshell_pin.errors import InvalidParameter, ShellFileError
+from sphshell_pin.errors import InvalidParameter, ShellFileError, SphshellError
 from sphshell_pin.shell import Shell
+from sphshell_pin.shell.readers.mesh import STL_RECORD
 
 from .surfaces import CUBE, CUBE_QUADS, by_place, plate
 
@@ -244,3 +247,82 @@ def test_nan_in_a_file_names_the_vertex(write):
     data = b" " * 80 + struct.pack("<I", 1) + bytes(12) + corners.tobytes() + bytes(2)
     with pytest.raises(ShellFileError, match="vertex 2 is not finite"):
         Shell.from_file(write("nan.stl", data), unit="m")
+
+
+def binary_stl(count, held, more=b""):
+    """Return a binary file whose header promises `count` triangles, and which holds others."""
+    facet = np.zeros((), STL_RECORD)
+    facet["corners"] = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    return bytes(80) + count.to_bytes(4, "little") + held * facet.tobytes() + more
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (binary_stl(9, 4), "its header promises 9 triangles, and it holds 4; export"),
+        (binary_stl(2, 3), "its header promises 2 triangles, and it holds 3; export"),
+        (binary_stl(3, 3)[:-7], "its header promises 3 triangles, and it holds 2; export"),
+        (binary_stl(0, 0), "its header promises 0 triangles, and it holds 0; export"),
+        (binary_stl(2**32 - 1, 1), "its header promises 4294967295 triangles, and it holds 1;"),
+        (b"solid a\nfacet normal 0 0 1\nvertex 0 0 0\nvertex 1", "it holds 1 vertices in 0 whole"),
+        (b"solid a\nvertex 1_0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendfacet", "2 vertices in 1 whole"),
+    ],
+)
+def test_an_stl_file_that_is_cut_or_miscounted_is_told_as_it_is(data, said, tmp_path):
+    (tmp_path / "a.stl").write_bytes(data)
+    with pytest.raises(ShellFileError, match=said):
+        Shell.from_file(tmp_path / "a.stl", "m")
+
+
+def test_bytes_behind_an_stl_file_are_noted(tmp_path):
+    (tmp_path / "a.stl").write_bytes(binary_stl(2, 2, bytes(17)))
+    health = Shell.from_file(tmp_path / "a.stl", "m").health
+    assert "17 bytes behind the last triangle of the file are left out" in health.notes
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "off", "shl"])
+def test_numbers_of_python_alone_are_refused(suffix, tmp_path):
+    text = {
+        "obj": "v 1_0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        "off": "OFF\n3 1 0\n1_0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+        "shl": "3 1 1\n1_0 0 0\n1 0 0\n0 1 0\n3 1 2 3\n",
+        "ply": "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "1_0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+    }[suffix]
+    (tmp_path / f"a.{suffix}").write_text(text)
+    with pytest.raises(ShellFileError):
+        Shell.from_file(tmp_path / f"a.{suffix}", None if suffix == "shl" else "m")
+
+
+TOKENS = [
+    b" ",
+    b"\n",
+    b"vertex ",
+    b"facet ",
+    b"v 0 0 0\n",
+    b"f ",
+    b"1 ",
+    b"0 0 0\n",
+    b"\\\n",
+    b"#",
+    b"a",
+]
+STARTS = {
+    "stl": [b"", b"solid\n", b"solid\nfacet normal 0 0 1 vertex a "],
+    "obj": [b"", b"v 0 0 0\nf "],
+    "off": [b"", b"OFF\n3 1 0\n"],
+    "ply": [b"", b"ply\nformat ascii 1.0\n", b"ply\nformat ascii 1.0\nend_header\n"],
+    "shl": [b"", b"3 1 1\n", b"Version: 2\n"],
+}
+
+
+@pytest.mark.parametrize("suffix", STARTS)
+def test_a_token_100_000_times_takes_no_longer_than_its_length(suffix, tmp_path):
+    for start in STARTS[suffix]:
+        for token in TOKENS:
+            (tmp_path / f"a.{suffix}").write_bytes(start + 100_000 * token)
+            before = time.process_time()
+            with contextlib.suppress(SphshellError):
+                Shell.from_file(tmp_path / f"a.{suffix}", None if suffix == "shl" else "m")
+            assert time.process_time() - before < 3.0, (start, token)

@@ -128,6 +128,10 @@ def test_a_page_needs_nothing_from_anywhere_and_escapes_what_it_is_told():
     assert "5 &lt; 6" in page
     assert "<b>" not in page.split("<script>", maxsplit=1)[0]
     assert not re.search(r"<(script|link|img|iframe)[^>]*\b(src|href)=", page)
+    # The notices of what is in the page go with it.
+    notices = page.rpartition("<!--")[2]
+    assert "three.js authors" in notices
+    assert notices.count("Permission is hereby granted") >= 4
     # The same scene gives the same page, byte by byte.
     again = render_page(commands, title, [("#ff0000", "5 < 6")])
     assert page == again

@@ -32,6 +32,7 @@ from sphshell_pin.dynamics.run.sensitivities import Sensitivities
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, Columns
 from sphshell_pin.dynamics.sensing.sensor_log import joined_logs, split_logs
 from sphshell_pin.errors import ResultError
+from sphshell_pin.regular_file import open_regular
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
@@ -251,7 +252,7 @@ def _read_file(path: str | PathLike[str], max_size: float) -> tuple[Header, Colu
         memory, or one of its arrays or a part of its header is not as it must be.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
             return _read(path, archive, max_size)
     except ResultError:
         raise

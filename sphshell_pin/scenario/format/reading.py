@@ -21,6 +21,7 @@ from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError, did_you_mean
 from sphshell_pin.named_numbers import present_name
 from sphshell_pin.parameters import parameters_of
+from sphshell_pin.regular_file import MOST_TEXT, read_text
 from sphshell_pin.scenario.format.schema import LISTS, STEPPING, RunSection, Scenario
 from sphshell_pin.shell.readers import SUFFIXES
 
@@ -255,7 +256,7 @@ def item_key(table: str, items: Sequence[Toml], index: int) -> str:
 
 def _read_text(path: str | PathLike[str]) -> str:
     try:
-        return Path(path).read_text(encoding="utf-8")
+        return read_text(path, MOST_TEXT)
     except OSError as error:
         raise ScenarioError(path, "", f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:

@@ -29,6 +29,7 @@ from sphshell_pin.errors import (
     WeakLawWarning,
 )
 from sphshell_pin.json_text import json_text, plain
+from sphshell_pin.regular_file import open_regular, read_text
 from sphshell_pin.scenario.format.build import Built, build
 from sphshell_pin.scenario.format.reading import shipped_scenarios
 from sphshell_pin.scenario.running.cad_audit import CadAudit, check_audit
@@ -243,7 +244,7 @@ def _not_written(folder: Path, error: OSError) -> ResultError:
 def _holds_complete(folder: Path) -> bool:
     """Whether `folder` has results that a run which stopped early must not replace."""
     try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        summary = json.loads(read_text(folder / SUMMARY))
         return bool(summary["complete"])
     except (OSError, ValueError, KeyError, TypeError):
         # Somebody's results without a summary count as complete.
@@ -348,5 +349,5 @@ def versions() -> dict[str, str]:
 
 
 def _digest(path: Path) -> str:
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         return f"sha256:{hashlib.file_digest(file, 'sha256').hexdigest()}"

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from sphshell_pin.errors import ShellFileError
+from sphshell_pin.regular_file import open_regular
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES
 
 LOOKED_AT = 4096
@@ -24,7 +25,7 @@ def check_frame(path: Path) -> str:
     suffix = path.suffix.lower()
     kind = "STEP" if suffix in STEP_SUFFIXES else "BREP" if suffix in BREP_SUFFIXES else "IGES"
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             data = file.read(LOOKED_AT)
             file.seek(max(0, file.seek(0, os.SEEK_END) - LOOKED_AT))
             tail = file.read(LOOKED_AT).rstrip(b"\0\x1a \r\n\t")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from sphshell_pin import regular_file
 from sphshell_pin.errors import InvalidShell, ShellFileError
 from sphshell_pin.shell.raw import (
     LARGEST_COUNT,
@@ -30,14 +30,14 @@ def read_text(path: Path) -> str:
 def read_bytes(path: Path) -> bytes:
     """Return the contents of a file; ShellFileError if it cannot be read."""
     try:
-        return path.read_bytes()
+        return regular_file.read_bytes(path)
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
 
 
-def real_numbers(words: Sequence[Any]) -> Floats:
+def real_numbers(words: Sequence[object]) -> Floats:
     """Return words of a file as numbers; ValueError, also for 1_0, which is one in Python alone."""
-    if words and isinstance(words[0], str) and "_" in "".join(words):
+    if words and isinstance(words[0], str) and "_" in "".join(map(str, words)):
         raise ValueError("an underscore in a number")
     return np.array(words, np.float64)
 

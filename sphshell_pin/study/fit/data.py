@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.arrays import Array
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound
+from sphshell_pin.regular_file import read_text
 from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.quantities import Quantity
 
@@ -257,7 +258,7 @@ def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
 def _read_csv(path: Path) -> _Table:
     source = str(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path)
     except OSError as fault:
         raise DataError(source, f"cannot be read: {fault.strerror}") from None
     except UnicodeDecodeError:

@@ -10,6 +10,7 @@ from typing import Any
 import tomlkit
 
 from sphshell_pin.errors import ScenarioError
+from sphshell_pin.regular_file import read_text
 from sphshell_pin.scenario.format.reading import change_data, change_scenario, parse_scenario
 from sphshell_pin.study.sweep.job import files_of
 
@@ -24,7 +25,7 @@ def scenario_text(source: Path, changes: Mapping[str, str], folder: Path) -> str
     ScenarioError
         A key or a value that no scenario may have.
     """
-    text = source.read_text(encoding="utf-8")
+    text = read_text(source)
     before = parse_scenario(text, source)
     wanted = change_scenario(before, changes, source)
     document = tomlkit.parse(text)

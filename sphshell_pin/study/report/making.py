@@ -19,6 +19,7 @@ from sphshell_pin.cases.machine import OtherWork, caution_of, describe
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
 from sphshell_pin.json_text import json_text
 from sphshell_pin.plot.figure import new_figure
+from sphshell_pin.regular_file import read_text
 from sphshell_pin.study.report.page import SPEED, Heading, render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
@@ -179,7 +180,7 @@ def _write(report: Report, out: Path, place: AtomicFolder) -> None:
 def _files_of_old(out: Path) -> list[str]:
     """Return the tables and pictures of the report that is in the folder."""
     try:
-        names = json.loads((out / DATA).read_text(encoding="utf-8"))["files"]
+        names = json.loads(read_text(out / DATA))["files"]
         return [name for name in names if Path(name).name == name and name.endswith(_OWN)]
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return []

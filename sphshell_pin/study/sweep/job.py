@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import import_extra
+from sphshell_pin.regular_file import open_regular
 from sphshell_pin.scenario.format.schema import Scenario
 
 if TYPE_CHECKING:
@@ -114,6 +115,6 @@ def digest_files(folder: Path, names: Iterable[str]) -> dict[str, str]:
         if not os.path.isfile(path):
             found[name] = "absent"
             continue
-        with open(path, "rb") as file:
+        with open_regular(path) as file:
             found[name] = hashlib.file_digest(file, "sha256").hexdigest()
     return found

@@ -23,6 +23,7 @@ from sphshell_pin.arrays import Array
 from sphshell_pin.cases.contents import Finding, Picture, Progress, Section, Table
 from sphshell_pin.cases.register import Register
 from sphshell_pin.errors import NameNotFound, ResultError
+from sphshell_pin.regular_file import read_text
 from sphshell_pin.study.report.making import Part, Report, Tell, make_report
 from sphshell_pin.study.report.page import Heading
 
@@ -213,7 +214,7 @@ def data_folder() -> Path:
 def read(name: str) -> Data:
     """Return the data of the file `name`.csv."""
     path = data_folder() / f"{name}.csv"
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = read_text(path).splitlines()
     origin = " ".join(line.lstrip("# ").rstrip() for line in lines if line.startswith("#"))
     head, *rows = csv.reader(line for line in lines if line and not line.startswith("#"))
     return Data(name, origin, {one: [row[k] for row in rows] for k, one in enumerate(head)})

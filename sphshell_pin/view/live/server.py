@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
+from sphshell_pin.regular_file import read_bytes
 from sphshell_pin.view.live.access import Access
 from sphshell_pin.view.live.events import LARGEST_MESSAGE, BadMessage, Client, Event, read_event
 from sphshell_pin.view.nodes import viewer_script
@@ -278,7 +279,7 @@ def _handlers() -> tuple[type, type]:
                 raise tornado.web.HTTPError(404)
             self._set_headers(host=self.request.host.lower(), token=self.token)
             self.set_header("Content-Type", f"{_TYPES[path.suffix]}; charset=utf-8")
-            content = path.read_bytes()
+            content = read_bytes(path)
             if path.suffix == ".html":
                 content = content.replace(b"@@token@@", self.token.encode())
             self.write(content)

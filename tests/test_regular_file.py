@@ -1,0 +1,127 @@
+"""Files of strangers are opened in one way: regular ones alone, and at once."""
+
+import os
+import re
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from sphshell_pin.regular_file import open_regular, read_bytes, read_text
+
+PACKAGE = Path(__file__).parents[1]
+
+
+@pytest.fixture(params=["pipe", "device", "link", "socket", "folder"])
+def special(request, tmp_path):
+    place = tmp_path / "special"
+    if request.param == "pipe":
+        os.mkfifo(place)
+    elif request.param == "socket":
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(os.path.relpath(place))
+    elif request.param == "folder":
+        place.mkdir()
+    else:
+        place.symlink_to("/dev/zero" if request.param == "link" else "/dev/null")
+    return place
+
+
+def test_what_is_no_regular_file_is_refused_at_once(special):
+    found = []
+
+    def reading():
+        for read in (open_regular, read_bytes, read_text):
+            with pytest.raises(OSError, match=r"is a (pipe|directory)|[Ii]s a dir|No such device"):
+                read(special)
+            found.append(read)
+
+    thread = threading.Thread(target=reading, daemon=True)
+    thread.start()
+    thread.join(10.0)
+    assert len(found) == 3
+
+
+def test_larger_files_than_stated_are_refused(tmp_path):
+    file = tmp_path / "a"
+    file.write_bytes(b"\xef\xbb\xbfa\r\nb")
+    assert read_text(file) == "a\nb"
+    assert read_bytes(file, 7) == b"\xef\xbb\xbfa\r\nb"
+    with pytest.raises(OSError, match="more than"):
+        read_bytes(file, 6)
+    with file.open("wb") as sparse:
+        sparse.truncate(1 << 40)
+    with pytest.raises(OSError, match=r"it holds 1\.1e\+03 GB, more than 4 GB"):
+        read_bytes(file)
+    assert read_bytes("/proc/self/stat" if Path("/proc/self/stat").exists() else os.devnull)
+
+
+READS = re.compile(
+    r"""\bopen\((?!\))|\.read_text\(|\.read_bytes\(|\.open\(|np\.load\(|ET\.parse\(|ZipFile\("""
+)
+OWN = re.compile(  # the package's own data, the system's files, pipes and what is written
+    r"__file__|/proc/|PARTS|TEMPLATE|viewer_script|data_folder|devnull|os\.open\(|\"wb\"|"
+    r"open\((source|target)|ZipFile\(file\)|archive\.open\(|Image\.open|webbrowser|def open|"
+    r"regular_file\.read|xacro\.open|self\._files"
+)
+
+
+def test_nothing_else_in_the_package_opens_files_for_reading():
+    found = []
+    for folder in ("sphshell_pin", "robots", "pytest_sphshell_pin"):
+        for path in sorted((PACKAGE / folder).rglob("*.py")):
+            if path.name != "regular_file.py":
+                lines = path.read_text(encoding="utf-8").splitlines()
+                found += [
+                    f"{path.relative_to(PACKAGE)}: {line.strip()}"
+                    for line in lines
+                    if READS.search(line.replace("open_regular(", "")) and not OWN.search(line)
+                ]
+    assert found == []
+
+
+COMMANDS = {
+    "scenario": ("run", "a.toml"),
+    "explain": ("explain", "a.toml"),
+    "urdf": ("check-robot", "a.urdf"),
+    "xacro": ("check-robot", "a.xacro"),
+    "surface": ("check", "a.stl", "--unit", "m"),
+    "step": ("check", "a.step"),
+    "results": ("export", "a.npz", "--to", "csv"),
+    "table": ("fit", "--help"),
+}
+
+
+@pytest.mark.parametrize("kind", ["pipe", "zeros"])
+def test_commands_say_what_a_special_file_is(kind, tmp_path):
+    program = (
+        "import sys, json\n"
+        "from sphshell_pin.cli import main\n"
+        "for words in json.loads(sys.argv[1]):\n"
+        "    sys.argv = ['sphshell-pin', *words]\n"
+        "    try:\n        main()\n"
+        "    except SystemExit as end:\n        print(words[1], end.code, flush=True)\n"
+    )
+    import json
+
+    for words in COMMANDS.values():
+        place = tmp_path / words[1]
+        if not place.exists() and words[1][0] == "a":
+            os.mkfifo(place) if kind == "pipe" else place.symlink_to("/dev/zero")
+    start = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-c", program, json.dumps([*COMMANDS.values()][:-1])],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert time.monotonic() - start < 100.0
+    assert "Traceback" not in done.stderr
+    ends = [line.split() for line in done.stdout.splitlines() if line[:2] == "a."]
+    assert [end for _, end in ends] == ["2"] * (len(COMMANDS) - 1), done.stderr
