@@ -23,6 +23,7 @@ import pinocchio as pin
 
 from sphshell_pin import _core
 from sphshell_pin.adapters import imports_of
+from sphshell_pin.adapters.mujoco_memory import layout, memory_of, reserve
 from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_names, check_placement, check_type
 from sphshell_pin.contact.friction import Friction
@@ -37,7 +38,7 @@ from sphshell_pin.shell import Shell
 with imports_of("mujoco"):
     import mujoco
 
-__all__ = ["MujocoContacts", "attach"]
+__all__ = ["MujocoContacts", "attach", "reserve"]
 
 
 # Stands for a mass that does not move: of bodies that only their partner's mobility counts for.
@@ -97,7 +98,15 @@ class MujocoContacts:
         home = scene.pairs[0].joint_j
         roles = _roles(model, ends, bodies[home - 1] if home else 0)
         self._core = _core.MujocoContacts(
-            scene.state()._core, _layout(), bodies, roots, dofs, roles, _touches(scene, shell), log
+            scene.state()._core,
+            layout(),
+            memory_of(model, scene),
+            bodies,
+            roots,
+            dofs,
+            roles,
+            _touches(scene, shell),
+            log,
         )
         self._applied_by: object = None
         again = self._core.attach(model._address)
@@ -142,9 +151,9 @@ class MujocoContacts:
 
     def contacts(self, data: mujoco.MjData) -> SceneContacts:
         """Return the contacts at the state of `data`, after mj_forward or mj_step1."""
-        self._model_of(data)
+        model = self._model_of(data)
         self.check()
-        return SceneContacts.from_rows(self._core.contacts(data._address))
+        return SceneContacts.from_rows(self._core.contacts(model._address, data._address))
 
     def log(self, data: mujoco.MjData) -> ContactLog:
         """Return the contacts of all steps of `data` since its time began, for attach(log=True)."""
@@ -155,11 +164,8 @@ class MujocoContacts:
         return ContactLog(**columns(rows), t=t, row=row)
 
     def reset(self, data: mujoco.MjData) -> None:
-        """Forget friction's memory and the log of `data`; mj_resetData alone does it, too.
-
-        To be called before `data` is deleted where many are made one after the other: another one
-        may come to the same place in memory.
-        """
+        """Forget the log of `data`; it also ends where time goes back."""
+        self._model_of(data)
         self._core.forget(data._address)
 
     def check(self) -> None:
@@ -208,7 +214,8 @@ def attach(
 
     The shell is at `placement` in the frame of the MuJoCo body (default: the world). Forces act on
     both bodies, equal and opposite, in each evaluation of mj_step and mj_forward, for all MjData of
-    the model and in any thread; friction remembers across the steps of each MjData. MuJoCo's own
+    the model and in any thread. Friction with a memory (BristleFriction, MindlinFriction) keeps it
+    in MuJoCo's state: `reserve` makes room for it before the model is compiled. MuJoCo's own
     contact between these geoms and those of `body` is left out by its contact filter; all other
     pairs collide as before. Copies of the model have the contacts, too; they end with the model.
     `law`, `friction` and `method` are as of Scene.add_contact; `log` keeps the contacts of all
@@ -218,9 +225,9 @@ def attach(
     resolve the contact as an explicit one. SetupWarning where MuJoCo's timestep is longer than
     `recommended_dt`: `MujocoContacts.step` then divides it.
 
-    Raises InvalidParameter for a name that is none, a geom or site that is no sphere, an explicit
-    <pair> between the geoms, a sphere that touches the shell already, or a passive callback or
-    contact filter that is set already.
+    Raises InvalidParameter for a name that is none, no room for the friction's memory, a geom or
+    site that is no sphere, an explicit <pair> between the geoms, a sphere that touches the shell
+    already, or a passive callback or contact filter that is set already.
     """
     check_type("model", model, mujoco.MjModel, "must be a mujoco.MjModel")
     check_type("shell", shell, Shell, "must be a Shell")
@@ -373,48 +380,3 @@ def _touches(scene: Scene, shell: Shell) -> list[str]:
         digest = hashlib.sha256(b"".join(np.asarray(one).tobytes() for one in surface))
         out.append(f"{pair.name} on {pair.joint_j} {digest.hexdigest()}")
     return out
-
-
-@cache
-def _layout() -> list[int]:
-    """Return where MuJoCo keeps what the core reads: see MujocoLayout in adapters/mujoco.hpp.
-
-    The arrays' pointers, and numbers with a value of their own, are looked for in the structs of a
-    small model, as they differ between versions.
-    """
-    model = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
-    )
-    data = mujoco.MjData(model)
-    data.time = model.opt.timestep = 1.2345678901234567e-77
-    model.opt.integrator, model.opt.enableflags = 0x5EED5EED, 0x6EED6EED
-    in_data = ("xpos", "xquat", "cvel", "subtree_com", "cdof", "qfrc_passive")
-    numbers, in_model = ("integrator", "enableflags"), ("geom_contype", "geom_conaffinity")
-    return [
-        _find(data._address, data.time, ctypes.c_double),
-        *(_find(data._address, _pointer(data, name), ctypes.c_uint64) for name in in_data),
-        _find(model._address, model.opt.timestep, ctypes.c_double),
-        *(_find(model._address, getattr(model.opt, n), ctypes.c_int) for n in numbers),
-        *(_find(model._address, _pointer(model, name), ctypes.c_uint64) for name in in_model),
-    ]
-
-
-def _pointer(struct: object, name: str) -> int:
-    return int(getattr(struct, name).ctypes.data)
-
-
-def _find(
-    address: int, value: float, kind: type[ctypes.c_double | ctypes.c_uint64 | ctypes.c_int]
-) -> int:
-    """Return how far behind `address` a number is [bytes].
-
-    Arrays without elements have the address of the one that follows them: of equal addresses one
-    behind the other the last is that of the array.
-    """
-    size = ctypes.sizeof(kind)
-
-    def is_at(at: int) -> bool:
-        return bool(kind.from_address(address + at).value == value)
-
-    first = next(at for at in range(0, 1 << 21, size) if is_at(at))
-    return next(at for at in range(first, 1 << 21, size) if not is_at(at + size))

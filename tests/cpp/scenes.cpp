@@ -165,6 +165,14 @@ void states_are_independent() {
   CHECK(second.external_forces(q, none)[1].linear()[0] == 0);
   second = first;
   CHECK(second.external_forces(q, none)[1].linear()[0] == stretched);
+  // What is remembered is a value.
+  SceneState third(scene);
+  CHECK(third.values() != first.values());
+  third.restore(first.values());
+  CHECK(third.values() == first.values());
+  CHECK(third.external_forces(q, none)[1].linear()[0] == stretched);
+  CHECK_THROWS(InvalidParameter, "values = 1 numbers must be the values of a state",
+               third.restore({0}));
   // A scene is copied when a state is made of it, and a model when a scene is.
   scene.add_contact({kRadius, "ball 0"}, floor_of(1), kLaw);
   CHECK(first.contacts(q, none).size() == 1 && SceneState(scene).contacts(q, none).size() == 2);

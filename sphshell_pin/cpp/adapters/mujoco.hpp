@@ -2,32 +2,50 @@
 //
 // Each body that carries a sphere or a shell is a free body of a scene: its placement and velocity
 // are what MuJoCo has computed, and the scene's wrench on it goes through MuJoCo's own motion axes
-// into qfrc_passive. Laws, queries, friction and its memory are those of any scene.
+// into qfrc_passive. Laws, queries, friction and its memory are those of any scene. The forces are
+// a function of MuJoCo's state, which holds the memory, too.
 #pragma once
 
+#include <array>
+#include <cstring>
 #include <memory>
-#include <optional>
 #include <shared_mutex>
 #include <string>
+#include <thread>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
-#include "dynamics/scene/scene_state.hpp"
+#include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {
 
 // Where an mjData, and in the second row an mjModel, keep what is read and written [bytes from the
 // beginning]. It differs between versions of MuJoCo: Python finds it in the structs at hand.
 struct MujocoLayout {
-  std::size_t time, xpos, xquat, cvel, subtree_com, cdof, qfrc_passive;
+  std::size_t time, qvel, plugin_state, xpos, xquat, cvel, subtree_com, cdof, qfrc_passive;
   std::size_t timestep, integrator, enableflags, contype, conaffinity;
 };
+
+// What a struct has so many bytes from its beginning.
+template <class T>
+T value_at(const void* from, std::size_t offset) {
+  T out;
+  std::memcpy(&out, static_cast<const char*>(from) + offset, sizeof(T));
+  return out;
+}
 
 // A body of MuJoCo that is joint k + 1 of the scene's model.
 struct MujocoBody {
   int id, root;  // root: of its kinematic tree, whose center of mass cvel and cdof refer to
   std::vector<int> dofs;  // that move it
+};
+
+// Where contacts keep what they remember: the state of an instance of the plugin below, which
+// MuJoCo copies, saves and resets with the rest of a state.
+struct MujocoMemory {
+  int instance = -1;                  // -1: nothing is remembered
+  std::size_t address = 0, size = 0;  // in mjData's plugin_state
 };
 
 // The part of each geom in a set of contacts: MuJoCo's own contact between the spheres and the
@@ -38,11 +56,12 @@ class MujocoContacts {
  public:
   // `report` is called with a fault of apply(), from any thread, where none has been noted since
   // take_fault(). `touches` has a name for each sphere with its shell, the same for the same ones.
-  MujocoContacts(SceneState scene, MujocoLayout layout, std::vector<MujocoBody> bodies,
-                 std::vector<MujocoRole> roles, std::vector<std::string> touches, bool logs,
-                 void (*report)(const std::string&))
+  MujocoContacts(SceneData scene, MujocoLayout layout, MujocoMemory memory,
+                 std::vector<MujocoBody> bodies, std::vector<MujocoRole> roles,
+                 std::vector<std::string> touches, bool logs, void (*report)(const std::string&))
       : prototype_(std::move(scene)),
         layout_(layout),
+        memory_(memory),
         bodies_(std::move(bodies)),
         roles_(std::move(roles)),
         touches_(std::move(touches)),
@@ -52,11 +71,13 @@ class MujocoContacts {
   // Adds the forces at the state of `data` to its qfrc_passive. Several threads may do so at once,
   // each with data of its own.
   void apply(const void* model, void* data);
-  // The contacts at the state of `data`, with its memory as it is.
-  std::vector<ContactRow> contacts(void* data);
+  // MuJoCo has moved `data` on by a step: its memory follows, by the stages of that step.
+  void advance(const void* model, void* data);
+  // The contacts at the state of `data`.
+  std::vector<ContactRow> contacts(const void* model, const void* data);
   // Those of all accepted steps, and their times [s].
   std::pair<std::vector<double>, std::vector<ContactRow>> log(const void* data);
-  // Forgets all about `data`.
+  // Forgets the log of `data`.
   void forget(const void* data);
   // What went wrong in apply(), which cannot raise, since this was last called.
   std::string take_fault();
@@ -67,31 +88,52 @@ class MujocoContacts {
   }
   const MujocoLayout& layout() const { return layout_; }
   const std::vector<std::string>& touches() const { return touches_; }
+  const MujocoMemory& memory() const { return memory_; }
   auto reporter() const { return report_; }
 
  private:
-  // What the forces on one mjData depend on besides its state.
-  struct Memory {
-    std::optional<SceneState> scene;
-    double begun = 0, accepted = 0, last = 0;  // times [s]: of its first, accepted, last evaluation
-    VectorX q, v;
+  // Of one thread: the scene at the stages of the step under way.
+  struct Scratch {
+    explicit Scratch(const SceneData& prototype) : scene(prototype) {}
+    SceneData scene;
+    const void* data = nullptr;
+    double time = 0;  // where the step began [s]
+    int stage = 0;    // evaluated of that step: 1, of RK4 up to 4
+    VectorX q, v, z;
+    std::array<VectorX, 4> rates;  // of the bristles, at the stages
+  };
+  struct Log {
     std::vector<double> times;
     std::vector<ContactRow> rows;
   };
-  Memory& memory(const void* data);
-  void read(const char* data, Memory& memory) const;
-  void move(const void* model, const char* data, Memory& memory);
+  Scratch& scratch();
+  template <class Work>
+  void report_faults(const Work& work);
+  void read(const char* data, Scratch& scratch) const;
+  // With the velocity of each body about the center of mass of its tree, angular first.
+  template <class VelocityOf>
+  void read(const char* data, Scratch& scratch, const VelocityOf& velocity_of) const;
+  void evaluate(const void* model, const char* data, Scratch& scratch) const;
+  void begin(const void* model, const char* data, Scratch& scratch) const;
   void add_forces(char* data, const SceneData& scene) const;
+  void add_to_log(const void* data, Scratch& scratch);
 
-  const SceneState prototype_;
+  static std::vector<double> memory_of_none(SceneData scene) {
+    return scene.save(VectorX::Zero(scene.bristle_size()));
+  }
+
+  const SceneData prototype_;
+  const std::vector<double> none_ = memory_of_none(prototype_);
   const MujocoLayout layout_;
+  const MujocoMemory memory_;
   const std::vector<MujocoBody> bodies_;
   const std::vector<MujocoRole> roles_;
   const std::vector<std::string> touches_;
   const bool logs_;
   void (*const report_)(const std::string&);
   std::shared_mutex mutex_;  // of what follows
-  std::unordered_map<const void*, std::unique_ptr<Memory>> memories_;
+  std::unordered_map<std::thread::id, std::unique_ptr<Scratch>> scratches_;
+  std::unordered_map<const void*, Log> logs_of_;
   std::string fault_;
 };
 
@@ -101,12 +143,19 @@ class MujocoContacts {
 void apply_passive(const void* model, void* data);
 int filter_contact(const void* model, void* data, int geom, int other);
 
+// Registers the plugin `sphshell_pin.memory` with MuJoCo, by its functions mjp_registerPlugin and
+// mj_getPluginConfig; returns its slot. An instance has a state of so many numbers as its attribute
+// `size` says, which is zero where nothing is remembered.
+int register_memory(void* register_plugin, void* get_config);
+
 // A model is known by a mark in its enableflags, which its copies carry: they have its contacts,
 // too, until those of the model end. A mark that was overwritten is found by the model's address.
 // register_passive() returns what touches already, or nothing where the contacts are registered.
 std::string register_passive(void* model, std::shared_ptr<MujocoContacts> contacts);
 // Of all models; the marks of those without other contacts are taken away.
 void unregister_passive(const MujocoContacts* contacts);
+// Whether contacts of `model` remember in an instance of the plugin already.
+bool is_taken(const void* model, int instance);
 // Whether the contacts act on `model`.
 bool acts_on(const void* model, const MujocoContacts* contacts);
 // The model, which is deleted by now, has no contacts any more.

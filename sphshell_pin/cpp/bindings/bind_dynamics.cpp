@@ -263,6 +263,18 @@ void bind_dynamics(nanobind::module_& m) {
   nb::class_<OwnState> state(m, "SceneState", slots<OwnState, visit_state>());
   bind_evaluations(state);
   state.def("copy", [](const OwnState& self) { return new OwnState(self); })
+      .def("save",
+           [](OwnState& self) {
+             const Use use(self.user, "save");
+             return to_array(self.state.save());
+           })
+      .def(
+          "restore",
+          [](OwnState& self, const VectorX& from) {
+            const Use use(self.user, "restore");
+            return self.state.restore(from.data(), static_cast<std::size_t>(from.size()));
+          },
+          "values"_a)
       .def(
           "advance",
           [](OwnState& self, nb::handle q, nb::handle v, double dt) {
@@ -284,10 +296,10 @@ void bind_dynamics(nanobind::module_& m) {
 
   // Times in seconds; by keyword only.
   nb::class_<RunSettings>(m, "RunSettings")
-      .def(nb::init<std::string, double, double, double, double, double, double, double, bool,
+      .def(nb::init<std::string, double, double, double, double, double, double, double, bool, bool,
                     bool>(),
            nb::kw_only(), "integrator"_a, "dt"_a, "rtol"_a, "atol"_a, "duration"_a, "start_time"_a,
-           "control_dt"_a, "record_dt"_a, "patches"_a, "torques"_a);
+           "control_dt"_a, "record_dt"_a, "patches"_a, "torques"_a, "states"_a);
 
   nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>(), "what"_a);
   // Entered and left in one instruction of Python each, so that Ctrl-C cannot come between.
@@ -337,6 +349,7 @@ void bind_dynamics(nanobind::module_& m) {
           "joint"_a, "point"_a, "force_world"_a, "anchor_world"_a, "stiffness"_a, "damping"_a,
           "frame"_a)
       .def("record_patches", alone("record", &Simulation::record_patches), "on"_a)
+      .def("resume", alone("resume", &Simulation::resume), "state"_a)
       .def("record_torques", alone("record_torques", &Simulation::record_torques))
       .def("take", record("take", &Simulation::take))
       .def("snapshot", record("snapshot", &Simulation::snapshot))

@@ -36,15 +36,21 @@ struct OwnMujoco {
 void bind_mujoco(nb::module_& m) {
   m.def("mujoco_passive", [] { return reinterpret_cast<std::uintptr_t>(&apply_passive); });
   m.def("mujoco_filter", [] { return reinterpret_cast<std::uintptr_t>(&filter_contact); });
+  m.def("mujoco_register", [](std::uintptr_t register_plugin, std::uintptr_t get_config) {
+    return register_memory(pointer(register_plugin), pointer(get_config));
+  });
+  m.def("mujoco_taken",
+        [](std::uintptr_t model, int instance) { return is_taken(pointer(model), instance); });
   m.def("mujoco_end", [](std::uintptr_t model) { end_model(pointer(model)); });
   nb::class_<OwnMujoco>(m, "MujocoContacts")
       .def(
           "__init__",
           [](OwnMujoco* self, const OwnState& state, const std::vector<std::size_t>& layout,
-             const std::vector<int>& ids, const std::vector<int>& roots,
-             const std::vector<std::vector<int>>& dofs, const std::vector<int>& roles,
-             std::vector<std::string> touches, bool logs) {
-            check_count("layout", layout.size(), 12);
+             const std::vector<int>& memory, const std::vector<int>& ids,
+             const std::vector<int>& roots, const std::vector<std::vector<int>>& dofs,
+             const std::vector<int>& roles, std::vector<std::string> touches, bool logs) {
+            check_count("layout", layout.size(), 14);
+            check_count("memory", memory.size(), 3);
             const std::size_t* at = layout.data();
             std::vector<MujocoBody> bodies;
             for (std::size_t k = 0; k < ids.size(); ++k)
@@ -52,13 +58,14 @@ void bind_mujoco(nb::module_& m) {
             std::vector<MujocoRole> parts;
             for (const int role : roles) parts.push_back(static_cast<MujocoRole>(role));
             new (self) OwnMujoco{std::make_shared<MujocoContacts>(
-                SceneState(state.state),
+                SceneData(state.state.scene()),
                 MujocoLayout{at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8], at[9],
-                             at[10], at[11]},
+                             at[10], at[11], at[12], at[13]},
+                MujocoMemory{memory[0], std::size_t(memory[1]), std::size_t(memory[2])},
                 std::move(bodies), std::move(parts), std::move(touches), logs, &report)};
           },
-          nb::arg("state"), nb::arg("layout"), nb::arg("ids"), nb::arg("roots"), nb::arg("dofs"),
-          nb::arg("roles"), nb::arg("touches"), nb::arg("logs"))
+          nb::arg("state"), nb::arg("layout"), nb::arg("memory"), nb::arg("ids"), nb::arg("roots"),
+          nb::arg("dofs"), nb::arg("roles"), nb::arg("touches"), nb::arg("logs"))
       .def("attach",
            [](const OwnMujoco& self, std::uintptr_t model) {
              return register_passive(pointer(model), self.contacts);
@@ -73,8 +80,8 @@ void bind_mujoco(nb::module_& m) {
              self.contacts->apply(pointer(model), pointer(data));
            })
       .def("contacts",
-           [](const OwnMujoco& self, std::uintptr_t data) {
-             return to_bytes(self.contacts->contacts(pointer(data)));
+           [](const OwnMujoco& self, std::uintptr_t model, std::uintptr_t data) {
+             return to_bytes(self.contacts->contacts(pointer(model), pointer(data)));
            })
       .def("log",
            [](const OwnMujoco& self, std::uintptr_t data) {

@@ -38,6 +38,10 @@ nb::dict to_dict(Record record, int nq, int nv) {
   out["energy"] = to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)});
   out["contact_row"] = to_array(std::move(record.contact_row));
   out["contacts"] = to_bytes(std::move(record.contacts));
+  if (record.states) {
+    out["states"] = to_array(std::move(*record.states));
+    out["state_sizes"] = to_array(std::move(record.state_sizes));
+  }
   if (record.torques) out["torques"] = to_array(std::move(*record.torques), {n, std::size_t(nv)});
   if (record.patches) out["patches"] = to_bytes(std::move(*record.patches));
   out["event_t"] = to_array(std::move(event_t));

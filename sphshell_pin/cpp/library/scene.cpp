@@ -200,4 +200,12 @@ void SceneState::advance(const Eigen::VectorXd& q, const Eigen::VectorXd& v, dou
   impl_->state.advance(q, v, check_not_negative("dt", dt, " [s]"));
 }
 
+std::vector<double> SceneState::values() const { return impl_->state.save(); }
+
+void SceneState::restore(const std::vector<double>& values) {
+  if (!impl_->state.restore(values.data(), values.size()))
+    throw InvalidParameter("values", std::to_string(values.size()) + " numbers",
+                           "must be the values of a state of a scene with the same pairs");
+}
+
 }  // namespace sphshell_pin

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.errors import InvalidParameter
 
-RECORDED = ("patch", "torque")
+RECORDED = ("patch", "torque", "state")
 """What a run records only where it is asked to."""
 
 PATCH = np.dtype(_core.patch_row_type())

@@ -12,16 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sphshell_pin.arrays import Array
-from sphshell_pin.checks import read_only
+from sphshell_pin.checks import check_finite, read_only
 from sphshell_pin.dynamics.result import result_columns
 from sphshell_pin.dynamics.result.contact_patches import PATCH, Patches
 from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event, Origin
+from sphshell_pin.dynamics.result.run_state import RunState, split_states
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene.joint_components import moving_joints
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import Columns, columns
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog, sensor_columns
-from sphshell_pin.errors import ResultError, import_extra
+from sphshell_pin.errors import InvalidParameter, ResultError, import_extra
 from sphshell_pin.offered import offered
 from sphshell_pin.summary import Detail, Fact, Summarized
 
@@ -49,7 +50,8 @@ class Result(Summarized):
     (None after load); `origin` the scenario it came from (None without one); `sensors` the readings
     of each sensor by its name; `patch_rows` the patches of the contacts, None where they were not
     recorded (see `patches`); `torque` (n, nv) the controller's torques, cut to their limits [N m or
-    N], None unless the run recorded them: nan where a torque that is held was not known yet.
+    N], None unless the run recorded them: nan where a torque that is held was not known yet;
+    `states` what the run can go on from at each row (see `at`), None unless they were recorded.
     """
 
     t: Array
@@ -66,6 +68,24 @@ class Result(Summarized):
     patch_rows: Patches | None = None
     sensitivity_rows: Sensitivities | None = None
     torque: Array | None = None
+    states: tuple[Array, ...] | None = None
+
+    def at(self, t: float) -> RunState:
+        """Return the state of the last step that was accepted by the last row at or before t [s].
+
+        `Simulation.run(result.at(t))` makes the rest of the run again, to the same bits, with the
+        same integrator and a controller that depends on the state alone. The state is that of the
+        row itself where steps end at rows: those of fixed steps, and the first one.
+
+        Raises ResultError where the run was not asked for states: run(..., record=("state",)).
+        """
+        if self.states is None:
+            said = "has no states, as the run was not asked for them: run(..., record=('state',))"
+            raise ResultError("the result", said)
+        row = int(np.searchsorted(self.t, check_finite("t", t), side="right")) - 1
+        if row < 0:
+            raise InvalidParameter("t", t, f"must not be before the first row: {self.t[0]} s")
+        return RunState.from_values(self.states[row], self.q.shape[1], self.v.shape[1])
 
     def _facts(self) -> list[Fact]:
         pairs = self.stats.pairs.values()
@@ -133,6 +153,7 @@ class Result(Summarized):
             sensors=sensors.logs(whole),
             patch_rows=None if patches is None else read_only(np.frombuffer(patches, PATCH)),
             torque=read_only(whole["torques"]) if "torques" in whole else None,
+            states=split_states(whole.get("states"), whole.get("state_sizes")),
         )
 
     @property

@@ -27,6 +27,7 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.result.contact_patches import PATCH
 from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event, Kept, Origin
+from sphshell_pin.dynamics.result.run_state import split_states
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.run.sensitivities import Sensitivities
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, Columns
@@ -78,6 +79,7 @@ OPTIONAL: dict[str, dict[str, Kind]] = {
         "sensitivities.depth": (FLOAT, ("m", "p")),
     },
     "torque": {"torque": (FLOAT, ("n", "nv"))},
+    "states": {"states.values": (FLOAT, ("k",)), "states.sizes": (INT, ("n",))},
 }
 """The same of runs that recorded more; other files have none of a group. The header names the p
 columns of sensitivities."""
@@ -153,6 +155,9 @@ def save_result(result: Result, path: Path, home: str | PathLike[str] | None) ->
         arrays |= {f"patches.{name}": result.patch_rows[name] for name in PATCH.names or ()}
     if result.torque is not None:
         arrays["torque"] = result.torque
+    if result.states is not None:
+        arrays["states.values"] = np.concatenate([np.zeros(0), *result.states])
+        arrays["states.sizes"] = np.array([len(one) for one in result.states], INT)
     rows = result.sensitivity_rows
     if rows is not None:
         header["sensitivities"] = rows.parameters
@@ -239,6 +244,7 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
         patch_rows=patches,
         sensitivity_rows=sensitivities,
         torque=arrays.get("torque"),
+        states=split_states(arrays.get("states.values"), arrays.get("states.sizes")),
     )
 
 

@@ -25,6 +25,7 @@ from sphshell_pin.dynamics.control.callables import reads_sensors
 from sphshell_pin.dynamics.control.controllers import Callback, Controller, wrap_callable
 from sphshell_pin.dynamics.result.contact_patches import check_record
 from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.run_state import RunState
 from sphshell_pin.dynamics.result.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.scene import explain
@@ -56,7 +57,7 @@ _FARTHEST = 1e12
 def start_run(
     scene: Scene,
     integrator: Integrator,
-    q0: ArrayLike,
+    q0: ArrayLike | RunState,
     v0: ArrayLike | None,
     duration: float,
     controller: AnyController,
@@ -75,6 +76,12 @@ def start_run(
     stop its sphere causes a WeakLawWarning, and a controller whose parameters are probably a
     mistake, or steps that are longer than recommended, a SetupWarning.
     """
+    resumed = None
+    if isinstance(q0, RunState):
+        if v0 is not None:
+            raise InvalidParameter("v0", v0, "must not be given: the state of a run has its own")
+        resumed, t0 = q0, q0.t
+        q0, v0 = resumed.q, resumed.v
     q, v = scene.check_state(q0, v0)
     duration = check_not_negative("duration", duration, "s")
     core_controller, hold = bind_controller(scene, integrator, controller, control_dt, q, sensors)
@@ -91,6 +98,9 @@ def start_run(
     )
     if prepare is not None:
         prepare(core)
+    if resumed is not None and not core.resume(resumed.values):
+        must = "must be the state of a run of a scene with the same pairs and joints"
+        raise InvalidParameter("q0", resumed, must)
     deep = core.deep_start()
     if deep is not None:
         raise deep_start(scene, *deep)
@@ -132,6 +142,7 @@ def run_settings(
         record_dt=every,
         patches="patch" in recorded,
         torques="torque" in recorded,
+        states="state" in recorded,
     )
 
 

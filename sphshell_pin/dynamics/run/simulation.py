@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative
 from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.run_state import RunState
 from sphshell_pin.dynamics.run.advance import (
     AnyController,
     CtrlC,
@@ -83,7 +84,7 @@ class Simulation(Summarized):
 
     def run(
         self,
-        q0: ArrayLike,
+        q0: ArrayLike | RunState,
         v0: ArrayLike | None = None,
         duration: float = 1.0,
         controller: AnyController = None,
@@ -107,6 +108,8 @@ class Simulation(Summarized):
         share done. The same input gives the same bits. With `record=("patch",)` the patch of each
         recorded contact is kept, too: `Result.patches`; with "torque" the controller's torques, cut
         to their limits: `Result.torque`. A controller that is not held is asked at each row then.
+        With "state" each row has the state of the run, which `Result.at` returns; in place of q0,
+        v0 and t0 it makes this run go on from there. Sensors begin anew, and controllers as well.
 
         `sensitivities` names what the rows are differentiated by: parameters as in
         `Scene.dynamics_derivatives`, "q0" and "v0" (nv columns each); `Result.sensitivities` then

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NoReturn
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_not_negative
+from sphshell_pin.arrays import Array
+from sphshell_pin.checks import check_floats, check_not_negative, read_only
 from sphshell_pin.dynamics.scene.explain import core_pairs, explain_pairs, has_state
 from sphshell_pin.errors import InvalidParameter, NotPicklable
 from sphshell_pin.summary import Fact, Summarized
@@ -33,7 +35,8 @@ class SceneState(Summarized):
 
     This loop makes the motion of `Simulation(scene, SemiImplicitEuler(dt))`; where the scene has
     joint components, add `scene.joint_forces(q, v, state=state)` to tau. `copy` gives a second
-    state, to try a step. A state is for one user at a time (else Busy), and cannot be pickled.
+    state, to try a step; `values` and `restore` keep and bring back what it remembers. A state is
+    for one user at a time (else Busy), and cannot be pickled.
     """
 
     def __init__(
@@ -59,6 +62,35 @@ class SceneState(Summarized):
         """
         core = self.core_of(self._scene)
         core.advance(q, v, check_not_negative("dt", dt, "s"))
+
+    @property
+    def values(self) -> Array:
+        """All that is remembered, as numbers (m,): to be kept, compared, and given to `restore`.
+
+        Whether the motion has begun, its last q (nq); of each pair how many contacts it has had,
+        how many there are now (twice), and the sphere's center (3) in the shell's frame [m]; pair
+        by pair, of each contact its id, 4 feature + 2 rim + saddle, depth, point and normal (3
+        each, in the shell's frame), and the stretch of its bristle (3 for each ring) [m]; then
+        the stretches of joints.
+        """
+        return read_only(self._core.save())
+
+    def restore(self, values: ArrayLike) -> None:
+        """Remember what a state of the same scene had as `values` (m,), and nothing else.
+
+        Raises InvalidParameter where they are not of a scene with the same pairs and joints.
+        """
+        if not self._core.restore(check_floats("values", values, "must be numbers (m,)").ravel()):
+            must = "must be the values of a state of a scene with the same pairs and joints"
+            raise InvalidParameter("values", values, must)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are of one scene, and remember the same."""
+        if not isinstance(other, SceneState) or other._pairs is not self._pairs:
+            return NotImplemented
+        return np.array_equal(self.values, other.values)
+
+    __hash__ = None  # type: ignore[assignment]
 
     def copy(self) -> SceneState:
         """Return an independent state with the same memory."""

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace sphshell {
 namespace {
@@ -24,9 +25,9 @@ ContactTracker::ContactTracker() {
 }
 
 // Pythagoras: the circle in which a plane at that depth cuts the sphere.
-double ContactTracker::disc(const Contact& contact, double radius) {
+double ContactTracker::disc(double depth, double radius) {
   if (radius == 0) return std::numeric_limits<double>::infinity();
-  const double distance = radius - contact.depth;
+  const double distance = radius - depth;
   return std::sqrt(std::max(0.0, radius * radius - distance * distance));
 }
 
@@ -49,7 +50,7 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
       // A minimum does not go on as a saddle.
       if (places_[i].saddle != (c.weight < 0)) continue;
       const double apart = (places_[i].point - c.point).norm();
-      if (apart < std::max({places_[i].reach, disc(c, radius), moved}))
+      if (apart < std::max({places_[i].reach, disc(c.depth, radius), moved}))
         pairings_.push_back({apart, static_cast<int>(i), static_cast<int>(j)});
     }
   }
@@ -72,8 +73,8 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
     if (at_[j] >= 0) continue;
     const Contact& c = contacts[j];
     at_[j] = static_cast<int>(places_.size());
-    places_.push_back(
-        {c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, c.feature, count_++});
+    places_.push_back({c.point, c.normal, c.depth, disc(c.depth, radius), c.weight < 0, c.rim,
+                       c.feature, count_++});
   }
   return at_;
 }
@@ -99,14 +100,28 @@ void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& ce
   deep_ = false;
   for (std::size_t j = 0; j < contacts.size(); ++j) {
     const Contact& c = contacts[j];
-    next_.push_back({c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, c.feature,
-                     places_[at_[j]].number});
+    next_.push_back({c.point, c.normal, c.depth, disc(c.depth, radius), c.weight < 0, c.rim,
+                     c.feature, places_[at_[j]].number});
     deep_ = deep_ || (radius > 0 && c.depth > kDeep * radius);
   }
   places_.swap(next_);
   known_ = places_.size();
   next_number_ = count_;
   center_ = center;
+}
+
+void ContactTracker::restore(std::vector<Place> places, std::size_t known, const Vec3& center,
+                             int next_number, double radius) {
+  places_ = std::move(places);
+  known_ = known;
+  center_ = center;
+  next_number_ = next_number;
+  count_ = next_number + static_cast<int>(places_.size() - known);
+  pushed_through_ = deep_ = false;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    places_[i].reach = disc(places_[i].depth, radius);
+    deep_ = deep_ || (i < known && radius > 0 && places_[i].depth > kDeep * radius);
+  }
 }
 
 }  // namespace sphshell

@@ -31,11 +31,17 @@ class ContactTracker {
   void accept(const std::vector<Contact>& contacts, const Vec3& center, double radius);
   // Without contacts, the center is all there is to remember.
   void move_to(const Vec3& center) { center_ = center; }
+  // Puts others in the place of all that is remembered; the first `known` are the known ones.
+  void restore(std::vector<Place> places, std::size_t known, const Vec3& center, int next_number,
+               double radius);
   // Forgets what was new since the last accept().
   void restart() { places_.resize(known_), count_ = next_number_; }
 
   const std::vector<Place>& places() const { return places_; }
   std::size_t known() const { return known_; }
+  const Vec3& center() const { return center_; }
+  // Of the contact that comes next to be accepted.
+  int next_number() const { return next_number_; }
   // True where the center may have come to the other side of the shell.
   bool deep() const { return deep_; }
   // True where a contact of the last match() was turned.
@@ -48,7 +54,7 @@ class ContactTracker {
   };
 
   // The radius of the disc of contact [m]; infinite of no sphere.
-  static double disc(const Contact& contact, double radius);
+  static double disc(double depth, double radius);
   void keep_side(Contact& contact, const Place& place, double radius);
 
   std::vector<Place> places_, next_;

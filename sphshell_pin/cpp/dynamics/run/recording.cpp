@@ -57,7 +57,15 @@ Record Recorder::take() {
   Record next;
   if (record_.patches) next.patches.emplace();
   if (record_.torques) next.torques.emplace();
+  if (record_.states) next.states.emplace();
   return std::exchange(record_, std::move(next));
+}
+
+// Rows that the other run has recorded are not due again.
+void Recorder::go_on(double start, double end, double t) {
+  start_ = start, end_ = end;
+  if (record_dt_ > 0)
+    while (due() <= t) ++next_row_;
 }
 
 // A row of its own; what was recorded before is put back.
@@ -113,6 +121,10 @@ void Recorder::add_row(const State& state, double share) {
   if (record_.torques) {
     const VectorX& torques = torques_(state);
     record_.torques->insert(record_.torques->end(), torques.begin(), torques.end());
+  }
+  if (record_.states) {
+    record_.states->insert(record_.states->end(), run_state_->begin(), run_state_->end());
+    record_.state_sizes.push_back(double(run_state_->size()));
   }
   if (follower_) follower_->add_row(state, share);
   ++rows_;

@@ -59,7 +59,10 @@ struct Record {
   std::vector<ContactRow> contacts;
   std::optional<std::vector<PatchRow>> patches;  // of the contacts, where they are asked for
   std::optional<std::vector<double>> torques;    // of the controller (nv), where asked for; or nan
-  std::vector<double> contact_row;               // the recorded row of each contact
+  // Those of runs, where asked for, one behind the other, and how many numbers each has.
+  std::optional<std::vector<double>> states;
+  std::vector<double> state_sizes;
+  std::vector<double> contact_row;  // the recorded row of each contact
   std::vector<Event> events;
   SensorRows sensors;
 };
@@ -92,6 +95,14 @@ class Recorder {
   // From now on rows have the torques (nv) that `torques` gives where the scene was evaluated.
   using TorquesAt = std::function<const VectorX&(const State&)>;
   void record_torques(TorquesAt torques, Eigen::Index nv);
+
+  // From now on rows have the state of the run that this refers to.
+  void record_states(const std::vector<double>& state) {
+    run_state_ = &state;
+    record_.states.emplace();
+  }
+  // Of a run that goes on at time t, from another's start to `end`.
+  void go_on(double start, double end, double t);
 
   // The scene's last evaluate() was at the state; `share`: see RowFollower.
   void add_row(const State& state, double share = 1);
@@ -140,6 +151,7 @@ class Recorder {
   State between_;
   RowFollower* follower_ = nullptr;
   TorquesAt torques_;  // empty unless asked for
+  const std::vector<double>* run_state_ = nullptr;
 };
 
 }  // namespace sphshell

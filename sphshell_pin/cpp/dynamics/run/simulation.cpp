@@ -53,13 +53,55 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
     sensors_ = std::make_unique<Sensors>(std::move(sensors), scene_, static_cast<Torques&>(*this),
                                          push_, settings_.start_time);
   if (settings_.torques) record_torques();
+  if (settings_.states) recorder_.record_states(kept_);
   if (controller_) controller_->prepare(scene_);
   if (controller_ && sensors_) controller_->read(sensors_->readings());
-  if (settings_.dt > 0) {
-    // The last step is shortened to end at the duration; a hair's breadth is not a step.
-    const double ratio = settings_.duration / settings_.dt;
-    grid_steps_ = std::lround(std::ceil(ratio - 1e-9 - 4e-16 * ratio));
+  count_steps();
+}
+
+// The last step is shortened to end at the duration; a hair's breadth is not a step.
+void Simulation::count_steps() {
+  if (settings_.dt == 0) return;
+  const double ratio = settings_.duration / settings_.dt;
+  grid_steps_ = std::lround(std::ceil(ratio - 1e-9 - 4e-16 * ratio));
+}
+
+// The numbers: start and duration of the run, the fixed step, how many of them and of the
+// controller's times are over, then those of the stepping, the torques, and the scene's memory.
+void Simulation::keep_state() {
+  if (!settings_.states) return;
+  kept_ = {settings_.start_time, settings_.duration, settings_.dt, double(grid_),
+           double(controls_)};
+  const std::vector<double> steps = stepping_.save(), memory = scene_.save(stepping_.state().z);
+  kept_.insert(kept_.end(), steps.begin(), steps.end());
+  kept_.insert(kept_.end(), tau_.begin(), tau_.end());
+  kept_.insert(kept_.end(), memory.begin(), memory.end());
+}
+
+// The times of steps, rows and controller are those of the run that goes on, and its end where it
+// is the same.
+bool Simulation::resume(const std::vector<double>& state) {
+  constexpr std::size_t own = 5;
+  const std::size_t nq = std::size_t(q().size()), nv = std::size_t(v().size());
+  const std::size_t steps = own + Stepping::kSaved + nq + nv, fixed = steps + nv;
+  if (started_ || state.size() < fixed ||
+      !scene_.load(state.data() + fixed, state.size() - fixed, stepping_.state().z))
+    return false;
+  if (state[2] == settings_.dt) {
+    const double duration = settings_.start_time - state[0] + settings_.duration;
+    const bool same = std::abs(duration - state[1]) <= 1e-12 * std::max(1.0, std::abs(duration));
+    settings_.duration = same ? state[1] : duration;
+    settings_.start_time = state[0];
+    count_steps();
+    grid_ = std::lround(state[3]);
+    controls_ = std::lround(state[4]);
+    next_control_ = settings_.start_time + double(controls_) * settings_.control_dt;
   }
+  stepping_.resume(state.data() + own);
+  tau_ = Eigen::Map<const VectorX>(state.data() + steps, Eigen::Index(nv));
+  recorder_.go_on(settings_.start_time, end(), time());
+  begin_record();
+  return true;
 }
 
 void Simulation::differentiate(SensitivitySettings settings) {
@@ -108,8 +150,13 @@ Simulation::Status Simulation::advance(double wall_seconds, double until,
 }
 
 void Simulation::start() {
-  started_ = true;
   stepping_.restart();
+  begin_record();
+}
+
+void Simulation::begin_record() {
+  started_ = true;
+  keep_state();
   recorder_.add_step(time(), 0);
   recorder_.add_limits(v(), cut_, time(), 0);
   recorder_.add_row(stepping_.state());
@@ -164,8 +211,10 @@ Simulation::Status Simulation::step() {
     // Rows of fixed steps: of the steps whose number is a multiple of the ratio.
     const long every =
         settings_.record_dt > 0 ? std::max(1L, std::lround(settings_.record_dt / settings_.dt)) : 1;
-    if (status == Status::Running && (grid_ % every == 0 || at_end()))
+    if (status == Status::Running && (grid_ % every == 0 || at_end())) {
+      keep_state();
       recorder_.add_row(stepping_.state());
+    }
   }
   return is_finite() ? status : Status::Diverged;
 }
@@ -225,6 +274,7 @@ void Simulation::accept() {
   stepping_.accept();
   recorder_.add_step(time(), time() - before);
   recorder_.add_limits(v(), cut_, time(), time() - before);
+  if (settings_.dt == 0) keep_state();
 }
 
 // Not-a-number fails every comparison.

@@ -22,6 +22,7 @@ struct RunSettings : StepSettings {
   double record_dt = 0;   // between recorded rows [s]; 0: every step
   bool patches = false;   // record those of contacts
   bool torques = false;   // record those of the controller
+  bool states = false;    // record the state of the run with each row
 };
 
 // A sphere that starts too deep in a shell for its contacts to be trusted.
@@ -60,6 +61,10 @@ class Simulation : private Torques {
   SensitivityRecord take_sensitivities() {
     return sensitivities_ ? sensitivities_->take() : SensitivityRecord();
   }
+
+  // Before the start: go on from the state of another run, as rows have it. False where it is not
+  // of such a scene.
+  bool resume(const std::vector<double>& state);
 
   // Whether the controller, asked twice at a state, has given two answers.
   bool controller_remembers() const { return sensitivities_ && sensitivities_->torques_remember(); }
@@ -121,7 +126,11 @@ class Simulation : private Torques {
   bool follow_state() const override;
   bool follow_time() const override;
 
+  // The state of the run where its last step was accepted, for rows within the next one.
+  void keep_state();
   void start();
+  void begin_record();
+  void count_steps();
   // Parts of a step, in their order: its length, the step itself (divided where a fixed one is too
   // long), derivatives, acceptance, and the torques that are held from then on.
   void begin_sensors();
@@ -157,6 +166,7 @@ class Simulation : private Torques {
   long controls_ = 0;
   double kink_ = std::numeric_limits<double>::infinity();  // of the torques, next in time [s]
   bool started_ = false, finished_ = false;
+  std::vector<double> kept_;  // see keep_state()
 };
 
 }  // namespace sphshell

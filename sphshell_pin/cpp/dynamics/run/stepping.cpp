@@ -65,6 +65,32 @@ void Stepping::restart() {
   last_error_ = 1;
 }
 
+std::vector<double> Stepping::save() const {
+  const Ledger& work = state_.ledger;
+  std::vector<double> out{state_.t,      work.damping,   work.friction,        work.control,
+                          proposal_,     last_error_,    double(after_event_), double(fine()),
+                          last_.damping, last_.friction, last_.elastic,        last_.bristles};
+  out.insert(out.end(), state_.q.begin(), state_.q.end());
+  out.insert(out.end(), state_.v.begin(), state_.v.end());
+  return out;
+}
+
+void Stepping::resume(const double* from) {
+  state_.t = from[0];
+  state_.ledger = {from[1], from[2], from[3]};
+  state_.q = Eigen::Map<const VectorX>(from + kSaved, state_.q.size());
+  state_.v = Eigen::Map<const VectorX>(from + kSaved + state_.q.size(), state_.v.size());
+  scene_.restart();
+  scene_.evaluate(state_.q, state_.v, state_.z, true);
+  set_fine(from[7] != 0);
+  free_ = !scene_.touching() && !scene_.joints().act();
+  guard_.begin(scene_);
+  events_.begin();
+  proposal_ = from[4], last_error_ = from[5];
+  after_event_ = from[6] != 0;
+  last_ = {from[8], from[9], from[10], from[11]};
+}
+
 // Of the steps that replace a fixed one, or those asked for.
 Stepping::Tolerances Stepping::tolerances() const {
   if (settings_.dt > 0) return {kFineTolerance, 1e-2 * kFineTolerance};

@@ -26,6 +26,11 @@ class Stepping {
 
   // Evaluates the scene at the state, where a run begins or its scene has changed.
   void restart();
+  // What the next steps depend on beside the scene's memory, as numbers; resume() goes on from
+  // them, where the scene's memory has been loaded into the state's bristles.
+  std::vector<double> save() const;
+  static constexpr std::size_t kSaved = 12;  // numbers beside q and v
+  void resume(const double* from);
   // A fixed step to `end`. False where it would carry a sphere too far: it is not made.
   bool make_fixed(double end);
   // A step whose length the error decides, to `end` at most; it ends at the first event. Nothing:

@@ -70,6 +70,16 @@ int Bristles::slot(std::size_t k, int place) {
   return spare < pool.count ? pool.first + spare * pool.rings : -1;
 }
 
+void Bristles::restore(const std::vector<std::size_t>& contacts) {
+  begin();
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const std::size_t begin = stretches_.size();
+    stretches_.resize(begin + contacts[k] * static_cast<std::size_t>(rings_[k]), Vec3::Zero());
+    close(k, begin);
+  }
+  size_ = static_cast<int>(stretches_.size());
+}
+
 void Bristles::restart() {
   for (Pool& pool : pools_) pool.taken.clear();
 }

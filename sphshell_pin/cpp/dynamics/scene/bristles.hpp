@@ -26,6 +26,8 @@ class Bristles {
   // first in a step get its spare slots.
   int slot(std::size_t k, int place);
   bool is_spare(std::size_t k, int slot) const { return slot >= pools_[groups_[k]].first; }
+  // The slots of so many known contacts of each pair, and none else.
+  void restore(const std::vector<std::size_t>& contacts);
   // Forgets which contacts have begun since the accepted state.
   void restart();
 

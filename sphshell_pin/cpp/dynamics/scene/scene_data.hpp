@@ -84,6 +84,11 @@ class SceneData {
   void accept(VectorX& z);
   // What accept() makes of z, without accepting anything.
   void reorder_bristles(VectorX& z);
+  // All that the forces depend on besides q, v and the scene itself, and what accept() needs: see
+  // scene_rows.cpp. load() puts it in the place of what is remembered, stretches in z; false where
+  // the numbers are not of such a scene: nothing is changed then.
+  std::vector<double> save(const VectorX& z);
+  bool load(const double* from, std::size_t count, VectorX& z);
   // Returns to the accepted state: forgets the contacts found since.
   void restart();
   // Rows of the contacts at (q, v), where the forces were last evaluated; with `patches` those of

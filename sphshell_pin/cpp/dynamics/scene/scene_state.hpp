@@ -40,6 +40,26 @@ class SceneState {
     begun_ = true;
   }
 
+  // All that is remembered, as numbers: whether the motion has begun, its last q, and the scene's
+  // memory. restore() takes it up; false, and nothing is changed, where it is not of such a scene.
+  std::vector<double> save() {
+    std::vector<double> out{double(begun_)};
+    const VectorX q = begun_ ? q_ : VectorX::Zero(scene_.body().model().nq);
+    out.insert(out.end(), q.begin(), q.end());
+    const std::vector<double> memory = scene_.save(z_);
+    out.insert(out.end(), memory.begin(), memory.end());
+    return out;
+  }
+  bool restore(const double* from, std::size_t count) {
+    const auto nq = static_cast<std::size_t>(scene_.body().model().nq);
+    if (count < 1 + nq || (from[0] != 0 && from[0] != 1)) return false;
+    const VectorX q = Eigen::Map<const VectorX>(from + 1, Eigen::Index(nq));
+    if (!q.allFinite() || !scene_.load(from + 1 + nq, count - 1 - nq, z_)) return false;
+    q_ = q;
+    begun_ = from[0] == 1;
+    return true;
+  }
+
   // Made when it is first asked for.
   Linearization& linearization() {
     if (!linearization_) linearization_.emplace(scene_);

@@ -116,6 +116,14 @@ class SPHSHELL_PIN_API SceneState {
   /// @throws InvalidParameter as external_forces(), and on a `dt` that is negative or not finite
   void advance(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double dt);
 
+  /// All that is remembered, as numbers, to be kept and compared: two states of a scene with the
+  /// same numbers go on alike. Python's SceneState.values says what each of them is.
+  std::vector<double> values() const;
+
+  /// Remembers what a state of such a scene had as values(), and nothing else.
+  /// @throws InvalidParameter where they are not of a scene with the same pairs
+  void restore(const std::vector<double>& values);
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -1,0 +1,233 @@
+// Which contacts a model of MuJoCo has, and the functions by which MuJoCo calls them.
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <unordered_set>
+
+#include "adapters/mujoco.hpp"
+
+namespace sphshell {
+namespace {
+
+using Set = std::vector<std::shared_ptr<MujocoContacts>>;
+
+// The mark of a model is in bits of its enableflags that MuJoCo does not use.
+constexpr std::uint32_t kMarks = 0x7fff;
+constexpr int kMarkShift = 16;
+// The first bytes of an mjModel are its sizes: they tell a model from one that has the mark by
+// chance, as from a file.
+constexpr std::size_t kSizes = 256;
+
+struct Marked {
+  void* owner;  // the model that the contacts were attached to
+  std::string sizes;
+  std::shared_ptr<const Set> contacts;  // in the order in which they were attached
+};
+
+struct Registry {
+  std::shared_mutex mutex;
+  std::optional<MujocoLayout> layout;
+  std::unordered_map<std::uint32_t, Marked> marked;
+  std::unordered_map<const void*, std::uint32_t> owners;
+  std::uint32_t last = std::random_device()();
+  std::unordered_set<std::uint32_t> ended;  // marks of copies that were found without contacts
+  void (*report)(const std::string&) = nullptr;
+
+  std::uint32_t mark(const void* model) const {
+    return value_at<std::uint32_t>(model, layout->enableflags) >> kMarkShift & kMarks;
+  }
+  void set_mark(void* model, std::uint32_t mark) const {
+    char* const at = static_cast<char*>(model) + layout->enableflags;
+    const auto others = value_at<std::uint32_t>(at, 0) & ~(kMarks << kMarkShift);
+    const std::uint32_t flags = others | mark << kMarkShift;
+    std::memcpy(at, &flags, sizeof(flags));
+  }
+  const Marked* find(const void* model) const {
+    if (marked.empty()) return nullptr;
+    std::uint32_t number = mark(model);
+    if (number == 0) {
+      const auto at = owners.find(model);
+      if (at == owners.end()) return nullptr;
+      number = at->second;
+    }
+    const auto at = marked.find(number);
+    if (at == marked.end()) return nullptr;
+    const bool same = std::memcmp(at->second.sizes.data(), model, kSizes) == 0;
+    return same ? &at->second : nullptr;
+  }
+};
+
+Registry& registry() {
+  static Registry* const all = new Registry;  // threads may step beyond the end of main()
+  return *all;
+}
+
+std::shared_ptr<const Set> contacts_of(const void* model) {
+  Registry& all = registry();
+  std::uint32_t mark = 0;
+  {
+    const std::shared_lock lock(all.mutex);
+    if (const Marked* const found = all.find(model)) return found->contacts;
+    if (!all.layout || (mark = all.mark(model)) == 0) return nullptr;
+  }
+  {
+    const std::unique_lock lock(all.mutex);
+    if (!all.ended.insert(mark).second) return nullptr;
+  }
+  all.report(
+      "a copy of a MuJoCo model moves without contacts: those of the model have ended, with it or "
+      "by detach(); attach them to the copy");
+  return nullptr;
+}
+
+}  // namespace
+
+void apply_passive(const void* model, void* data) {
+  if (const auto here = contacts_of(model))
+    for (const auto& contacts : *here) contacts->apply(model, data);
+}
+
+namespace {
+
+// What MuJoCo knows of a plugin: its mjpPlugin, up to what is never used here.
+struct Plugin {
+  const char* name;
+  int num_attributes;
+  const char* const* attributes;
+  int capabilities, stage;
+  int (*num_state)(const void* model, int instance);
+  int (*num_sensordata)(const void*, int, int);
+  int (*init)(const void*, void*, int);
+  void (*destroy)(void*, int);
+  void (*copy)(void*, const void*, const void*, int);
+  void (*reset)(const void* model, double* state, void*, int instance);
+  void (*compute)(const void*, void*, int, int);
+  void (*advance)(const void* model, void* data, int instance);
+  void* unused[32];
+};
+constexpr int kPassive = 4;  // mjPLUGIN_PASSIVE
+
+const char* (*get_config)(const void* model, int instance, const char* attribute);
+
+int memory_size(const void* model, int instance) {
+  const char* const text = get_config(model, instance, "size");
+  return text ? std::max(0, std::atoi(text)) : 0;
+}
+
+void forget_memory(const void* model, double* state, void*, int instance) {
+  std::fill_n(state, memory_size(model, instance), 0.0);
+}
+
+void advance_memory(const void* model, void* data, int instance) {
+  if (const auto here = contacts_of(model))
+    for (const auto& contacts : *here)
+      if (contacts->memory().instance == instance) contacts->advance(model, data);
+}
+
+}  // namespace
+
+int register_memory(void* register_plugin, void* config) {
+  static const char* const attributes[] = {"size"};
+  get_config = reinterpret_cast<decltype(get_config)>(config);
+  Plugin plugin{};
+  plugin.name = "sphshell_pin.memory";
+  plugin.num_attributes = 1;
+  plugin.attributes = attributes;
+  plugin.capabilities = kPassive;
+  plugin.num_state = &memory_size;
+  plugin.init = [](const void*, void*, int) { return 0; };
+  plugin.reset = &forget_memory;
+  plugin.compute = [](const void*, void*, int, int) {};
+  plugin.advance = &advance_memory;
+  return reinterpret_cast<int (*)(const Plugin*)>(register_plugin)(&plugin);
+}
+
+int filter_contact(const void* model, void*, int geom, int other) {
+  const Registry& all = registry();
+  const int* const type = value_at<const int*>(model, all.layout->contype);
+  const int* const affinity = value_at<const int*>(model, all.layout->conaffinity);
+  if (!(type[geom] & affinity[other]) && !(type[other] & affinity[geom])) return 1;
+  const auto here = contacts_of(model);
+  return here && std::any_of(here->begin(), here->end(), [&](const auto& contacts) {
+           return contacts->separates(geom, other);
+         });
+}
+
+std::string register_passive(void* model, std::shared_ptr<MujocoContacts> contacts) {
+  Registry& all = registry();
+  const std::unique_lock lock(all.mutex);
+  if (!all.layout) all.layout = contacts->layout();
+  all.report = contacts->reporter();
+  const Marked* const before = all.find(model);
+  Set set = before ? *before->contacts : Set();
+  for (const auto& one : set)
+    for (const std::string& touch : contacts->touches())
+      if (std::count(one->touches().begin(), one->touches().end(), touch)) return touch;
+  set.push_back(std::move(contacts));
+  // A copy of a model with contacts has a mark, and contacts, of its own from here on.
+  const auto owned = all.owners.find(model);
+  std::uint32_t number = owned == all.owners.end() ? 0 : owned->second;
+  if (number == 0) {
+    if (all.marked.size() + 1 >= kMarks)
+      throw std::length_error("too many MuJoCo models have contacts");
+    do number = ++all.last & kMarks;
+    while (number == 0 || all.marked.count(number));
+  }
+  all.ended.erase(number);
+  all.set_mark(model, number);
+  all.owners[model] = number;
+  all.marked[number] = {model, std::string(static_cast<const char*>(model), kSizes),
+                        std::make_shared<const Set>(std::move(set))};
+  return {};
+}
+
+void unregister_passive(const MujocoContacts* contacts) {
+  Registry& all = registry();
+  std::vector<std::shared_ptr<const Set>> before;  // destroyed without the lock
+  const std::unique_lock lock(all.mutex);
+  for (auto at = all.marked.begin(); at != all.marked.end();) {
+    Marked& marked = at->second;
+    Set set;
+    for (const auto& one : *marked.contacts)
+      if (one.get() != contacts) set.push_back(one);
+    before.push_back(marked.contacts);
+    if (set.empty()) {
+      all.set_mark(marked.owner, 0);
+      all.owners.erase(marked.owner);
+      at = all.marked.erase(at);
+    } else {
+      marked.contacts = std::make_shared<const Set>(std::move(set));
+      ++at;
+    }
+  }
+}
+
+bool is_taken(const void* model, int instance) {
+  const auto here = contacts_of(model);
+  return here && std::any_of(here->begin(), here->end(),
+                             [&](const auto& one) { return one->memory().instance == instance; });
+}
+
+bool acts_on(const void* model, const MujocoContacts* contacts) {
+  const auto here = contacts_of(model);
+  return here && std::any_of(here->begin(), here->end(),
+                             [&](const auto& one) { return one.get() == contacts; });
+}
+
+void end_model(const void* model) {
+  Registry& all = registry();
+  std::shared_ptr<const Set> before;
+  const std::unique_lock lock(all.mutex);
+  const auto owned = all.owners.find(model);
+  if (owned == all.owners.end()) return;
+  before = all.marked.at(owned->second).contacts;
+  all.marked.erase(owned->second);
+  all.owners.erase(owned);
+}
+
+}  // namespace sphshell
