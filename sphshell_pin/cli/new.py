@@ -17,6 +17,7 @@ from sphshell_pin.cli.app import (
     command,
     length_of,
     option,
+    progress_bar,
     say,
     xacro_args_of,
 )
@@ -119,34 +120,36 @@ def new(
         _list_robots(robot)
     from sphshell_pin.scenario.drafting.new import new_scenario
 
+    title = f"{robot} and {surface}: searching posture, place and values"
     try:
-        made = new_scenario(
-            robot,
-            surface,
-            frame=frame,
-            radius=length_of("--radius", radius),
-            offset=offset,
-            unit=unit,
-            bodies=body,
-            faces=faces_of(face),
-            material=law,
-            against=against,
-            press=press,
-            place=place,
-            at=at,
-            path=path,
-            length=length_of("--length", length),
-            tips=tips,
-            base="floating" if free_flyer else base,
-            package_dirs=package_dir or (),
-            xacro_args=xacro_args_of(xacro_arg),
-            density=density,
-            mimic=not no_mimic,
-            out=out,
-            force=force,
-            # What was tried goes to the error stream, the answer to the other.
-            tell=lambda what: typer.echo(what, err=True),
-        )
+        with progress_bar(title, "TimeElapsedColumn", total=None):
+            made = new_scenario(
+                robot,
+                surface,
+                frame=frame,
+                radius=length_of("--radius", radius),
+                offset=offset,
+                unit=unit,
+                bodies=body,
+                faces=faces_of(face),
+                material=law,
+                against=against,
+                press=press,
+                place=place,
+                at=at,
+                path=path,
+                length=length_of("--length", length),
+                tips=tips,
+                base="floating" if free_flyer else base,
+                package_dirs=package_dir or (),
+                xacro_args=xacro_args_of(xacro_arg),
+                density=density,
+                mimic=not no_mimic,
+                out=out,
+                force=force,
+                # What was tried goes to the error stream, the answer to the other.
+                tell=lambda what: typer.echo(what, err=True),
+            )
     except UnitMissing as error:
         raise SphshellError(f"the unit {error.must('--unit {}')}") from error
     _show(made)
