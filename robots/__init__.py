@@ -29,6 +29,7 @@ from sphshell_pin.robots.files import (
     read,
 )
 from sphshell_pin.robots.inertia import mass_fault, with_density
+from sphshell_pin.robots.library_names import is_library_name, library_source
 from sphshell_pin.robots.mesh_spheres import MeshSpheres, spheres_of_link, spheres_of_mesh
 
 __all__ = [
@@ -47,9 +48,11 @@ __all__ = [
     "exactly",
     "fingertips",
     "floats",
+    "is_library_name",
     "is_path",
     "keep_geometry_of",
     "keep_spheres",
+    "library_source",
     "load",
     "load_file",
     "load_urdf",
@@ -126,6 +129,8 @@ def load(
 ) -> LoadedRobot:
     """Return the robot called `name`, its mimic joints free unless `mimic` is set.
 
+    Names that end in _description are those of the package robot_descriptions.
+
     `mimic` and `pose` are those of `load_file`. With `free_flyer` the root link floats, with False
     it is fixed where the reference posture has it; by default it is as its collection has it.
 
@@ -142,6 +147,17 @@ def load(
         file = URDF_FOLDER / f"{name}.urdf"
         free = OWN[name] if free_flyer is None else free_flyer
         return load_file(file, free_flyer=free, name=name, mimic=mimic, pose=pose)
+    if is_library_name(name):
+        source = library_source(name)
+        return load_file(
+            source.file,
+            source.folders,
+            free_flyer=free_flyer,
+            mimic=mimic,
+            name=name,
+            xacro_args=source.xacro_args,
+            pose=pose,
+        )
     try:
         import example_robot_data
     except ImportError:

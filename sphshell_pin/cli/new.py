@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
@@ -28,12 +28,16 @@ if TYPE_CHECKING:
     from sphshell_pin.scenario.drafting.new import NewScenario
 
 
+_FRAMES = 8  # of a robot in a list
+
+
 @command()
 def new(
     robot: Annotated[
         str,
         option(
-            "A shipped robot (sphshell-pin list), or a URDF, xacro (which is code) or MJCF file."
+            "A shipped robot (sphshell-pin list), a URDF, xacro (which is code) or MJCF file, a "
+            "name of robot_descriptions, or a folder: its robots are listed."
         ),
     ],
     surface: Annotated[
@@ -112,6 +116,8 @@ def new(
 
     Example: sphshell-pin new --robot panda --surface blade.stl --unit mm
     """
+    if Path(robot).is_dir():
+        _list_robots(robot)
     from sphshell_pin.scenario.drafting.new import new_scenario
 
     title = f"{robot} and {surface}: searching posture, place and values"
@@ -147,6 +153,23 @@ def new(
     except UnitMissing as error:
         raise SphshellError(f"the unit {error.must('--unit {}')}") from error
     _show(made)
+
+
+def _list_robots(folder: str) -> NoReturn:
+    """Print the robots in a folder, each as it is found, and end: one has to be named."""
+    from sphshell_pin.robots.workspace import find_robots
+
+    count = 0
+    for one in find_robots(folder):
+        count += 1
+        say(f"{one.file}: {one.joints} joints" if one.joints else f"{one.file}")
+        if one.frames:
+            shown = ", ".join(one.frames[:_FRAMES]) + (", ..." if one.frames[_FRAMES:] else "")
+            say(f"  frames at its ends: {shown}")
+        if one.missing:
+            say(f"  missing: {one.missing}")
+    which = f"say which of these {count} robots: --robot FILE" if count else "holds no robot's file"
+    raise SphshellError(f"{folder}: {which}")
 
 
 def _show(made: NewScenario) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.workspace import find_robots
 from tests.command import call
 
 XACRO = """<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro">
@@ -80,3 +81,45 @@ def test_the_search_ends_at_the_workspace(tmp_path: Path) -> None:
     folders = Folders.of(file)
     assert folders.package("arm_resources") is None
     assert str(tmp_path / "one" / "src") in folders.searched()
+
+
+def test_a_workspace_lists_its_robots(tmp_path: Path) -> None:
+    file = workspace(tmp_path, "src/vendor/arm_resources")
+    bare = file.with_name("bare.urdf")
+    bare.write_text(
+        '<robot name="bare"><link name="a"/><link name="b"><visual><geometry>'
+        '<sphere radius="1"/></geometry></visual></link><joint name="j" type="continuous">'
+        '<parent link="a"/><child link="b"/></joint></robot>'
+    )
+    asking = file.with_name("asking.xacro")
+    asking.write_text(XACRO.replace("<link", '<link name="$(arg which)"/><link', 1))
+    found = {one.file.name: one for one in find_robots(tmp_path)}
+    assert sorted(found) == ["arm.xacro", "asking.xacro", "bare.urdf"]
+    assert found["arm.xacro"].frames == ("tip",)
+    assert not found["arm.xacro"].missing
+    assert "--density" in found["bare.urdf"].missing
+    assert "--xacro-arg which=VALUE" in found["asking.xacro"].missing
+    told = call("new", "--robot", tmp_path)
+    assert told.exit_code == 2
+    assert "say which of these 3 robots" in told.output
+
+
+def test_names_of_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = "arm_of_mine_description"
+    for command in (["check-robot", name], ["new", "--robot", name]):
+        assert "pip install robot_descriptions" in call(*command).output
+    file = workspace(tmp_path / "repo", "arm_resources")
+    package = tmp_path / "lib" / "robot_descriptions"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    (package / f"{name}.py").write_text(
+        f"REPOSITORY_PATH = {str(tmp_path / 'repo')!r}\n"
+        f"PACKAGE_PATH = {str(file.parents[1])!r}\nXACRO_PATH = {str(file)!r}\n"
+    )
+    (package / "broken_description.py").write_text("raise OSError('no network')")
+    monkeypatch.syspath_prepend(str(tmp_path / "lib"))
+    assert robots.load(name, mimic=True).model.nv == 1
+    with pytest.raises(robots.RobotError, match="no network"):
+        robots.load("broken_description")
+    with pytest.raises(robots.RobotError, match="has no robot"):
+        robots.load("other_description")

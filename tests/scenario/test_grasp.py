@@ -219,7 +219,7 @@ def test_fingers_that_mimic_others_hold_too(tmp_path):
         ({"place": "below"}, "--place belongs to a single tip"),
         ({"radius": 0.01}, "--radius belongs to a single tip"),
         ({"robot": "three_link_finger"}, "needs two fingertips or more"),
-        ({"robot": "turntable"}, "this robot has 0"),
+        ({"robot": "turntable"}, "this robot has 1"),
         pytest.param({"against": "steel", "press": 500.0}, "no grasp .* works"),
         ({"unit": "m", "surface": "large"}, "cannot hold a part of 400 x 400 x 400 mm"),
     ],

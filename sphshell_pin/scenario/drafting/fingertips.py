@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.arrays import Array
-from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
-from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry
+from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, gripper_joints
 
 # Of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's place, as
 # meshes of fingertips stand out of the spheres that stand for them.
 AT_TIP = 1.5
 _ASKED = "as it was asked for"
-# Words in the names of frames that mark the end of a limb, in the order of trust.
+# Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at
+# the end of a limb.
+_TOOL_WORDS = ("tcp", "tool", "ee", "eef", "effector", "grasp", "grip", "flange")
 _END_WORDS = ("tcp", "tip", "tool", "ee_link", "eef", "end_effector", "foot", "feet")
 
 
@@ -54,7 +58,8 @@ def find_tips(
     """
     if not robot.model.nv:
         raise SphshellError("the robot has no joint: let its root float with --base floating")
-    known = _known(robot, shipped)
+    held = gripper_joints(robot.model)
+    known = [one for one in _known(robot, shipped) if _joint_of(robot.model, one.frame) not in held]
     if frame is not None:
         find_frame(robot.model, frame)
         known = [one for one in known if one.frame == frame]
@@ -63,13 +68,36 @@ def find_tips(
     if known and offset is not None:
         known = [replace(known[0], offset=offset, source=_ASKED)]
     if not known:
-        names = _ends(robot.model) if frame is None else [(frame, _ASKED)]
+        names = _ends(robot.model, held) if frame is None else [(frame, _ASKED)]
         known = [_at_end(robot, *one, radius, offset, asked=frame is not None) for one in names]
     found = [_sized(one, radius) for one in known]
     # The sphere of a shipped robot is where it belongs, whatever size is asked for.
     for one in found if shipped is None or offset is not None else ():
         _check_outside(robot, one)
     return found
+
+
+def every_finger(robot: LoadedRobot) -> list[Tip]:
+    """Return the fingertips of a hand: spheres of its collision geometry, else at links' ends.
+
+    A ball at the end of each link that has geometry and carries no further joint.
+    """
+    model, spheres = robot.model, end_spheres(robot)
+    source = "the sphere of its collision geometry"
+    if len(spheres) > 1:
+        return [Tip(one.frame, one.radius, np.array(one.offset), source) for one in spheres]
+    tips = []
+    for joint in sorted(_leaves(model)):
+        frame = frame_on_joint(model, joint)
+        link = None if frame is None else LinkGeometry(robot, frame)
+        if link is not None and frame is not None and len(link.corners):
+            end = link.end()
+            tips.append(Tip(frame, end.radius, end.offset, end.source))
+    return tips
+
+
+def _joint_of(model: pin.Model, frame: str) -> int:
+    return int(model.frames[find_frame(model, frame)].parentJoint)
 
 
 def _at_end(
@@ -134,15 +162,43 @@ def _sized(tip: Tip, radius: float | None) -> Tip:
     return tip
 
 
-def _ends(model: pin.Model) -> list[tuple[str, str]]:
-    """Return the frames at the ends of the limbs that may be meant, and why."""
-    leaves = set(range(1, model.njoints)) - {int(one) for one in model.parents}
+def _leaves(model: pin.Model, held: Collection[int] = ()) -> set[int]:
+    """Return the joints without `held` that carry no further one."""
+    left = set(range(1, model.njoints)) - set(held)
+    return left - {int(model.parents[one]) for one in left}
+
+
+def _ends(model: pin.Model, held: Collection[int]) -> list[tuple[str, str]]:
+    """Return the frames at the ends of the limbs that may be meant, and why.
+
+    The joints `held` are those of grippers, whose jaws are no ends.
+    """
+    leaves = _leaves(model, held)
     carriers = {int(one.parentFrame) for one in model.frames}
-    names = [
-        one.name
+    childless = [
+        one
         for i, one in enumerate(model.frames)
-        if int(one.parentJoint) in leaves and i not in carriers
+        if int(one.parentJoint) not in {0, *held} and i not in carriers
     ]
+    if not floats(model):
+        for word in _TOOL_WORDS:
+            tools = [
+                one
+                for one in childless
+                if any(part.startswith(word) for part in re.split(r"[^a-z0-9]+", one.name.lower()))
+                and (len(word) > 2 or word in re.split(r"[^a-z0-9]+", one.name.lower()))
+            ]
+            if tools:
+                best = max(
+                    tools, key=lambda one: (len(model.supports[one.parentJoint]), -len(one.name))
+                )
+                several = f", one of {len(tools)}" if len(tools) > 1 else ""
+                return [(best.name, f"a frame called '{word}'{several}")]
+    names = [one.name for one in childless if int(one.parentJoint) in leaves]
+    jaws = {int(model.parents[one]) for one in held} - set(held)
+    if not names and len(leaves) == 1 and leaves <= jaws:
+        (joint,) = leaves
+        return [(frame_on_joint(model, joint) or model.names[joint], "what carries the gripper")]
     if len(names) == 1:
         return [(names[0], "the only end of the robot")]
     for word in _END_WORDS:

@@ -12,10 +12,10 @@ from sphshell_pin.arrays import Array
 from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots import LoadedRobot, end_spheres, floats
+from sphshell_pin.robots import LoadedRobot, floats
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.fingertips import Tip, every_finger
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.drafting.hand_text import DURATION, GAP, HandDraft
@@ -44,16 +44,13 @@ def every_tip(robot: LoadedRobot, asked: Asked) -> list[Tip]:
     for option in ("frame", "radius", "place"):
         if getattr(asked, option) is not None:
             raise SphshellError(f"--{option} belongs to a single tip: leave it out with --tips all")
-    spheres = end_spheres(robot)
-    if len(spheres) < 2:
+    tips = every_finger(robot)
+    if len(tips) < 2:
         raise SphshellError(
-            "--tips all needs two fingertips or more, spheres in the collision geometry of links "
-            f"that carry no further joint; this robot has {len(spheres)}"
+            "--tips all needs two fingertips or more, links with geometry that carry no further "
+            f"joint; this robot has {len(tips)}"
         )
-    return [
-        Tip(one.frame, one.radius, np.array(one.offset), "the sphere of its collision geometry")
-        for one in spheres
-    ]
+    return tips
 
 
 def hold_in_hand(

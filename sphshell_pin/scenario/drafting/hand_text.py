@@ -172,7 +172,7 @@ class HandDraft:
         frames = ", ".join(f"'{tip.frame}'" for tip in self.hand.tips)
         used = self.grasp.friction / friction_between(one, other)[0]
         return (
-            f"{len(self.hand.tips)} fingertips, the spheres of the collision geometry: {frames}",
+            f"{len(self.hand.tips)} fingertips, {self.hand.tips[0].source}: {frames}",
             f"the part is {other.name} all through and weighs {self.part.mass:.3g} kg",
             f"the fingertips press with {self.press:.3g} N at most; its weight and their forces "
             f"use {100 * used:.0f} % of the friction",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.arrays import Array
+from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.drafting.wording import rounded
@@ -32,10 +34,30 @@ class End:
     source: str
 
 
+def gripper_joints(model: pin.Model) -> set[int]:
+    """Return the joints of grippers: behind a joint, two limbs or more that slide or are coupled.
+
+    They have two coordinates at most. A run holds them, where the tip is on what carries them.
+    """
+    rules, found = mimics(model), set[int]()
+    coupled = {*rules, *(rule.of for rule in rules.values())}
+    for carrier in range(1, model.njoints):
+        behind = [int(one) for one in model.subtrees[carrier]][1:]
+        ends = set(behind) - {int(model.parents[one]) for one in behind}
+        jaws = all(
+            model.names[one] in coupled or model.joints[one].shortname().startswith("JointModelP")
+            for one in behind
+        )
+        if len(ends) > 1 and jaws and len({model.joints[one].idx_v for one in behind}) <= 2:
+            found |= set(behind)
+    return found
+
+
 class LinkGeometry:
     """The corners of the geometry that moves with a frame of a robot, in that frame.
 
-    Those of its collision geometry; where it has none, of its visual one.
+    A gripper that it carries is part of it, as the start has it. They are those of its collision
+    geometry; where it has none, of its visual one.
     """
 
     def __init__(self, robot: LoadedRobot, frame: str) -> None:
@@ -43,10 +65,14 @@ class LinkGeometry:
         self._robot, self._model = robot, model
         self._frame = model.frames[find_frame(model, frame)]
         self._joint = int(self._frame.parentJoint)
+        self._jaws = gripper_joints(model) & {int(one) for one in model.subtrees[self._joint]}
+        self._jaws -= {self._joint}
         bodies = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
         carried = [name for name in bodies if self._carries(name)]
         self.link = carried[0] if carried else frame
-        self.corners = _moved(self._frame.placement.inverse(), self._corners(self._joint))
+        self.corners = _moved(
+            self._frame.placement.inverse(), self._corners(self._joint, self._jaws)
+        )
 
     def depth(self, center: Array) -> float:
         """Return how far `center` (3,) [m] is inside the convex hull [m]; negative outside."""
@@ -76,7 +102,8 @@ class LinkGeometry:
             if covers <= reach:
                 break
         before = float(along.max() - center @ ahead)
-        if radius is None and covers - before < _STANDS_OUT * covers:
+        # Open jaws may lie in a ball, but are no round end.
+        if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
             return End(center, rounded(covers), f"it covers the end of link '{self.link}'")
         ball = rounded(_BALL * covers) if radius is None else radius
         front = center + (before + ball) * ahead
@@ -94,10 +121,14 @@ class LinkGeometry:
     def _ahead(self) -> Array:
         """Return the unit vector (3,) towards the end, in the frame.
 
-        Away from the joint's axis; along it where the link is about it, away from the link before.
+        To the jaws of a gripper. Else away from the joint's axis; along it where the link is about
+        it, away from the link before.
         """
         model, place = self._model, self._frame.placement.inverse()
         here = _middle(self.corners)
+        if self._jaws:
+            away = here - _middle(_moved(place, self._corners(self._joint)))
+            return np.asarray(away / max(float(np.linalg.norm(away)), 1e-12))
         joint = model.joints[self._joint]
         before = self._corners(int(model.parents[self._joint]))
         behind = place.act(model.jointPlacements[self._joint].actInv(_middle(before)))
@@ -114,13 +145,18 @@ class LinkGeometry:
         ahead: Array = away / max(float(np.linalg.norm(away)), 1e-12)
         return ahead
 
-    def _corners(self, joint: int) -> Array:
-        """Return the corners (k, 3) [m] of the geometry of a joint, in the joint's frame."""
+    def _corners(self, joint: int, jaws: Collection[int] = ()) -> Array:
+        """Return the corners (k, 3) [m] of the geometry of joints, in the first one's frame."""
+        data = self._model.createData()
+        pin.forwardKinematics(self._model, data, self._robot.q0)
         for geometry in (self._robot.collision_model, self._robot.visual_model):
             found = [
-                _moved(one.placement, np.asarray(Shell.from_geometry(one).vertices))
+                _moved(
+                    data.oMi[joint].actInv(data.oMi[one.parentJoint] * one.placement),
+                    np.asarray(Shell.from_geometry(one).vertices),
+                )
                 for one in geometry.geometryObjects
-                if int(one.parentJoint) == joint
+                if int(one.parentJoint) in {joint, *jaws}
             ]
             if found:
                 return np.concatenate(found)

@@ -16,7 +16,8 @@ from sphshell_pin.scenario.format.reach import Reach, turn_between
 
 # Mobility along the approach and across it, as a part of the best one: below the first a posture is
 # singular; the posture that a robot is known to work in is taken from the second on.
-_MOBILE, _EASY = 0.02, 0.1
+# A heavy arm with a light wrist has 0.01 in its best posture.
+_MOBILE, _EASY = 2e-3, 0.1
 # Postures: seeds tried, how far from each other [rad or m] they have to be, and how many are taken.
 _SEEDS, _APART, _MOST = 32, 0.3, 4
 # Cosine between limb and approach below which the limb is beside the tip or before it.

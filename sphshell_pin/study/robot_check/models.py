@@ -43,7 +43,7 @@ def check_known(names: Iterable[str]) -> None:
             if not os.path.isfile(robot):
                 what = "is a folder, not a URDF file" if os.path.isdir(robot) else "no such file"
                 raise SphshellError(f"{robot}: {what}")
-        elif robot not in known:
+        elif robot not in known and not robots.is_library_name(robot):
             raise NameNotFound("robot", robot, "sphshell_pin.robots", known, "sphshell-pin list")
 
 
@@ -73,13 +73,18 @@ def load_subject(
         raise InvalidParameter("robot", robot, "must be a name, a file or a pinocchio.Model")
     robot = str(robot)
     check_known([robot])
+    name = Path(robot).stem
+    if robots.is_library_name(robot):
+        source = robots.library_source(robot)
+        name, robot = robot, str(source.file)
+        package_dirs, xacro_args = source.folders, xacro_args or source.xacro_args
     if robots.is_path(robot):
         file = Path(robot)
         description = robots.read(file, package_dirs, xacro_args, free_flyer=free_flyer or None)
         assumed = ""
         if density is not None:
             description, assumed = robots.with_density(description, density)
-        subject = _without_meshes(description, file.stem, None, free_flyer=free_flyer, mimic=mimic)
+        subject = _without_meshes(description, name, None, free_flyer=free_flyer, mimic=mimic)
         return replace(subject, notes=(*filter(None, (assumed,)), *subject.notes))
     if density is not None:
         raise InvalidParameter("density", density, f"belongs to a file, not to {robot}")
