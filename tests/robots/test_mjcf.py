@@ -299,7 +299,7 @@ WAYS = """<mujoco><compiler angle="degree"/><default><geom quat="0.5 0.5 0.5 0.5
 
 @pytest.mark.parametrize(
     "way",
-    ['zaxis="1 1 0"', 'axisangle="1 2 -1 40"', 'xyaxes="1 1 0 -1 1 0.5"', 'euler="10 70 -40"'],
+    ['zaxis="1 1 0"', 'axisangle="1 2 -1 40"', 'xyaxes="1 1 0 -1 1 1"', 'euler="10 70 -40"'],
 )
 def test_an_orientation_in_one_way_replaces_that_of_a_default_in_another(way, tmp_path):
     mujoco = pytest.importorskip("mujoco")

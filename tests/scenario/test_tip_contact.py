@@ -17,7 +17,7 @@ MATERIALS = find_material("rubber"), find_material("steel")
 
 
 def hertz(depth: float) -> float:
-    """Return the force [N] of a sphere of RADIUS, E* = 1 / ((1 - nu1^2) / E1 + (1 - nu2^2) / E2)."""
+    """Force [N] of a sphere of RADIUS: 4/3 E* (R depth^3)^0.5, 1/E* the sum of (1 - nu^2) / E."""
     softness = sum((1 - one.poisson**2) / one.young for one in MATERIALS)
     return 4 / 3 * np.sqrt(RADIUS) / softness * depth**1.5
 
