@@ -15,6 +15,7 @@ from sphshell_pin.parameters import parameters_of
 from sphshell_pin.scenario import build, live_parameters, rebuild
 from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.sweep.plan import plan_sweep
+from tests import models
 from tests.scenario.files import DROP, write
 
 LAW = next(line for line in DROP.splitlines() if line.startswith("law"))
@@ -135,6 +136,17 @@ def test_the_numbers_of_all_kinds_are_tried(family, part):
             assert numbers - {"radius", "radius_2"} <= tried
         else:
             assert kind in ("adams", "table", "function", "none", "joint-torque")
+
+
+def test_a_single_number_has_no_places() -> None:
+    """Only of several numbers can one be named by its place."""
+    scene = models.on_plate(models.ball(), models.linear_law(1e4, 10.0))
+    state = (models.free_q([0, 0, 0.049]), [0.0] * 6)
+    for number in ("law.stiffness", "sphere.radius"):
+        found = scene.dynamics_derivatives(*state, parameters=[f"ball-plate.{number}"])
+        assert found.parameters == (f"ball-plate.{number}",)
+        with pytest.raises(NameNotFound, match=rf"{number}\.0"):
+            scene.dynamics_derivatives(*state, parameters=[f"ball-plate.{number}.0"])
 
 
 def test_former_names_work_and_warn(tmp_path):

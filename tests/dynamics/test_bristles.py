@@ -102,6 +102,16 @@ def test_a_slide_ends_where_coulomb_says(integrator) -> None:
     assert abs(rows.v[-1, 0]) < 1e-8
 
 
+@pytest.mark.parametrize("speed", [0.1, 2.0])
+def test_a_bristle_that_slides_stores_what_it_holds(speed: float) -> None:
+    """(mu N)^2 / 2k beside the normal law's (m g)^2 / 2K, however fast it slides."""
+    scene = block(sp.BristleFriction(0.3, 0.3, K, 2.0))
+    rows = run(scene, sp.Adaptive(1e-9), REST, [speed, 0, 0], 0.02, record_dt=1e-3)
+    stored = rows.energy.elastic - 0.5 * G**2 / K
+    assert rows.v[-1, 0] > 0.3 * speed
+    assert stored[5:] == pytest.approx(0.5 * (0.3 * G) ** 2 / K, rel=1e-6)
+
+
 @pytest.mark.parametrize("method", ["smooth", "facets"])
 def test_borders_of_elements_are_not_felt(method: str) -> None:
     """A ball that slides and then rolls over 800 triangles, and over one square."""

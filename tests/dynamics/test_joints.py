@@ -171,6 +171,17 @@ def test_torques_are_cut_at_the_effort_limit_and_the_result_says_when() -> None:
     assert residual(result) < 1e-9
 
 
+def test_the_fastest_of_a_joint_s_directions_counts() -> None:
+    model = models.ball(joint=pin.JointModelTranslation())
+    joints = sp.JointComponents(speed={"ball_joint": 2.5})
+    result = sp.Simulation(sp.Scene(model, joints=joints), sp.RungeKutta4(1e-2)).run(
+        [0.0, 0.0, 0.0], [1.0, -3.0, 0.5], 0.1
+    )
+    figures = result.stats.joints["ball_joint"]
+    assert figures.peak_speed == pytest.approx(3.0, rel=1e-12)
+    assert figures.first_too_fast == 0.0
+
+
 def test_events_of_limits_name_the_joint_that_met_them() -> None:
     model = pin.buildSampleModelManipulator()
     model.gravity.setZero()

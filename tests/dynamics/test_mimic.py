@@ -8,6 +8,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
+from sphshell_pin.dynamics.scene.mimic import mimics, shortened
+from sphshell_pin.errors import SphshellError
 from tests import differences, meshes
 
 # Two fingers of two links each, as those of Robotiq's 2F-85: the knuckles of both sides follow one
@@ -174,3 +176,16 @@ def test_joint_components_act_on_the_joint_that_is_mimicked() -> None:
     )
     assert result.stats.joints["left_knuckle_joint"].stops
     assert np.abs(result.energy.residual).max() < 1e-5 * result.energy.exchanged
+
+
+@pytest.mark.parametrize("off", [1e-5, -1e-3, 0.1])
+def test_a_joint_that_follows_is_where_its_rule_puts_it(off: float) -> None:
+    model, full = gripper()
+    matrix, offset = reduction(model, full)
+    q = matrix @ np.array([0.1, 0.4]) + offset
+    np.testing.assert_allclose(shortened(model, q, check=True), [0.1, 0.4], rtol=0, atol=0)
+    for joint in mimics(model):
+        one = q.copy()
+        one[full.joints[full.getJointId(joint)].idx_q] += off
+        with pytest.raises(SphshellError, match=f"joint '{joint}' cannot be at .* it mimics"):
+            shortened(model, one, check=True)

@@ -419,3 +419,15 @@ def test_relaxation_and_weakness_follow_the_speed_that_the_law_can_stop() -> Non
     assert relaxation_time(pair, unknown) == 2e-5
     own = source([[0.0, 0.0, 0.0]], [1e-3])
     assert relaxation_time(own.pairs[0], own.explain([0.0]).pairs[0]) == 2e-5
+
+
+@pytest.mark.parametrize(("share", "soft"), [(0.08, False), (0.15, True), (0.3, True)])
+def test_a_law_in_which_a_body_sinks_by_a_tenth_of_its_radius_is_soft(share, soft) -> None:
+    radius, mass = 0.05, 2.0
+    law = models.linear_law(mass * 9.81 / (share * radius), 10.0)
+    scene = models.on_plate(models.ball(mass=mass), law, radius=radius)
+    report = scene.explain(models.free_q([0, 0, radius]))
+    told = [one for one in report.warnings if "the law is soft for this mass" in one]
+    assert len(told) == soft
+    if soft:
+        assert f"at rest the depth is {share:.0%} of the radius" in told[0]

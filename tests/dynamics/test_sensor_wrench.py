@@ -113,6 +113,26 @@ def test_a_locked_joint_changes_nothing(locked):
         assert np.abs(result.sensors["wrist"].values[0] - expected).max() < 1e-10, frame
 
 
+@pytest.mark.parametrize(("lock", "frame", "link"), [(["knuckle"], "knuckle", "finger")])
+def test_a_contact_on_the_frame_of_a_locked_joint_is_beyond_the_sensor(lock, frame, link):
+    """As that of a sphere on the link there, which is at the same place."""
+    model, q = arm(), np.array([0.4, -0.7])
+    center = poses(model, q)[link].translation
+    plane = pin.SE3(np.eye(3), center - [0.01, 0.02, 0.02 - 3e-4])
+    read_by = {}
+    for one in (None, frame, link):
+        scene = sp.Scene(model, lock=lock, q_lock=q)
+        if one is not None:
+            scene.add_contact(
+                sp.Sphere(0.02, one), models.plate(), placement=plane, law=sp.ImpactLaw(1e6, 1.5)
+            )
+        result = read(scene, q[:1], sp.GravityCompensation(), [sensor()])
+        read_by[one] = result.sensors["wrist"].values[0]
+    assert np.abs(read_by[frame] - read_by[link]).max() < 1e-10
+    # Of the pressed arm the shoulder moves: it is the contact's force that the sensor tells.
+    assert np.abs(read_by[frame] - read_by[None]).max() > 0.1
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_pressed_tip_reads_the_opposite_of_the_contact_force(seed):
     model, radius, depth = arm(), 0.02, 3e-4

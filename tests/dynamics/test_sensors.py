@@ -55,6 +55,27 @@ def test_the_filter_is_of_first_order(integrator, share):
         assert abs(20 * np.log10(gain) + 3.0103) < 0.02
 
 
+@pytest.mark.parametrize("steps_over_tau", [0.02, 0.1, 0.3, 0.7, 3.0])
+@pytest.mark.parametrize("slope", [0.0, 5.0])
+def test_the_filter_follows_a_parabola_exactly(steps_over_tau, slope):
+    """The torque of a weight on a horizontal slide: b t + c t^2 with gravity's share `slope`."""
+    dt = 1e-3
+    tau = dt / steps_over_tau
+    model = models.empty()
+    model.gravity.linear = np.array([slope, 0.0, -9.81])
+    models.add_body(model, "weight", pin.JointModelPX(), inertia=pin.Inertia.FromSphere(2.0, 0.05))
+    cutoff = 1 / (2 * np.pi * tau)
+    sensor = sp.ForceTorqueSensor(name="wrist", frame="universe", rate=1 / dt, cutoff=cutoff)
+    # Fixed steps take it for linear between their ends.
+    integrator = sp.Adaptive(1e-9) if slope else sp.SemiImplicitEuler(dt)
+    result = sp.Simulation(sp.Scene(model), integrator, [sensor]).run([0.1], [1.5], 20 * dt)
+    log = result.sensors["wrist"]
+    t, gone = log.sampled, -np.expm1(-log.sampled / tau)
+    place = 0.1 + 1.5 * (t - tau * gone) + 0.5 * slope * (t**2 - 2 * tau * t + 2 * tau**2 * gone)
+    assert len(t) > 15
+    assert log.values[:, 4] == pytest.approx(-2.0 * 9.81 * place, abs=1e-11)
+
+
 @pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.SemiImplicitEuler(1e-3)])
 def test_the_filter_follows_held_torques_exactly(integrator):
     """Between the jumps of a staircase a filter of first order moves exponentially."""

@@ -137,6 +137,33 @@ def test_more_contacts_begin_at_once_than_there_is_room_for(integrator) -> None:
         testing.assert_energy_kept(result, 1e-4)
 
 
+def test_a_group_over_the_bulge_of_a_coarse_shell_is_not_far() -> None:
+    """A ball of 80 flat triangles: the surface is the sphere, beyond the middles of the flats."""
+    vertices, triangles = meshes.icosphere(1)
+    # With a flat on top, boxes end where it does.
+    out, up = vertices[triangles[0]].mean(axis=0), np.array([0.0, 0.0, 1.0])
+    bulge = 1 - float(np.linalg.norm(out))
+    turn = pin.Quaternion.FromTwoVectors(out, up).toRotationMatrix()
+    vertices, out = vertices @ turn.T, up
+    shell = sp.Shell(vertices, triangles, normals=vertices)
+    # All spheres of the group on a line out of the flat's middle: none reaches the flat itself.
+    radius = 0.25 * bulge
+    spheres = [sp.Sphere(radius, "ball", tuple(0.1 * k * bulge * out)) for k in range(4)]
+    model = models.empty()
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    law = sp.ImpactLaw(1e6, 1.0)
+    together, alone = (
+        scene_of(
+            spheres, together=one, shell=shell, model=model, law=law, friction=None, method="smooth"
+        )
+        for one in (True, False)
+    )
+    q = out * (1 + 0.5 * radius)
+    found = together.contacts(q)
+    assert len(found) == len(alone.contacts(q)) > 0
+    assert found.depth == pytest.approx(alone.contacts(q).depth, rel=1e-12)
+
+
 def test_names_tell_frames() -> None:
     model = models.ball()
     models.add_body(model, "other", pin.JointModelFreeFlyer())

@@ -1,5 +1,7 @@
 """Preston's law: grooves against their closed form, volumes against force, slip and time."""
 
+import dataclasses
+
 import coal
 import numpy as np
 import pytest
@@ -61,26 +63,30 @@ def test_volume_is_the_work_of_friction():
     assert worn.volume == pytest.approx(COEFFICIENT * work, rel=1e-3)
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.6, np.pi / 2])
-def test_an_elliptical_patch_in_any_direction(angle):
-    """Depth = k p0 (pi / 2) l (1 - (d / w)^2), half length l and half width w along the path."""
-    a, b, force = 2e-3, 1e-3, 10.0
-    t = np.linspace(0.0, 0.1, 11)
-    x = -0.01 + 0.2 * t
-    n = len(t)
-    up, axis = np.array([0.0, 0.0, 1.0]), np.array([np.cos(angle), np.sin(angle), 0.0])
-    patches = PlacedPatches(
+def ellipses(x, angles, a=2e-3, b=1e-3, force=10.0):
+    """One contact with a patch at each x (k,), turned by angles (k,), that slips at 0.2 m/s."""
+    n, zero = len(x), 0.0 * x
+    return PlacedPatches(
         row=np.arange(n),
         pair=np.zeros(n, dtype=np.int64),
         contact_id=np.zeros(n, dtype=np.int64),
-        points=np.stack([x, 0 * x, 0 * x], axis=1),
-        normals=np.tile(up, (n, 1)),
-        axes=np.tile(axis, (n, 1)) * np.where(np.arange(n) % 2, 1.0, -1.0)[:, None],
+        points=np.stack([x, zero, zero], axis=1),
+        normals=np.stack([zero, zero, zero + 1.0], axis=1),
+        axes=np.stack([np.cos(angles), np.sin(angles), zero], axis=1),
         half_axes=np.tile([a, b], (n, 1)),
         force=np.full(n, force),
         slip=np.full(n, 0.2),
         element=np.zeros(n, dtype=np.int64),
     )
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.6, np.pi / 2])
+def test_an_elliptical_patch_in_any_direction(angle):
+    """Depth = k p0 (pi / 2) l (1 - (d / w)^2), half length l and half width w along the path."""
+    a, b, force = 2e-3, 1e-3, 10.0
+    t = np.linspace(0.0, 0.1, 11)
+    patches = ellipses(-0.01 + 0.2 * t, np.full(11, angle), a, b, force)
+    patches.axes[::2] *= -1
     shell = plate(0.02)
     samples = divide(shell, patches.points, 1.2 * a, 1e-4, curved=False)
     depth, lost = deposit(samples, patches, strokes_of(t, patches), shell)
@@ -94,6 +100,33 @@ def test_an_elliptical_patch_in_any_direction(angle):
     expected = p0 * np.pi / 2 * length * np.maximum(0.0, 1.0 - (y / w) ** 2)
     assert np.abs(depth[chosen] - expected).max() < 0.01 * expected.max()
     assert depth @ samples.areas == pytest.approx(force * 0.2 * 0.1, rel=1e-12)
+
+
+def test_a_stroke_back_removes_what_the_stroke_there_does():
+    """Along a path on which the ellipse turns, too."""
+    shell, t = plate(0.02), np.linspace(0.0, 0.02, 3)
+    x, angles = np.array([-0.002, 0.0, 0.002]), np.array([0.0, 0.5, 1.1])
+    there, back = ellipses(x, angles), ellipses(x[::-1], angles[::-1])
+    samples = divide(shell, there.points, 2.4e-3, 2e-4, curved=False)
+    removed, again = (deposit(samples, k, strokes_of(t, k), shell)[0] for k in (there, back))
+    assert removed.max() > 0
+    assert np.abs(again - removed).max() < 1e-6 * removed.max()
+
+
+def test_a_contact_within_the_run_does_the_work_of_the_trapezoid_rule():
+    """Force times slip is nothing at the rows before its first and after its last."""
+    rng = np.random.default_rng(1)
+    t = np.cumsum(rng.uniform(0.5, 2.0, 9))
+    patches = ellipses(np.linspace(-0.01, 0.01, 6), np.zeros(6))
+    row, force = np.array([1, 2, 3, 5, 7, 8]), rng.uniform(1.0, 9.0, 6)
+    patches = dataclasses.replace(
+        patches, row=row, force=force, contact_id=np.array([4, 4, 4, 5, 6, 6])
+    )
+    strokes = strokes_of(t, patches)
+    power = np.zeros(9)
+    power[row] = 0.2 * force
+    work = (0.5 * (strokes.begin + strokes.end) * strokes.time).sum()
+    assert work == pytest.approx(np.trapezoid(power, t), rel=1e-12)
 
 
 def test_pieces_cover_what_is_near_and_nothing_twice():

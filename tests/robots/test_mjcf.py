@@ -285,3 +285,37 @@ def test_meshes_of_mjcf(tmp_path):
     path.write_text(path.read_text().replace('mesh="wedge"', seen))
     with pytest.warns(RobotWarning, match=r"visual meshes, which are missing or broken: .*nix.stl"):
         assert robots.load_file(path).model.nv == 2
+
+
+WAYS = """<mujoco><compiler angle="degree"/><default><geom quat="0.5 0.5 0.5 0.5"/>
+<site quat="1 1 0 0"/><default class="turned"><geom quat="0.9 0.1 -0.3 0.2"/></default></default>
+<worldbody><body name="b"><joint name="j" type="hinge" axis="0 1 0"/>
+<geom type="box" size="0.02 0.03 0.1" euler="30 20 0" mass="1"/>
+<geom type="box" size="0.02" fromto="0 0 0 .1 .05 .2" mass="1"/>
+<geom class="turned" type="box" size="0.02 0.05 0.03" pos="0.2 0.1 0" {way} mass="0.5"/>
+<site name="way" {way}/><site name="site" type="capsule" size="0.01" fromto="0 0 0 .1 .05 .2"/>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    "way",
+    ['zaxis="1 1 0"', 'axisangle="1 2 -1 40"', 'xyaxes="1 1 0 -1 1 1"', 'euler="10 70 -40"'],
+)
+def test_an_orientation_in_one_way_replaces_that_of_a_default_in_another(way, tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    path = tmp_path / "ways.xml"
+    path.write_text(WAYS.format(way=way), encoding="utf-8")
+    theirs = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(theirs)
+    mujoco.mj_forward(theirs, data)
+    model = robots.load_file(path).model
+    turn = pin.Quaternion(*theirs.body_iquat[1]).toRotationMatrix()
+    inertia = model.inertias[1]
+    expected = turn @ np.diag(theirs.body_inertia[1]) @ turn.T
+    assert np.allclose(inertia.inertia, expected, rtol=0, atol=1e-12)
+    assert np.allclose(inertia.lever, theirs.body_ipos[1], rtol=0, atol=1e-14)
+    ours = model.createData()
+    pin.framesForwardKinematics(model, ours, pin.neutral(model))
+    for site in ("way", "site"):
+        found = ours.oMf[model.getFrameId(site)].rotation
+        assert np.allclose(found, data.site(site).xmat.reshape(3, 3), rtol=0, atol=1e-12)

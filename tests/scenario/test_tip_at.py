@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
+from sphshell_pin.scenario.format.reach import Reach, turn_between
+from tests import models
 from tests.scenario import files
 from tests.scenario.test_new import arm_urdf
 
@@ -118,3 +121,25 @@ def test_a_tip_without_a_contact_needs_its_frame(tmp_path):
     path = scenario(tmp_path, f"{{ tip_at = {XYZ} }}", sphere="universe")
     with pytest.raises(ScenarioError, match="name the frame of the tip"):
         build(path)
+
+
+@pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3), np.array([2.0, -1.0, 2.0]) / 3])
+def test_a_half_turn_is_one_about_an_axis_across(axis):
+    """Of opposite directions there is no shortest turn: any of half a turn will do."""
+    turn = turn_between(axis, -axis)
+    assert np.linalg.norm(turn) == pytest.approx(np.pi, rel=1e-12)
+    np.testing.assert_allclose(pin.exp3(turn) @ axis, -axis, atol=1e-12)
+
+
+@pytest.mark.parametrize("beyond", [0.01, 0.5, 1.5])
+def test_of_a_place_out_of_reach_a_solution_is_never_farther_than_its_start(beyond):
+    """A hinge at its limit, and a place that its tip passes only beyond it."""
+    model, arm = models.empty(), 0.3
+    models.add_body(model, "tip", pin.JointModelRZ())
+    model.lowerPositionLimit, model.upperPositionLimit = np.array([-1.0]), np.array([1.0])
+    reach = Reach(model, "tip", [arm, 0.0, 0.0])
+    place = arm * np.array([np.cos(1 + beyond), np.sin(1 + beyond), 0.0])
+    for start in (1.0, 0.5):
+        q, off = reach.solve(np.array([start]), place)
+        assert off == pytest.approx(np.linalg.norm(place - reach.center(q)), rel=1e-12)
+        assert off <= 2 * arm * np.sin(0.5 * (1 + beyond - start)) * (1 + 1e-12)

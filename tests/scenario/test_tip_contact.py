@@ -1,0 +1,44 @@
+"""What is drafted for a tip that presses, against Hertz's law."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sphshell_pin.contact.materials import find_material
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.scenario.drafting.plan import press_force
+from sphshell_pin.scenario.drafting.tip_contact import sticking
+
+RADIUS = 0.01
+MATERIALS = find_material("rubber"), find_material("steel")
+
+
+def hertz(depth: float) -> float:
+    """Force [N] of a sphere of RADIUS: 4/3 E* (R depth^3)^0.5, 1/E* the sum of (1 - nu^2) / E."""
+    softness = sum((1 - one.poisson**2) / one.young for one in MATERIALS)
+    return 4 / 3 * np.sqrt(RADIUS) / softness * depth**1.5
+
+
+def test_bristles_are_as_stiff_as_the_contact_and_damped_by_a_tenth():
+    mass, depth, step = 2.0, 4e-4, 1e-8
+    contact = sticking(MATERIALS, RADIUS, 0.1, hertz(depth), mass)
+    stiffness, damping = contact.bristle
+    slope = (hertz(depth + step) - hertz(depth - step)) / (2 * step)
+    # Both are rounded to what one reads.
+    assert stiffness == pytest.approx(slope, rel=0.05)
+    assert damping / (2 * np.sqrt(stiffness * mass)) == pytest.approx(0.1, rel=0.1)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.49, 0.51, 0.79])
+def test_a_tip_is_pressed_in_by_half_its_radius_at_most(share):
+    stance = SimpleNamespace(force=1e9, approach=np.array([0.0, 0.0, -1.0]))
+    press = float(hertz(share * RADIUS))
+    tip = SimpleNamespace(radius=RADIUS)
+    if share < 0.5:
+        assert press_force(stance, tip, MATERIALS, press) == press
+    else:
+        with pytest.raises(SphshellError, match="by more than half of it"):
+            press_force(stance, tip, MATERIALS, press)
