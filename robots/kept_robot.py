@@ -6,7 +6,6 @@ the meshes that show the robot. Both may have been changed since.
 
 from __future__ import annotations
 
-import re
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
@@ -18,7 +17,7 @@ import pinocchio as pin
 
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots import LoadedRobot, exactly
-from sphshell_pin.robots.description import Description, check_size
+from sphshell_pin.robots.description import Description
 from sphshell_pin.robots.files import (
     RobotError,
     build_geometry,
@@ -27,12 +26,6 @@ from sphshell_pin.robots.files import (
     keep_spheres,
 )
 from sphshell_pin.robots.packages import Folders
-
-ALONE = (".stl", ".dae", ".obj", ".ply")
-"""Formats of meshes that can be shown without other files."""
-
-_MATERIALS = re.compile(rb"^[ \t]*mtllib\b.*$", re.MULTILINE)
-_IMAGES = re.compile(rb"<library_images\b.*?</library_images\s*>|<library_images\s*/>", re.DOTALL)
 
 
 def text_of(description: Description) -> str:
@@ -48,25 +41,6 @@ def meshes_of(description: Description) -> dict[str, Path | None]:
         return {str(path): path if path.is_file() else None for path in paths}
     names = [one.get("filename", "") for one in description.root.iterfind("link/visual//mesh")]
     return {name: description.folders.find(name) for name in names}
-
-
-def without_references(name: str, content: bytes) -> bytes | None:
-    """Return a mesh file without the names of textures and materials; None if that fails.
-
-    Those who draw a mesh read what it names, which may be any file.
-    """
-    if name.endswith(".obj"):
-        return _MATERIALS.sub(b"", content)
-    if not name.endswith(".dae"):
-        return content
-    content = _IMAGES.sub(b"", content)
-    try:
-        check_size(content)
-        root = ET.fromstring(content)
-    except (ValueError, ET.ParseError):
-        return None
-    named = [one for one in root.iter() if str(one.tag).endswith("library_images") and len(one)]
-    return None if named else content
 
 
 def load_kept(
@@ -85,7 +59,7 @@ def load_kept(
     Raises RobotError as `robots.load_file` does.
     """
     description = described(text.encode(), Folders(Path(file), kept=meshes))
-    model = build_model(description, free_flyer=free_flyer)
+    model = build_model(description, free_flyer=free_flyer, mimic=mimic)
     visual, missing = build_geometry(description, model, pin.GeometryType.VISUAL)
     keep_spheres(description)
     spheres, _ = build_geometry(description, model, pin.GeometryType.COLLISION)

@@ -6,6 +6,7 @@ The answer is JSON: a xacro file is code, so nothing that comes from its process
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import resource
 import sys
@@ -15,14 +16,16 @@ from xml.parsers.expat import ExpatError
 
 from sphshell_pin.limits import limit_memory
 from sphshell_pin.robots.packages import Folders
-from sphshell_pin.robots.xacro_expressions import checked
+from sphshell_pin.robots.xacro_expressions import install
+
+MOST_TEXT, MOST_SAID = 100_000_000, 100_000
+"""Characters of the URDF, and of xacro's warnings."""
 
 
-def serve() -> None:
-    """Expand the file that standard input names, and write the answer to standard output."""
-    request = json.load(sys.stdin)
-    answers, sys.stdout = sys.stdout, sys.stderr  # xacro may print
-    sys.dont_write_bytecode = True
+def serve(source: int, target: int) -> None:
+    """Expand the file that is named on one pipe, and write the answer to the other."""
+    with open(source) as pipe:
+        request = json.load(pipe)
     time = int(request["time_limit"])
     for kind, most in (
         (resource.RLIMIT_CPU, time),
@@ -34,14 +37,20 @@ def serve() -> None:
             resource.setrlimit(kind, (most, most))
     limit_memory(request["memory_limit"])
     file = Path(request["file"])
+    sys.stderr = said = io.StringIO()  # as long as the memory allows
+    answer: dict[str, str]
     try:
         folders = Folders.of(file, request["folders"])
-        answer = {"urdf": _expanded(file, folders, request["arguments"])}
+        urdf = _expanded(file, folders, request["arguments"])
+        if len(urdf) > MOST_TEXT:
+            raise ValueError(f"it expands to more than {MOST_TEXT / 1e6:g} MB")
+        answer = {"urdf": urdf, "said": said.getvalue()[:MOST_SAID]}
     except MemoryError:
         answer = {"fault": "memory"}
     except ValueError as error:
         answer = {"fault": "file", "reason": str(error)}
-    json.dump(answer, answers)
+    with open(target, "w") as pipe:
+        json.dump(answer, pipe)
 
 
 def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str:
@@ -61,8 +70,8 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     # xacro asks ament alone, which few machines have. $(eval find('name')) looks in the dictionary.
     substitution_args._eval_find = substitution_args._eval_dict["find"] = find
     try:
-        with checked(xacro, substitution_args):
-            document = xacro.process_file(str(file), mappings=dict(arguments))
+        install(xacro, substitution_args)
+        document = xacro.process_file(str(file), mappings=dict(arguments))
     except (xacro.XacroException, ExpatError, OSError) as error:
         if isinstance(error.__cause__ or error.__context__, MemoryError):
             raise MemoryError from None

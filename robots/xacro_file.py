@@ -24,15 +24,11 @@ TIME_LIMIT = 5.0
 WAIT = 60.0
 """How long the process is waited for [s], on a busy machine too."""
 
+CHILD = "sphshell_pin.robots.xacro_child"
+"""The module whose `serve` runs in the process."""
+
 MEMORY_LIMIT = 1e9
 """What a file may take [bytes]."""
-
-_START = """
-import sys
-sys.path[:] = sys.argv[1:]
-from sphshell_pin.robots.xacro_child import serve
-serve()
-"""
 
 
 def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> bytes:
@@ -53,7 +49,7 @@ def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> byt
     long = f"xacro takes more than {TIME_LIMIT:g} s to expand it: check its expressions and loops"
     try:
         done = subprocess.run(
-            child_command(_START),
+            child_command(CHILD),
             input=json.dumps(request).encode(),
             capture_output=True,
             timeout=WAIT,
@@ -78,7 +74,7 @@ def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> byt
         raise ValueError(str(answer.get("reason")))
     if fault is not None or not isinstance(urdf, str):
         raise ValueError(f"xacro cannot expand it: its process {fault or 'gave no answer'}")
-    sys.stderr.write(done.stderr.decode(errors="replace"))  # xacro's warnings
+    sys.stderr.write(answer["said"])  # xacro's warnings
     return urdf.encode()
 
 

@@ -9,11 +9,13 @@ from contextlib import suppress
 from multiprocessing import spawn
 from pathlib import Path
 
+from sphshell_pin import sandbox
 
-def child_command(program: str) -> list[str]:
-    """Return the command that runs a program with this interpreter, `sys.path` as arguments."""
+
+def child_command(module: str) -> list[str]:
+    """Return the command that runs `serve` of a module in a process of its own, confined."""
     python = os.fsdecode(spawn.get_executable() or sys.executable)
-    return [python, "-P", "-c", program, *map(str, sys.path)]
+    return [python, "-P", sandbox.__file__, module, *map(str, sys.path)]
 
 
 def last_line(errors: bytes) -> str:

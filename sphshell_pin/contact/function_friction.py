@@ -70,6 +70,11 @@ class FunctionFriction(OwnFunctions, Friction, kind="function"):
         return float(_SPEEDS[np.argmax(found >= 0.99 * found.max())])
 
     @property
+    def vanishes_at_rest(self) -> bool:
+        """Whether under 1 N it falls to a tenth of its largest before slips are too slow to see."""
+        return self.coefficient(_SLOW) <= 0.1 * self.largest_coefficient
+
+    @property
     def largest_coefficient(self) -> float:
         """The coefficient at `sticking_speed`, under 1 N."""
         return self.coefficient(self.sticking_speed)

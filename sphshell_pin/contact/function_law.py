@@ -33,8 +33,8 @@ class FunctionLaw(OwnFunctions, NormalLaw, kind="function"):
         gets the parameters as a tuple, is slow and takes the GIL (SlowLawWarning). It must be
         continuous and grow with the depth; below zero it counts as none
     energy : of the elastic part, that is of the force at rest [J], `double energy(double depth,
-        const double* parameters)`; by default its integral by Gauss's rule, exact for sums of
-        depth^(k/2), k <= 14, and the better the smoother the force is
+        const double* parameters)`; by default its integral, adaptive to about 1e-11 once for each
+        set of parameters, kinks included
     parameters : numbers by name, in the order in which the functions get them; attributes of the
         law, varied, fitted and differentiated as those of other laws
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -130,21 +130,28 @@ def convert(
             arguments = (file, written, unit_in, unit_out, options)
             if with_cad:
                 purpose = f"converting {suffix} to {goal.suffix.lower()} files"
-                done: Conversion = run_in_child("convert", arguments, file, purpose, limits)
+                done: Conversion = run_in_child(
+                    "convert", arguments, file, purpose, limits, written
+                )
             else:
-                done = exchange(*arguments)
+                done = exchange(*arguments, written.write_bytes)
             return replace(done, target=replace(done.target, path=goal))
     except OSError as error:
         raise ShellFileError(goal, f"cannot be written ({error.strerror})") from error
 
 
 def exchange(
-    source: Path, target: Path, unit_in: str | None, unit_out: str | None, options: CadOptions
+    source: Path,
+    target: Path,
+    unit_in: str | None,
+    unit_out: str | None,
+    options: CadOptions,
+    write: Callable[[bytes], object],
 ) -> Conversion:
-    """Write the surface of one file to another, read that back and compare."""
+    """Give what the `target` holds to `write`, read that back and compare it with the source."""
     first = _surface(source, unit_in, options)
     unit = unit_out or (first.held.unit if first.held.unit in METRES_PER_UNIT else "mm")
-    _write(target, unit, first, options)
+    write(_content(target, unit, first, options))
     suffix = target.suffix.lower()
     carried = suffix == ".shl" or suffix in CAD_SUFFIXES
     stated = unit if suffix in BREP_SUFFIXES or not carried else None
@@ -166,19 +173,17 @@ def _surface(path: Path, unit: str | None, options: CadOptions) -> _Mesh | _Face
     return _Mesh(path, unit)
 
 
-def _write(path: Path, unit: str, source: _Mesh | _Faces, options: CadOptions) -> None:
+def _content(path: Path, unit: str, source: _Mesh | _Faces, options: CadOptions) -> bytes:
     if path.suffix.lower() not in CAD_SUFFIXES:
-        path.write_bytes(encoded(path, source.shell(), unit))
-        return
+        return encoded(path, source.shell(), unit)
     from sphshell_pin.shell.cad.units import MILLIMETER
-    from sphshell_pin.shell.cad.writing import faceted, parts_of, write_cad
+    from sphshell_pin.shell.cad.writing import cad_content, faceted, parts_of
 
     if isinstance(source, _Faces):
         model = source.model
-        write_cad(path, parts_of(model, options.faces is None), model.meters, unit)
-    else:
-        shell = source.shell()
-        write_cad(path, [(shell.name, faceted(shell))], MILLIMETER, unit)
+        return cad_content(path, parts_of(model, options.faces is None), model.meters, unit)
+    shell = source.shell()
+    return cad_content(path, [(shell.name, faceted(shell))], MILLIMETER, unit)
 
 
 class _Mesh:

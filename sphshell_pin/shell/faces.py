@@ -35,6 +35,8 @@ class Face:
         are those of curved elements with its normals
     name : of the CAD face; None of one that was recognized
     reason : why it is not exact, with the distance in the file's own geometry; "" if it is
+    inscribed : whether it is a plane with all corners on a round face beside it: it is wider than
+        the equal steps of that face
     """
 
     kind: str
@@ -47,6 +49,7 @@ class Face:
     exact: bool
     name: str | None = None
     reason: str = ""
+    inscribed: bool = False
 
 
 def faces_of(core: _core.Shell, names: Sequence[str] = ()) -> tuple[Face, ...]:
@@ -99,6 +102,7 @@ def _face(
         exact,
         name,
         reason,
+        kind == "plane" and second > 0.0,
     )
 
 
@@ -114,6 +118,12 @@ def described(faces: Sequence[Face], elements: int) -> str:
         share += f"; {curved} of {len(faces)} as curved elements"
         told = [f"{f.name or f.kind}: {f.reason}" for f in faces if f.reason][:MOST_GROUPS]
         share += f" ({'; '.join(told)})" if told else ""
+    if flats := [face for face in faces if face.inscribed]:
+        at = "({:.4g}, {:.4g}, {:.4g}) m".format(*flats[0].point)
+        share += (
+            f"; plane although inscribed in the round face beside it, as wider than its steps: "
+            f"{len(flats)}, one at {at}"
+        )
     return (", ".join(parts) or "none recognized") + share
 
 

@@ -8,23 +8,23 @@ loader draws what it would have drawn.
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.errors import ShellFileError
+from sphshell_pin.shell.readers.mesh import STL_RECORD, stl_corners
 from sphshell_pin.view.nodes import Json
 
 # A list of numbers in a Collada file: coordinates, or indices of corners.
-_NUMBERS = re.compile(r"(<(?:float_array|p|vcount)\b[^>]*>)([^<]*)(</)")
+_NUMBERS = re.compile(r"(<(?:float_array|p|vcount)\b[^<>]*>)([^<]*)(</)")
 MARK = "$$"  # where a list was taken out; no Collada file has two dollars
 LEAST = 64  # shorter lists stay as they are
 LEVELS = 65_535  # steps between the least and the largest coordinate of a mesh
 LEVELS_OF_NORMALS = 1023
 STL_HEADER = 84  # bytes: a title of 80, then the number of facets
-_FACET = re.compile(rb"facet\s+(normal\s.*?)endfacet", re.DOTALL | re.IGNORECASE)
-_FACET_WORDS = (b"normal", b"outer", b"loop", b"vertex", b"endloop")
 _LEAST_NORMAL = 0.1  # a shorter normal is none
-STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def take_out_numbers(text: str) -> tuple[str, list[Json]]:
@@ -64,9 +64,9 @@ def pack_facets(data: bytes) -> Json | None:
     if len(data) <= STL_HEADER:
         return None
     count = int.from_bytes(data[80:STL_HEADER], "little")
-    if len(data) != STL_HEADER + STL_FACET.itemsize * count:
+    if len(data) != STL_HEADER + STL_RECORD.itemsize * count:
         return None
-    soup = np.frombuffer(data, STL_FACET, count, STL_HEADER)["corners"].reshape(-1, 3)
+    soup = np.frombuffer(data, STL_RECORD, count, STL_HEADER)["corners"].reshape(-1, 3)
     if not np.isfinite(soup).all():
         return None
     points, first, number = np.unique(soup, axis=0, return_index=True, return_inverse=True)
@@ -84,20 +84,18 @@ def lit_facets(data: bytes) -> bytes:
     """Return the STL file `data` with a normal for each facet that states none.
 
     The page draws facets with the normals of the file, and black where they are zero, as many
-    writers leave them. A text file with such facets becomes a binary one; others stay as they are.
+    writers leave them. A text file becomes a binary one; what cannot be read stays as it is.
     """
     count = int.from_bytes(data[80:STL_HEADER], "little")
-    if len(data) == STL_HEADER + STL_FACET.itemsize * count:
-        facets = np.frombuffer(data, STL_FACET, count, STL_HEADER).copy()
+    if len(data) == STL_HEADER + STL_RECORD.itemsize * count:
+        facets = np.frombuffer(data, STL_RECORD, count, STL_HEADER).copy()
     else:
         try:
-            numbers = [one.split() for one in _FACET.findall(data)]
-            values = np.array([[float(x) for x in one] for one in map(_numbers_of, numbers)], "<f4")
-        except ValueError:
+            corners, _ = stl_corners(Path("mesh.stl"), data)
+        except ShellFileError:
             return data
-        facets = np.zeros(len(values), STL_FACET)
-        if len(values):
-            facets["normal"], facets["corners"] = values[:, :3], values[:, 3:].reshape(-1, 3, 3)
+        facets = np.zeros(len(corners) // 3, STL_RECORD)
+        facets["corners"] = corners.reshape(-1, 3, 3)
     with np.errstate(invalid="ignore"):
         dark = ~(np.linalg.norm(facets["normal"], axis=1) > _LEAST_NORMAL)
     if not dark.any():
@@ -108,14 +106,6 @@ def lit_facets(data: bytes) -> bytes:
     facets["normal"][dark] = normals / np.where(lengths > 0.0, lengths, 1.0)
     title = b"normals computed from the corners".ljust(80)
     return title + len(facets).to_bytes(4, "little") + facets.tobytes()
-
-
-def _numbers_of(words: list[bytes]) -> list[bytes]:
-    """Return the twelve numbers of a facet of a text file: its normal and corners."""
-    numbers = [word for word in words if word.lower() not in _FACET_WORDS]
-    if len(numbers) != 12:
-        raise ValueError("no facet of three corners")
-    return numbers
 
 
 def pack_numbers(values: NDArray[np.float64], *, exact: bool) -> Json:

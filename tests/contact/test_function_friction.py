@@ -105,6 +105,12 @@ def test_what_is_negative_counts_as_none_and_no_number_is_refused() -> None:
         wrong.external_forces(BALL, MOVES)
 
 
+def test_what_does_not_vanish_at_rest_is_warned_of() -> None:
+    constant = sp.FunctionFriction(FORCE(lambda s, n, p: 0.3 * n))
+    with pytest.warns(errors.SetupWarning, match="does not vanish at rest"):
+        models.on_plate(models.ball(), TWIN, constant)
+
+
 def test_where_it_cannot_be() -> None:
     with pytest.raises(errors.InvalidParameter, match="beside a FoundationLaw take a Coulomb"):
         models.on_plate(models.ball(), sp.FoundationLaw(1e6, 5e-3), OWN)

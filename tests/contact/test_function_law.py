@@ -99,6 +99,27 @@ BALL = np.array([0.01, 0.02, 0.0492, 0, 0, 0, 1.0])
 MOVES = np.array([0.1, 0.0, -0.05, 1.0, 2.0, 0.0])
 
 
+DEPTHS = [1e-13, 3e-7, 0.99e-4, 1.01e-4, 4e-4, 2e-3]
+KINKED = {
+    "stiffens": (lambda d, r, p: 1e4 * d + max(0.0, d - 1e-4) * 4e5, lambda d: 5e3 * d * d
+                 + 2e5 * max(0.0, d - 1e-4) ** 2),
+    "yields": (lambda d, r, p: min(1e5 * d, 10.0), lambda d: 5e4 * d * d if d < 1e-4
+               else 5e-4 + 10 * (d - 1e-4)),
+    "exponential": (lambda d, r, p: 2 * math.expm1(d / 5e-4), lambda d: 2 * (5e-4
+                    * math.expm1(d / 5e-4) - d)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", KINKED)
+def test_the_energy_is_the_integral_over_kinks(name) -> None:
+    function, expected = KINKED[name]
+    # In any order: what is found once is extended.
+    for depths in (DEPTHS, DEPTHS[::-1]):
+        law = sp.FunctionLaw(FORCE(function))
+        for depth in depths:
+            assert np.isclose(law.energy(depth), expected(depth), rtol=1e-9, atol=1e-20)
+
+
 @pytest.mark.parametrize("friction", [models.FRICTION, sp.BristleFriction(0.5, 0.4, 1e4, 10.0)])
 def test_derivatives_are_those_of_the_twin(friction) -> None:
     own, twin = (models.on_plate(models.ball(), law, friction) for law in (C_LAW, TWIN))

@@ -1,7 +1,7 @@
 """Robots' files: xacro, package paths, poses, mimic joints, and what is refused."""
 
-import contextlib
 import shutil
+import sys
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -69,6 +69,21 @@ HOSTILE = {
     "argument": "$(eval (lambda: open('FILE', 'w'))())",
     "walrus": "${[y := 1, y]}",
     "nested": "${" + "-" * 3000 + "(lambda: 1)()}",
+    "vars": "${python.vars(python.type)['mro'](int)}",
+    "type": "${python.type('a', (), dict())}",
+    "class": "${''.__class__}",
+    "method": "${[].append}",
+    "format": "${f1.format(1)}",
+    "format of a key": "${f2.format([1])}",
+    "width": "${f3.format(1)}",
+    "width of %": "${'%099999999999d' % 1}",
+    "attribute of a number": "${(1).real}",
+    "attribute of a function": "${len.real}",
+    "loader": "$(eval __loader__)",
+    "private name of math": "$(eval [v for v in [__spec__]])",
+    "bytes": "${b'a'}",
+    "f-string": "$(eval f'{1}')",
+    "function of functions": "${map(python.vars, [1])}",
 }
 
 
@@ -84,9 +99,15 @@ def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
     made = tmp_path / "made"
     expression = escape(HOSTILE[how].replace("FILE", str(made)), {"'": "&apos;", '"': "&quot;"})
     links = "<link name='a'/><link name='${p}'/>"
-    path = xacro(tmp_path, f"<xacro:property name='p' value='{expression}'/>{links}")
+    values = {"p": expression, "f1": "{0.real}", "f2": "{0[0]}", "f3": "{:99999999999}"}
+    given = "".join(f"<xacro:property name='{k}' value='{v}'/>" for k, v in values.items())
+    path = xacro(tmp_path, given + links)
     # What is in $(eval ...) ends at the first parenthesis, and is no expression then.
-    why = "refused in the expression|too deeply" if "${" in HOSTILE[how] else "xacro cannot expand"
+    why = (
+        "refused in the expression|too deeply|is not defined"
+        if "${" in HOSTILE[how]
+        else "xacro cannot expand"
+    )
     with pytest.raises(robots.RobotError, match=why):
         robots.load_file(path)
     assert not made.exists()
@@ -95,8 +116,18 @@ def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
 @pytest.mark.parametrize(
     ("expression", "words"),
     [
-        ("9**9**9", "takes more than 1 s to expand"),
-        ("len('a'*(3*10**9))", "takes more than 1 GB of memory"),
+        ("9**9**9", "has more than 1000000 items"),
+        ("10**10**10", "has more than 1000000 items"),
+        ("1 &lt;&lt; 10**10", "has more than 1000000 items"),
+        ("'a'*10**9", "has more than 1000000 items"),
+        ("[0]*10**9", "has more than 1000000 items"),
+        ("'a'.zfill(10**9)", "has more than 1000000 items"),
+        ("python.zip(python.range(10**12))", "has more than 1000000 items"),
+        ("[1 for a in range(10**5) for b in range(10**5)]", "take more than 300000 steps"),
+        ("[0 for a in range(10**9) if 0]", "take more than 300000 steps"),
+        ("python.sum(python.range(10**11))", "takes more than 1 s to expand"),
+        ("math.factorial(10**8)", "takes more than 1 s to expand"),
+        ("len(list(range(10**9)))", "takes more than 1 GB of memory"),
     ],
 )
 def test_what_a_xacro_file_takes_is_limited(tmp_path, monkeypatch, expression, words):
@@ -105,24 +136,65 @@ def test_what_a_xacro_file_takes_is_limited(tmp_path, monkeypatch, expression, w
         robots.load_file(xacro(tmp_path, f'<link name="${{{expression}}}"/>'))
 
 
-def test_what_the_check_of_expressions_misses_is_in_a_process_that_writes_nothing(
-    tmp_path, monkeypatch
-):
-    """Without the check, an expression reaches open()."""
-    made = tmp_path / "made"
-    call = OS.replace("'", '"') + '.__init__.__globals__["__builtins__"]["open"]'
-    link = f'<link name=\'${{(lambda: {call}("{made}", "w").write("executed"))()}}\'/>'
-    without = "from sphshell_pin.robots import xacro_expressions as x; x.check = lambda _: None"
-    first, serve = xacro_file._START.strip().rsplit("\n", 1)
-    monkeypatch.setattr(xacro_file, "_START", f"{first}\n{without}\n{serve}")
-    with contextlib.suppress(robots.RobotError):
-        robots.load_file(xacro(tmp_path, link))
-    assert made.exists()  # it was opened
-    assert not made.read_bytes()
+UNCHECKED = """
+import os, socket
+from sphshell_pin.robots import xacro_child
+def attempt(function, *arguments):
+    try:
+        function(*arguments)
+    except Exception as error:
+        return type(error).__name__
+    return "done"
+def unchecked(xacro, substitution_args):
+    xacro.safe_eval = lambda text, *_: eval(text, globals())
+xacro_child.install = unchecked
+serve = xacro_child.serve
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel has no such means")
+def test_an_expression_that_escapes_is_in_a_process_that_does_nothing(tmp_path, monkeypatch):
+    (tmp_path / "unchecked_xacro.py").write_text(UNCHECKED)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(xacro_file, "CHILD", "unchecked_xacro")
+    kept = tmp_path / "kept"
+    kept.write_text("precious")
+    calls = (
+        f"os.unlink, '{kept}'",
+        f"os.mkdir, '{tmp_path / 'made'}'",
+        f"open, '{kept}', 'w'",
+        "socket.socket",
+        "os.execv, '/bin/true', ['true']",
+        "os.fork",
+    )
+    links = "".join(f'<link name="a{k}_${{attempt({call})}}"/>' for k, call in enumerate(calls))
+    description = robots.read(xacro(tmp_path, links))
+    names = [link.get("name") for link in description.root.iter("link")]
+    assert names == [f"a{k}_PermissionError" for k in range(len(calls))]
+    assert kept.read_text() == "precious"
 
 
 def test_xacro_expressions_compute(tmp_path):
     names = ["${'a'.upper() + str(max([round(x) for x in (1.2, 3.7)]))}", "$(eval 'b2')"]
+    values = {
+        "_tmp_ + 1": 4,
+        "dict(a=1, **dict(b=2))['b']": 2,
+        "', '.join(sorted(['b', 'a'])[::-1])": "b, a",
+        "python.isinstance(_tmp_, python.int) and not _tmp_ in [1, 2]": True,
+        "[a * b for a, b in python.zip([1, 2], [3, 4]) if a > 1]": [8],
+        "f.format(1, name=2)": "1  2.00",
+        "'%d %s' % (1, 'a')": "1 a",
+        "xacro.tokenize('a, b;c')": ["a", "b", "c"],
+        "2**3 // 5 % 2 << 2": 4,
+        "list(map(str, python.range(2)))": ["0", "1"],
+        "1 if 1 < 2 < 2 else python.sum(x for x in [1, 2])": 3,
+        "max(['aa', 'b'], key=len).count('a')": 2,
+    }
+    start = "<xacro:property name='_tmp_' value='3'/>"
+    start += "<xacro:property name='f' value='{} {name:5.2f}'/>"
+    texts = "".join(f'<a b="${{{escape(text)}}}"/>' for text in values)
+    expanded = robots.read(xacro(tmp_path, start + texts)).root
+    assert [one.get("b") for one in expanded.iter("a")] == [*map(str, values.values())]
     links = "".join(f'<link name="{name}"/>' for name in names)
     joint = (
         '<joint name="j" type="revolute"><parent link="A4"/><child link="b2"/>'

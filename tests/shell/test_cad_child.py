@@ -39,21 +39,19 @@ JOBS = {
 """What a child may do in place of reading a file."""
 
 
-def start_with(job):
-    """Program of a child that does `job`, and does without OpenCASCADE."""
-    return process._START.replace(
-        "serve()",
-        f"""
-import os, re, types
+MODULE = """
+import os, re, signal, sys, types
 from sphshell_pin.shell.cad import child
 def job(*arguments):
     {job}
-answers = os.dup(1)
-name = "sphshell_pin.shell.cad.jobs"
-sys.modules[name] = types.SimpleNamespace(JOBS=dict(read=job))
-child.require_kernel = lambda purpose: None
-serve()""",
-    )
+def serve(source, target):
+    global answers
+    answers = target
+    name = "sphshell_pin.shell.cad.jobs"
+    sys.modules[name] = types.SimpleNamespace(JOBS=dict(read=job))
+    child.require_kernel = lambda purpose: None
+    child.serve(source, target)
+"""
 
 
 @pytest.fixture
@@ -64,7 +62,9 @@ def box(tmp_path):
 def load_with(job, box, monkeypatch, **limits):
     with monkeypatch.context() as patch:
         process._end_idle()
-        patch.setattr(process, "_START", start_with(JOBS[job]))
+        (box.parent / "own_child.py").write_text(MODULE.format(job=JOBS.get(job, job)))
+        patch.syspath_prepend(box.parent)
+        patch.setattr(process, "CHILD", "own_child")
         Shell.from_file(box, "mm", **limits)
 
 
@@ -99,27 +99,35 @@ def test_files_on_which_opencascade_crashed_or_hung():
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_the_child_ends_with_its_parent(number, box, tmp_path):
     """A script without a guard, while the child holds the interpreter's lock for ever."""
-    job = f"open({str(tmp_path / 'pid')!r}, 'w').write(f'{{os.getpid()}} '); {JOBS['hang']}"
+    (tmp_path / "own_child.py").write_text(MODULE.format(job=JOBS["hang"]))
     code = f"""
-import signal
+import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore it
 from sphshell_pin import Shell
 from sphshell_pin.shell.cad import process
-process._START = {start_with(job)!r}
+sys.path.insert(0, {str(tmp_path)!r})
+process.CHILD = "own_child"
 Shell.from_file({str(box)!r}, "mm")
 """
     parent = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE)
-    pid = wait_for(lambda: int((tmp_path / "pid").read_text().split(" ")[-2]))
+    (pid,) = wait_for(lambda: children(parent.pid) or None)
+    time.sleep(1.5)  # until it does its job
     os.kill(parent.pid, number)
     assert parent.wait(30) == -number
     assert (b"KeyboardInterrupt" in parent.communicate()[1]) == (number == signal.SIGINT)
     wait_for(lambda: not running(pid) or None)
 
 
+def children(pid):
+    bare = {"PATH": os.environ["PATH"]}
+    command = ["ps", "-o", "pid=", "--ppid", str(pid)]
+    return subprocess.run(command, capture_output=True, check=False, env=bare).stdout.split()
+
+
 def running(pid):
     # Without libraries that sanitizers load first: ps may not end with them.
     bare = {"PATH": os.environ["PATH"]}
-    command = ["ps", "-o", "stat=", "-p", str(pid)]
+    command = ["ps", "-o", "stat=", "-p", pid]
     shown = subprocess.run(command, capture_output=True, check=False, env=bare)
     return shown.stdout[:1] not in (b"Z", b"")
 

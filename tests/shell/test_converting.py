@@ -116,7 +116,7 @@ def test_a_failed_conversion_leaves_the_old_file_and_nothing_else(plate, tmp_pat
     def fail(*_):
         raise ShellFileError("out.stl", "no room")
 
-    monkeypatch.setattr(converting, "_write", fail)
+    monkeypatch.setattr(converting, "_content", fail)
     with pytest.raises(ShellFileError, match="no room"):
         convert(tmp_path / "mesh.stl", tmp_path / "out.stl", "mm")
     for name in ("out.stl", "out.iges"):

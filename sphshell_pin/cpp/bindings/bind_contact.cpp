@@ -1,6 +1,7 @@
 #include "bindings/interop.hpp"
 
 #include "bindings/callbacks.hpp"
+#include "bindings/law_integral.hpp"
 #include "bindings/own_errors.hpp"
 
 #include <nanobind/eigen/dense.h>
@@ -37,8 +38,10 @@ nb::class_<Law> bind_family(nb::module_& m, const char* name, nb::type_slots par
 NormalLaw of_function(Numbers parameters, std::uintptr_t force, nb::object of_force,
                       std::uintptr_t energy, nb::object of_energy) {
   FunctionLaw law;
-  law.function = LawForce(force, std::move(of_force));
+  LawForce own(force, std::move(of_force));
+  law.potential = LawIntegral(own);
   if (!of_energy.is_none()) law.potential = LawEnergy(energy, std::move(of_energy));
+  law.function = std::move(own);
   law.parameters = std::move(parameters);
   return {std::move(law)};
 }

@@ -1,6 +1,7 @@
 #include "bindings/interop.hpp"
 
 #include "bindings/callbacks.hpp"
+#include "bindings/law_integral.hpp"
 
 #include <cstring>
 
@@ -109,6 +110,8 @@ int visit_law(const NormalLaw& law, visitproc visit, void* arg) {
   if (!own) return 0;
   if (const auto* force = own->function.target<LawForce>()) Py_VISIT(force->object().ptr());
   if (const auto* energy = own->potential.target<LawEnergy>()) Py_VISIT(energy->object().ptr());
+  if (const auto* energy = own->potential.target<LawIntegral>())
+    Py_VISIT(energy->force().object().ptr());
   return 0;
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from contextlib import suppress
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -21,7 +22,7 @@ from sphshell_pin.checks import (
     check_names,
     check_vector,
 )
-from sphshell_pin.contact import Friction, ImpactLaw, NormalLaw, Plane, Sphere
+from sphshell_pin.contact import Friction, FunctionFriction, ImpactLaw, NormalLaw, Plane, Sphere
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
 from sphshell_pin.dynamics.scene.models import (
     check_model,
@@ -37,7 +38,7 @@ from sphshell_pin.dynamics.scene.sphere_arguments import (
     parts_of,
     warn_of_size,
 )
-from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
+from sphshell_pin.errors import InvalidParameter, NameNotFound, SetupWarning, SphshellError
 from sphshell_pin.shell import Shell
 from sphshell_pin.summary import Detail, Fact, Summarized, names
 
@@ -302,6 +303,7 @@ class SceneParts(Summarized):
                 FutureWarning,
                 stacklevel=3,
             )
+        _warn_of_friction_at_rest(friction)
         (joint_i, pose_i), (joint_j, pose_j) = (self.frame_in_joint(*frame) for frame in (i, j))
         pair = ContactPair(
             name=self._pair_name(name, default),
@@ -365,6 +367,19 @@ def _converted(
     """Return what the core does not read by itself, as arrays, or raise what is wrong with it."""
     _check_unchanged(model, shown)
     return checked_state(model, lock, q, v, tau)
+
+
+def _warn_of_friction_at_rest(friction: Friction | None) -> None:
+    # What its function cannot answer is raised where it is called for.
+    with suppress(SphshellError):
+        if isinstance(friction, FunctionFriction) and not friction.vanishes_at_rest:
+            warnings.warn(
+                "the force of a FunctionFriction does not vanish at rest: at a slip of 1e-6 m/s it "
+                "is more than a tenth of its largest, which takes steps of a microsecond or less; "
+                "let it grow from zero over a slip speed, or take a BristleFriction, which sticks",
+                SetupWarning,
+                stacklevel=4,
+            )
 
 
 def _check_unchanged(model: pin.Model, shown: pin.Model) -> None:

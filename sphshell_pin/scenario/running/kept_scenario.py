@@ -22,8 +22,10 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.dynamics.result.result_parts import Kept
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.parameters import Component
+from sphshell_pin.regular_file import read_bytes
 from sphshell_pin.robots import LoadedRobot
-from sphshell_pin.robots.kept_robot import ALONE, load_kept, meshes_of, text_of, without_references
+from sphshell_pin.robots.kept_robot import load_kept, meshes_of, text_of
+from sphshell_pin.robots.plain_mesh import FORMATS, plain_mesh
 from sphshell_pin.scenario.format.bodies import origin
 from sphshell_pin.scenario.format.schema import (
     ContactSection,
@@ -81,20 +83,22 @@ def keep(
 ) -> Kept:
     """Return what is kept of a scenario in `folder`, built with `robots` and `shells`.
 
-    Robots and surfaces that need no file are built again from the settings. A mesh is kept if it
-    needs no other file, up to MOST_FILES in total.
+    Robots and surfaces that need no file are built again from the settings. A mesh is kept as
+    `plain_mesh` writes it, up to MOST_FILES in total.
     """
     arrays: dict[str, NDArray[np.generic]] = {}
     room = MOST_FILES
 
-    def kept(path: Path | None, alone: bool = True) -> str:
+    def kept(path: Path | None, suffix: str = "") -> str:
         nonlocal room
         try:
-            content = b"" if path is None else path.read_bytes()
+            content = b"" if path is None else read_bytes(path)
         except OSError:  # gone since the scenario was built
             return ""
+        if suffix:
+            content = plain_mesh(suffix, content) or b""
         digest = hashlib.sha256(content).hexdigest()
-        if content and alone and _file(digest) not in arrays and len(content) <= room:
+        if content and _file(digest) not in arrays and len(content) <= room:
             room -= len(content)
             arrays[_file(digest)] = np.frombuffer(content, np.uint8)
         return digest if content else ""
@@ -106,7 +110,7 @@ def keep(
             held.append(None)
             continue
         meshes = {
-            name: kept(path, name.lower().endswith(ALONE))
+            name: kept(path, Path(name).suffix.lower() or "none")
             for name, path in meshes_of(description).items()
         }
         file = str(description.file.absolute() if description.is_mjcf else section.path)
@@ -189,7 +193,7 @@ def _robot(section: RobotSection, one: _Robot | None, kept: Kept) -> LoadedRobot
     places = {}
     for name, digest in one.meshes.items():
         suffix = Path(name).suffix.lower()
-        place = _place(kept, digest, suffix) if suffix in ALONE else None
+        place = _place(kept, digest, suffix) if suffix in FORMATS else None
         if place is not None:
             places[name] = place
     called = Path(section.path or "").name.partition(".")[0]
@@ -213,8 +217,10 @@ def _place(kept: Kept, digest: str, suffix: str) -> Path | None:
     array = kept.arrays.get(_file(digest))
     if array is None or array.dtype != np.uint8:
         return None
-    content = without_references(suffix, array.tobytes())
-    if content is None:
+    content = array.tobytes()
+    if suffix in FORMATS:  # whoever wrote the results
+        content = plain_mesh(suffix, content) or b""
+    if not content:
         return None
     # Named by what it holds: files of all results of a process stand in one folder.
     place = _folder() / (hashlib.sha256(content).hexdigest() + suffix)

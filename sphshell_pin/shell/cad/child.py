@@ -2,55 +2,76 @@
 
 from __future__ import annotations
 
+import ctypes
 import fcntl
+import importlib.util
 import os
 import pickle
 import re
 import resource
 import select
 import signal
+import sys
 import traceback
 import warnings
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from pathlib import Path
 
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.limits import limit_memory
-from sphshell_pin.shell.cad.messages import ALIVE, pack
+from sphshell_pin.shell.cad.messages import ALIVE, WRITE, Parent, pack
 from sphshell_pin.shell.cad.options import require_kernel
 
 IDLE = 90.0
 """A child without a job ends after this time [s]."""
 
+MOST_WRITTEN = 1 << 20
+"""Of its standard error, which is a file [bytes]."""
+
 GRACE = 10.0
 """How much longer than the time limit a child may live that its parent has not ended [s]."""
 
 
-def serve() -> None:
-    """Answer jobs until the parent closes the pipes, or has none for a while."""
+def serve(source: int, target: int) -> None:
+    """Answer jobs from one pipe to the other until they close, or none comes for a while."""
     # OpenCASCADE holds the interpreter's lock, so no thread of Python could end the process.
     for one in (signal.SIGIO, signal.SIGALRM):
         signal.signal(one, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGIO, signal.SIGALRM))
-    source = os.dup(0)
-    requests, answers = Connection(source, writable=False), Connection(os.dup(1), readable=False)
-    # OpenCASCADE writes reports to the standard output.
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for number in (0, 1):
-        os.dup2(nothing, number)
+    requests, answers = Connection(source, writable=False), Connection(target, readable=False)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (MOST_WRITTEN, MOST_WRITTEN))
+    _load_display_libraries()
     while requests.poll(IDLE):
         try:
             message = requests.recv_bytes()
         except EOFError:
             break
         _end_with_parent(source, True)
-        answer = _answer(answers, message)
+        answer = _answer(requests, answers, message)
         _end_with_parent(source, False)
         answers.send_bytes(answer)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     # The destructors of OpenCASCADE's libraries have nothing to save.
     os._exit(0)
+
+
+def _load_display_libraries() -> None:
+    """Load stand-ins for the libraries of a display that OpenCASCADE needs and this machine lacks.
+
+    A library that is loaded already serves all that ask for its name. The stand-ins define what is
+    named in tables; functions that are only called are looked up when they are, which is never.
+    """
+    core = importlib.util.find_spec("sphshell_pin._core")  # which need not be loaded
+    folder = Path(core.origin if core and core.origin else "").parent / "no_display"
+    for library in sorted(folder.glob("*.so.*")):
+        try:
+            ctypes.CDLL(library.name)
+        except OSError:
+            with suppress(OSError):
+                ctypes.CDLL(str(library))
+                sys.setdlopenflags(os.RTLD_LAZY)
 
 
 def _end_with_parent(pipe: int, wanted: bool) -> None:
@@ -61,19 +82,24 @@ def _end_with_parent(pipe: int, wanted: bool) -> None:
     """
     with suppress(OSError):
         flags = fcntl.fcntl(pipe, fcntl.F_GETFL)
-        fcntl.fcntl(pipe, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(pipe, fcntl.F_SETFL, flags | os.O_ASYNC if wanted else flags & ~os.O_ASYNC)
     if wanted and select.select([pipe], [], [], 0.0)[0]:  # it closed before
         os._exit(0)
 
 
-def _answer(answers: Connection, message: bytes) -> bytes:
+def _answer(requests: Connection, answers: Connection, message: bytes) -> bytes:
     """Do one job; return what `process.run_in_child` reads, and the warnings."""
     job, arguments, purpose, folder, time_limit, memory_limit = pickle.loads(message)
 
     def alive() -> None:
         signal.setitimer(signal.ITIMER_REAL, time_limit + GRACE)
         answers.send_bytes(ALIVE)
+
+    def write(content: bytes) -> None:
+        _end_with_parent(requests.fileno(), False)
+        answers.send_bytes(WRITE + content)
+        requests.recv_bytes()
+        _end_with_parent(requests.fileno(), True)
 
     content: object = None
     with warnings.catch_warnings(record=True) as caught:
@@ -86,7 +112,7 @@ def _answer(answers: Connection, message: bytes) -> bytes:
             if folder:
                 os.chdir(folder)
             limit_memory(memory_limit)
-            kind, content = "done", JOBS[job](alive, *arguments)
+            kind, content = "done", JOBS[job](Parent(alive, write), *arguments)
         except SphshellError as error:
             kind, content = "error", error.with_traceback(None)
         except Exception as error:

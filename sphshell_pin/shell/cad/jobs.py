@@ -14,6 +14,7 @@ import numpy as np
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.cad.curved_error import hold_curvature
 from sphshell_pin.shell.cad.exact import TrimmedFaces
+from sphshell_pin.shell.cad.messages import Parent
 from sphshell_pin.shell.cad.options import CadOptions
 from sphshell_pin.shell.cad.surface import load_cad
 from sphshell_pin.shell.cleaned import CleanedSurface
@@ -21,14 +22,12 @@ from sphshell_pin.shell.cleaning import clean_surface
 from sphshell_pin.shell.converting import Conversion, exchange
 from sphshell_pin.shell.raw import Floats, Ints
 
-Alive = Callable[[], None]
-
 BETWEEN = 100
 """Contacts after which the audit reports that it continues."""
 
 
 def read(
-    alive: Alive,
+    parent: Parent,
     path: Path,
     unit: str | None,
     options: CadOptions,
@@ -52,7 +51,7 @@ def read(
 
 
 def stationary_points(
-    alive: Alive,
+    parent: Parent,
     path: Path,
     unit: str | None,
     options: CadOptions,
@@ -77,7 +76,7 @@ def stationary_points(
     kinds = np.zeros(len(centers), np.int32)
     for k, (center, contact) in enumerate(zip(centers, contacts, strict=True)):
         if k % BETWEEN == 0:
-            alive()
+            parent.alive()
         found = faces.stationary_point(center / meters, contact / meters)
         if found is None:
             continue
@@ -88,15 +87,15 @@ def stationary_points(
 
 
 def convert(
-    alive: Alive,
+    parent: Parent,
     source: Path,
     target: Path,
     unit_in: str | None,
     unit_out: str | None,
     options: CadOptions,
 ) -> Conversion:
-    """Write the surface of one file to another, and measure; see `converting.exchange`."""
-    return exchange(source, target, unit_in, unit_out, options)
+    """Have the surface of one file written to another, and measure; see `converting.exchange`."""
+    return exchange(source, target, unit_in, unit_out, options, parent.write)
 
 
 JOBS: dict[str, Callable[..., object]] = {

@@ -23,7 +23,7 @@ from typing import Any
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError, SphshellError
 from sphshell_pin.limits import child_command, last_line
-from sphshell_pin.shell.cad.messages import ALIVE, unpack
+from sphshell_pin.shell.cad.messages import ALIVE, WRITE, unpack
 from sphshell_pin.shell.cad.options import CadOptions
 
 TIME_LIMIT = 600.0
@@ -44,6 +44,9 @@ LONGEST = 1e6
 LARGEST = 1 << 32
 """Of an answer [bytes]; two million triangles take a tenth."""
 
+CHILD = "sphshell_pin.shell.cad.child"
+"""The module whose `serve` runs in the process."""
+
 MOST_JOBS = 50
 """Of one child: OpenCASCADE does not give all memory back."""
 
@@ -53,22 +56,19 @@ _ADVICE = (
 )
 _NO_ANSWER = f"gets no valid answer from OpenCASCADE: {_ADVICE}"
 
-_START = """
-import signal
-signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C: it ends the child
-import sys
-sys.path[:] = sys.argv[1:]
-from sphshell_pin.shell.cad.child import serve
-serve()
-"""
-
 
 def run_in_child(
-    job: str, arguments: tuple[object, ...], path: Path, purpose: str, options: CadOptions
+    job: str,
+    arguments: tuple[object, ...],
+    path: Path,
+    purpose: str,
+    options: CadOptions,
+    target: Path | None = None,
 ) -> Any:  # what the job returns
     """Do a job of `jobs.JOBS` in a child, and return its result.
 
     path : of the file that is read, for messages; purpose : what needs OpenCASCADE
+    target : the file that the job has written, if it has one written
 
     Raises
     ------
@@ -76,6 +76,8 @@ def run_in_child(
         As the job raises it.
     ShellFileError
         If OpenCASCADE crashes, or exceeds the time or memory limit of `options`.
+    OSError
+        If `target` cannot be written.
     """
     time_limit = TIME_LIMIT if options.time_limit is None else min(options.time_limit, LONGEST)
     memory_limit = MEMORY_LIMIT if options.memory_limit is None else options.memory_limit
@@ -88,7 +90,7 @@ def run_in_child(
     fine = False
     try:
         try:
-            answer: Any = child.ask(request, time_limit)
+            answer: Any = child.ask(request, time_limit, target)
         except EOFError:
             raise ShellFileError(path, child.why_ended(memory_limit)) from None
         except ValueError:
@@ -129,7 +131,7 @@ class _Child:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the child)
         # The child ends when its standard input closes, even if this process is killed.
         self._process = subprocess.Popen(
-            child_command(_START),
+            child_command(CHILD),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -142,21 +144,27 @@ class _Child:
         self._process.stdout.close()
         self._jobs, self._since = 0, 0.0
 
-    def ask(self, request: bytes, limit: float) -> object:
-        """Return the answer, None if it takes more than `limit` [s].
+    def ask(self, request: bytes, limit: float, target: Path | None) -> object:
+        """Return the answer, None if it takes more than `limit` [s]; write `target` if asked to.
 
         Raises EOFError if the child ends before, ValueError if the answer is damaged.
         """
         self._jobs += 1
-        try:
-            self._requests.send_bytes(request)
-            while self._answers.poll(limit):
+        while True:
+            try:
+                if request:
+                    self._requests.send_bytes(request)
+                if not self._answers.poll(limit):
+                    return None
                 answer = self._answers.recv_bytes(LARGEST)
-                if answer != ALIVE:
-                    return unpack(answer)
-        except OSError as error:
-            raise EOFError from error
-        return None
+            except OSError as error:
+                raise EOFError from error
+            request = b""
+            if target is not None and answer.startswith(WRITE):
+                target.write_bytes(memoryview(answer)[len(WRITE) :])
+                request = b"written"
+            elif answer != ALIVE:
+                return unpack(answer)
 
     def why_ended(self, memory_limit: float) -> str:
         """Return why the child has ended, or no longer answers."""

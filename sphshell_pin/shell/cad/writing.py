@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -61,20 +62,22 @@ def parts_of(model: CadModel, whole: bool) -> list[Part]:
     ]
 
 
-def write_cad(path: Path, parts: Sequence[Part], meters: float, unit: str) -> None:
-    """Write named shapes, of `meters` per number, in the format the suffix names.
+def cad_content(path: Path, parts: Sequence[Part], meters: float, unit: str) -> bytes:
+    """Return a file of named shapes, of `meters` per number, in the format the suffix names.
 
     Raises
     ------
     InvalidParameter
         If the format cannot state `unit`.
     ShellFileError
-        If the file cannot be written.
+        If OpenCASCADE cannot write the shapes in this format.
     """
-    suffix = path.suffix.lower()
+    suffix, stream = path.suffix.lower(), io.BytesIO()
     if suffix in BREP_SUFFIXES:
         shapes = [_scaled(shape, meters / metres_per_unit(unit)) for _, shape in parts]
-        done = BRepTools.Write_s(shapes[0] if len(shapes) == 1 else compound(shapes), str(path))
+        stream.write(b"DBRep_DrawableShape\n")
+        BRepTools.Write_s(shapes[0] if len(shapes) == 1 else compound(shapes), stream)
+        done = True
     else:
         names = STEP_UNITS if suffix in STEP_SUFFIXES else IGES_UNITS
         known = [name for name in names if metres_per_unit(name) == metres_per_unit(unit)]
@@ -82,9 +85,10 @@ def write_cad(path: Path, parts: Sequence[Part], meters: float, unit: str) -> No
             raise InvalidParameter("unit", unit, f"must be one of: {', '.join(names)}")
         parts = [(name, _scaled(shape, meters / MILLIMETER)) for name, shape in parts]
         write = _write_step if suffix in STEP_SUFFIXES else _write_iges
-        done = write(path, parts, names[known[0]])
+        done = write(stream, parts, names[known[0]])
     if not done:
-        raise ShellFileError(path, "cannot be written: is there such a folder, and room in it?")
+        raise ShellFileError(path, "cannot be written: its shapes have no form in this format")
+    return stream.getvalue()
 
 
 def faceted(shell: Shell) -> Occ:
@@ -132,7 +136,7 @@ def _scaled(shape: Occ, factor: float) -> Occ:
     return BRepBuilderAPI_Transform(shape, larger, True).Shape()
 
 
-def _write_step(path: Path, parts: Sequence[Part], unit: str) -> bool:
+def _write_step(stream: io.BytesIO, parts: Sequence[Part], unit: str) -> bool:
     document = TDocStd_Document(TCollection_ExtendedString("MDTV-XCAF"))
     XCAFApp_Application.GetApplication_s().InitDocument(document)
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
@@ -146,16 +150,16 @@ def _write_step(path: Path, parts: Sequence[Part], unit: str) -> bool:
     try:
         if not writer.Transfer(document, STEPControl_AsIs):
             return False
-        return bool(writer.Write(str(path)) == IFSelect_RetDone)
+        return bool(writer.WriteStream(stream) == IFSelect_RetDone)
     finally:
         Interface_Static.SetCVal_s("write.step.unit", "MM")
 
 
-def _write_iges(path: Path, parts: Sequence[Part], unit: str) -> bool:
+def _write_iges(stream: io.BytesIO, parts: Sequence[Part], unit: str) -> bool:
     Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
     writer = IGESControl_Writer(unit, BREP_OF_SOLIDS)
     for _, shape in parts:
         if not writer.AddShape(shape):
             return False
     writer.ComputeModel()
-    return bool(writer.Write(str(path)))
+    return bool(writer.Write(stream))

@@ -13,35 +13,59 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, RawSurface
-from sphshell_pin.shell.readers.text import finish, indices, pack_polygons, read_bytes, read_text
+from sphshell_pin.shell.readers.text import (
+    finish,
+    indices,
+    pack_polygons,
+    read_bytes,
+    read_text,
+    real_numbers,
+)
 
 STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 """A triangle of a binary .stl file."""
 
-_VERTEX = re.compile(rb"(?i)\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+_VERTEX = re.compile(rb"(?i)\bvertex\s+([^\s_]+)\s+([^\s_]+)\s+([^\s_]+)(?!\S)")
 _END_OF_FACET = re.compile(rb"(?i)\bendfacet\b")
 
 
 def read_stl(path: Path) -> RawSurface:
     """Read a binary or text .stl file: a soup of triangles."""
-    data = read_bytes(path)
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) == 84 + STL_RECORD.itemsize * count:
-        vertices = np.frombuffer(data, STL_RECORD, count, 84)["corners"].reshape(-1, 3)
-    else:
-        vertices = _reals(path, _VERTEX.findall(data))
-        count = len(_END_OF_FACET.findall(data))
-        if len(vertices) != 3 * count:
+    vertices, notes = stl_corners(path, read_bytes(path))
+    offsets, corners = pack_polygons(np.full(len(vertices) // 3, 3), np.arange(len(vertices)))
+    return finish(path, vertices.astype(np.float64), offsets, corners, notes=notes)
+
+
+def stl_corners(path: Path, data: bytes) -> tuple[npt.NDArray[np.floating], tuple[str, ...]]:
+    """Return the corners (3n, 3) of the triangles in the .stl file `data`, and notes on it.
+
+    `path` is for messages. A text holds no null character, a binary file does.
+    """
+    count, size = int.from_bytes(data[80:84], "little"), STL_RECORD.itemsize
+    if b"\0" in data or len(data) == 84 + count * size:
+        held = (len(data) - 84) // size
+        if held < max(count, 1) or held > count:
             raise ShellFileError(
-                path, "is not a readable .stl file (neither a whole binary file nor whole text)"
+                path,
+                f"is cut off or damaged: its header promises {count} triangles, and it holds "
+                f"{max(held, 0)}; export it anew",
             )
-    if count == 0:
-        raise ShellFileError(path, "is not a readable .stl file (it holds no triangles)")
-    offsets, corners = pack_polygons(np.full(count, 3), np.arange(3 * count))
-    return finish(path, vertices.astype(np.float64), offsets, corners)
+        rest = len(data) - 84 - count * size
+        notes = (f"{rest} bytes behind the last triangle of the file are left out",) * (rest > 0)
+        return np.frombuffer(data, STL_RECORD, count, 84)["corners"].reshape(-1, 3), notes
+    vertices = _reals(path, _VERTEX.findall(data))
+    count = len(_END_OF_FACET.findall(data))
+    if len(vertices) != 3 * count or not count:
+        raise ShellFileError(
+            path,
+            f"is cut off, or no .stl file: as a text it holds {len(vertices)} vertices in {count} "
+            "whole facets, each of which needs three; as a binary file it would hold null bytes",
+        )
+    return vertices, ()
 
 
 def read_obj(path: Path) -> RawSurface:
@@ -115,15 +139,14 @@ def _check_reals(path: Path, line: int, words: list[str]) -> None:
     try:
         if len(words) < 4:
             raise ValueError("three numbers are needed")
-        for word in words[1:4]:
-            float(word)
+        real_numbers(words[1:4])
     except ValueError as error:
         raise ShellFileError(path, f"'{' '.join(words)}': {error}", line) from None
 
 
 def _reals(path: Path, words: Sequence[object], width: int = 3) -> Floats:
     try:
-        return np.array(words, np.float64).reshape(-1, width)
+        return real_numbers(words).reshape(-1, width)
     except ValueError as error:
         raise ShellFileError(path, f"holds a coordinate that is not a number ({error})") from None
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurface
-from sphshell_pin.shell.readers.text import finish, pack_polygons, read_bytes
+from sphshell_pin.shell.readers.text import finish, pack_polygons, read_bytes, real_numbers
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -51,21 +51,25 @@ _Values = npt.NDArray[Any]  # of the types that the header names
 
 
 def read_ply(path: Path) -> RawSurface:
-    """Read a .ply file: polygons of any size, and vertex normals if it has them.
+    """Read a .ply file, see `parse_ply`."""
+    return parse_ply(path, read_bytes(path))
+
+
+def parse_ply(path: Path, data: bytes) -> RawSurface:
+    """Read the content of a .ply file: polygons of any size, and vertex normals if it has them.
 
     Raises
     ------
     ShellFileError
         If the file is truncated, holds no faces, or does not follow the format.
     """
-    data = read_bytes(path)
     form, elements, start = _header(path, data)
     table: dict[str, Floats] = {}
     polygons: Polygons | None = None
     try:
         body = data[start:]
         if form == "ascii":  # as if it were binary, all numbers 64-bit reals
-            body = np.array(body.split(), np.float64).tobytes()
+            body = real_numbers(body.decode("latin-1").split()).tobytes()
         source = _Data(body)
         for element in elements:
             lists = [prop for prop in element.properties if prop.count_kind]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,13 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
+
+
+def real_numbers(words: Sequence[Any]) -> Floats:
+    """Return words of a file as numbers; ValueError, also for 1_0, which is one in Python alone."""
+    if words and isinstance(words[0], str) and "_" in "".join(words):
+        raise ValueError("an underscore in a number")
+    return np.array(words, np.float64)
 
 
 def pack_polygons(

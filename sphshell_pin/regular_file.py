@@ -1,0 +1,50 @@
+"""Files opened for reading: regular ones alone, and no more of them than stated.
+
+A pipe makes its reader wait for ever, and a device may never end.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from os import PathLike
+from typing import BinaryIO
+
+MOST = 4e9
+"""Of a file, unless stated [bytes]."""
+
+SMALL = 1 << 16
+"""Files of the system state no size [bytes]."""
+
+
+def open_regular(path: str | PathLike[str], most: float = MOST) -> BinaryIO:
+    """Open a regular file of at most `most` bytes for reading.
+
+    Raises OSError, whose `strerror` says what the file is instead.
+    """
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        about = os.fstat(number)
+        if stat.S_ISDIR(about.st_mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(errno.EINVAL, "is a pipe, a socket or a device, not a file", str(path))
+        if about.st_size > most:
+            size = f"{about.st_size / 1e9:.3g} GB, more than {most / 1e9:.3g} GB"
+            raise OSError(errno.EFBIG, f"it holds {size}", str(path))
+        return open(number, "rb")
+    except BaseException:
+        os.close(number)
+        raise
+
+
+def read_bytes(path: str | PathLike[str], most: float = MOST) -> bytes:
+    """Return the content of a file, see `open_regular`."""
+    with open_regular(path, most) as file:
+        return file.read(max(os.fstat(file.fileno()).st_size, SMALL))  # no more: it may grow
+
+
+def read_text(path: str | PathLike[str], most: float = MOST) -> str:
+    """Return the text of a file in UTF-8, without a byte-order mark, see `open_regular`."""
+    return read_bytes(path, most).decode("utf-8-sig")

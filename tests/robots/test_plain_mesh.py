@@ -1,0 +1,122 @@
+"""Meshes written anew: the same points, faces and colors, and nothing that they name."""
+
+import importlib.util
+import sysconfig
+import time
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import coal
+import numpy as np
+import pytest
+
+from sphshell_pin.robots.plain_mesh import FORMATS, plain_mesh
+
+HEAD = '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">'
+OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2//1 3\n"
+NAME = b"/etc/passwd"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"mtllib " + NAME + b"\n" + OBJ,
+        b"# x\rmtllib " + NAME + b"\r" + OBJ.replace(b"\n", b"\r"),
+        b"# x\rmtllib " + NAME + b"\n" + OBJ,
+        b"mtl\\\nlib " + NAME + b"\n" + OBJ,
+        b"\x0cmtllib " + NAME + b"\n" + OBJ,
+        b"\0mtllib " + NAME + b"\n" + OBJ,
+        b"v 0 0 0 \rmtllib " + NAME + b"\n" + OBJ,
+    ],
+)
+def test_an_obj_file_keeps_its_numbers_alone(content):
+    made = plain_mesh(".obj", content)
+    assert made is not None
+    assert made.endswith(
+        b"v 0.0 0.0 0.0\nv 1.0 0.0 0.0\nv 0.0 1.0 0.0\nvn 0.0 0.0 1.0\nf 1//1 2//1 3\n"
+    )
+    assert not {word for word in made.split() if word.isalpha()} - {b"v", b"vn", b"f"}
+    assert plain_mesh(".obj", made) == made
+
+
+def test_a_collada_file_keeps_what_is_drawn_and_no_names_of_files():
+    phong = "<profile_COMMON><technique><phong><diffuse><color>1 0 0 1</color></diffuse></phong>"
+    library = f'<library_effects><effect id="e">{phong}</technique></profile_COMMON></effect>'
+    library = library.replace("<color", '<texture texture="t"/><color') + "</library_effects>"
+    images = "<library_images><image><init_from>/etc/passwd</init_from></image></library_images>"
+    nodes = '<scene><instance_visual_scene url="#s"/><instance_physics_scene url="#s"/></scene>'
+    abroad = '<library_nodes><node><instance_node url="other.dae#n"/></node></library_nodes>'
+    prefixed = images.replace("library_images", "c:library_images")
+    for extra in (images, prefixed):
+        head = HEAD.replace("xmlns=", 'xmlns:c="http://a" xmlns=')
+        text = f"{head}<!-- a --><?b c?>{extra}{abroad}{library}{nodes}</COLLADA>"
+        made = plain_mesh(".dae", text.encode())
+        assert made is not None
+        assert b"passwd" not in made
+        assert b"other" not in made
+        assert b"texture" not in made
+        root = ET.fromstring(made)
+        tags = [one.tag.rpartition("}")[2] for one in root.iter()]
+        assert [tag for tag in tags if tag in ("color", "instance_visual_scene")] == [
+            "color",
+            "instance_visual_scene",
+        ]
+        assert plain_mesh(".dae", made) == made
+    assert plain_mesh(".dae", b"<a/>") is None
+    assert plain_mesh(".dae", f"{HEAD}<!DOCTYPE a></COLLADA>".encode()) is None
+    assert plain_mesh(".dae", f"{HEAD}<translate>a b</translate></COLLADA>".encode()) is None
+
+
+def bounds(path):
+    mesh = coal.MeshLoader().load(str(path), np.ones(3))
+    points = mesh.vertices()
+    return mesh.num_tris, points.min(axis=0), points.max(axis=0)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_assimp_reads_the_same_from_what_is_written_anew(suffix, tmp_path):
+    home = Path(__file__).parents[2]
+    found = [one for one in home.glob(f"*/**/meshes/**/*{suffix}") if "build" not in one.parts]
+    if importlib.util.find_spec("cmeel"):
+        prefix = Path(sysconfig.get_path("purelib")) / "cmeel.prefix/share/example-robot-data"
+        found += prefix.glob(f"robots/*_description/meshes/**/*{suffix}")
+    found = [one for one in found if one.stat().st_size < 200_000]
+    if not found:
+        pytest.skip(f"there is no mesh of a robot in {suffix}")
+    for path in sorted(found)[:8]:
+        made = plain_mesh(suffix, path.read_bytes())
+        assert made is not None, path
+        (tmp_path / f"a{suffix}").write_bytes(made)
+        count, low, high = bounds(path)
+        again, least, most = bounds(tmp_path / f"a{suffix}")
+        assert again == count
+        np.testing.assert_allclose(
+            [least, most], [low, high], rtol=0.0, atol=1e-6 * np.abs(high - low).max()
+        )
+
+
+REPEATED = {
+    ".dae": [
+        "<COLLADA><!-- {} --></COLLADA>",
+        "<COLLADA>{}</COLLADA>",
+        "<COLLADA><library_images {}/></COLLADA>",
+        "<COLLADA><float_array>{}</float_array></COLLADA>",
+    ],
+    ".obj": ["{}", "f {}\n", "v {}\n", "mtllib {}", "{}\\\n"],
+    ".stl": ["solid {}", "solid\nfacet normal 0 0 1\nouter loop\n{}"],
+    ".ply": ["ply\nformat ascii 1.0\n{}\nend_header\n", "ply\n{}"],
+}
+TOKENS = (
+    *("<p ", "<library_images ", "vertex ", "vertex 0 0 0\n", "facet normal ", " ", "\n"),
+    *("f 1 2 3\n", "\\\n", "1 ", "element vertex 3\n", "endfacet ", "a/"),
+)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_time_is_in_proportion_to_the_size(suffix):
+    for text in REPEATED[suffix]:
+        for token in TOKENS:
+            content = text.format(token * 100_000).encode()
+            start = time.process_time()
+            plain_mesh(suffix, content)
+            assert time.process_time() - start < 3.0, (text, token)
