@@ -34,6 +34,7 @@ class Face:
         borders with what is no such face, are farther from it than 4e-9 of the size, and contacts
         are those of curved elements with its normals
     name : of the CAD face; None of one that was recognized
+    reason : why it is not exact, with the distance in the file's own geometry; "" if it is
     inscribed : whether it is a plane with all corners on a round face beside it: it is wider than
         the equal steps of that face
     """
@@ -47,6 +48,7 @@ class Face:
     elements: Ints = field(repr=False)
     exact: bool
     name: str | None = None
+    reason: str = ""
     inscribed: bool = False
 
 
@@ -58,15 +60,35 @@ def faces_of(core: _core.Shell, names: Sequence[str] = ()) -> tuple[Face, ...]:
     order = np.argsort(of_element, kind="stable").astype(np.int32)
     rows, starts = np.unique(of_element[order], return_index=True)
     exact = core.exact_faces
+    reasons = _reasons(core.inexact_faces, names)
     parts = zip(rows.tolist(), np.split(order, starts[1:]), strict=True)
     return tuple(
-        _face(KINDS[kinds[k]], numbers[k], some, bool(exact[k]), names[k] if names else None)
+        _face(
+            KINDS[kinds[k]],
+            numbers[k],
+            some,
+            bool(exact[k]),
+            names[k] if names else None,
+            "" if exact[k] else reasons.get(k, ""),
+        )
         for k, some in parts
         if k >= 0
     )
 
 
-def _face(kind: str, numbers: Floats, elements: Ints, exact: bool, name: str | None) -> Face:
+def _reasons(inexact: Floats, names: Sequence[str]) -> dict[int, str]:
+    """Return by face what is off it: rows (n, 3) of the face, the one beside it, and how far."""
+    reasons = {}
+    for face, other, off in inexact.tolist():
+        beside = f" to {names[int(other)] if names else 'another face'}" if other >= 0 else ""
+        what = "a vertex" if other == face else f"its border{beside}"
+        reasons[int(face)] = f"{what} is off it by {off * 1e9:.2g} nm"
+    return reasons
+
+
+def _face(
+    kind: str, numbers: Floats, elements: Ints, exact: bool, name: str | None, reason: str
+) -> Face:
     point, axis = read_only(numbers[:3].copy()), read_only(numbers[3:6].copy())
     radius, second = numbers[6:].tolist()
     return Face(
@@ -79,6 +101,7 @@ def _face(kind: str, numbers: Floats, elements: Ints, exact: bool, name: str | N
         read_only(elements.copy()),
         exact,
         name,
+        reason,
         kind == "plane" and second > 0.0,
     )
 
@@ -93,6 +116,8 @@ def described(faces: Sequence[Face], elements: int) -> str:
     share = f"; {left:.3g} % of the elements on none" if left > 0.0 else ""
     if curved := sum(not face.exact for face in faces):
         share += f"; {curved} of {len(faces)} as curved elements"
+        told = [f"{f.name or f.kind}: {f.reason}" for f in faces if f.reason][:MOST_GROUPS]
+        share += f" ({'; '.join(told)})" if told else ""
     if flats := [face for face in faces if face.inscribed]:
         at = "({:.4g}, {:.4g}, {:.4g}) m".format(*flats[0].point)
         share += (

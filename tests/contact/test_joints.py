@@ -96,3 +96,11 @@ def test_vertices_of_a_file_are_moved_onto_its_faces(folder):
     deepest, counts = few.contacts_batch(centers, np.full(50, ball))
     assert (counts == 1).all()
     assert np.abs(deepest - 0.01 * bore.radius).max() <= 1e-12 * ball
+
+
+def test_a_face_says_why_it_is_not_exact(folder):
+    rough = sp.Shell.from_file(with_few_digits(step_of(tee(), folder), 1))
+    reasons = [face.reason for face in rough.faces if not face.exact]
+    assert reasons
+    assert all(reason.endswith(" nm") and "off it by" in reason for reason in reasons)
+    assert all(face.reason == "" for face in rough.faces if face.exact)

@@ -24,6 +24,8 @@ constexpr double kOfRounding = 1.8;
 // Vertices are moved onto faces by so many times single precision: faces that are fitted to coarser
 // numbers are not that exact.
 constexpr double kMostMoved = 3;
+// Systems write CAD files whose edges are off the faces by this share of the size.
+constexpr double kFileTolerance = 2e-5;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
@@ -217,6 +219,7 @@ double tolerance_of(const Shell& shell, const CurveOptions& options) {
 std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions options) {
   const double tolerance = tolerance_of(*shell, options);
   std::shared_ptr<Shell> out = shell;
+  bool recognized = false;
   // Means of facet normals are no information: better ones are estimated.
   options.estimate =
       !options.exact && !options.normals.empty() && estimated_elsewhere(*shell, options.normals);
@@ -226,22 +229,17 @@ std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions o
     // Nothing is moved onto faces that are given up.
     if (!options.normals.empty() && !options.estimate)
       settle_given_normals(*shell, options.normals, faces);
-    std::vector<Vec3> moved =
-        snapped_vertices(*shell, faces, kMostMoved * kSinglePrecision * shell->size());
     if (!faces.of.empty()) options.known = std::make_shared<const Faces>(std::move(faces));
-    if (!moved.empty()) {
-      options.regions = nullptr;
-      out = std::make_shared<Shell>(std::move(moved), shell->triangles(), shell->element(),
-                                    shell->crease_angle(), shell->side());
-    }
+    recognized = true;
   }
-  // Vertices of CAD files are off the faces by the tolerance of the system that wrote them.
-  if (out == shell && options.known) {
-    std::vector<Vec3> moved =
-        snapped_vertices(*shell, *options.known, kMostMoved * kSinglePrecision * shell->size());
-    if (!moved.empty())
-      out = std::make_shared<Shell>(std::move(moved), shell->triangles(), shell->element(),
-                                    shell->crease_angle(), shell->side());
+  // Vertices are off the faces by the rounding of their coordinates, or the tolerance of a file.
+  const double most = recognized ? kMostMoved * kSinglePrecision : kFileTolerance;
+  std::vector<Vec3> moved;
+  if (options.known) moved = snapped_vertices(*shell, *options.known, most * shell->size());
+  if (!moved.empty()) {
+    options.regions = nullptr;
+    out = std::make_shared<Shell>(std::move(moved), shell->triangles(), shell->element(),
+                                  shell->crease_angle(), shell->side());
   }
   out->curve(std::move(options));
   return out;
@@ -389,6 +387,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
       if (bulge > limit)
         for (Vec3& one : offset) one *= limit / bulge;
     }
+    settle_on_faces(shell, edge, faces_, p[edge.first_vertex], d, offset);
     for (int i = 0; i < edge.count && !straight.empty(); ++i)
       if (straight[topology.incidence[edge.begin + i]]) offset = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 0; i < edge.count; ++i) {

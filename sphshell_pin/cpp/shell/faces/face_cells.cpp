@@ -99,7 +99,7 @@ class CellMaker {
     for (int i = 0; i < 3; ++i) {
       cell.upright[i] = static_cast<float>(cell.sign * n[i]);
       const double off = std::abs(shape.distance(facet.corner[i]));
-      if (!(off <= gap_)) give_up(cell.face, -1, off);
+      if (!(off <= gap_)) give_up(cell.face, cell.face, off);
       if (!shape.has_parameters()) continue;
       const Eigen::Vector2d at = shape.parameters(facet.corner[i], shell_.size());
       for (int c = 0; c < 2; ++c) {

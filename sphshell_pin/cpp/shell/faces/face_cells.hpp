@@ -32,8 +32,8 @@ struct FaceCell {
   double place[3][2];
 };
 
-// Why a face does not give closest points: it, or its border to another one (-1: to no face), is
-// off the elements there by so much [m].
+// Why a face does not give closest points: its border to another one (-1: to no face) is off it by
+// so much [m], or, where the other is the face itself, a vertex.
 struct Inexact {
   int face, other;
   double off;

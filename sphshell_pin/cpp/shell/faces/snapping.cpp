@@ -1,6 +1,7 @@
 #include "shell/faces/snapping.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "shell/faces/face_cells.hpp"
 
@@ -8,6 +9,9 @@ namespace sphshell {
 namespace {
 
 constexpr int kMostSnaps = 8;
+// Curves are settled on faces in so many rounds, by at most this share of their chord.
+constexpr int kMostRounds = 3;
+constexpr double kMostSettled = 0.02;
 // A triangle may turn by 25 degrees (cosine): beyond that, its height is of the rounding.
 constexpr double kLeastAlike = 0.9;
 
@@ -76,6 +80,32 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
     }
   }
   return out;
+}
+
+// Planes have the last word.
+void settle_on_faces(const Shell& shell, const Edge& edge, const Faces& faces, const Vec3& begin,
+                     const Vec3& d, std::array<Vec3, 2>& offset) {
+  if (faces.of.empty() || edge.kind == EdgeClass::Boundary) return;
+  const std::array<Vec3, 2> before = offset;
+  for (int round = 0; round < kMostRounds; ++round)
+    for (const bool flat : {false, true})
+      for (int i = 0; i < edge.count; ++i) {
+        const int face = faces.of_triangle(triangle_of(shell.topology().incidence[edge.begin + i]));
+        if (face < 0) continue;
+        const Primitive& shape = faces.shapes[face];
+        if ((shape.kind == FaceKind::Plane) != flat) continue;
+        Vec3 off[2];
+        for (int k = 0; k < 2; ++k) {
+          // Bernstein's polynomials at a third are 4/9 and 2/9.
+          const Vec3 x = begin + (k + 1) / 3.0 * d + (4 * offset[k] + 2 * offset[1 - k]) / 9;
+          const double distance = shape.distance(x, off[k]);
+          off[k] *= distance;
+        }
+        for (int k = 0; k < 2; ++k) offset[k] -= 3 * off[k] - 1.5 * off[1 - k];
+      }
+  // An edge that is nowhere near its faces stays as it is.
+  for (int k = 0; k < 2; ++k)
+    if (!((offset[k] - before[k]).norm() <= kMostSettled * d.norm())) offset = before;
 }
 
 }  // namespace sphshell
