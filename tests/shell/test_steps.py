@@ -114,6 +114,31 @@ def test_a_plane_side_of_a_ring_is_plane(seed):
     assert sorted(face.kind for face in shell.faces) == ["plane", "torus"]
 
 
+@pytest.mark.parametrize("columns", [24, 40, 64])
+@pytest.mark.parametrize("pitch", [0.0, 0.0035, 0.006])
+@pytest.mark.parametrize("taper", [0.0, 0.0003])
+def test_a_strip_of_one_row_does_not_lean(columns, pitch, taper):
+    """Two rails on a cylinder or a cone cannot tell a tilt across them from curvature."""
+    turn = 2 * np.pi * np.arange(int(1.5 * columns) if pitch == 0 else 3 * columns) / columns
+    turn = turn[turn < 6.0] if pitch == 0 else turn
+    low = pitch * turn / (2 * np.pi)
+    rails = []
+    for z in (low, low + 0.0033):
+        radius = 2 * RADIUS + taper / 0.0035 * z
+        rails.append(np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1))
+    m = len(turn)
+    quads = [[i, i + 1, m + i + 1, m + i] for i in range(m - 1)]
+    triangles = [[t[0], *t[k : k + 2]] for t in quads for k in (1, 2)]
+    shell = sp.Shell(np.concatenate(rails).astype(np.float32).astype(float), triangles, faces=False)
+    at = np.random.default_rng(0).uniform(turn[2], turn[-3], 50)
+    z = pitch * at / (2 * np.pi) + 0.0016
+    slope = np.arctan(taper / 0.0035)
+    radius = 2 * RADIUS + taper / 0.0035 * z + 6e-4 * np.cos(slope)
+    centers = [radius * np.cos(at), radius * np.sin(at), z - 6e-4 * np.sin(slope)]
+    off = error(shell, np.transpose(centers), 6e-4)
+    assert off < 0.3 * 2 * RADIUS * (1 - np.cos(np.pi / columns))
+
+
 @pytest.mark.parametrize("kind", ["irregular", "unequal rows", "ends"])
 @pytest.mark.parametrize("seed", range(5))
 def test_steps_that_are_not_equal_stay_in_one_face(kind, seed):

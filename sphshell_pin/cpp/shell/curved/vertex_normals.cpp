@@ -28,6 +28,8 @@ constexpr double kSmallTurn = 0.005, kLikely = 0.25;
 constexpr double kMostUnevenHeights = 10, kLittle = 0.02, kSurelyAlike = 0.1;
 // A tilt is taken if its standard error is below this share of the spread.
 constexpr double kMostDoubt = 0.1;
+// A fit leaves at least this share of the squared heights, whatever it says: its terms are not all.
+constexpr double kLeastLeft = 1e-3;
 // A given normal contradicts a face that is off by more than this.
 constexpr double kContradiction = 0.01;
 // Corners take the normal of a face in their fan within this angle [rad] of their own facet's.
@@ -100,7 +102,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
                                      size.cwiseInverse().asDiagonal());
     if (!(solver.vectorD().cwiseAbs().minCoeff() > kLeastPivot)) return false;
     const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
-    const double left = std::max(heights2 - fit.dot(along), 0.0);
+    const double left = std::max(heights2 - fit.dot(along), kLeastLeft * heights2);
     if (round > 0 && left > most_uneven * heights2) return false;
     // The variances of the first two coefficients: what is left, over the degrees of freedom, times
     // the diagonal of the inverse.
