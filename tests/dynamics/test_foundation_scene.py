@@ -249,3 +249,25 @@ def test_a_foundation_that_cannot_carry_its_load_says_so() -> None:
     scene = on_plate(ball(mass=1000.0), sp.FoundationLaw(1e4, 5e-3))
     with pytest.warns(sp.errors.WeakLawWarning, match="cannot stop the sphere"):
         sp.Simulation(scene).run(free_q([0, 0, 0.06]), np.zeros(6), 0.01)
+
+
+@pytest.mark.parametrize("depth", [5e-6, 2e-4])
+def test_derivatives_by_the_radius_hold_beside_a_border(depth: float) -> None:
+    """Where the depth is small beside the radius, by which the steps of differences are."""
+    plate = sp.Shell([[-0.02, -1, 0], [0.02, -1, 0], [0.02, 1, 0], [-0.02, 1, 0]], [[0, 1, 2, 3]])
+
+    def force(radius: float, *names: str):
+        scene = sp.Scene(ball(0.0, 0.05, 0.01, pin.JointModelTranslation()))
+        law = sp.FoundationLaw(1e6, 2e-3, dissipation=0.3)
+        scene.add_contact(sp.Sphere(radius, "ball"), plate, law=law, friction=None, name="c")
+        center, moves = np.array([0.021, 0.0, np.sqrt((0.01 - depth) ** 2 - 1e-6)]), np.ones(3)
+        if names:
+            found = scene.contact_force_derivatives(center, -0.05 * moves, parameters=names)
+            return found.by_parameters[0][:, 0]
+        return scene.external_forces(center, -0.05 * moves)[1].linear
+
+    step = 2e-3 * depth
+    one, two = (force(0.01 + k * step) - force(0.01 - k * step) for k in (1, 2))
+    expected = (8 * one - two) / (12 * step)
+    found = force(0.01, "c.sphere.radius")
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()

@@ -30,7 +30,7 @@ _PLACES = {
 }
 # Steps of central differences, and of one-sided ones at a bound, relative to the number; a law is a
 # smooth function of its numbers, at a contact that is held.
-_STEP, _STEP_AT_BOUND = 1e-5, 1e-7
+_STEP, _STEP_OF_RADIUS, _STEP_AT_BOUND = 1e-5, 1e-6, 1e-7
 
 
 @dataclass(frozen=True, repr=False)
@@ -143,7 +143,8 @@ def _core_parameter(
         except InvalidParameter:
             return None
 
-    step = _STEP * (abs(value) or 1.0)
+    # A radius changes depths, beside which its step must be small.
+    step = (_STEP if kind == _FIELD else _STEP_OF_RADIUS) * (abs(value) or 1.0)
     less, more = changed(value - step), changed(value + step)
     if less is None or more is None:
         # At a bound: from there to one side.
