@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick studies lint format bench report robots hard-cases work-precision rollouts \
-  real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
+  joints real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
 
 help:
 	@sed -nE 's/^([a-z-]+):.* ## (.*)/make \1\t\2/p' Makefile | expand -t 22
@@ -102,6 +102,9 @@ work-precision: $(VENV)/.test ## error against computing time of the integrators
 
 rollouts: $(VENV)/.test ## print the speed-up of 10 000 runs over threads
 	$(BIN)/python -m benchmarks.rollout
+
+joints: $(VENV)/.test ## spheres over every joint between faces of generated parts (COUNT=1000000 SEED=1)
+	$(BIN)/python -m tests.joints --count $(or $(COUNT),1000000) --seed $(or $(SEED),1)
 
 real-surfaces: $(VENV)/.test ## answers to 1500 spheres on each surface of FOLDER=..., and jumps along walks
 	SPHSHELL_FOLDER=$(abspath $(FOLDER)) $(PYTEST) tests/contact/smooth/test_real_surfaces.py -m ""

@@ -1,16 +1,14 @@
-"""Quote a report in README.md: the figures there come from measured data, never by hand.
+"""Quote a report: the figures of README.md and the pages come from measured data, never by hand.
 
 python -m benchmarks.quote results/report
 
-Copies report.json to docs/measured/, which the documentation site shows, and replaces
-what stands between `<!-- measured: NAME -->` and `<!-- end measured -->` on the README.
+Copies report.json to docs/measured/, from which docs/site/tables.py writes the pages.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -20,9 +18,7 @@ from sphshell_pin.cases.contents import Table, columns
 
 Data = dict[str, Any]
 ROOT = Path(__file__).parent.parent
-PAGE = "README.md"
 DATA = "docs/measured/report.json"
-BLOCK = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end measured -->)", re.DOTALL)
 
 # What the README shows, by key of the finding, in its order.
 SUMMARY = (
@@ -50,7 +46,7 @@ def blocks_of(data: Data) -> dict[str, str]:
         if machine.get(key)
     ]
     if "peers_ratios" in tables:
-        tables["peers"] = peers(tables["peers_ratios"])
+        tables["peers_by_scene"] = peers(tables["peers_ratios"])
     return tables | {
         "findings": findings(list(found.values())),
         "summary": head + findings([found[key] for key in SUMMARY if key in found]),
@@ -77,17 +73,6 @@ def peers(ratios: str) -> str:
     return Table("", "", columns("scene", *names), lines).markdown()
 
 
-def quoted(text: str, blocks: dict[str, str]) -> str:
-    """Return a page with its blocks replaced."""
-
-    def block(found: re.Match[str]) -> str:
-        if found[2] not in blocks:
-            raise ValueError(f"no block is called {found[2]!r}: one of {', '.join(blocks)}")
-        return f"{found[1]}{blocks[found[2]]}{found[3]}"
-
-    return BLOCK.sub(block, text)
-
-
 def read(path: Path) -> Data:
     """Return the data of a report; raise ValueError where a section was not measured."""
     data: Data = json.loads(path.read_text(encoding="utf-8"))
@@ -98,7 +83,7 @@ def read(path: Path) -> Data:
 
 
 def main() -> int:
-    """Copy the data, replace the blocks; return 2 where the report cannot be quoted."""
+    """Copy the data; return 2 where the report cannot be quoted."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.quote", description=(__doc__ or "").partition("\n")[0]
     )
@@ -106,12 +91,11 @@ def main() -> int:
     options = parser.parse_args()
     try:
         data = read(options.report / "report.json")
-        texts = {DATA: json.dumps(data, indent=1, ensure_ascii=False) + "\n"}
-        texts[PAGE] = quoted((ROOT / PAGE).read_text(encoding="utf-8"), blocks_of(data))
-        for name, text in texts.items():
-            with atomic_file(ROOT / name) as file:
-                file.write(text.encode())
-            print(f"wrote {name}")
+        blocks_of(data)
+        text = json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+        with atomic_file(ROOT / DATA) as file:
+            file.write(text.encode())
+        print(f"wrote {DATA}; python docs/site/tables.py writes the pages")
     except (OSError, ValueError, LookupError) as error:
         print(f"error: {options.report}: {error}", file=sys.stderr)
         return 2

@@ -24,10 +24,11 @@ from sphshell_pin.robots.files import (
     build_geometry,
     build_model,
     is_path,
-    keep_collision_of,
+    keep_geometry_of,
     keep_spheres,
     read,
 )
+from sphshell_pin.robots.inertia import mass_fault, with_density
 from sphshell_pin.robots.mesh_spheres import MeshSpheres, spheres_of_link, spheres_of_mesh
 
 __all__ = [
@@ -47,16 +48,18 @@ __all__ = [
     "fingertips",
     "floats",
     "is_path",
-    "keep_collision_of",
+    "keep_geometry_of",
     "keep_spheres",
     "load",
     "load_file",
     "load_urdf",
+    "mass_fault",
     "mimics_of_library",
     "names",
     "read",
     "spheres_of_link",
     "spheres_of_mesh",
+    "with_density",
 ]
 
 if TYPE_CHECKING:
@@ -109,6 +112,8 @@ class LoadedRobot:
     """What its file states that is not modeled, one sentence each."""
     description: Description | None = None
     """Its file, as it was read; None of a robot of example-robot-data."""
+    assumed: str = ""
+    """What its file does not state and was taken from elsewhere, in one sentence."""
 
 
 def names() -> list[str]:
@@ -175,6 +180,7 @@ def load_file(
     xacro_args: Mapping[str, object] | None = None,
     srdf: str | PathLike[str] | None = None,
     pose: str | None = None,
+    density: float | None = None,
 ) -> LoadedRobot:
     """Return the robot of one's own file: URDF, xacro (`xacro_args` are its arguments) or MJCF.
 
@@ -186,6 +192,9 @@ def load_file(
     With `mimic`, joints that mimic others (URDF `<mimic>`, MJCF `<equality><joint>`) do so exactly:
     the model's nq and nv are those of the other joints (`sphshell_pin.dynamics.scene.mimic`).
     Without it they move freely, as Pinocchio reads them.
+
+    `density` [kg/m^3] gives the links of a URDF that state no mass that of their collision
+    geometry, else of their visual one; `assumed` of the robot says so.
 
     `srdf` is a file with poses (its `<group_state>`). `pose` names the one that becomes `q0`; in
     MJCF it may be a `<key>`.
@@ -207,7 +216,10 @@ def load_file(
         A xacro file without the package xacro.
     """
     description = read(path, package_dirs, xacro_args, free_flyer=free_flyer)
-    model = build_model(description, free_flyer=free_flyer)
+    assumed = ""
+    if density is not None:
+        description, assumed = with_density(description, density)
+    model = build_model(description, free_flyer=free_flyer, mimic=mimic)
     _load_poses(model, srdf)
     collision, missing = build_geometry(description, model, pin.GeometryType.COLLISION)
     visual, without = build_geometry(description, model, pin.GeometryType.VISUAL)
@@ -219,10 +231,12 @@ def load_file(
         visual,
         description.q0(model),
         description=description,
+        assumed=assumed,
     )
     if missing:
         warnings.warn(
-            f"{path}: without these visual meshes, which are missing: {', '.join(missing)}; "
+            f"{path}: without these visual meshes, which are missing or broken: "
+            f"{', '.join(missing)}; "
             f"searched in {description.folders.searched()} (see --package-dir)",
             RobotWarning,
             stacklevel=2,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Mapping
@@ -83,9 +84,20 @@ def parsed(text: bytes) -> ET.Element:
     The parser knows namespaces, which `check_size` does not look at.
     """
     try:
-        return ET.fromstring(text)
+        return ET.fromstring(_declared(text))
     except ET.ParseError as error:
         raise ValueError(f"it is not well-formed XML: {error}") from None
+
+
+def _declared(text: bytes) -> bytes:
+    """Return XML whose root declares every prefix of a name: other readers ignore them."""
+    used = set(re.findall(rb"<([A-Za-z_][\w.-]*):\w", text))
+    used |= set(re.findall(rb"\s([A-Za-z_][\w.-]*):[\w.-]+\s*=", text))
+    unknown = used - set(re.findall(rb"\sxmlns:([\w.-]+)\s*=", text)) - {b"xml", b"xmlns"}
+    if not unknown:
+        return text
+    named = b"".join(b' xmlns:%b="urn:%b"' % (one, one) for one in sorted(unknown))
+    return re.sub(rb"<(?:robot|mujoco)\b", lambda found: found[0] + named, text, count=1)
 
 
 def check_poses(root: ET.Element, model: pin.Model) -> None:

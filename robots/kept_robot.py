@@ -59,7 +59,7 @@ def load_kept(
     Raises RobotError as `robots.load_file` does.
     """
     description = described(text.encode(), Folders(Path(file), kept=meshes))
-    model = build_model(description, free_flyer=free_flyer)
+    model = build_model(description, free_flyer=free_flyer, mimic=mimic)
     visual, missing = build_geometry(description, model, pin.GeometryType.VISUAL)
     keep_spheres(description)
     spheres, _ = build_geometry(description, model, pin.GeometryType.COLLISION)

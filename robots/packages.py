@@ -15,6 +15,8 @@ from sphshell_pin.regular_file import MOST_TEXT, read_bytes
 
 # Folders one within another below one of ROS_PACKAGE_PATH; a workspace has three.
 _DEEPEST = 5
+# Folders that are looked at below one, and above a package, in search of another package.
+_MOST_FOLDERS, _ABOVE = 5000, 3
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,7 @@ class Folders:
     """The folders that are searched for the packages and the relative names of `file`.
 
     In this order: those given, the folder of the file and those above it, ROS_PACKAGE_PATH,
-    AMENT_PREFIX_PATH (its share folders).
+    AMENT_PREFIX_PATH (its share folders), and all of the workspace of the file.
     """
 
     file: Path
@@ -33,7 +35,7 @@ class Folders:
     @classmethod
     def of(cls, file: Path, given: Iterable[str | PathLike[str]] = ()) -> Folders:
         """Return those of `file`, with the folders `given` first."""
-        return cls(file, tuple(Path(one) for one in given))
+        return cls(file, tuple(Path(one).absolute() for one in given))
 
     def packages(self, name: str) -> Iterator[Path]:
         """Yield the folders that may be the package called `name`, the likeliest first."""
@@ -47,7 +49,7 @@ class Folders:
             yield from _beside(folder, name)
         for folder in _listed("AMENT_PREFIX_PATH"):
             yield from _beside(folder / "share", name)
-        for folder in _listed("ROS_PACKAGE_PATH"):
+        for folder in (*_listed("ROS_PACKAGE_PATH"), *self.given, workspace(home)):
             yield from _below(folder, name)
 
     def package(self, name: str) -> Path | None:
@@ -78,7 +80,8 @@ class Folders:
 
     def searched(self) -> str:
         """Say where has been searched."""
-        searched = [str(one) for one in (*self.given, self.file.parent)]
+        home = self.file.absolute().parent
+        searched = [str(one) for one in (*self.given, self.file.parent, workspace(home))]
         searched += [
             f"${name} ({os.environ[name]})"
             for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
@@ -110,10 +113,28 @@ def _stated_name(package_xml: Path) -> str | None:
         return None
 
 
+def workspace(folder: Path) -> Path:
+    """Return the highest folder that holds packages beside that of `folder`, or `folder` itself.
+
+    That is the clone (its .git) or the `src` above the package, else the folder of the package.
+    """
+    above = (folder, *folder.parents)
+    packages = [one for one in above if (one / "package.xml").is_file()]
+    if not packages:
+        return folder
+    roots = list(packages[-1].parents)[:_ABOVE]
+    if (packages[-1] / ".git").exists():
+        roots.insert(0, packages[-1])
+    ends = [one for one in roots if one.name == "src" or (one / ".git").exists()]
+    return ends[-1] if ends else packages[-1].parent
+
+
 def _below(root: Path, name: str) -> Iterator[Path]:
     """Yield the packages of that name anywhere below `root`, as rospack finds them."""
-    for place, folders, files in os.walk(root):
+    for count, (place, folders, files) in enumerate(os.walk(root)):
         here = Path(place)
+        if count > _MOST_FOLDERS:
+            return
         if "package.xml" in files:
             folders.clear()  # a package has no other in it
             if _is_package(here, name):

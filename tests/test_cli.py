@@ -241,3 +241,34 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
     assert process.returncode == 130
     assert "interrupted at t =" in stderr
     assert (out / "run.npz").is_file()
+
+
+@pytest.mark.parametrize(
+    ("redirected", "told"),
+    [
+        ("> /dev/full", "not all of the output could be printed: No space left on device"),
+        (">&-", ""),
+        ("<&- >&- 2>&-", ""),
+        ("| true", ""),
+    ],
+)
+def test_output_that_nobody_takes_fails_no_command(redirected, told):
+    program = f"'{sys.executable}' -c 'from sphshell_pin.cli import main; main()' list"
+    script = f"set -o pipefail; {program} {redirected}"
+    run = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False)
+    assert run.returncode == 0
+    assert told in run.stderr
+    assert "Error" not in run.stderr
+
+
+def test_characters_that_an_encoding_lacks_are_escaped(tmp_path):
+    path = write(tmp_path, name="é")
+    code = f"import sys; sys.argv[1:] = ['explain', {str(path)!r}]; "
+    run = subprocess.run(
+        [sys.executable, "-c", code + "from sphshell_pin.cli import main; main()"],
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        check=False,
+    )
+    assert run.returncode == 0
+    assert b"\\xe9" in run.stdout

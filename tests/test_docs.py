@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 import shlex
@@ -197,3 +198,13 @@ def test_no_page_is_an_orphan():
     pictures = {path for path in shown.rglob("*") if path.is_file()}
     assert pictures <= linked
     assert all(picture.stat().st_size < 400_000 for picture in pictures)
+
+
+def test_the_tables_of_the_pages_are_those_of_today(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "site"))
+    tables = importlib.import_module("tables")
+    for page in tables.PAGES:
+        text = page.read_text(encoding="utf-8")
+        assert tables.filled(text) == text, f"{page.name} is stale: python docs/site/tables.py"
+        marks = re.findall(rf"^<!-- (?:{'|'.join(tables.SHOWN)}): .*-->$", text, re.M)
+        assert len(marks) == len(tables.BLOCK.findall(text)), page.name

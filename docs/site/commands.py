@@ -1,4 +1,4 @@
-"""A hook of MkDocs: commands.md shows the help of the command line."""
+"""The help of the command line as Markdown."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ import typer
 from sphshell_pin.cli import app
 
 
-def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put a section for each command below the head of commands.md."""
-    if page.file.src_uri != "commands.md":
-        return markdown
+def all_commands() -> str:
+    """Return a section for each command."""
     group: Any = typer.main.get_command(app)
-    return "\n".join([markdown, *(_section(name, one) for name, one in group.commands.items())])
+    return "\n".join(_section(name, one) for name, one in group.commands.items())
 
 
 def _section(name: str, command: Any) -> str:

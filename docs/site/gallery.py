@@ -82,12 +82,13 @@ class Shot:
         verdict = next(one for one in run.verdicts if one.figure == self.figure)
         measured = f"{self.what} **{self.shown(verdict.measured)}**"
         expected = self.expected(run.built.scenario.expect[self.figure])
+        file = f"[{self.name}.toml](../scenarios/{self.name}.toml)"
         return "<br>".join(
             (
                 f"![{title}](pictures/gallery/{self.name}.png)",
                 f"**{title}**",
                 f"{measured}, expected {expected}",
-                f"`sphshell-pin run {self.name}` ([{self.name}.toml](scenarios/{self.name}.toml))",
+                f"`sphshell-pin run {self.name}` ({file})",
             )
         )
 
@@ -152,6 +153,11 @@ def on_files(files: Any, config: Any) -> Any:
         content = path.read_text(encoding="utf-8")
         files.append(File.generated(config, f"scenarios/{path.name}", content=content))
     return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Let links to the scenario files of the repository lead to those of the site."""
+    return markdown.replace("](../scenarios/", "](scenarios/")
 
 
 def main(*names: str) -> None:

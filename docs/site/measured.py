@@ -1,14 +1,11 @@
-"""A hook of MkDocs: a page shows the data of docs/measured/ in place of a link to them.
+"""The data of docs/measured/ as Markdown.
 
-A line `[data](measured/NAME.json)` becomes all sections of that file, which
-sphshell_pin/cases/measured.py writes, and `[NAME](measured/report.json)` one block of a report (see
-benchmarks/quote.py).
+sphshell_pin/cases/measured.py writes them; the blocks of a report are those of benchmarks/quote.py.
 """
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,19 +13,13 @@ from typing import Any
 from sphshell_pin.benchmarks import quote
 
 DATA = Path(__file__).parents[1] / "measured"
-LINK = re.compile(r"^\[(\w+)\]\(measured/(\w+)\.json\)$", re.MULTILINE)
 PLAIN = str.maketrans({mark: f"\\{mark}" for mark in "\\|*_<"})
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Replace such lines of a page; a name that is not there is an error of the build."""
-    return LINK.sub(lambda found: shown(found[1], found[2]), markdown)
-
-
-def shown(block: str, name: str) -> str:
-    """Return a file's content, or of a report one block, as Markdown."""
-    if name == "report":
-        return quote.blocks_of(quote.read(DATA / "report.json"))[block]
+def measured(name: str) -> str:
+    """Return the content of a file, or the block of that name of the report, as Markdown."""
+    if not (DATA / f"{name}.json").is_file():
+        return quote.blocks_of(quote.read(DATA / "report.json"))[name]
     data = json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
     head = f"*Measured by `{data['command']}`; [all data](measured/{name}.json).*"
     sections = of_robots(data) if name == "robots" else data["sections"]
@@ -53,7 +44,7 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     """Return rows, headings first, as a table; but for code in it, a cell is plain text."""
     plain = [[cell if "`" in cell else cell.translate(PLAIN) for cell in row] for row in rows]
     plain.insert(1, ["---"] * len(rows[0]))
-    return "\n".join(f"| {' | '.join(row)} |" for row in plain)
+    return "\n".join(f"|{'|'.join(row)}|" for row in plain)
 
 
 def of_robots(data: dict[str, Any]) -> list[dict[str, Any]]:

@@ -1,13 +1,8 @@
-"""A hook of MkDocs: tables of parameters, from the classes that describe them.
-
-`<!-- parameters: ImpactLaw -->` stands for the parameters of a class, and
-`<!-- kinds: ImpactLaw -->` for what a scenario file may state of its family.
-"""
+"""Tables of parameters, from the classes that describe them, as Markdown."""
 
 from __future__ import annotations
 
 import dataclasses
-import re
 from typing import Any
 
 import sphshell_pin as sp
@@ -16,24 +11,17 @@ from sphshell_pin.scenario.format import shape_tables as primitives
 
 # Annotations of parameters that are numbers; see sphshell_pin.parameters.
 NUMBERS = ("float", "Named")
-MARK = re.compile(r"^<!-- (parameters|kinds): (\w+) -->$", re.MULTILINE)
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Replace the marks of a page; a class that is not there is an error of the build."""
-    return MARK.sub(lambda found: shown(found[1], found[2]), markdown)
+def kinds(name: str) -> str:
+    """Return what a scenario file may state of the family of a class."""
+    family = _class(name).kinds
+    return "| `type` | keys |\n|---|---|\n" + "".join(map(row, family.values()))
 
 
-def shown(what: str, name: str) -> str:
-    """Return what stands for a mark, as Markdown."""
-    kind = getattr(sp, name, None) or getattr(primitives, name)
-    if what == "parameters":
-        return table(kind)
-    return "| `type` | keys |\n|---|---|\n" + "".join(map(row, kind.kinds.values()))
-
-
-def table(kind: Any) -> str:
+def parameters(name: str) -> str:
     """Return the parameters of a class: name, unit, default, meaning."""
+    kind = _class(name)
     lines = [f"| parameter of `{kind.__name__}` | unit | default | meaning |", "|---|---|---|---|"]
     about = parameters_of(kind)
     for one in dataclasses.fields(kind):
@@ -41,6 +29,10 @@ def table(kind: Any) -> str:
             unit = about[one.name].general_unit or ("1" if one.type in NUMBERS else "")
             lines.append(f"| `{one.name}` | {unit} | {default_of(one)} | {about[one.name].help} |")
     return "\n".join(lines) + "\n"
+
+
+def _class(name: str) -> Any:
+    return getattr(sp, name, None) or getattr(primitives, name)
 
 
 def row(kind: Any) -> str:

@@ -10,15 +10,16 @@ evaluation of its passive forces: no Python is run in a step.
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import math
 import warnings
+import weakref
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.adapters import imports_of
@@ -41,7 +42,19 @@ __all__ = ["MujocoContacts", "attach"]
 
 # Stands for a mass that does not move: of bodies that only their partner's mobility counts for.
 _FIXED = 1e9
-_BITS = 32  # of contype and conaffinity
+_SPHERE, _SHELL = 1, 2  # MujocoRole in adapters/mujoco.hpp
+
+
+_REPLACED = {
+    "passive": (
+        "they do not act, as another passive callback has taken the place of attach's: call "
+        "contacts.apply(data) in it, or attach again after mujoco.set_mjcb_passive(None)"
+    ),
+    "contactfilter": (
+        "MuJoCo's own contact between the same geoms acts beside them, as another contact filter "
+        "has taken the place of attach's: attach again after mujoco.set_mjcb_contactfilter(None)"
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -65,7 +78,13 @@ class MujocoContacts:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, scene: Scene, bodies: list[int], ends: list[_End], log: bool
+        self,
+        model: mujoco.MjModel,
+        scene: Scene,
+        shell: Shell,
+        bodies: list[int],
+        ends: list[_End],
+        log: bool,
     ) -> None:
         self.model = model
         self.scene = scene
@@ -75,15 +94,18 @@ class MujocoContacts:
         self.recommended_dt = scene.explain(q).recommended_dt
         roots = [int(model.body_rootid[one]) for one in bodies]
         dofs = [_dofs_of(model, one) for one in bodies]
-        state = scene.state()._core
-        self._core = _core.MujocoContacts(state, _layout(model), bodies, roots, dofs, log)
-        self._bits = _separate(model, ends, self._body_of_shell(bodies))
+        home = scene.pairs[0].joint_j
+        roles = _roles(model, ends, bodies[home - 1] if home else 0)
+        self._core = _core.MujocoContacts(
+            scene.state()._core, _layout(), bodies, roots, dofs, roles, _touches(scene, shell), log
+        )
+        self._applied_by: object = None
+        again = self._core.attach(model._address)
+        if again:
+            said = "must not touch the same shell already, by an earlier attach"
+            raise InvalidParameter("spheres", again.split(" on ")[0], said)
+        weakref.finalize(model, _core.mujoco_end, model._address)
         self._attached = True
-        self._core.attach(model._address)
-
-    def _body_of_shell(self, bodies: list[int]) -> int:
-        joint = self.scene.pairs[0].joint_j
-        return bodies[joint - 1] if joint else 0
 
     @property
     def substeps(self) -> int:
@@ -93,27 +115,40 @@ class MujocoContacts:
 
     def step(self, data: mujoco.MjData) -> None:
         """Move `data` on by MuJoCo's timestep, in `substeps` steps."""
-        whole, parts = self.model.opt.timestep, self.substeps
-        self.model.opt.timestep = whole / parts
+        model = self._model_of(data)
+        whole, parts = model.opt.timestep, self.substeps
+        model.opt.timestep = whole / parts
         try:
             for _ in range(parts):
-                mujoco.mj_step(self.model, data)
+                mujoco.mj_step(model, data)
         finally:
-            self.model.opt.timestep = whole
+            model.opt.timestep = whole
         self.check()
+
+    def _model_of(self, data: mujoco.MjData) -> mujoco.MjModel:
+        """Return the model of `data`: this one, or a copy of it, which has the contacts, too."""
+        check_type("data", data, mujoco.MjData, "must be a mujoco.MjData")
+        model = data.model
+        if model is not self.model and not self._core.acts_on(model._address):
+            must = "must be of the model that the spheres were attached in, or of a copy of it"
+            raise InvalidParameter("data", data, f"{must}: attach them to the other model")
+        return model
 
     def apply(self, data: mujoco.MjData) -> None:
         """Add the forces to data.qfrc_passive: for a passive callback of your own."""
-        self._core.apply(self.model._address, data._address)
+        self._applied_by = _set_now("passive")
+        self._core.apply(self._model_of(data)._address, data._address)
         self.check()
 
     def contacts(self, data: mujoco.MjData) -> SceneContacts:
         """Return the contacts at the state of `data`, after mj_forward or mj_step1."""
+        self._model_of(data)
         self.check()
         return SceneContacts.from_rows(self._core.contacts(data._address))
 
     def log(self, data: mujoco.MjData) -> ContactLog:
         """Return the contacts of all steps of `data` since its time began, for attach(log=True)."""
+        self._model_of(data)
         self.check()
         t, rows = self._core.log(data._address)
         row = np.unique(t, return_inverse=True)[1].astype(np.int64)
@@ -128,20 +163,25 @@ class MujocoContacts:
         self._core.forget(data._address)
 
     def check(self) -> None:
-        """Raise SphshellError where a step since the last check had a fault."""
+        """Raise SphshellError where a step since the last check had a fault, or had no contacts.
+
+        A callback of MuJoCo's cannot raise. Python reports the first fault at once, as one that was
+        ignored (sys.unraisablehook).
+        """
         fault = self._core.take_fault()
+        if not fault and self._attached:
+            for slot, own in _callbacks().items():
+                now = _set_now(slot)
+                by_hand = slot == "passive" and now is not None and now is self._applied_by
+                if now is not own and not by_hand:
+                    fault = _REPLACED[slot]
         if fault:
             raise SphshellError(f"contacts in MuJoCo: {fault}")
 
     def detach(self) -> None:
-        """End the contacts, and let MuJoCo's own between these geoms be as they were."""
-        if not self._attached:
-            return
+        """End the contacts; MuJoCo's own between these geoms are as they were before."""
         self._attached = False
-        self._core.detach(self.model._address)
-        contype, conaffinity, changed = self._bits
-        self.model.geom_contype[changed] = contype[changed]
-        self.model.geom_conaffinity[changed] = conaffinity[changed]
+        self._core.detach()
 
     def __enter__(self) -> MujocoContacts:
         """Return itself: `with attach(...) as contacts:` detaches at the end."""
@@ -169,16 +209,18 @@ def attach(
     The shell is at `placement` in the frame of the MuJoCo body (default: the world). Forces act on
     both bodies, equal and opposite, in each evaluation of mj_step and mj_forward, for all MjData of
     the model and in any thread; friction remembers across the steps of each MjData. MuJoCo's own
-    contact between these geoms and those of `body` is switched off by a free bit of contype and
-    conaffinity; all other pairs collide as before. `law`, `friction` and `method` are as of
-    Scene.add_contact; `log` keeps the contacts of all steps.
+    contact between these geoms and those of `body` is left out by its contact filter; all other
+    pairs collide as before. Copies of the model have the contacts, too; they end with the model.
+    `law`, `friction` and `method` are as of Scene.add_contact; `log` keeps the contacts of all
+    steps.
 
     MuJoCo's implicit integrators do not know the derivatives of passive forces: the step must
     resolve the contact as an explicit one. SetupWarning where MuJoCo's timestep is longer than
     `recommended_dt`: `MujocoContacts.step` then divides it.
 
     Raises InvalidParameter for a name that is none, a geom or site that is no sphere, an explicit
-    <pair> between the geoms, no free bit, or a passive callback that is set already.
+    <pair> between the geoms, a sphere that touches the shell already, or a passive callback or
+    contact filter that is set already.
     """
     check_type("model", model, mujoco.MjModel, "must be a mujoco.MjModel")
     check_type("shell", shell, Shell, "must be a Shell")
@@ -201,8 +243,8 @@ def attach(
     settings = {"law": law, "friction": friction, "method": method}
     for ball, end in zip(balls, ends, strict=True):
         scene.add_contact(ball, shell, frame, pose, name=end.name, **settings)  # type: ignore[arg-type]
-    _claim_callback()
-    made = MujocoContacts(model, scene, bodies, ends, log)
+    _claim_callbacks()
+    made = MujocoContacts(model, scene, shell, bodies, ends, log)
     if made.substeps > 1:
         said = (
             f"MuJoCo's timestep of {model.opt.timestep:.3g} s is too long for this law: the "
@@ -279,91 +321,100 @@ def _dofs_of(model: mujoco.MjModel, body: int) -> list[int]:
     return out
 
 
-def _separate(
-    model: mujoco.MjModel, ends: list[_End], home: int
-) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Switch off collisions of the spheres' geoms with those of the body `home`, and no others.
-
-    Returns contype and conaffinity as they were, and which geoms have others now. Geoms a and b
-    collide where contype of one has a bit of conaffinity of the other. A sphere gets one bit that
-    nobody else has, as its contype, and those that it is to meet get that bit in conaffinity.
-    """
-    geoms = [end.geom for end in ends if end.geom >= 0]
-    of_body = np.flatnonzero(model.geom_bodyid == home)
+def _roles(model: mujoco.MjModel, ends: list[_End], home: int) -> list[int]:
+    """Return the part of each geom: 1, a sphere; 2, of the shell's body `home`; 0, neither."""
+    roles = np.zeros(model.ngeom, int)
+    roles[model.geom_bodyid == home] = _SHELL
+    roles[[end.geom for end in ends if end.geom >= 0]] = _SPHERE
     for one, other in zip(model.pair_geom1, model.pair_geom2, strict=True):
-        if (one in geoms and other in of_body) or (other in geoms and one in of_body):
+        if {int(roles[one]), int(roles[other])} == {_SPHERE, _SHELL}:
             told = "must not have a <pair> with the geoms of the shell's body: remove it"
-            raise InvalidParameter("spheres", model.geom(one).name, told)
-    contype, conaffinity = model.geom_contype.copy(), model.geom_conaffinity.copy()
-    was = contype.copy(), conaffinity.copy()
-    for geom in geoms:
-        meets = (contype[geom] & conaffinity) | (contype & conaffinity[geom]) != 0
-        meets[geom] = False
-        if not meets[of_body].any():
-            continue
-        meets[of_body] = False
-        used = int(np.bitwise_or.reduce(contype | conaffinity)) & (1 << _BITS) - 1
-        free = [bit for bit in range(_BITS - 1) if not used >> bit & 1]
-        if meets.any() and not free:
-            told = "cannot be kept from MuJoCo's own contact: all bits of contype are in use"
-            raise InvalidParameter("spheres", model.geom(geom).name, told)
-        contype[geom] = conaffinity[geom] = 0
-        if meets.any():
-            contype[geom] = 1 << free[0]
-            conaffinity[meets] |= 1 << free[0]
-    changed = np.flatnonzero((contype != was[0]) | (conaffinity != was[1]))
-    model.geom_contype[:], model.geom_conaffinity[:] = contype, conaffinity
-    return *was, changed
+            name = model.geom(one if roles[one] == _SPHERE else other).name
+            raise InvalidParameter("spheres", name, told)
+    return [int(role) for role in roles]
 
 
 @cache
-def _passive() -> object:
-    """Return the core's function for MuJoCo, which calls it without Python."""
-    kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-    return kind(_core.mujoco_passive())
+def _callbacks() -> dict[str, object]:
+    """Return the core's functions for MuJoCo, which calls them without Python, by their slot."""
+    pointer, number = ctypes.c_void_p, ctypes.c_int
+    passive = ctypes.CFUNCTYPE(None, pointer, pointer)
+    contactfilter = ctypes.CFUNCTYPE(number, pointer, pointer, number, number)
+    return {
+        "passive": passive(_core.mujoco_passive()),
+        "contactfilter": contactfilter(_core.mujoco_filter()),
+    }
 
 
-def _claim_callback() -> None:
-    set_already = mujoco.get_mjcb_passive()
-    if set_already is None:
-        mujoco.set_mjcb_passive(_passive())
-    elif set_already is not _passive():
-        raise InvalidParameter(
-            "model",
-            set_already,
-            "must have no passive callback of yours: set it after attach, and call "
-            "contacts.apply(data) in it",
-        )
+def _set_now(slot: str) -> object:
+    return getattr(mujoco, f"get_mjcb_{slot}")()
 
 
-def _layout(model: mujoco.MjModel) -> list[int]:
+def _claim_callbacks() -> None:
+    for slot, own in _callbacks().items():
+        now = _set_now(slot)
+        if now is not None and now is not own:
+            after = (
+                "passive callback of yours: set it after attach, and call contacts.apply(data) in "
+                if slot == "passive"
+                else "contact filter of yours, as attach sets its own: leave out pairs of geoms by "
+                "contype and conaffinity in place of "
+            )
+            raise InvalidParameter("model", now, f"must have no {after}it")
+    for slot, own in _callbacks().items():
+        getattr(mujoco, f"set_mjcb_{slot}")(own)
+
+
+def _touches(scene: Scene, shell: Shell) -> list[str]:
+    """Return a text for each pair, the same for the same sphere at the same place of a shell."""
+    out = []
+    for pair in scene.pairs:
+        surface = (shell.vertices, shell.elements, pair.placement_j.homogeneous)
+        digest = hashlib.sha256(b"".join(np.asarray(one).tobytes() for one in surface))
+        out.append(f"{pair.name} on {pair.joint_j} {digest.hexdigest()}")
+    return out
+
+
+@cache
+def _layout() -> list[int]:
     """Return where MuJoCo keeps what the core reads: see MujocoLayout in adapters/mujoco.hpp.
 
-    The arrays' pointers, and two numbers that are changed for a moment, are looked for in the
-    structs themselves, as they differ between versions.
+    The arrays' pointers, and numbers with a value of their own, are looked for in the structs of a
+    small model, as they differ between versions.
     """
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
+    )
     data = mujoco.MjData(model)
-    data.time = time = 1.2345678901234567e-77
-    arrays = ("xpos", "xquat", "cvel", "subtree_com", "cdof", "qfrc_passive")
-    out = [_find(data._address, time, ctypes.c_double)]
-    out += [
-        _find(data._address, getattr(data, name).ctypes.data, ctypes.c_uint64) for name in arrays
+    data.time = model.opt.timestep = 1.2345678901234567e-77
+    model.opt.integrator, model.opt.enableflags = 0x5EED5EED, 0x6EED6EED
+    in_data = ("xpos", "xquat", "cvel", "subtree_com", "cdof", "qfrc_passive")
+    numbers, in_model = ("integrator", "enableflags"), ("geom_contype", "geom_conaffinity")
+    return [
+        _find(data._address, data.time, ctypes.c_double),
+        *(_find(data._address, _pointer(data, name), ctypes.c_uint64) for name in in_data),
+        _find(model._address, model.opt.timestep, ctypes.c_double),
+        *(_find(model._address, getattr(model.opt, n), ctypes.c_int) for n in numbers),
+        *(_find(model._address, _pointer(model, name), ctypes.c_uint64) for name in in_model),
     ]
-    kept = model.opt.timestep, model.opt.integrator
-    try:
-        model.opt.timestep = time
-        out.append(_find(model._address, time, ctypes.c_double))
-        model.opt.integrator = 0x5EED5EED
-        out.append(_find(model._address, 0x5EED5EED, ctypes.c_int))
-    finally:
-        model.opt.timestep, model.opt.integrator = kept
-    return out
+
+
+def _pointer(struct: object, name: str) -> int:
+    return int(getattr(struct, name).ctypes.data)
 
 
 def _find(
     address: int, value: float, kind: type[ctypes.c_double | ctypes.c_uint64 | ctypes.c_int]
 ) -> int:
-    """Return how far behind `address` a number is [bytes]."""
+    """Return how far behind `address` a number is [bytes].
+
+    Arrays without elements have the address of the one that follows them: of equal addresses one
+    behind the other the last is that of the array.
+    """
     size = ctypes.sizeof(kind)
-    offsets = range(0, 1 << 21, size)
-    return next(at for at in offsets if kind.from_address(address + at).value == value)
+
+    def is_at(at: int) -> bool:
+        return bool(kind.from_address(address + at).value == value)
+
+    first = next(at for at in range(0, 1 << 21, size) if is_at(at))
+    return next(at for at in range(first, 1 << 21, size) if not is_at(at + size))

@@ -30,6 +30,8 @@ from sphshell_pin.regular_file import read_text
 # finds no moved file again, a sweep locks its folder.
 _JOURNAL, _CHANGES = ".journal", ".journal-journal"
 
+# Another process can remove the parent that long between two steps of this one.
+_MOST_TRIES = 100
 # In the folder where the new ones are made: they, and the list written once all are complete.
 _FILES, _READY = "files", "ready.json"
 
@@ -73,11 +75,9 @@ class AtomicFolder:
     def __enter__(self) -> Self:
         try:
             folder = self._folder
-            self._made = [one for one in (folder, *folder.parents) if not one.exists()]
-            folder.mkdir(parents=True, exist_ok=True)
+            self._take()
             with tempfile.TemporaryFile(dir=folder):
                 pass
-            self._take()
             self._clear()
             for name in self._inner:
                 if any(folder.glob(f".{name}.*")):  # what a process left that was writing there
@@ -161,35 +161,65 @@ class AtomicFolder:
         self._move_in(inside)
 
     def _take(self) -> None:
-        """Lock the folder by a file beside it; in it if the parent cannot be written."""
-        beside, inside = self._folder.parent / f".{self._folder.name}.lock", self._folder / ".lock"
-        for path in (beside, inside):
+        """Lock the folder, then make it: only its holder makes it, and removes it again."""
+        folder = self._folder
+        for tries_left in reversed(range(_MOST_TRIES)):
             try:
-                descriptor, locked = lock_file(path, wait=False)
-            except BlockingIOError:
-                raise FolderInUse(f"{holder(path)} is writing it") from None
-            except OSError:
-                if path == inside:
+                self._make(folder.parent)
+                try:
+                    self._lock_by(folder.parent / f".{folder.name}.lock")
+                except (FolderInUse, FileNotFoundError):
                     raise
-                continue
-            self._lock = path, descriptor
-            self._suffix = "" if locked else f"-{os.getpid()}"
-            sign(descriptor)
-            return
+                except OSError:  # the parent cannot be written
+                    self._make(folder)
+                    self._lock_by(folder / ".lock")
+                break
+            except FileNotFoundError:
+                # Another process has just removed the parent, which it had made in vain.
+                if not tries_left:
+                    raise
+        self._make(folder)
+
+    def _lock_by(self, path: Path) -> None:
+        """Lock the folder by the file at `path`."""
+        try:
+            descriptor, locked = lock_file(path, wait=False)
+        except BlockingIOError:
+            raise FolderInUse(f"{holder(path)} is writing it") from None
+        self._lock = path, descriptor
+        self._suffix = "" if locked else f"-{os.getpid()}"
+        sign(descriptor)
+
+    def _make(self, folder: Path) -> None:
+        """Make a folder and its parents; remember those that this process made."""
+        for one in reversed((folder, *folder.parents)):
+            if not one.exists():
+                with contextlib.suppress(FileExistsError):
+                    one.mkdir()
+                    self._made.append(one)
 
     def _end(self) -> None:
-        """Unlock the folder; remove it if it was made in vain."""
-        if self._lock is not None:
-            path, descriptor = self._lock
-            self._lock = None
-            try:
-                with contextlib.suppress(OSError):
-                    os.unlink(path)
-            finally:
-                os.close(descriptor)
-        with contextlib.suppress(OSError):
-            for one in self._made:
-                one.rmdir()  # fails where something is in it
+        """Remove the folder if it was made in vain, and unlock it."""
+        try:
+            if self._lock is not None:
+                path, descriptor = self._lock
+                self._lock = None
+                if path.parent != self._folder and self._folder in self._made:
+                    # While it is locked: afterwards it may be another process's.
+                    try:
+                        self._folder.rmdir()
+                        self._made.pop()
+                    except OSError:
+                        self._made.clear()
+                try:
+                    with contextlib.suppress(OSError):
+                        os.unlink(path)
+                finally:
+                    os.close(descriptor)
+        finally:
+            with contextlib.suppress(OSError):
+                while self._made:
+                    self._made.pop().rmdir()  # fails where something is in it
 
     def _places(self) -> tuple[Path, Path]:
         """Return the folders in which the new files may be made: beside, and inside."""

@@ -18,6 +18,7 @@ import typer
 from sphshell_pin import errors
 from sphshell_pin._interrupts import interrupts_heard
 from sphshell_pin.checks import stated_pairs
+from sphshell_pin.cli.printing import lossy_streams
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 
 if TYPE_CHECKING:
@@ -89,6 +90,14 @@ PackageDirOption = Annotated[
         callback=_search_in,
     ),
 ]
+DensityOption = Annotated[
+    float | None,
+    option(
+        "Of links whose mass the URDF does not state: from their meshes; 2700 is aluminium.",
+        metavar="KG/M^3",
+    ),
+]
+MimicOption = Annotated[bool, option("Joints that mimic others move freely.", "--no-mimic")]
 XacroArgOption = Annotated[
     list[str] | None,
     option(
@@ -133,7 +142,8 @@ def options(
 
 def main() -> None:
     """Run the command line."""
-    app()
+    with lossy_streams():
+        app()
 
 
 def command(name: str | None = None) -> Callable[[Callable[P, None]], Callable[P, None]]:

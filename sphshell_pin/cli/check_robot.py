@@ -15,6 +15,8 @@ from sphshell_pin.cli.app import (
     ERROR,
     INTERRUPTED,
     MISSED,
+    DensityOption,
+    MimicOption,
     PackageDirOption,
     RadiusOption,
     XacroArgOption,
@@ -62,6 +64,12 @@ def check_robot_(
     ] = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
+    density: DensityOption = None,
+    no_mimic: MimicOption = False,
+    mend: Annotated[
+        Path | None,
+        option("Write a URDF of the robot that needs none of these options.", metavar="OUT.urdf"),
+    ] = None,
     quick: Annotated[bool, option("Fewer postures and runs.", "--quick")] = False,
     seed: Annotated[int, option("Seed of the random postures.", min=0)] = 0,
     json: Annotated[
@@ -89,9 +97,21 @@ def check_robot_(
         raise SphshellError("say which robots: names, files, or --all")
     names = models.all_names() if every else list(robot or [])
     models.check_known(names)
-    for path in (json, write):
+    if mend is not None and len(names) != 1:
+        raise SphshellError("--mend writes one robot: give one")
+    for path in (json, write, mend):
         if path is not None:
             _check_writable(path)
+    if mend is not None:
+        from sphshell_pin.robots.mending import mended
+
+        args = xacro_args_of(xacro_arg)
+        text, changes = mended(names[0], package_dir or (), args, density)
+        write_whole(mend, text.encode())
+        say(f"Written: {mend}")
+        for change in changes:
+            say(f"  {change}")
+        names, package_dir, xacro_arg, density = [str(mend)], None, None, None
     sizes = study.QUICK if quick else study.Sizes()
     check = partial(
         study.check_robot,
@@ -100,6 +120,8 @@ def check_robot_(
         free_flyer=free_flyer,
         package_dirs=package_dir or (),
         xacro_args=xacro_args_of(xacro_arg),
+        density=density,
+        mimic=not no_mimic,
         seed=seed,
         sizes=sizes,
     )

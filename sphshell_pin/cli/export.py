@@ -24,7 +24,13 @@ FORMATS = ("mcap", "csv", "parquet")
 def export(
     *,
     run: RunArgument,
-    to: Annotated[str, option("mcap (ROS 2 messages), csv or parquet (tables).", metavar="FORMAT")],
+    to: Annotated[
+        str | None,
+        option(
+            "mcap (ROS 2 messages), csv or parquet (tables); by default as --out ends.",
+            metavar="FORMAT",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         option(
@@ -50,6 +56,8 @@ def export(
     """
     from sphshell_pin.scenario.running.replay import Replay
 
+    if to is None:
+        to = out.suffix.removeprefix(".") if out is not None else ""
     if to not in FORMATS:
         must = f"must be one of {', '.join(FORMATS)}"
         if to == "rrd":

@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+from json import dumps
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-from sphshell_pin.cli.app import argument, command, option, print_table, say
+import typer
+
+from sphshell_pin.cli.app import (
+    MISSED,
+    argument,
+    command,
+    length_of,
+    option,
+    print_table,
+    say,
+)
 from sphshell_pin.errors import SphshellError, UnitMissing
+
+if TYPE_CHECKING:
+    from sphshell_pin.study.against import Against
+
+MOST_ROWS = 16  # of the printed table
 
 FORMATS = ".stl .obj .ply .off .shl, .step .iges .brep"
 
@@ -44,29 +60,91 @@ def check(
     face: FaceOption = None,
     time_limit: TimeLimitOption = None,
     memory_limit: MemoryLimitOption = None,
+    against: Annotated[
+        Path | None, option("Another file of the same part: compare contact on all faces of both.")
+    ] = None,
+    against_unit: Annotated[str | None, option("Length unit of that file.")] = None,
+    radius: Annotated[
+        str | None, option("With --against: radius of the spheres, 2 % of the size unless given.")
+    ] = None,
+    tolerance: Annotated[float, option("With --against: share by which forces may differ.")] = 0.01,
+    json: Annotated[
+        Path | None, option("With --against: write all figures to this file.", "--json")
+    ] = None,
 ) -> None:
     """Print the health of a surface file: what was found, what was repaired, how far it is curved.
+
+    With --against, press spheres into all faces of two files of one part, and print the faces on
+    which contact differs. Exit code 1: it does.
 
     Example: sphshell-pin check blade.stl --unit mm
     """
     from sphshell_pin import Shell
+    from sphshell_pin.shell.cad import CAD_SUFFIXES
 
-    try:
-        shell = Shell.from_file(
-            file,
-            unit,
-            _number_or_word(scale),
-            chord_error=chord_error,
-            bodies=body,
-            faces=faces_of(face),
-            time_limit=time_limit,
-            memory_limit=memory_limit,
-            side=side,
+    def load(file: Path, unit: str | None, unit_option: str, first: bool = True) -> Shell:
+        # Of two files, options of CAD belong to those that are CAD.
+        cad = against is None or file.suffix.lower() in CAD_SUFFIXES
+        try:
+            return Shell.from_file(
+                file,
+                unit,
+                _number_or_word(scale) if first else None,
+                chord_error=chord_error if cad else None,
+                bodies=body if cad and first else None,
+                faces=faces_of(face) if cad and first else None,
+                time_limit=time_limit if cad else None,
+                memory_limit=memory_limit if cad else None,
+                side=side if against is None else "both",
+            )
+        except UnitMissing as error:
+            raise SphshellError(f"the unit {error.must(unit_option + ' {}')}") from error
+
+    shell = load(file, unit, "--unit")
+    if against is None:
+        shell.curvature_report()
+        say(str(shell.health))
+        return
+    from sphshell_pin.study.against import compare_shells
+
+    other = load(against, against_unit, "--against-unit", False)
+    found = compare_shells(shell, other, length_of("--radius", radius), tolerance)
+    _print_against(found, (file.name, against.name))
+    if json is not None:
+        from sphshell_pin.atomic import write_whole
+
+        text = dumps({"files": [str(file), str(against)], **found.to_dict()}, indent=1)
+        write_whole(json, text.encode())
+    raise typer.Exit(0 if found.same else MISSED)
+
+
+def _print_against(found: Against, names: tuple[str, str]) -> None:
+    """Print the faces that differ most, and the verdict."""
+    rows = [
+        (
+            f"{'AB'[one.of]} {one.name}",
+            one.kind,
+            f"{one.area:.1e}",
+            str(one.places),
+            f"{one.worst:+.1e}",
+            f"{one.worst / found.radius:+.1e}",
+            f"{one.median / found.radius:.0e}",
+            f"{one.worst / found.size:+.1e}",
+            "{:.2f}-{:.2f}".format(*one.force),
+            f"{one.lost}+{one.extra}",
         )
-    except UnitMissing as error:
-        raise SphshellError(f"the unit {error.must('--unit {}')}") from error
-    shell.curvature_report()
-    say(str(shell.health))
+        for one in found.off[:MOST_ROWS]
+    ]
+    if rows:
+        columns = ("face", "kind", "[m^2]", "places", "worst [m]", "of r", "median", "of size")
+        print_table((*columns, "force", "lost+extra"), rows)
+    if len(found.off) > len(rows):
+        say(f"{len(found.off) - len(rows)} more faces differ")
+    if found.unreached:
+        say(f"{found.unreached} faces are not compared: no sphere of this radius touches one alone")
+    spheres = f"spheres of radius {found.radius:.3g} m, {found.depth:.3g} m deep"
+    say(f"A {names[0]}, B {names[1]}; {spheres}")
+    say(found.verdict())
 
 
 @command()

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from sphshell_pin.cli.app import (
+    DensityOption,
+    MimicOption,
     PackageDirOption,
     RadiusOption,
     XacroArgOption,
     command,
     length_of,
     option,
+    progress_bar,
     say,
     xacro_args_of,
 )
@@ -95,6 +98,8 @@ def new(
     free_flyer: Annotated[bool, option("The same as --base floating.", "--free-flyer")] = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
+    density: DensityOption = None,
+    no_mimic: MimicOption = False,
     out: Annotated[
         Path | None, option("The file to write; default: ROBOT_on_SURFACE.toml.")
     ] = None,
@@ -109,32 +114,36 @@ def new(
     """
     from sphshell_pin.scenario.drafting.new import new_scenario
 
+    title = f"{robot} and {surface}: searching posture, place and values"
     try:
-        made = new_scenario(
-            robot,
-            surface,
-            frame=frame,
-            radius=length_of("--radius", radius),
-            offset=offset,
-            unit=unit,
-            bodies=body,
-            faces=faces_of(face),
-            material=law,
-            against=against,
-            press=press,
-            place=place,
-            at=at,
-            path=path,
-            length=length_of("--length", length),
-            tips=tips,
-            base="floating" if free_flyer else base,
-            package_dirs=package_dir or (),
-            xacro_args=xacro_args_of(xacro_arg),
-            out=out,
-            force=force,
-            # What was tried goes to the error stream, the answer to the other.
-            tell=lambda what: typer.echo(what, err=True),
-        )
+        with progress_bar(title, "TimeElapsedColumn", total=None):
+            made = new_scenario(
+                robot,
+                surface,
+                frame=frame,
+                radius=length_of("--radius", radius),
+                offset=offset,
+                unit=unit,
+                bodies=body,
+                faces=faces_of(face),
+                material=law,
+                against=against,
+                press=press,
+                place=place,
+                at=at,
+                path=path,
+                length=length_of("--length", length),
+                tips=tips,
+                base="floating" if free_flyer else base,
+                package_dirs=package_dir or (),
+                xacro_args=xacro_args_of(xacro_arg),
+                density=density,
+                mimic=not no_mimic,
+                out=out,
+                force=force,
+                # What was tried goes to the error stream, the answer to the other.
+                tell=lambda what: typer.echo(what, err=True),
+            )
     except UnitMissing as error:
         raise SphshellError(f"the unit {error.must('--unit {}')}") from error
     _show(made)

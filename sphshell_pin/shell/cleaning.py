@@ -57,6 +57,15 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
         raise InvalidShell("all vertices of the surface lie in one place: there is no element")
     tolerance = WELD_TOLERANCE * size
     representative, distance = _core.mend_weld(vertices, tolerance)
+    place = representative
+    if raw.solids is not None:
+        # Each solid is cleaned by itself, with its own copies of the vertices it has in common with
+        # others.
+        of_vertex = np.zeros(len(vertices), np.int64)
+        of_vertex[polygons.corners] = raw.solids[polygons.source[polygons.polygon_of_slot]] + 1
+        key = representative * (of_vertex.max() + 1) + of_vertex
+        _, first, group = np.unique(key, return_index=True, return_inverse=True)
+        representative = first[group].astype(np.int32)
     found["weld_tolerance"] = tolerance
     welded = int((representative != np.arange(len(vertices), dtype=np.int32)).sum())
     found["welded_vertices"] = welded
@@ -64,12 +73,30 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
     if welded:
         polygons = polygons.with_corners(representative[polygons.corners])
     polygons, table = _mend(polygons, vertices, table, tolerance, size, found)
-    oriented = orient(polygons, vertices)
-    polygons, vertices = _without_unused(oriented.polygons, vertices)
+    solid = None if raw.solids is None else raw.solids[polygons.source]
+    oriented = orient(polygons, vertices, solid)
+    polygons = oriented.polygons
+    if solid is not None:
+        polygons = _joined(polygons, place)
+    polygons, vertices = _without_unused(polygons, vertices)
     # Those merged into another vertex are counted there.
     found["unused_vertices"] = len(raw.vertices) - welded - len(vertices)
     oriented = replace(oriented, polygons=polygons)
     return _with_origin(_assemble(oriented, vertices, table, found), raw)
+
+
+def _joined(polygons: Polygons, place: Ints) -> Polygons:
+    """Return the polygons with the vertices in one `place` (n,) made one where solids share edges.
+
+    A sphere that rolls over the joint of two solids touches one surface, not two. Edges and their
+    users stay those of each solid.
+    """
+    ends = np.sort(place[polygons.edges.ends], axis=1)
+    _, edge, users = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    shared = polygons.edges.ends[users[edge.ravel()] > 1]
+    merged = np.arange(len(place), dtype=np.int32)
+    merged[shared] = place[shared]
+    return polygons.renumbered(merged)
 
 
 def take_surface(raw: RawSurface) -> CleanedSurface:
@@ -311,8 +338,9 @@ def _assemble(
         components=len(oriented.closed),
         closed_components=int(oriented.closed.sum()),
         cavities=oriented.cavities,
+        overlapping_components=oriented.overlapping,
         one_sided_components=int(oriented.one_sided.sum()),
-        euler_number=int(in_use.sum()) - borders["edges"] + len(polygons),
+        euler_number=oriented.euler_number,
         worst_shape=float(_core.mend_shapes(starts, triangles.reshape(-1), vertices).min()),
     )
     return CleanedSurface(
@@ -328,7 +356,9 @@ def _with_origin(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
     faces = raw.faces[surface.source_element]
     normals = surface.normals
     if normals is not None:
-        normals = settle_joints(normals, surface.triangles, faces[surface.triangle_element])
+        face = faces[surface.triangle_element]
+        plane = None if raw.face_shapes is None else raw.face_shapes[face, 0] == 0
+        normals = settle_joints(normals, surface.triangles, face, plane)
     return replace(
         surface,
         normals=normals,

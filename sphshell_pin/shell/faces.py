@@ -34,6 +34,8 @@ class Face:
         borders with what is no such face, are farther from it than 4e-9 of the size, and contacts
         are those of curved elements with its normals
     name : of the CAD face; None of one that was recognized
+    inscribed : whether it is a plane with all corners on a round face beside it: it is wider than
+        the equal steps of that face
     """
 
     kind: str
@@ -45,6 +47,7 @@ class Face:
     elements: Ints = field(repr=False)
     exact: bool
     name: str | None = None
+    inscribed: bool = False
 
 
 def faces_of(core: _core.Shell, names: Sequence[str] = ()) -> tuple[Face, ...]:
@@ -76,6 +79,7 @@ def _face(kind: str, numbers: Floats, elements: Ints, exact: bool, name: str | N
         read_only(elements.copy()),
         exact,
         name,
+        kind == "plane" and second > 0.0,
     )
 
 
@@ -89,6 +93,12 @@ def described(faces: Sequence[Face], elements: int) -> str:
     share = f"; {left:.3g} % of the elements on none" if left > 0.0 else ""
     if curved := sum(not face.exact for face in faces):
         share += f"; {curved} of {len(faces)} as curved elements"
+    if flats := [face for face in faces if face.inscribed]:
+        at = "({:.4g}, {:.4g}, {:.4g}) m".format(*flats[0].point)
+        share += (
+            f"; plane although inscribed in the round face beside it, as wider than its steps: "
+            f"{len(flats)}, one at {at}"
+        )
     return (", ".join(parts) or "none recognized") + share
 
 

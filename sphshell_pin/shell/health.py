@@ -83,6 +83,11 @@ _PROBLEMS = (
         "at {pinched_at:place}: unless it is meant, an element is missing beside it",
     ),
     (
+        "overlapping_components",
+        "{overlapping_components:closed component} partly inside another, or equal to it: taken as "
+        "a solid, not as a cavity",
+    ),
+    (
         "one_sided_components",
         "{one_sided_components:component} one-sided (like a Moebius strip): only "
         'side="both" makes sense',
@@ -238,6 +243,7 @@ class ShellHealth:
         triangulated; the most corners; outlines that cross themselves
     flipped_elements, reversed_components : winding turned
     components, closed_components, cavities : connected across edges of two elements
+    overlapping_components : closed, partly inside another one or in its place
     one_sided_components : without a consistent winding (a Moebius strip)
     edges, boundary_edges, boundary_loops, non_manifold_edges : edges of any, of one, of three and
         more elements
@@ -246,7 +252,7 @@ class ShellHealth:
     non_manifold_at : middle of one non-manifold edge
     pinched_vertices, pinched_at : vertices whose elements are not all connected across the edges
         that meet there, counted by `Shell`; one of them
-    euler_number : vertices - edges + elements
+    euler_number : vertices - edges + elements, those that solids share once for each
     worst_shape : smallest 2 area / longest edge^2 of a triangle
     has_normals : normals were given
     missing_normals, rescaled_normals, turned_normals : zero or not finite, replaced by the
@@ -289,6 +295,7 @@ class ShellHealth:
     components: int = 0
     closed_components: int = 0
     cavities: int = 0
+    overlapping_components: int = 0
     one_sided_components: int = 0
     edges: int = 0
     boundary_edges: int = 0

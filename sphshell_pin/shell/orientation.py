@@ -9,7 +9,7 @@ import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.shell.polygons import Polygons, examine_quads
-from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask
+from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask, area_vectors
 
 SMALL_HOLE_EDGES = 4
 SMALL_HOLE_AREA = 0.3
@@ -17,6 +17,15 @@ SMALL_HOLE_AREA = 0.3
 
 TINY_HOLE_AREA = 0.02
 """A boundary loop of any number of edges is a hole if it spans less than this share."""
+
+LINES = 16
+"""Through each closed component, along which it is measured how much of it is in others."""
+
+INSIDE, OUTSIDE = 0.95, 0.05
+"""A component with at least, at most this share inside another is in it, is beside it."""
+
+SAME_VOLUME = 1e-6
+"""A component larger by less than this share does not hold another."""
 
 
 def split_elements(polygons: Polygons, vertices: Floats) -> tuple[Longs, Ints]:
@@ -60,8 +69,10 @@ class Oriented:
     flipped : (m,) wound the other way than in the input
     reversed_components : components turned as a whole
     cavities : closed components inside another one, wound inward (away from the material)
+    overlapping : closed components partly inside another one
     volume : enclosed by the closed components [m^3]
     area : (components,) [m^2]
+    euler_number : vertices - edges + polygons
     """
 
     polygons: Polygons
@@ -71,16 +82,22 @@ class Oriented:
     flipped: Mask
     reversed_components: int
     cavities: int
+    overlapping: int
     volume: float
     area: Floats
+    euler_number: int
 
 
-def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> Oriented:
+def orient(
+    polygons: Polygons, vertices: Floats, solid: Ints | None = None, keep_winding: bool = False
+) -> Oriented:
     """Wind polygons of three and four corners alike within each component.
 
     A closed component is wound outward; inside another closed one it is a cavity, wound toward
-    its inside, and so on by turns. An open one keeps the winding most of its area has. With
-    `keep_winding` nothing is turned, and a component counts as closed only if it need not be.
+    its inside, and so on by turns. With the `solid` (m,) of each polygon, -1 of none, that is asked
+    only of components of one solid, which must not be connected to others. An open one keeps the
+    winding most of its area has. With `keep_winding` nothing is turned, and a component counts as
+    closed only if it need not be.
     """
     edges = polygons.edges
     component, flipped, one_sided = _core.mend_flood_fill(
@@ -95,15 +112,24 @@ def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> 
         closed &= (odd_ones == 0) | (odd_ones == np.bincount(component, minlength=number))
     triangles, element = as_triangles(polygons, vertices)
     # The volume about a point near the surface loses the least to rounding.
-    volume, total_area, turned_area, largest = _core.mend_sums(
+    volume, total_area, turned_area = _core.mend_sums(
         vertices, triangles, element, component, flipped, number, vertices.mean(axis=0)
     )
-    # The middle of the largest triangle: the place least likely to lie on another component.
-    places = vertices[triangles[largest]].mean(axis=1)
-    depth = np.zeros(number, np.int32)  # how many other closed components enclose each closed one
-    if closed.sum() > 1:
+    # How many other closed components enclose each closed one.
+    depth, overlapping = np.zeros(number, np.int64), 0
+    group = np.where(closed, 0, -1).astype(np.int32)
+    if solid is not None:
+        group[component] = np.where(closed[component], solid + 1, -1)
+    if closed.sum() > len(np.unique(group[closed])):
         owner = component[element]
-        depth = _core.mend_nesting(vertices, triangles, owner, places, closed.astype(np.uint8))
+        places, of_place = _places(vertices, triangles, owner, group >= 0)
+        pairs, share = _core.mend_overlaps(vertices, triangles, owner, places, of_place, group)
+        # Of two that share room only the larger can hold the other.
+        size = np.abs(volume)[pairs]
+        larger = size[:, 1] * (1.0 - SAME_VOLUME) > size[:, 0]
+        depth = np.bincount(pairs[larger & (share > INSIDE), 0], minlength=number)
+        partly = (share > OUTSIDE) & ~(larger & (share > INSIDE)) & (size[:, 0] <= size[:, 1])
+        overlapping = len(np.unique(pairs[partly, 0]))
     inward = depth % 2 == 1
     reverse = np.where(
         closed, (volume < 0.0) != inward, turned_area > 1e-9 * np.maximum(total_area, 1e-300)
@@ -116,6 +142,8 @@ def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> 
         turned = np.bincount(component, flip, number)
         reversed_components = int((turned == np.bincount(component, minlength=number)).sum())
     sign = np.where(inward, -1.0, 1.0)
+    used = np.zeros(len(vertices), np.bool_)
+    used[polygons.corners] = True
     return Oriented(
         polygons=polygons.reverse(flip),
         component=component,
@@ -124,9 +152,31 @@ def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> 
         flipped=flip,
         reversed_components=reversed_components,
         cavities=0 if keep_winding else int((closed & inward).sum()),
+        overlapping=overlapping,
         volume=float((np.abs(volume) * sign)[closed].sum()),
         area=total_area,
+        euler_number=int(used.sum()) - len(edges.users) + len(polygons),
     )
+
+
+def _places(vertices: Floats, triangles: Ints, owner: Ints, wanted: Mask) -> tuple[Floats, Ints]:
+    """Return points (n, 3) on triangles of the `wanted` components, and the component of each.
+
+    They are spread by area, LINES on each component.
+    """
+    own = np.flatnonzero(wanted[owner])
+    own = own[np.argsort(owner[own], kind="stable")]
+    corners = vertices[triangles[own]]
+    total = np.cumsum(np.linalg.norm(area_vectors(corners), axis=1))
+    components, first = np.unique(owner[own], return_index=True)
+    start, stop = np.append(0.0, total)[first], total[np.append(first[1:], len(own)) - 1]
+    share = (np.arange(LINES) + 0.5) / LINES
+    at = np.searchsorted(total, start[:, None] + share * (stop - start)[:, None])
+    # No two in one place of a triangle that has several of them.
+    weights = 0.2 + 0.3 * np.stack([share, np.roll(share, LINES // 2)], axis=1)
+    weights = np.tile(np.c_[weights, 1.0 - weights.sum(axis=1)], (len(components), 1))
+    places = np.einsum("nk,nkx->nx", weights, corners[at.ravel()])
+    return places, np.repeat(components, LINES).astype(np.int32)
 
 
 def _closed_components(polygons: Polygons, component: Ints, flip: Mask, number: int) -> Mask:

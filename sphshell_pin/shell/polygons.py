@@ -92,7 +92,10 @@ class Polygons:
         return Polygons(self.offsets, np.ascontiguousarray(corners), self.source, self.normal_row)
 
     def renumbered(self, place: Ints) -> Polygons:
-        """Return the same polygons, vertex v called place[v], which must keep the order."""
+        """Return the same polygons and edges, vertex v called place[v].
+
+        The edges ascend only if `place` keeps the order.
+        """
         polygons = self.with_corners(place[self.corners])
         if "edges" in self.__dict__:  # found already: cached_property keeps them there
             edges = self.edges

@@ -57,6 +57,8 @@ class RawSurface:
     face_names : of the CAD faces
     face_shapes : (f, 9) of the CAD faces, as of CleanedSurface, or None
     rounding : half the step to which the coordinates are known [m], 0 if they show none
+    solids : (m,) solid of the CAD file whose surface each polygon is part of, -1 of none; or None.
+        No vertex is used by polygons of two
     """
 
     vertices: Floats
@@ -68,6 +70,7 @@ class RawSurface:
     face_names: tuple[str, ...] = ()
     face_shapes: Floats | None = None
     rounding: float = 0.0
+    solids: Ints | None = None
 
     @property
     def num_polygons(self) -> int:

@@ -7,9 +7,9 @@ import pinocchio as pin
 
 from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics import Result, Scene
+from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.testing.finding import Finding
-from sphshell_pin.testing.forces import mass_matrix
 
 
 def momentum(result: Result) -> Finding:
@@ -95,7 +95,7 @@ def kinetic_energy(model: pin.Model, data: pin.Data, q: Array, v: Array) -> floa
     """Return the kinetic energy [J]; Pinocchio's function refuses mimic joints."""
     if not len(model.mimicking_joints):
         return float(pin.computeKineticEnergy(model, data, q, v))
-    return 0.5 * float(v @ mass_matrix(model, data, q) @ v)
+    return 0.5 * float(v @ mass_matrix(model, q) @ v)
 
 
 def _potential_energy(model: pin.Model, data: pin.Data, q: Array) -> float:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics import Scene
+from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.testing.finding import Finding, Optional
 
@@ -60,12 +61,6 @@ def joint_names(model: pin.Model) -> list[str]:
     return names
 
 
-def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
-    """Return the whole mass matrix (nv, nv)."""
-    upper = np.triu(np.asarray(pin.crba(model, data, q)).reshape(model.nv, model.nv))
-    return np.asarray(upper + np.triu(upper, 1).T)
-
-
 def accelerations(
     model: pin.Model, data: pin.Data, q: Array, v: Array, tau: Array, forces: pin.StdVec_Force
 ) -> Array:
@@ -76,7 +71,7 @@ def accelerations(
     if not len(model.mimicking_joints):
         return np.array(pin.aba(model, data, q, v, tau, forces))
     free = tau - pin.rnea(model, data, q, v, np.zeros(model.nv), forces)
-    return np.linalg.solve(mass_matrix(model, data, q), free)
+    return np.linalg.solve(mass_matrix(model, q), free)
 
 
 def balance(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None) -> Finding:
@@ -97,7 +92,7 @@ def balance(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None
     if tau.shape != (model.nv,):
         raise InvalidParameter("tau", tau.shape, f"must have shape ({model.nv},)")
     names = joint_names(model)
-    mass = mass_matrix(model, data, q)
+    mass = mass_matrix(model, q)
     contact = contact_torques(scene, data, q, v)
     free = tau - pin.nonLinearEffects(model, data, q, v)
     try:

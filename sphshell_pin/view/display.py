@@ -22,7 +22,7 @@ from sphshell_pin.view.bodies import (
 )
 from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
 from sphshell_pin.view.distance import Painting, range_text
-from sphshell_pin.view.frames import FrameAxes, draw_grid, grid_spacing
+from sphshell_pin.view.frames import FrameAxes, draw_grid, floor_height, grid_spacing
 from sphshell_pin.view.nodes import (
     material,
     new_visualizer,
@@ -63,7 +63,7 @@ PARTS: tuple[Part, ...] = get_args(Part)
 "curved" are the curved elements of shells in contact by the method "smooth", in place of the flat
 ones.
 """
-HIDDEN_AT_FIRST: frozenset[Part] = frozenset({*get_args(Painting), "frames", "grid"})
+HIDDEN_AT_FIRST: frozenset[Part] = frozenset({*get_args(Painting), "frames"})
 OF_SHELLS: frozenset[Part] = frozenset({*get_args(Painting), "wireframe", "trails", "curved"})
 
 
@@ -120,6 +120,8 @@ class Display:
         set_surroundings(self.visualizer)
         look(self.visualizer, self.view)
         self.update(neutral)
+        self._floor = floor_height(scene, self._data)
+        draw_grid(self.visualizer["grid"], self.view, self._floor)
 
     def update(
         self, q: ArrayLike, contacts: Contacts | None = None, patches: Patches | None = None
@@ -172,7 +174,7 @@ class Display:
     def grid(self) -> str | None:
         """What the grid shows, if it is shown."""
         step = f"{1e3 * grid_spacing(self.view):g} mm"
-        return None if "grid" in self._hidden else f"grid of {step} at z = 0"
+        return None if "grid" in self._hidden else f"grid of {step} at z = {self._floor:.4g} m"
 
     @property
     def face_keys(self) -> list[tuple[str, str]]:
@@ -242,13 +244,10 @@ class Display:
             self._arrows.show_arrows(on)
         elif part == "points":
             self._show_points()
-        elif part in ("robot", "spheres"):
+        elif part in ("robot", "spheres", "grid"):
             show(self.visualizer[part], on)
         elif part == "frames":
             self._show_frames(on)
-        elif part == "grid":
-            draw_grid(self.visualizer["grid"], self.view)
-            show(self.visualizer["grid"], on)
         else:
             for shell in self._shells.values():
                 self._show_of_shell(shell, part, on)

@@ -75,10 +75,28 @@ def grid_spacing(view: View) -> float:
     return nice(view.distance / 12.0)
 
 
-def draw_grid(node: Visualizer, view: View) -> None:
-    """Draw a grid at z = 0 below `node`, around what `view` looks at."""
+def floor_height(scene: Scene, data: pin.Data) -> float:
+    """Return the height [m] of the floor: 0, where the robot stands, or below the lowest shell.
+
+    The shells are where forward kinematics left the joints in `data`.
+    """
+    lowest = 0.0
+    for pair in scene.pairs:
+        if pair.shell is not None:
+            placement = data.oMi[pair.joint_j] * pair.placement_j
+            low, high = np.asarray(pair.shell.box)
+            down = placement.rotation[2]
+            reach = 0.5 * np.abs(down) @ (high - low)
+            height = placement.translation[2] + 0.5 * down @ (low + high) - reach
+            lowest = min(lowest, float(height))
+    return lowest
+
+
+def draw_grid(node: Visualizer, view: View, height: float) -> None:
+    """Draw a grid at a `height` [m] below `node`, around what `view` looks at."""
     step = grid_spacing(view)
     points, segments = lattice(np.arange(-LINES, LINES + 1.0))
-    points = points + np.round(np.array([*view.target[:2], 0.0]) / step)
+    points = step * (points + np.round(np.array([*view.target[:2], 0.0]) / step))
+    points[:, 2] = height
     look = material("LineBasic", GRID_COLOR, 0.45, depthWrite=False)
-    set_object(node, line_segments(step * points, segments), look, "LineSegments")
+    set_object(node, line_segments(points, segments), look, "LineSegments")

@@ -29,6 +29,7 @@ from sphshell_pin.view.camera import DIRECTIONS, choose_view
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
 from sphshell_pin.view.display import TRAIL_COLOR, Display
 from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
+from sphshell_pin.view.frames import GRID_COLOR
 from sphshell_pin.view.nodes import FloatArray, css, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
@@ -381,14 +382,14 @@ def _legend(
 
 
 def _color_keys(display: Display, shown: ContactRows) -> list[tuple[str, str]]:
-    """Return the legend of the colors of shells and patches."""
+    """Return the legend of the colors of shells and patches, and of the grid."""
     keys: list[tuple[tuple[str, ...], str]] = []
     if display.coloring is not None:
         keys.append((RAMP, display.coloring))
     if shown.patches is not None and len(shown.row):
         keys.append((PRESSURE_RAMP, str(display.patch_scale)))
     found = [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
-    return found + display.face_keys
+    return [*found, *display.face_keys, (css(GRID_COLOR), str(display.grid))]
 
 
 def _digits(speed: float, fps: float) -> int:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import copy
+import gc
+import sys
 import threading
+import weakref
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter, SetupWarning
+from sphshell_pin.errors import InvalidParameter, SetupWarning, SphshellError
 from sphshell_pin.scenario import build
 from tests import meshes
 from tests.shell.test_faces import torus
@@ -20,6 +24,7 @@ from sphshell_pin.adapters.mujoco import attach  # noqa: E402
 from sphshell_pin.benchmarks.in_mujoco import ball, generalized, mjcf_of, text  # noqa: E402
 
 LAW = sp.HuntCrossleyLaw(1e5, 1.5, 0.2)
+SOFT = sp.HuntCrossleyLaw(1e5, 1.5, 1.0)
 RNG = np.random.default_rng(0)
 
 
@@ -236,8 +241,158 @@ def test_mujocos_own_contact_is_off_between_them_and_nowhere_else():
     with pytest.warns(SetupWarning):
         contacts = attach(model, plate(0.1), ["a"], body="tray", law=LAW)
     assert touching() == everything - {frozenset(("tray", "a"))}
+    second = attach(model, plate(0.1), ["b"], body="tray", law=SOFT)
     contacts.detach()
+    assert touching() == everything - {frozenset(("tray", "b"))}
+    second.detach()
     assert touching() == everything
+
+
+def slab(count: int, radius: float = 0.02) -> str:
+    """A plate, and balls that begin in touch with it."""
+    balls = "".join(
+        f'<body pos="{0.05 * k} 0 {0.95 * radius}"><freejoint/>'
+        f'<geom name="ball{k}" type="sphere" size="{radius}" mass=".1"/></body>'
+        for k in range(count)
+    )
+    return f"""<mujoco><option timestep="5e-5"/><worldbody>
+      <body name="part"><geom name="slab" type="box" size=".1 .1 .01" pos="0 0 -.01"/></body>
+      {balls}</worldbody></mujoco>"""
+
+
+def on_slab(model, *names: str, **given):
+    return attach(model, plate(0.1), names, body="part", law=SOFT, **given)
+
+
+def test_contacts_end_with_their_model_and_touch_no_stranger():
+    """A new model may have the address of a deleted one, and another size."""
+    addresses, alive = set(), []
+    for k in range(60):
+        model = mujoco.MjModel.from_xml_string(slab(3))
+        addresses.add(model._address)
+        contacts = on_slab(model, "ball0", "ball1", "ball2")
+        alive.append(weakref.ref(contacts))
+        del model, contacts
+        other, data = model_of(slab(1 + k % 3))
+        mujoco.mj_forward(other, data)
+        assert not np.any(data.qfrc_passive)
+        assert data.ncon == 1 + k % 3
+        addresses.add(other._address)
+    gc.collect()
+    assert len(addresses) < 120
+    assert not any(one() for one in alive)
+
+
+def test_a_copy_of_a_model_has_its_contacts_while_they_last(monkeypatch):
+    model = mujoco.MjModel.from_xml_string(slab(2))
+    flags = model.opt.enableflags
+    contacts = on_slab(model, "ball0")
+    other = copy.deepcopy(model)
+    data = mujoco.MjData(other)
+    contacts.step(data)
+    assert len(contacts.contacts(data).depth) == 1
+    second = on_slab(other, "ball1")
+    for one, pushed in ((model, [True, False]), (other, [True, True])):
+        data = mujoco.MjData(one)
+        mujoco.mj_forward(one, data)
+        assert [bool(force) for force in data.qfrc_passive[[2, 8]]] == pushed
+        assert data.ncon == 2 - sum(pushed)
+    # Flags that were overwritten do not end them.
+    model.opt.enableflags = flags
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_passive[2] > 0
+    with pytest.raises(InvalidParameter, match="the spheres were attached in, or of a copy of it"):
+        second.contacts(data)
+    third = copy.deepcopy(other)
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda fault: told.append(str(fault.exc_value)))
+    for one in (contacts, second):
+        one.detach()
+    assert model.opt.enableflags == flags
+    data = mujoco.MjData(third)
+    mujoco.mj_forward(third, data)
+    mujoco.mj_forward(third, data)
+    assert not np.any(data.qfrc_passive)
+    assert len(told) == 1
+    assert "a copy of a MuJoCo model moves without contacts" in told[0]
+
+
+def test_data_of_other_models_are_refused_before_they_are_touched():
+    big = mujoco.MjModel.from_xml_string(slab(5))
+    contacts = on_slab(big, *(f"ball{k}" for k in range(5)), log=True)
+    small, data = model_of(slab(1))
+    mujoco.mj_forward(small, data)
+    for method in (contacts.apply, contacts.contacts, contacts.log, contacts.step):
+        for wrong in (data, None, big):
+            with pytest.raises(InvalidParameter, match="data"):
+                method(wrong)
+    assert not np.any(data.qfrc_passive)
+
+
+def test_any_number_of_spheres_and_none_twice():
+    spheres = "".join(
+        f'<geom name="s{k}" type="sphere" size=".002" pos="{0.003 * k} 0 0" mass=".01"/>'
+        for k in range(40)
+    )
+    hand = f'<body pos="0 0 .0019"><freejoint/>{spheres}</body>'
+    model, data = model_of(slab(0).replace("</worldbody>", hand + "</worldbody>"))
+    contacts = on_slab(model, *(f"s{k}" for k in range(40)))
+    mujoco.mj_forward(model, data)
+    assert len(contacts.contacts(data).depth) == 34  # those above the plate
+    assert data.ncon == 0
+    with pytest.raises(InvalidParameter, match="'s3' must not touch the same shell already"):
+        on_slab(model, "s3")
+    mujoco.mj_forward(model, data)
+    assert len(contacts.contacts(data).depth) == 34
+
+
+@pytest.mark.parametrize(
+    ("slot", "said"), [("passive", "do not act"), ("contactfilter", "acts beside them")]
+)
+def test_a_callback_that_was_replaced_is_noticed(slot, said):
+    model, data = model_of(slab(1))
+    contacts = on_slab(model, "ball0")
+    try:
+        for other in (None, lambda *_: 0):
+            getattr(mujoco, f"set_mjcb_{slot}")(other)
+            for ask in (contacts.check, lambda: contacts.step(data)):
+                with pytest.raises(SphshellError, match=said):
+                    ask()
+    finally:
+        getattr(mujoco, f"set_mjcb_{slot}")(None)
+    contacts.detach()
+    contacts.check()
+    with on_slab(model, "ball0") as again:
+        again.step(data)
+
+
+@pytest.mark.parametrize("fault", ["raises", "nan", "state"])
+def test_a_fault_in_a_step_is_reported_at_once_and_by_check(fault, monkeypatch):
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda fault: told.append(str(fault.exc_value)))
+
+    attached = False
+
+    def law(depth, rate, p):
+        if attached and fault == "raises":
+            raise RuntimeError("mine")
+        return np.nan if attached and fault == "nan" else 1e5 * max(depth, 0.0) ** 1.5
+
+    model, data = model_of(slab(1))
+    contacts = attach(model, plate(0.1), ["ball0"], body="part", law=sp.FunctionLaw(law))
+    attached = True
+    said = {"raises": "mine", "nan": "is nan at depth", "state": "not finite"}[fault]
+    for _ in range(2):
+        if fault == "state":
+            data.qpos[0] = np.nan
+        mujoco.mj_forward(model, data)
+        mujoco.mj_forward(model, data)
+        assert said in told.pop()
+        assert not told
+        with pytest.raises(SphshellError, match=said):
+            contacts.check()
+    contacts.check()
 
 
 def test_substeps_carry_a_stiff_law():

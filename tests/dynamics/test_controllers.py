@@ -75,3 +75,25 @@ def test_a_point_beside_the_frame_is_moved_as_a_frame_there() -> None:
     assert np.abs(end(frame.name) - end("beside")).max() > 1e-6
     with pytest.raises(InvalidParameter, match="offset"):
         sp.CartesianImpedance("ball", PATH, 100.0, 10.0, offset=[0.0, 0.1])
+
+
+@pytest.mark.parametrize("integrator", [sp.RungeKutta4(1e-4), sp.Adaptive(1e-8, 1e-10)])
+def test_the_normal_force_comes_on_as_a_smooth_step(integrator) -> None:
+    # A free mass is pushed away from the shell's normal: its speed is the integral of the force.
+    shell, scene = models.plate(), sp.Scene(models.ball())
+    start, rise, force = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]), 0.02, 3.0
+    controller = sp.CartesianImpedance(
+        "ball",
+        [[0.0, 0.0, 0.0]],
+        0.0,
+        0.0,
+        force,
+        shell=shell,
+        force_rise=rise,
+        joints=["ball_joint"],
+    )
+    mass = pin.computeTotalMass(scene.model)
+    result = sp.Simulation(scene, integrator).run(start, None, 0.03, controller, record_dt=1e-3)
+    share = np.minimum(result.t / rise, 1.0)
+    pushed = force / mass * (rise * (share**3 - 0.5 * share**4) + np.maximum(result.t - rise, 0.0))
+    np.testing.assert_allclose(result.v[:, 2], -pushed, rtol=1e-6, atol=1e-12)

@@ -65,6 +65,7 @@ def test_faults(folder, tmp_path, monkeypatch):
     damaged.write_bytes(Path("drop/run.npz").read_bytes()[:5000])
     for arguments, words in (
         (["drop", "--to", "rrd"], "Rerun's viewer opens .mcap files"),
+        (["drop"], "must be one of mcap, csv, parquet"),
         (["drop", "--to", "bag"], "must be one of mcap, csv, parquet"),
         (["drop", "--to", "mcap", "--start", "soon"], "--start"),
         (["drop", "--to", "mcap", "--start", "-1"], "give another start"),

@@ -4,6 +4,7 @@ import contextlib
 import errno
 import fcntl
 import os
+import shutil
 import signal
 import stat
 import threading
@@ -281,3 +282,42 @@ def test_a_folder_made_in_vain_is_removed(tmp_path):
     with pytest.raises(ZeroDivisionError):
         refuse()
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["out", "x/y/out"])
+def test_of_processes_that_meet_in_a_new_folder_one_wins_and_loses_nothing(name, tmp_path):
+    out, rounds, processes = tmp_path / name, 30, 5
+
+    def take_part(k):
+        try:
+            with AtomicFolder(out, last=LAST) as place:
+                time.sleep(0.002)  # as if something were computed
+                staging = place.staging()
+                (staging / LAST).write_text(str(k))
+                place.replace(staging, [LAST])
+                return 0 if (out / LAST).read_text() == str(k) else 2
+        except FolderInUse:
+            return 1
+
+    for _ in range(rounds):
+        start, go = os.pipe()
+        children = []
+        for k in range(processes):
+            child = os.fork()
+            if child == 0:
+                code = 3
+                with contextlib.suppress(BaseException):
+                    os.close(go)
+                    os.read(start, 1)
+                    code = take_part(k)
+                os._exit(code)
+            children.append(child)
+        os.close(start)
+        os.close(go)
+        codes = [os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children]
+        # Who comes after the winner has ended writes anew.
+        assert set(codes) <= {0, 1}
+        assert 0 in codes
+        assert os.listdir(out) == [LAST]
+        assert os.listdir(out.parent) == ["out"]
+        shutil.rmtree(tmp_path / name.split("/")[0])

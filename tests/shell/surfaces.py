@@ -73,3 +73,9 @@ def by_place(surface: CleanedSurface, wound=True):
         else:
             out.append(tuple(sorted(places)))
     return sorted(out)
+
+
+def signed_volume(surface):
+    """Volume inside a cleaned surface by its winding."""
+    p = surface.vertices[surface.triangles]
+    return np.einsum("ij,ij->i", p[:, 0], np.cross(p[:, 1], p[:, 2])).sum() / 6.0

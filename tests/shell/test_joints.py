@@ -10,6 +10,7 @@ import pytest
 from sphshell_pin import Shell
 from sphshell_pin.shell.cleaning import clean_surface
 from sphshell_pin.shell.raw import raw_surface
+from sphshell_pin.shell.tangent_joints import settle_joints
 
 SMOOTH, CREASE = 0, 1
 SLACK = 0.005  # [rad] by which the tangent plane misses the round's normal
@@ -69,6 +70,23 @@ def test_tangent_faces_share_their_normals_and_others_keep_theirs() -> None:
     # Midway between both.
     np.testing.assert_allclose(joint[0], [np.sin(SLACK / 2), np.cos(SLACK / 2), 0.0], atol=1e-9)
     assert np.linalg.norm(crease[0] - crease[-1]) == pytest.approx(np.sqrt(2.0))
+
+
+def test_planes_keep_their_normals_at_joints_off_tangent() -> None:
+    """What is beside them leans, or keeps its own where that is a plane, too."""
+    lean = np.array([[0.0, 0.0, 1.0], [0.0, np.sin(0.01), np.cos(0.01)]])
+    normals, triangles = (
+        np.repeat(lean, 3, axis=0).reshape(2, 3, 3),
+        np.array([[0, 1, 2], [2, 1, 3]]),
+    )
+    face = np.array([0, 1])
+    for plane in ([True, False], [False, True], [True, True]):
+        settled = settle_joints(normals, triangles, face, np.array(plane))
+        for own, flat in enumerate(plane):
+            if flat:
+                assert np.array_equal(settled[own], normals[own])
+            else:
+                assert (settled[own, [1, 2] if own == 0 else [0, 1]] == lean[1 - own]).all()
 
 
 def test_faces_go_with_a_shell_that_is_moved_or_stored() -> None:

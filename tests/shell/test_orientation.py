@@ -7,12 +7,16 @@ from hypothesis import strategies as st
 
 from sphshell_pin.shell import clean
 
-from .surfaces import CUBE, CUBE_QUADS, areas, by_place, joined, plate, tetrahedron
-
-
-def signed_volume(surface):
-    p = surface.vertices[surface.triangles]
-    return np.einsum("ij,ij->i", p[:, 0], np.cross(p[:, 1], p[:, 2])).sum() / 6.0
+from .surfaces import (
+    CUBE,
+    CUBE_QUADS,
+    areas,
+    by_place,
+    joined,
+    plate,
+    signed_volume,
+    tetrahedron,
+)
 
 
 @given(st.lists(st.booleans(), min_size=6, max_size=6))

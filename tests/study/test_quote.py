@@ -1,18 +1,8 @@
 """What the README and the documents quote is what was measured."""
 
-import pytest
-
 from sphshell_pin.benchmarks import quote
 from sphshell_pin.cases.contents import Column, Finding, Section, Table
 from sphshell_pin.study.report import making
-
-
-def test_the_readme_agrees_with_the_measured_data():
-    page = (quote.ROOT / quote.PAGE).read_text(encoding="utf-8")
-    blocks = quote.blocks_of(quote.read(quote.ROOT / quote.DATA))
-    assert quote.BLOCK.search(page), "no block to fill"
-    assert quote.quoted(page, blocks) == page
-    assert page.count("<!-- measured:") == len(quote.BLOCK.findall(page))
 
 
 def report(folder, error=None):
@@ -33,23 +23,12 @@ def report(folder, error=None):
     return folder
 
 
-def test_blocks_are_replaced_and_nothing_else(tmp_path):
+def test_blocks_are_tables_of_markdown(tmp_path):
     blocks = quote.blocks_of(quote.read(report(tmp_path / "report") / "report.json"))
-    page = (
-        "a\n<!-- measured: times -->\nold\n<!-- end measured -->\nb\n"
-        "<!-- measured: summary -->\n<!-- end measured -->\nc\n"
-    )
-    new = quote.quoted(page, blocks)
-    assert "| who | s |\n| --- | --- |\n| a\\|b | 43.8 |\n" in new
-    assert "| coal / ours | 33.8 x | 29.9 to 35.5 | at least 15 x |" in new
-    assert "| a \\| b | 1.4 x |  | at most 1.2 x (this aim is missed) |" in new
-    assert 'a "fast" one, 2026-11-21, with `--quick`' in new
-    assert "old" not in new
-    assert new.startswith("a\n<!--")
-    assert new.endswith("-->\nc\n")
-    assert quote.quoted(new, blocks) == new
-    with pytest.raises(ValueError, match="no block is called 'weather'"):
-        quote.quoted("<!-- measured: weather -->\n<!-- end measured -->", blocks)
+    assert "| who | s |\n| --- | --- |\n| a\\|b | 43.8 |\n" in blocks["times"]
+    assert "| coal / ours | 33.8 x | 29.9 to 35.5 | at least 15 x |" in blocks["summary"]
+    assert "| a \\| b | 1.4 x |  | at most 1.2 x (this aim is missed) |" in blocks["summary"]
+    assert 'a "fast" one, 2026-11-21, with `--quick`' in blocks["summary"]
 
 
 def test_a_report_that_is_not_whole_is_not_quoted(tmp_path, monkeypatch, capsys):

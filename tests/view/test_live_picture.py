@@ -206,7 +206,6 @@ def test_axes_show_how_frames_are_placed_and_the_grid_says_its_spacing():
     easel = Easel(player)
     assert not any("/frames/" in path for path in easel.draw().objects)
     easel.picture.show("frames", True)
-    easel.picture.show("grid", True)
     seen = easel.draw()
     model = player.scene.model
     data = model.createData()
@@ -222,7 +221,7 @@ def test_axes_show_how_frames_are_placed_and_the_grid_says_its_spacing():
             )
     points = attribute(seen.objects["/meshcat/grid"])
     step = np.diff(np.unique(points[:, 0].round(5))).min()
-    assert easel.picture.display.grid == f"grid of {1e3 * step:g} mm at z = 0"
+    assert easel.picture.display.grid == f"grid of {1e3 * step:g} mm at z = 0 m"
     assert np.ptp(points[:, :2], axis=0) == pytest.approx(40 * step, rel=1e-5)
     assert not points[:, 2].any()
     # A scene that is replaced takes its axes along.

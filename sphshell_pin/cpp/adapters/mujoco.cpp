@@ -1,9 +1,13 @@
 #include "adapters/mujoco.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <mutex>
+#include <random>
+#include <stdexcept>
+#include <unordered_set>
 
 namespace sphshell {
 namespace {
@@ -25,15 +29,75 @@ const double* array_at(const void* from, std::size_t offset) {
   return value_at<const double*>(from, offset);
 }
 
-// The contacts of each model, in the order in which they were attached.
+using Set = std::vector<std::shared_ptr<MujocoContacts>>;
+
+// The mark of a model is in bits of its enableflags that MuJoCo does not use.
+constexpr std::uint32_t kMarks = 0x7fff;
+constexpr int kMarkShift = 16;
+// The first bytes of an mjModel are its sizes: they tell a model from one that has the mark by
+// chance, as from a file.
+constexpr std::size_t kSizes = 256;
+
+struct Marked {
+  void* owner;  // the model that the contacts were attached to
+  std::string sizes;
+  std::shared_ptr<const Set> contacts;  // in the order in which they were attached
+};
+
 struct Registry {
   std::shared_mutex mutex;
-  std::unordered_map<const void*, std::vector<std::shared_ptr<MujocoContacts>>> of;
+  std::optional<MujocoLayout> layout;
+  std::unordered_map<std::uint32_t, Marked> marked;
+  std::unordered_map<const void*, std::uint32_t> owners;
+  std::uint32_t last = std::random_device()();
+  std::unordered_set<std::uint32_t> ended;  // marks of copies that were found without contacts
+  void (*report)(const std::string&) = nullptr;
+
+  std::uint32_t mark(const void* model) const {
+    return value_at<std::uint32_t>(model, layout->enableflags) >> kMarkShift & kMarks;
+  }
+  void set_mark(void* model, std::uint32_t mark) const {
+    char* const at = static_cast<char*>(model) + layout->enableflags;
+    const auto others = value_at<std::uint32_t>(at, 0) & ~(kMarks << kMarkShift);
+    const std::uint32_t flags = others | mark << kMarkShift;
+    std::memcpy(at, &flags, sizeof(flags));
+  }
+  const Marked* find(const void* model) const {
+    if (marked.empty()) return nullptr;
+    std::uint32_t number = mark(model);
+    if (number == 0) {
+      const auto at = owners.find(model);
+      if (at == owners.end()) return nullptr;
+      number = at->second;
+    }
+    const auto at = marked.find(number);
+    if (at == marked.end()) return nullptr;
+    const bool same = std::memcmp(at->second.sizes.data(), model, kSizes) == 0;
+    return same ? &at->second : nullptr;
+  }
 };
 
 Registry& registry() {
   static Registry* const all = new Registry;  // threads may step beyond the end of main()
   return *all;
+}
+
+std::shared_ptr<const Set> contacts_of(const void* model) {
+  Registry& all = registry();
+  std::uint32_t mark = 0;
+  {
+    const std::shared_lock lock(all.mutex);
+    if (const Marked* const found = all.find(model)) return found->contacts;
+    if (!all.layout || (mark = all.mark(model)) == 0) return nullptr;
+  }
+  {
+    const std::unique_lock lock(all.mutex);
+    if (!all.ended.insert(mark).second) return nullptr;
+  }
+  all.report(
+      "a copy of a MuJoCo model moves without contacts: those of the model have ended, with it or "
+      "by detach(); attach them to the copy");
+  return nullptr;
 }
 
 }  // namespace
@@ -46,8 +110,13 @@ void MujocoContacts::apply(const void* model, void* data) {
     move(model, bytes, own);
     add_forces(bytes, own.scene->scene());
   } catch (const std::exception& error) {
-    const std::unique_lock lock(mutex_);
-    fault_ = error.what();
+    const std::string text = error.what();
+    {
+      const std::unique_lock lock(mutex_);
+      if (!fault_.empty()) return;
+      fault_ = text;
+    }
+    report_(text);
   }
 }
 
@@ -106,6 +175,9 @@ void MujocoContacts::read(const char* data, Memory& memory) const {
     const Vec3Map angular(cvel + 6 * body.id), linear(cvel + 6 * body.id + 3);
     memory.q.segment<3>(7 * k) = origin;
     memory.q.segment<4>(7 * k + 3) = turn.coeffs();
+    if (!origin.allFinite() || !turn.coeffs().allFinite() || !angular.allFinite() ||
+        !linear.allFinite())
+      throw std::domain_error("the state of data is not finite");
     const auto to_body = turn.conjugate().toRotationMatrix();
     memory.v.segment<3>(6 * k) =
         to_body * (linear + angular.cross(origin - Vec3Map(center + 3 * body.root)));
@@ -164,31 +236,87 @@ void MujocoContacts::add_forces(char* data, const SceneData& scene) const {
 }
 
 void apply_passive(const void* model, void* data) {
-  std::vector<std::shared_ptr<MujocoContacts>> here;
+  if (const auto here = contacts_of(model))
+    for (const auto& contacts : *here) contacts->apply(model, data);
+}
+
+int filter_contact(const void* model, void*, int geom, int other) {
+  const Registry& all = registry();
+  const int* const type = value_at<const int*>(model, all.layout->contype);
+  const int* const affinity = value_at<const int*>(model, all.layout->conaffinity);
+  if (!(type[geom] & affinity[other]) && !(type[other] & affinity[geom])) return 1;
+  const auto here = contacts_of(model);
+  return here && std::any_of(here->begin(), here->end(), [&](const auto& contacts) {
+           return contacts->separates(geom, other);
+         });
+}
+
+std::string register_passive(void* model, std::shared_ptr<MujocoContacts> contacts) {
   Registry& all = registry();
-  {
-    const std::shared_lock lock(all.mutex);
-    const auto at = all.of.find(model);
-    if (at == all.of.end()) return;
-    here = at->second;
+  const std::unique_lock lock(all.mutex);
+  if (!all.layout) all.layout = contacts->layout();
+  all.report = contacts->reporter();
+  const Marked* const before = all.find(model);
+  Set set = before ? *before->contacts : Set();
+  for (const auto& one : set)
+    for (const std::string& touch : contacts->touches())
+      if (std::count(one->touches().begin(), one->touches().end(), touch)) return touch;
+  set.push_back(std::move(contacts));
+  // A copy of a model with contacts has a mark, and contacts, of its own from here on.
+  const auto owned = all.owners.find(model);
+  std::uint32_t number = owned == all.owners.end() ? 0 : owned->second;
+  if (number == 0) {
+    if (all.marked.size() + 1 >= kMarks)
+      throw std::length_error("too many MuJoCo models have contacts");
+    do number = ++all.last & kMarks;
+    while (number == 0 || all.marked.count(number));
   }
-  for (const auto& contacts : here) contacts->apply(model, data);
+  all.ended.erase(number);
+  all.set_mark(model, number);
+  all.owners[model] = number;
+  all.marked[number] = {model, std::string(static_cast<const char*>(model), kSizes),
+                        std::make_shared<const Set>(std::move(set))};
+  return {};
 }
 
-void register_passive(const void* model, std::shared_ptr<MujocoContacts> contacts) {
-  const std::unique_lock lock(registry().mutex);
-  registry().of[model].push_back(std::move(contacts));
+void unregister_passive(const MujocoContacts* contacts) {
+  Registry& all = registry();
+  std::vector<std::shared_ptr<const Set>> before;  // destroyed without the lock
+  const std::unique_lock lock(all.mutex);
+  for (auto at = all.marked.begin(); at != all.marked.end();) {
+    Marked& marked = at->second;
+    Set set;
+    for (const auto& one : *marked.contacts)
+      if (one.get() != contacts) set.push_back(one);
+    before.push_back(marked.contacts);
+    if (set.empty()) {
+      all.set_mark(marked.owner, 0);
+      all.owners.erase(marked.owner);
+      at = all.marked.erase(at);
+    } else {
+      marked.contacts = std::make_shared<const Set>(std::move(set));
+      ++at;
+    }
+  }
 }
 
-void unregister_passive(const void* model, const MujocoContacts* contacts) {
-  const std::unique_lock lock(registry().mutex);
-  const auto at = registry().of.find(model);
-  if (at == registry().of.end()) return;
-  auto& here = at->second;
-  here.erase(std::remove_if(here.begin(), here.end(),
-                            [&](const auto& one) { return one.get() == contacts; }),
-             here.end());
-  if (here.empty()) registry().of.erase(at);
+bool acts_on(const void* model, const MujocoContacts* contacts) {
+  Registry& all = registry();
+  const std::shared_lock lock(all.mutex);
+  const Marked* const found = all.layout ? all.find(model) : nullptr;
+  return found && std::any_of(found->contacts->begin(), found->contacts->end(),
+                              [&](const auto& one) { return one.get() == contacts; });
+}
+
+void end_model(const void* model) {
+  Registry& all = registry();
+  std::shared_ptr<const Set> before;
+  const std::unique_lock lock(all.mutex);
+  const auto owned = all.owners.find(model);
+  if (owned == all.owners.end()) return;
+  before = all.marked.at(owned->second).contacts;
+  all.marked.erase(owned->second);
+  all.owners.erase(owned);
 }
 
 }  // namespace sphshell

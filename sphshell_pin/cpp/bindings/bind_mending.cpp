@@ -104,12 +104,10 @@ void bind_mending(nanobind::module_& module) {
                                 polygon ? polygon->data() : nullptr, triangles.shape(0),
                                 component.data(), flip.data(), components, center.data());
         });
-        return to_arrays(std::move(sums.volume), std::move(sums.area), std::move(sums.turned_area),
-                         std::move(sums.largest));
+        return to_arrays(std::move(sums.volume), std::move(sums.area), std::move(sums.turned_area));
       },
       "points"_a, "triangles"_a, "triangle_polygon"_a.none(), "component"_a, "flip"_a,
-      "components"_a, "center"_a,
-      "(volume, area, turned area, largest triangle) of each component.");
+      "components"_a, "center"_a, "(volume, area, turned area) of each component.");
 
   module.def(
       "mend_clip_ears",
@@ -162,14 +160,18 @@ void bind_mending(nanobind::module_& module) {
       "nodes"_a, "pairs"_a, "Component (nodes,) of an undirected graph.");
 
   module.def(
-      "mend_nesting",
+      "mend_overlaps",
       [](InRows<double, 3> points, InRows<std::int32_t, 3> triangles,
-         In<std::int32_t> triangle_component, InRows<double, 3> queries, In<std::uint8_t> closed) {
-        return to_array(without_gil([&] {
-          return nesting_depth(points.data(), triangles.data(), triangle_component.data(),
-                               triangles.shape(0), queries.data(), closed.data(), closed.shape(0));
-        }));
+         In<std::int32_t> triangle_component, InRows<double, 3> places,
+         In<std::int32_t> place_component, In<std::int32_t> group) {
+        auto found = without_gil([&] {
+          return overlaps(points.data(), triangles.data(), triangle_component.data(),
+                          triangles.shape(0), places.data(), place_component.data(),
+                          places.shape(0), group.data());
+        });
+        return nb::make_tuple(rows_of<2>(std::move(found.pairs)), to_array(std::move(found.share)));
       },
-      "points"_a, "triangles"_a, "triangle_component"_a, "queries"_a, "closed"_a,
-      "How many closed components enclose the query point (c,3) of each component.");
+      "points"_a, "triangles"_a, "triangle_component"_a, "places"_a, "place_component"_a, "group"_a,
+      "(component and another (p,2), share (p,) of the first's inside that is in the other), along "
+      "lines through places (n,3).");
 }

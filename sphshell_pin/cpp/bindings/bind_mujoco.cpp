@@ -10,13 +10,22 @@
 #include "adapters/mujoco.hpp"
 #include "bindings/arrays.hpp"
 #include "bindings/evaluations.hpp"
+#include "bindings/gil.hpp"
 #include "bindings/records.hpp"
 
 namespace {
 
 using namespace sphshell;
 
-const void* pointer(std::uintptr_t address) { return reinterpret_cast<const void*>(address); }
+void* pointer(std::uintptr_t address) { return reinterpret_cast<void*>(address); }
+
+// A callback of MuJoCo cannot raise: Python reports the fault as it does those of finalizers.
+void report(const std::string& fault) {
+  const AcquireGil gil;
+  nb::module_ errors = nb::module_::import_("sphshell_pin.errors");
+  PyErr_SetString(errors.attr("SphshellError").ptr(), ("contacts in MuJoCo: " + fault).c_str());
+  PyErr_WriteUnraisable(nullptr);
+}
 
 struct OwnMujoco {
   std::shared_ptr<MujocoContacts> contacts;
@@ -26,37 +35,46 @@ struct OwnMujoco {
 
 void bind_mujoco(nb::module_& m) {
   m.def("mujoco_passive", [] { return reinterpret_cast<std::uintptr_t>(&apply_passive); });
+  m.def("mujoco_filter", [] { return reinterpret_cast<std::uintptr_t>(&filter_contact); });
+  m.def("mujoco_end", [](std::uintptr_t model) { end_model(pointer(model)); });
   nb::class_<OwnMujoco>(m, "MujocoContacts")
       .def(
           "__init__",
           [](OwnMujoco* self, const OwnState& state, const std::vector<std::size_t>& layout,
              const std::vector<int>& ids, const std::vector<int>& roots,
-             const std::vector<std::vector<int>>& dofs, bool logs) {
-            check_count("layout", layout.size(), 9);
+             const std::vector<std::vector<int>>& dofs, const std::vector<int>& roles,
+             std::vector<std::string> touches, bool logs) {
+            check_count("layout", layout.size(), 12);
             const std::size_t* at = layout.data();
             std::vector<MujocoBody> bodies;
             for (std::size_t k = 0; k < ids.size(); ++k)
               bodies.push_back({ids[k], roots[k], dofs[k]});
+            std::vector<MujocoRole> parts;
+            for (const int role : roles) parts.push_back(static_cast<MujocoRole>(role));
             new (self) OwnMujoco{std::make_shared<MujocoContacts>(
                 SceneState(state.state),
-                MujocoLayout{at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8]},
-                std::move(bodies), logs)};
+                MujocoLayout{at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8], at[9],
+                             at[10], at[11]},
+                std::move(bodies), std::move(parts), std::move(touches), logs, &report)};
           },
           nb::arg("state"), nb::arg("layout"), nb::arg("ids"), nb::arg("roots"), nb::arg("dofs"),
-          nb::arg("logs"))
-      .def("attach", [](const OwnMujoco& self,
-                        std::uintptr_t model) { register_passive(pointer(model), self.contacts); })
-      .def("detach",
+          nb::arg("roles"), nb::arg("touches"), nb::arg("logs"))
+      .def("attach",
            [](const OwnMujoco& self, std::uintptr_t model) {
-             unregister_passive(pointer(model), self.contacts.get());
+             return register_passive(pointer(model), self.contacts);
            })
+      .def("acts_on",
+           [](const OwnMujoco& self, std::uintptr_t model) {
+             return acts_on(pointer(model), self.contacts.get());
+           })
+      .def("detach", [](const OwnMujoco& self) { unregister_passive(self.contacts.get()); })
       .def("apply",
            [](const OwnMujoco& self, std::uintptr_t model, std::uintptr_t data) {
-             self.contacts->apply(pointer(model), const_cast<void*>(pointer(data)));
+             self.contacts->apply(pointer(model), pointer(data));
            })
       .def("contacts",
            [](const OwnMujoco& self, std::uintptr_t data) {
-             return to_bytes(self.contacts->contacts(const_cast<void*>(pointer(data))));
+             return to_bytes(self.contacts->contacts(pointer(data)));
            })
       .def("log",
            [](const OwnMujoco& self, std::uintptr_t data) {

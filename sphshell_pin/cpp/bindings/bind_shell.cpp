@@ -245,6 +245,17 @@ Array<std::uint8_t> exact_faces(const Shell& shell) {
   return to_array(std::move(out));
 }
 
+// Faces that do not give closest points: which, beside which other one (-1: none), and how far off
+// [m]; (n, 3).
+Array<double> inexact_faces(const Shell& shell) {
+  std::vector<double> out;
+  if (shell.curved())
+    for (const Inexact& one : shell.curved()->inexact())
+      out.insert(out.end(), {double(one.face), double(one.other), one.off});
+  const std::size_t n = out.size() / 3;
+  return to_array(std::move(out), {n, 3});
+}
+
 // Kinds (n,) and numbers (n, 8) of all faces.
 nb::tuple faces(const Shell& shell) {
   std::vector<int> kind;
@@ -341,6 +352,7 @@ void bind_shell(nanobind::module_& m) {
   array("bending", &bending);
   array("triangle_face", &triangle_face);
   array("exact_faces", &exact_faces);
+  array("inexact_faces", &inexact_faces);
   array("chord_errors", [](const Shell& s) {
     return to_array(s.curved() ? s.curved()->chord_errors(s) : std::vector<double>());
   });

@@ -45,7 +45,7 @@ _MOST_ROWS = 200
 
 # What the C++ class takes as it is.
 _NUMBERS = (
-    *("stiffness", "damping", "normal_force"),
+    *("stiffness", "damping", "normal_force", "force_rise"),
     *("rotational_stiffness", "rotational_damping", "decoupled"),
 )
 
@@ -59,7 +59,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     its points: with `shell` in the shell's frame and projected on it, else in the world. Straight
     pieces join them, or with `spline` one smooth curve. With `normal_force` [N] (needs a shell) the
     spring acts in the tangent plane only, and the point is pushed against the shell's normal, on
-    the side where it is at the start.
+    the side where it is at the start; the force comes on smoothly over the first `force_rise` [s].
 
     The target waits `lead_in` [s] at the first point, moves at `speed` [m/s], and waits at the
     last. With `acceleration` [m/s2], `jerk` [m/s3] or both it sets out and stops softly, at each
@@ -130,6 +130,13 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     )
     decoupled: bool = parameter(
         False, help="the robot's inertia, posture and joint damping do not act on the frame"
+    )
+    force_rise: float = parameter(
+        0.0,
+        at_least=0,
+        unit="s",
+        label="force rise",
+        help="time in which the normal force comes on, smoothly",
     )
 
     def __post_init__(self) -> None:

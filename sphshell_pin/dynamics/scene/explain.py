@@ -18,7 +18,7 @@ from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
-from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
+from sphshell_pin.dynamics.scene.models import beyond_limits, mass_matrix, unit_warning
 from sphshell_pin.dynamics.scene.sources import checked_source
 
 if TYPE_CHECKING:
@@ -214,9 +214,9 @@ def _names(names: list[str]) -> str:
 
 def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:
     """Work out the explanation of each pair of `scene` at q (nq,), v (nv,)."""
-    data, mass_matrix = _mass_at(scene, q, v)
+    data, matrix = _mass_at(scene, q, v)
     gravity = float(np.linalg.norm(scene.model.gravity.linear))
-    return tuple(_explain_pair(scene, pair, data, mass_matrix, v, gravity) for pair in scene.pairs)
+    return tuple(_explain_pair(scene, pair, data, matrix, v, gravity) for pair in scene.pairs)
 
 
 def _with_curvature(pair: ContactPair, figures: PairExplanation) -> PairExplanation:
@@ -269,8 +269,7 @@ def _mass_at(scene: Scene, q: Array, v: Array) -> tuple[pin.Data, Array]:
     data = model.createData()
     pin.forwardKinematics(model, data, q, v)
     pin.computeJointJacobians(model, data, q)
-    pin.crba(model, data, q)
-    return data, np.triu(data.M) + np.triu(data.M, 1).T
+    return data, mass_matrix(model, q)
 
 
 @dataclass(frozen=True)
@@ -317,7 +316,7 @@ def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
 
 
 def _explain_pair(
-    scene: Scene, pair: ContactPair, data: pin.Data, mass_matrix: Array, v: Array, gravity: float
+    scene: Scene, pair: ContactPair, data: pin.Data, matrix: Array, v: Array, gravity: float
 ) -> PairExplanation:
     gap = mass = slip_mass = speed = math.nan
     touch = _touch_of(pair, data)
@@ -326,7 +325,7 @@ def _explain_pair(
         jacobian = _point_jacobian(scene, data, pair.joint_i, touch.point) - _point_jacobian(
             scene, data, pair.joint_j, touch.point
         )
-        mobility = jacobian @ np.linalg.solve(mass_matrix, jacobian.T) if v.size else np.eye(3) * 0
+        mobility = jacobian @ np.linalg.solve(matrix, jacobian.T) if v.size else np.eye(3) * 0
         mass = _mass(float(touch.normal @ mobility @ touch.normal))
         tangent = np.eye(3) - np.outer(touch.normal, touch.normal)
         slip_mass = _mass(float(np.linalg.eigvalsh(tangent @ mobility @ tangent).max()))

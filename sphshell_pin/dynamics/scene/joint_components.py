@@ -21,7 +21,7 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.contact.normal_law import NormalLaw, check_law
-from sphshell_pin.dynamics.scene.models import find_joint
+from sphshell_pin.dynamics.scene.models import find_joint, mass_matrix
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 T = TypeVar("T")
@@ -347,8 +347,7 @@ class Spring:
 
 def joint_inertia(model: pin.Model) -> Array:
     """Return the inertia (nv,) [kg m^2 or kg] that each joint moves in the neutral posture."""
-    data = model.createData()
-    return np.maximum(np.diag(pin.crba(model, data, pin.neutral(model))), 1e-12)
+    return np.maximum(np.diag(mass_matrix(model, pin.neutral(model))), 1e-12)
 
 
 def check_joints(joints: object, model: pin.Model, lock: Iterable[str]) -> JointComponents:

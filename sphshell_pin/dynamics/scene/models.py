@@ -149,6 +149,20 @@ def model_reach(model: pin.Model) -> float:
     return float(reach.max())
 
 
+def mass_matrix(model: pin.Model, q: Array) -> Array:
+    """Return the mass matrix (nv, nv) at q (nq,): M e_k is the torque of a unit acceleration.
+
+    Pinocchio's own (crba) is wrong where joints are not numbered depth first and where a tree
+    branches behind a mimic joint; its recursive Newton-Euler algorithm is right for both.
+    """
+    weightless = pin.Model(model)
+    weightless.gravity.vector = np.zeros(6)
+    data, at_rest = weightless.createData(), np.zeros(model.nv)
+    columns = [pin.rnea(weightless, data, q, at_rest, one) for one in np.eye(model.nv)]
+    mass = np.array(columns).reshape(model.nv, model.nv)
+    return np.asarray(0.5 * (mass + mass.T))
+
+
 def apparent_mass(model: pin.Model, q: Array, joint: int, point: Array) -> float:
     """Return the mass [kg] that a force at a `point` (3,) [m] of a joint's frame has to move.
 
@@ -157,8 +171,7 @@ def apparent_mass(model: pin.Model, q: Array, joint: int, point: Array) -> float
     ball's mass. It is at most the mass of all bodies, which a point that cannot move gets.
     """
     data = model.createData()
-    mass = pin.crba(model, data, q)
-    mass = np.triu(mass) + np.triu(mass, 1).T
+    mass = mass_matrix(model, q)
     pin.computeJointJacobians(model, data, q)
     jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)
     jacobian = jacobian.reshape(6, model.nv)  # of one velocity it comes as a vector

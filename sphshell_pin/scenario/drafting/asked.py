@@ -54,6 +54,9 @@ class Asked:
     base: Literal["fixed", "floating"] | None
     package_dirs: Sequence[str | PathLike[str]]
     xacro_args: Mapping[str, str] | None
+    density: float | None
+    """Of the links whose mass the robot's file does not state [kg/m^3]."""
+    mimic: bool
     out: str | PathLike[str] | None
     force: bool
     tell: Callable[[str], None] | None
@@ -62,7 +65,7 @@ class Asked:
     @classmethod
     def checked(cls, **given: Any) -> Asked:
         """Return what is asked; InvalidParameter or NameNotFound for what nothing can be."""
-        for name, unit in (("radius", "m"), ("press", "N"), ("length", "m")):
+        for name, unit in (("radius", "m"), ("press", "N"), ("length", "m"), ("density", "kg/m^3")):
             if given[name] is not None:
                 check_positive(name, given[name], unit)
         if given["place"] is not None and given["place"] not in PLACES:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
+from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.schema import RobotSection, ShellSection
 
 HELD = 0.05
@@ -50,6 +51,8 @@ def draft_text(
     if plan.left_out:
         left_out = f", without {' and '.join(plan.left_out)}: the tip would not hold its force"
     text = _fill("robot", name=name, title=title, robot=robot, left_out=left_out)
+    if not robot.mimic:
+        text += "mimic = false # joints that mimic others move freely\n"
     if plan.root is not None:
         text += _fill("root", root=_rounded(plan.root, digits))
     elif robot.start:
@@ -80,7 +83,10 @@ def draft_text(
         values = {"offset": offset, "path": path, "told": told}
         text += _fill("press", tip=plan.tips[0], shell=shell, press=control, **values)
         if control.even:
-            mean_force = {"value": control.force, "rtol": HELD}
+            # Over the time of contact; while the force comes on, half of it on average.
+            full = plan.duration - 0.5 * control.force_rise
+            mean = control.force * full / (plan.duration - control.first_touch)
+            mean_force = {"value": rounded(mean, 3), "rtol": HELD}
     elif isinstance(control, Hold):
         text += _fill("hold", hold=control)
     # Measured on balls, arms, hands and legs: the implicit integrator is never much slower than

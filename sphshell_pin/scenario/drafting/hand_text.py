@@ -13,6 +13,7 @@ import pinocchio as pin
 from sphshell_pin.arrays import Array
 from sphshell_pin.contact.materials import Material, friction_between
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
+from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.scenario.drafting.draft_text import toml
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.part import Part, part_file
@@ -93,7 +94,7 @@ class HandDraft:
         model = self.hand.model
         torque = float(np.abs(self.hand.torques(self.grasp)).max())
         kp = rounded(torque / _DRAWN)
-        inertia = np.diag(pin.crba(model, model.createData(), self.grasp.q))
+        inertia = np.diag(mass_matrix(model, self.grasp.q))
         moved = [model.joints[j].idx_v for j in self.hand.joints]
         return kp, rounded(1.4 * math.sqrt(kp * float(np.median(inertia[moved]))))
 
@@ -123,7 +124,7 @@ class HandDraft:
         place = grasp.placement
         root = [*place.translation.tolist(), *pin.Quaternion(place.rotation).coeffs().tolist()]
         stated = self.built.scenario.robot[0].model_dump(exclude_defaults=True)
-        keys = ("name", "urdf", "file", "package_dirs", "xacro_args")
+        keys = ("name", "urdf", "file", "package_dirs", "xacro_args", "density", "mimic")
         source = "\n".join(f"{key} = {toml(stated[key])}" for key in keys if key in stated)
         if self.lock:
             source += f"\nlock = {toml(list(self.lock))} # they move no fingertip"

@@ -24,7 +24,9 @@ from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.pose_search import find_working, sphere_centers
+from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.refusals import CannotStand
+from sphshell_pin.scenario.format.bodies import check_masses
 from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.format.reading import parse_scenario
 from sphshell_pin.scenario.format.schema import RobotSection, RunSection, Scenario, ShellSection
@@ -76,6 +78,8 @@ def new_scenario(
     base: Literal["fixed", "floating"] | None = None,
     package_dirs: Sequence[str | PathLike[str]] = (),
     xacro_args: Mapping[str, str] | None = None,
+    density: float | None = None,
+    mimic: bool = True,
     out: str | PathLike[str] | None = None,
     force: bool = False,
     tell: Callable[[str], None] | None = None,
@@ -90,6 +94,10 @@ def new_scenario(
     robot
         Name of a shipped robot, or path of a URDF, xacro (`xacro_args`: its arguments) or MJCF file
         (`package_dirs`: folders above the packages of its meshes).
+    density
+        Of the links of a URDF that state no mass [kg/m^3]: they get that of their geometry.
+    mimic
+        Whether joints that mimic others do so exactly; else they move freely.
     base
         "fixed" or "floating"; by default as its file states it, but a single limb on a free base is
         an arm, which is fixed, and so is a robot that cannot stand on the surface.
@@ -163,6 +171,8 @@ def _written(asked: Asked) -> NewScenario:
         tips = find_tips(
             loaded, shipped=section.name, frame=asked.frame, radius=radius, offset=asked.offset
         )
+    aside = [set(joints_aside(bare.assembly.model, tip)) for tip in tips]
+    check_masses(bare.assembly, set.intersection(*aside))
     shell = _shell_section(asked, file, bare, tips)
     built = _build_bare(section, file, shell, reuse=bare)
     built = _sided(built, tips, inside=asked.inside)
@@ -175,6 +185,8 @@ def _written(asked: Asked) -> NewScenario:
 
     def draft(section: RobotSection, plan: Plan) -> tuple[str, Built]:
         title = f"{loaded.name} {_DOES[type(plan.control)]} {shell.name}"
+        if loaded.assumed:
+            title += f", its masses from its geometry at {section.density:g} kg/m^3"
         text = draft_text(file.stem, title, section, shell, plan)
         return text, read(text, built)
 
@@ -195,7 +207,7 @@ def _written(asked: Asked) -> NewScenario:
         _check_free(part, force=asked.force)
         _write(part, made.part)
     _write(file, made.text)
-    why = made.why
+    why = (*made.why, *filter(None, (loaded.assumed,)))
     if shaped is not None and not in_hand:
         why = (f"the base is {shaped}, by the robot's shape: or --base", *why)
     return NewScenario(file, made.text, made.built, explain_built(made.built), why)
@@ -243,11 +255,11 @@ def _free_path(asked: Asked) -> Path:
 def _robot_section(asked: Asked, path: Path) -> RobotSection:
     robot, file = asked.robot, Path(asked.robot)
     if not is_path(robot):
-        if asked.package_dirs or asked.xacro_args:
+        if asked.package_dirs or asked.xacro_args or asked.density:
             raise SphshellError(
-                f"mesh folders and xacro arguments belong to a file, not to {robot}"
+                f"mesh folders, xacro arguments and a density belong to a file, not to {robot}"
             )
-        return RobotSection(name=str(robot), base=asked.base)
+        return RobotSection(name=str(robot), base=asked.base, mimic=asked.mimic)
     place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
     return RobotSection(
         urdf=place if is_urdf else None,
@@ -255,6 +267,8 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
         package_dirs=[_relative(Path(one), path) for one in asked.package_dirs],
         xacro_args=dict(asked.xacro_args or {}),
         base=asked.base,
+        density=asked.density,
+        mimic=asked.mimic,
     )
 
 

@@ -46,6 +46,7 @@ MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
 # Of the path across a surface: radii a second.
 PATH_RATE = 3.0
 LEAD_IN = 0.5
+FORCE_RISE = 0.25
 # Of the target's speed and acceleration, each [s].
 RAMP = 0.25
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
@@ -64,6 +65,9 @@ class Press:
     """Points (k, 3) in the shell's frame [m]."""
     speed: float
     lead_in: float
+    force_rise: float
+    first_touch: float
+    """When the sphere has crossed the gap, about [s]."""
     stiffness: float
     damping: float
     rotational_stiffness: float
@@ -163,11 +167,7 @@ def press_force(
 
 
 def press_gap(radius: float, force: float, materials: tuple[Material, Material]) -> float:
-    """Return the gap at the start [m] from which the first touch peaks at four times `force` [N].
-
-    Fallen through g, Hertz's sphere stops at 4^(2/3) times the depth d under `force` at rest, where
-    2/5 k (4^(2/3) d)^(5/2) = force (g + 4^(2/3) d): g = 1.51 d.
-    """
+    """Return the gap at the start [m]: one and a half times the depth under `force` [N] at rest."""
     rest = float((force / hertz_stiffness(radius, *materials)) ** (2 / 3))
     return min(TIP_GAP * radius, 1.5 * rest)
 
@@ -186,7 +186,10 @@ def press_plan(
     """
     stance, path = place.stance, way.points
     rate = rounded(PATH_RATE * tip.radius)
-    contact = contact_of(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
+    # Over the gap the mass is moved by 3 force (t / rise)^2, the beginning of the rise: the gap is
+    # force t^4 / (4 mass rise^2), the speed four times that by t.
+    crossing = (4 * stance.mass * FORCE_RISE**2 * gap / force) ** 0.25
+    contact = contact_of(materials, 4 * gap / crossing, 0.1 * rate)
     softest = contact.mu_static * force / (TIP_LAG * tip.radius)
     stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
     mass = math.sqrt(stance.mass * stance.slide_mass)
@@ -203,6 +206,8 @@ def press_plan(
         even=way.even,
         speed=rate,
         lead_in=LEAD_IN,
+        force_rise=FORCE_RISE,
+        first_touch=crossing,
         stiffness=rounded(stiffness),
         damping=rounded(1.4 * math.sqrt(stiffness * mass)),
         rotational_stiffness=rounded(turning),

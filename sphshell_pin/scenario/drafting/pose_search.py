@@ -12,7 +12,7 @@ import pinocchio as pin
 from sphshell_pin.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
-from sphshell_pin.dynamics.scene.models import find_frame, model_reach
+from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix, model_reach
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING, floats
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
@@ -335,7 +335,7 @@ def _drop(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Work
     else:
         if asked.inside:
             raise SphshellError("a robot cannot stand in a bowl: take another --surface")
-        inertia = np.diag(pin.crba(model, model.createData(), q0))[6:]
+        inertia = np.diag(mass_matrix(model, q0))[6:]
         mass = float(pin.computeTotalMass(model))
         leg = float(np.linalg.norm(root[:3] - centers, axis=1).max())
         pair = chosen_materials(asked, tips, mass / len(tips))

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
-from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.format.reach import Reach, turn_between
 
@@ -192,9 +192,8 @@ def _stance(
     reach_length = max((float(np.linalg.norm(center - one)) for one in joints), default=0.0)
     scaled = jacobian / np.repeat([max(reach_length, 1e-9), 1.0], 3)[:, None]
     values = np.linalg.svd(scaled, compute_uv=False)
-    upper = pin.crba(model, model.createData(), q)
-    mass_matrix = (np.triu(upper) + np.triu(upper, 1).T)[np.ix_(columns, columns)]
-    response = np.linalg.solve(mass_matrix, jacobian.T)
+    mass = mass_matrix(model, q)[np.ix_(columns, columns)]
+    response = np.linalg.solve(mass, jacobian.T)
     mobility = linear @ response[:, :3]
     top = max(float(np.linalg.eigvalsh(mobility)[-1]), 1e-300)
     along = float(approach @ mobility @ approach)
@@ -223,7 +222,7 @@ def _stance(
         mass=1 / max(along, 1e-9),
         slide_mass=1 / max(float(sideways[-1]) if slide is not None else along, 1e-9),
         inertia=turns / turning if spare and turning > 1e-9 else 0.0,
-        joint_inertia=np.diag(mass_matrix).copy(),
+        joint_inertia=np.diag(mass).copy(),
         force=float(np.clip(room / np.abs(pushes[limited]), 0, None).min(initial=np.inf)),
         reach=reach_length,
         mobility=usable / top,

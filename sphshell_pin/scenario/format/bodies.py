@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +21,7 @@ from sphshell_pin.dynamics.scene.models import (
     set_joint,
 )
 from sphshell_pin.errors import MissingExtra, ScenarioError, SphshellError
-from sphshell_pin.robots import LoadedRobot, load, load_file
+from sphshell_pin.robots import LoadedRobot, load, load_file, mass_fault
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.format.reading import item_key
 from sphshell_pin.scenario.format.schema import (
@@ -222,11 +222,21 @@ def origin(section: RobotSection) -> tuple[object, ...]:
         section.path,
         tuple(section.package_dirs),
         tuple(section.xacro_args.items()),
+        section.density,
         section.srdf,
         section.pose,
         section.floats,
         section.mimic,
     )
+
+
+def check_masses(assembly: Assembly, lock: Collection[str]) -> None:
+    """Raise SphshellError for a joint not in `lock` that moves no mass: what lacks one."""
+    for robot, prefix in zip(assembly.loaded, assembly.prefixes, strict=True):
+        held = {name.removeprefix(prefix) for name in lock if name.startswith(prefix)}
+        fault = mass_fault(robot.model, robot.q0, robot.description, held)
+        if fault is not None:
+            raise SphshellError(f"{robot.name}: {fault}")
 
 
 def reduce_visual(assembly: Assembly) -> pin.GeometryModel:
@@ -265,6 +275,7 @@ def _load(section: RobotSection, path: Path) -> LoadedRobot:
         xacro_args=section.xacro_args,
         srdf=None if section.srdf is None else folder / section.srdf,
         pose=section.pose,
+        density=section.density,
     )
 
 

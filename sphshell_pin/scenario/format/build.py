@@ -42,6 +42,7 @@ from sphshell_pin.scenario.format.bodies import (
     Assembly,
     assemble,
     blamed_on,
+    check_masses,
     origin,
     reduce_visual,
     restrict,
@@ -170,6 +171,8 @@ def build_scenario(
 
     with blamed_on(path, "robot"):
         q_lock = assembly.q0 if assembly.lock else None
+        if scenario.contact:
+            check_masses(assembly, assembly.lock)
         joints = joint_components(scenario, assembly, path)
         scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
     shells: dict[str, ShellPlace] = {}
@@ -253,6 +256,8 @@ def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell |
 def explain_built(built: Built) -> Explanation:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
     said = built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
+    assumed = tuple(one.assumed for one in built.assembly.loaded if one.assumed)
+    said = replace(said, modelled=(*said.modelled, *assumed))
     if not isinstance(built.controller, Controller):
         return said
     setup = built.controller._setup_warnings(built.scene, built.q0)

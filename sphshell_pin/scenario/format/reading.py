@@ -6,6 +6,7 @@ import functools
 import importlib
 import os
 import re
+import shlex
 import tomllib
 import typing
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,12 +23,15 @@ from sphshell_pin.named_numbers import present_name
 from sphshell_pin.parameters import parameters_of
 from sphshell_pin.regular_file import MOST_TEXT, read_text
 from sphshell_pin.scenario.format.schema import LISTS, STEPPING, RunSection, Scenario
+from sphshell_pin.shell.readers import SUFFIXES
 
 TOO_DEEP = "is not valid TOML: its tables or lists are nested too deeply"
 # A key of a hundred parts: the time and memory of tomllib grow with their square.
 _LONG_KEY = re.compile(r"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""")
 # What tomllib gives: tables, lists and values in each other.
 Toml: TypeAlias = Any
+
+_ROBOT_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -47,6 +51,13 @@ def find_scenario(name: str | PathLike[str]) -> Path:
     """
     path = Path(name)
     if os.path.isfile(path):
+        suffix, quoted = path.suffix.lower(), shlex.quote(str(path))
+        if suffix in SUFFIXES:
+            must = f"is a surface: sphshell-pin new --robot ROBOT --surface {quoted}"
+            raise ScenarioError(path, "", f"{must} writes a scenario")
+        if suffix in _ROBOT_SUFFIXES:
+            must = f"is a robot: sphshell-pin new --robot {quoted} --surface SURFACE"
+            raise ScenarioError(path, "", f"{must} writes a scenario")
         return path
     shipped = shipped_scenarios()
     if str(name) in shipped:

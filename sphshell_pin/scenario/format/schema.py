@@ -90,6 +90,7 @@ class RobotSection(Section):
     urdf: str | None = None
     package_dirs: list[str] = []
     xacro_args: dict[str, bool | int | float | str] = {}
+    density: Positive | None = None
     srdf: str | None = None
     pose: str | None = None
     base: Literal["fixed", "floating"] | None = None
@@ -112,7 +113,7 @@ class RobotSection(Section):
                 "give either name (a shipped robot) or file (a URDF, xacro or MJCF; urdf is the "
                 "same key), not both"
             )
-        of_files = ("package_dirs", "xacro_args", "srdf")
+        of_files = ("package_dirs", "xacro_args", "density", "srdf")
         beside = [key for key in of_files if getattr(self, key)]
         if self.name is not None and beside:
             raise ValueError(f"{' and '.join(beside)} belong to a file; drop them beside name")

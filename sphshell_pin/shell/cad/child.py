@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import ctypes
 import fcntl
+import importlib.util
 import os
 import pickle
 import re
 import resource
 import select
 import signal
+import sys
 import traceback
 import warnings
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from pathlib import Path
 
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.limits import limit_memory
@@ -38,6 +42,7 @@ def serve(source: int, target: int) -> None:
     requests, answers = Connection(source, writable=False), Connection(target, readable=False)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (MOST_WRITTEN, MOST_WRITTEN))
+    _load_display_libraries()
     while requests.poll(IDLE):
         try:
             message = requests.recv_bytes()
@@ -50,6 +55,23 @@ def serve(source: int, target: int) -> None:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     # The destructors of OpenCASCADE's libraries have nothing to save.
     os._exit(0)
+
+
+def _load_display_libraries() -> None:
+    """Load stand-ins for the libraries of a display that OpenCASCADE needs and this machine lacks.
+
+    A library that is loaded already serves all that ask for its name. The stand-ins define what is
+    named in tables; functions that are only called are looked up when they are, which is never.
+    """
+    core = importlib.util.find_spec("sphshell_pin._core")  # which need not be loaded
+    folder = Path(core.origin if core and core.origin else "").parent / "no_display"
+    for library in sorted(folder.glob("*.so.*")):
+        try:
+            ctypes.CDLL(library.name)
+        except OSError:
+            with suppress(OSError):
+                ctypes.CDLL(str(library))
+                sys.setdlopenflags(os.RTLD_LAZY)
 
 
 def _end_with_parent(pipe: int, wanted: bool) -> None:

@@ -13,7 +13,7 @@ from OCP.collections import (
     IndexedDataMap_TopoDS_Shape_List_TopoDS_Shape_TopTools_ShapeMapHasher as AncestorMap,
 )
 from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound
 
@@ -71,6 +71,12 @@ class CadModel:
     def shape(self) -> Occ:
         """All faces as one TopoDS_Compound; borders that faces share stay shared."""
         return compound([face.shape for face in self.faces])
+
+    @property
+    def solids(self) -> tuple[int, ...]:
+        """For each face the row of its body if that is a solid, else -1."""
+        kinds = [shape.ShapeType() for _, shape in self.bodies]
+        return tuple(f.body if kinds[f.body] == TopAbs_SOLID else -1 for f in self.faces)
 
     @property
     def tolerance(self) -> float:

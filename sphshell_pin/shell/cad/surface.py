@@ -95,16 +95,17 @@ class CadSurface:
             faces.append(np.full(len(mesh.triangles), row, np.int32))
             count += len(mesh.points)
         triangles = np.concatenate(corners)
-        meshes = self.found.meshes
+        meshes, of_face = self.found.meshes, np.concatenate(faces)
         shapes = np.array([NO_SHAPE if mesh is None else mesh.surface.shape() for mesh in meshes])
         return RawSurface(
             vertices=np.concatenate(points) * self.model.meters,
             offsets=3 * np.arange(len(triangles) + 1, dtype=np.int64),
             corners=triangles.ravel().astype(np.int32),
             normals=np.concatenate(normals).reshape(-1, 3),
-            faces=np.concatenate(faces),
+            faces=of_face,
             face_names=tuple(face.name for face in self.model.faces),
             face_shapes=moved_shapes(shapes, self.model.meters, np.eye(3), np.zeros(3)),
+            solids=np.array(self.model.solids, np.int32)[of_face],
         )
 
 

@@ -31,6 +31,8 @@ def check_robot(
     free_flyer: bool = False,
     package_dirs: Sequence[str | PathLike[str]] = (),
     xacro_args: Mapping[str, object] | None = None,
+    density: float | None = None,
+    mimic: bool = True,
     seed: int = 0,
     sizes: Sizes | None = None,
     progress: Callable[[str], object] | None = None,
@@ -41,9 +43,10 @@ def check_robot(
     else the outermost of the spheres inside the collision mesh at the end of the longest limb, or
     that end. A file is a URDF, xacro (`xacro_args` are its arguments) or MJCF; `free_flyer` frees
     the root link of a URDF, `package_dirs` are the folders that hold packages that it includes.
-    Mimic joints are exact. Other meshes are not loaded. The same `seed` gives the same postures;
-    `sizes` says how many; `progress` is called with the key of each check before it starts. A
-    model is a pinocchio.Model.
+    `density` [kg/m^3] gives links of a URDF the mass of their geometry where it states none. Mimic
+    joints are exact unless `mimic` is False. Other meshes are not loaded. The same `seed` gives the
+    same postures; `sizes` says how many; `progress` is called with the key of each check before it
+    starts. A model is a pinocchio.Model.
 
     A robot that cannot be loaded on this machine, or whose sphere nothing can move, is reported as
     not checked, with the reason.
@@ -63,7 +66,12 @@ def check_robot(
         radius = check_positive("radius", radius, "m")
     try:
         subject = load_subject(
-            robot, free_flyer=free_flyer, package_dirs=package_dirs, xacro_args=xacro_args
+            robot,
+            free_flyer=free_flyer,
+            package_dirs=package_dirs,
+            xacro_args=xacro_args,
+            density=density,
+            mimic=mimic,
         )
     except (MissingExtra, NameNotFound):
         raise

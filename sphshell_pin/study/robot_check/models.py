@@ -53,13 +53,15 @@ def load_subject(
     free_flyer: bool = False,
     package_dirs: Sequence[str | PathLike[str]] = (),
     xacro_args: Mapping[str, object] | None = None,
+    density: float | None = None,
+    mimic: bool = True,
 ) -> Subject:
     """Load the robot of a name or a file without its meshes, or take a pinocchio.Model.
 
-    Mimic joints are exact. Of collision geometry only the spheres are taken, which may be its
-    fingertips. `free_flyer` frees the root link of a file; `package_dirs` and `xacro_args` are
-    those of `robots.load_file`. Raises NameNotFound, and RobotError for a description that cannot
-    be read.
+    Mimic joints are exact unless `mimic` is False, and `density` is that of `robots.load_file`. Of
+    collision geometry only the spheres are taken, which may be its fingertips. `free_flyer` frees
+    the root link of a file; `package_dirs` and `xacro_args` are those of `robots.load_file`. Raises
+    NameNotFound, and RobotError for a description that cannot be read.
     """
     if isinstance(robot, pin.Model):
         if free_flyer:
@@ -74,23 +76,30 @@ def load_subject(
     if robots.is_path(robot):
         file = Path(robot)
         description = robots.read(file, package_dirs, xacro_args, free_flyer=free_flyer or None)
-        return _without_meshes(description, file.stem, None, free_flyer=free_flyer)
+        assumed = ""
+        if density is not None:
+            description, assumed = robots.with_density(description, density)
+        subject = _without_meshes(description, file.stem, None, free_flyer=free_flyer, mimic=mimic)
+        return replace(subject, notes=(*filter(None, (assumed,)), *subject.notes))
+    if density is not None:
+        raise InvalidParameter("density", density, f"belongs to a file, not to {robot}")
     if free_flyer:
         raise InvalidParameter("free_flyer", robot, "must be a file: named robots know it")
     if robot in robots.OWN:
         description = robots.read(robots.URDF_FOLDER / f"{robot}.urdf")
-        return _without_meshes(description, robot, robot, free_flyer=robots.OWN[robot])
-    return _from_library(robot)
+        floating = robots.OWN[robot]
+        return _without_meshes(description, robot, robot, free_flyer=floating, mimic=mimic)
+    return _from_library(robot, mimic=mimic)
 
 
-def _from_library(name: str) -> Subject:
+def _from_library(name: str, *, mimic: bool) -> Subject:
     from example_robot_data import robots_loader
 
     loader = robots_loader.ROBOTS[name]
     reads_files_only = loader.__init__ is robots_loader.RobotLoader.__init__
     if not loader.urdf_filename or not reads_files_only:
         # It is an SDF, or changes what it has read: only itself knows how.
-        loaded = robots.load(name, mimic=True)
+        loaded = robots.load(name, mimic=mimic)
         return Subject(name, loaded, name, loaded.notes)
     inner = Path(loader.path, loader.urdf_subpath, loader.urdf_filename)
     folder = Path(robots_loader.getModelPath(str(inner)))
@@ -106,7 +115,9 @@ def _from_library(name: str) -> Subject:
         rotors, posture = loader.has_rotor_parameters, loader.ref_posture
         return np.array(robots_loader.readParamsFromSrdf(model, str(srdf), False, rotors, posture))
 
-    return _without_meshes(description, name, name, free_flyer=loader.free_flyer, pose=pose)
+    return _without_meshes(
+        description, name, name, free_flyer=loader.free_flyer, mimic=mimic, pose=pose
+    )
 
 
 def _without_meshes(
@@ -115,19 +126,22 @@ def _without_meshes(
     shipped: str | None,
     *,
     free_flyer: bool,
+    mimic: bool = True,
     pose: Callable[[pin.Model], NDArray[np.float64]] | None = None,
 ) -> Subject:
-    model = robots.build_model(description, free_flyer=free_flyer)
+    model = robots.build_model(description, free_flyer=free_flyer, mimic=mimic)
     q0 = pose(model) if pose is not None else description.q0(model)
-    whole = copy.deepcopy(description)
-    robots.keep_spheres(description)
-    spheres, _ = robots.build_geometry(description, model, pin.GeometryType.COLLISION)
-    robot = robots.LoadedRobot(name, model, spheres, pin.GeometryModel(), q0)
-    robot = robots.exactly(robot, description, mimic=True, warn=False)
+    bare = copy.deepcopy(description)
+    robots.keep_spheres(bare)
+    spheres, _ = robots.build_geometry(bare, model, pin.GeometryType.COLLISION)
+    robot = robots.LoadedRobot(
+        name, model, spheres, pin.GeometryModel(), q0, description=description
+    )
+    robot = robots.exactly(robot, description, mimic=mimic, warn=False)
 
     def spheres_of(link: str) -> robots.MeshSpheres:
-        part = copy.deepcopy(whole)
-        robots.keep_collision_of(part, link)
+        part = copy.deepcopy(description)
+        robots.keep_geometry_of(part, {link})
         geometry, _ = robots.build_geometry(part, model, pin.GeometryType.COLLISION)
         return robots.spheres_of_link(model, geometry, link, count=8)
 

@@ -7,8 +7,8 @@ import pinocchio as pin
 
 from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
-from sphshell_pin.dynamics.scene.models import reduced_model
-from sphshell_pin.testing.forces import joint_names, mass_matrix
+from sphshell_pin.dynamics.scene.models import mass_matrix, reduced_model
+from sphshell_pin.testing.forces import joint_names
 
 # Below this, of mass matrices with a unit diagonal, rounding decides the accelerations.
 _SINGULAR = 1e-9
@@ -53,14 +53,14 @@ def massless_joints(model: pin.Model, postures: list[Array]) -> list[str]:
     First those that move no mass or inertia at all; then, as long as it is needed, the last one on
     its limb that the bodies behind it cannot slow down.
     """
-    data, names = model.createData(), joint_names(model)
-    least = np.max([np.diag(mass_matrix(model, data, q)) for q in postures], axis=0)
+    names = joint_names(model)
+    least = np.max([np.diag(mass_matrix(model, q)) for q in postures], axis=0)
     light = least <= 1e-14 * least.max(initial=0.0)
     held = list(dict.fromkeys(name for name, bare in zip(names, light, strict=True) if bare))
     while len(held) < model.njoints - 1:
         rest = reduced_model(model, tuple(held), postures[0]) if held else model
         keep = [k for k, name in enumerate(names) if name not in held]
-        space = [_pivots(rest, rest.createData(), _kept(model, rest, q)) for q in postures]
+        space = [_pivots(rest, _kept(model, rest, q)) for q in postures]
         shares = np.max(space, axis=0)
         weak = np.flatnonzero(~(shares > _SINGULAR))
         if not len(weak):
@@ -69,18 +69,18 @@ def massless_joints(model: pin.Model, postures: list[Array]) -> list[str]:
     return held
 
 
-def regularity(model: pin.Model, data: pin.Data, q: Array) -> float:
+def regularity(model: pin.Model, q: Array) -> float:
     """Return how far the mass matrix at q (nq,) is from singular: 0 if it is, 1 if diagonal."""
-    pivots = _pivots(model, data, q)
+    pivots = _pivots(model, q)
     return float(pivots.min(initial=1.0)) if np.isfinite(pivots).all() else 0.0
 
 
-def _pivots(model: pin.Model, data: pin.Data, q: Array) -> Array:
+def _pivots(model: pin.Model, q: Array) -> Array:
     """Return by what ABA divides (nv,): the inertia at each joint, other joints free to yield.
 
     Relative to that with the other joints held.
     """
-    mass = mass_matrix(model, data, q)
+    mass = mass_matrix(model, q)
     held = np.diag(mass).copy()
     # M = U D U^T, from the last velocity on; Pinocchio's own has no mimic joints.
     with np.errstate(divide="ignore", invalid="ignore"):

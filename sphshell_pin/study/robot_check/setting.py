@@ -11,8 +11,9 @@ from sphshell_pin.arrays import Array
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
-from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots import mass_fault
 from sphshell_pin.shell import Shell
 from sphshell_pin.study.robot_check.models import Subject, listed
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
@@ -23,7 +24,7 @@ from sphshell_pin.study.robot_check.probe_spheres import (
     moved_sphere,
     placed_data,
 )
-from sphshell_pin.testing.forces import mass_matrix, point_jacobian
+from sphshell_pin.testing.forces import point_jacobian
 
 PLATE, BASE = "sphshell_check_plate", "sphshell_check_base"
 
@@ -73,7 +74,9 @@ def setting_of(
     """
     model, notes = subject.robot.model, [*subject.notes]
     if model.nv == 0:
-        raise SphshellError(f"the robot '{subject.name}' has no joint that moves")
+        raise SphshellError(
+            f"the robot '{subject.name}' has no joint that moves: let its root float, --free-flyer"
+        )
     postures = [random_posture(model, rng) for _ in range(5)]
     held = massless_joints(model, postures)
     if held:
@@ -82,8 +85,15 @@ def setting_of(
             "joints that move no mass are held here, as `lock` does it in a scene, because forward "
             f"dynamics has no answer for them: {listed(held)}"
         )
-    tip, said = find_sphere(subject, model, rng, frame, radius)
-    sphere, shifted = moved_sphere(model, tip, rng)
+    try:
+        tip, said = find_sphere(subject, model, rng, frame, radius)
+        sphere, shifted = moved_sphere(model, tip, rng)
+    except SphshellError:
+        robot = subject.robot
+        fault = mass_fault(robot.model, postures[0], robot.description) if held else None
+        if fault is None:
+            raise
+        raise SphshellError(fault) from None
     notes += said + shifted
     return Setting(model, sphere, patch(tip.radius), tuple(notes))
 
@@ -165,7 +175,7 @@ def meeting_posture(
 
 def random_torques(model: pin.Model, q: Array, rng: np.random.Generator) -> Array:
     """Return random torques (nv,) that move light and heavy joints alike."""
-    weight = np.diag(mass_matrix(model, model.createData(), q))
+    weight = np.diag(mass_matrix(model, q))
     return np.asarray(np.sqrt(weight) * rng.normal(size=model.nv))
 
 
@@ -211,7 +221,7 @@ class _Contact:
         pin.computeJointJacobians(model, data, q)
         jacobian = point_jacobian(model, data, joint, point)
         row = self.normal @ (jacobian - point_jacobian(model, data, other, point))
-        return 1.0 / float(row @ np.linalg.solve(mass_matrix(model, data, q), row))
+        return 1.0 / float(row @ np.linalg.solve(mass_matrix(model, q), row))
 
     def _point(self, model: pin.Model, data: pin.Data, sphere: Sphere) -> tuple[int, Array]:
         joint, center = center_of(model, data, sphere)
@@ -233,7 +243,7 @@ def _motion(
             fast = float(np.linalg.norm(way))
             # A limb stretched out hardly moves its end: another posture says more.
             moves = fast > 0.05 * np.linalg.norm(jacobian) > 0.0
-            if moves and regularity(model, data, q) > wanted:
+            if moves and regularity(model, q) > wanted:
                 carries = np.abs(jacobian).max(axis=0) > 0.0
                 v *= np.where(carries, speed / fast, min(speed / fast, 1.0))
                 return q, v, way / fast

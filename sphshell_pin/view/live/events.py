@@ -141,7 +141,7 @@ def read_event(message: str | bytes) -> Event:
         try:
             event[name] = check(data[name])
         except BadMessage as fault:
-            raise BadMessage(f"'{name}' of '{kind}' {fault}") from None
+            raise BadMessage(f"the {name} {fault}") from None
     return event
 
 

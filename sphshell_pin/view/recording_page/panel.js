@@ -146,6 +146,7 @@ class Panel {
       Points: [...below(tree.contacts, /^point_/), ...(tree.pressure ? [tree.pressure] : [])],
       Path: in_shells("trail"),
       Wireframe: in_shells("elements"),
+      Grid: tree.grid ? [tree.grid] : [],
     };
     for (const [label, nodes] of Object.entries(parts)) {
       const drawn = nodes.filter((node) => Object.keys(node.children).length);

@@ -13,8 +13,9 @@
 namespace sphshell {
 namespace {
 
-// Of the radius: a step of the center for second derivatives, and a distance without direction.
-constexpr double kMove = 1e-5, kNoDistance = 1e-6;
+// Of the radius: a step of the center for derivatives, a distance without direction, and what a
+// place may move by such steps. Of the depth: the largest step that changes it.
+constexpr double kMove = 1e-5, kNoDistance = 1e-6, kAside = 1e-2, kDeeper = 1e-3;
 
 // Tangents along one line (the sine of their angle), as at the common corner of two curved sides
 // that go on into each other, are one.
@@ -85,10 +86,13 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
   const CurvedFacet& curved = shell.curved()->facets()[contact.facet];
   const Facet& facet = shell.facets()[contact.facet];
   Place place{contact.facet, contact.feature, contact.index, {0, 0}, curved.patch(facet)};
-  // Of a flat element nothing depends on the place.
+  field_.look_about(contact.point,
+                    std::sqrt(radius * std::max(contact.depth, 0.0)) + kAside * radius);
+  // Within a flat element nothing depends on the place.
   const Primitive* face = face_at(place);
   const bool flat = contact.feature == Feature::Face &&
-                    (face ? face->kind == FaceKind::Plane : bool(curved.flat));
+                    (face ? face->kind == FaceKind::Plane : bool(curved.flat)) &&
+                    !field_.near_joint(contact.facet);
   // A ring is touched along a line, where there is no elliptic contact: the sphere's own curvature.
   if (flat || contact.feature == Feature::Ring) {
     const Vec3 normal = flat ? contact.normal : facet.normal;
@@ -102,8 +106,10 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
     place.at = parameters_of(place.patch, facet, contact.point);
   Motion motion;
   ContactShape out = shape_at(place, contact.depth, center, contact.normal, radius, motion);
-  if (!want_second || motion.normal.isZero(0)) return out;
-  const double step = kMove * radius;
+  const double step = std::min(kMove * radius, kDeeper * contact.depth);
+  // Nothing is known of the motion of a center that is on the surface.
+  const bool moves = std::abs(radius - contact.depth) > kNoDistance * radius;
+  if (!want_second || !moves || !(step > 0)) return out;
   for (int i = 0; i < 3; ++i) {
     out.second.col(i).setZero(), out.tilt_by.col(i).setZero();
     for (int sign : {1, -1}) {
@@ -136,60 +142,54 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
   motion.parameters.setZero(), motion.normal.setZero();
   // On the surface itself the direction to the center is undefined.
   const bool moves = std::abs(distance) > kNoDistance * radius;
-  CurvatureField::Local local;
+  depth = std::max(depth, 0.0);  // where a difference reaches beyond it
+  const Primitive* face = face_at(place);
+  // Seen from the other side a surface curves the other way.
+  const int along = face && direction_of(place, center).dot(normal) < 0 ? -1 : 1;
+  int sign = along;
+  if (face)
+    sign *= field_.shell().curved()->face_cells()[place.facet].sign;
+  else if (place.feature == Feature::Face)
+    sign = normal_of(patch, place.at[0], place.at[1]).dot(normal) < 0 ? -1 : 1;
+  if (moves && face) {
+    motion.normal = along * face->hessian(center);
+  } else if (moves) {
+    Mat3 dx_dc = Mat3::Zero();
+    if (place.feature == Feature::Face) {
+      dx_dc = dx_dc_of(patch, place.at[0], place.at[1], Sphere{center, 0, 0});
+      motion.parameters = parameters_by(patch, place.at[0], place.at[1]) * dx_dc;
+    } else if (place.feature == Feature::Edge) {
+      const Shell& shell = field_.shell();
+      const CubicCurve side =
+          shell.curved()->facets()[place.facet].side(shell.facets()[place.facet], place.index);
+      const Vec3 tangent = side.tangent(place.at[0]);
+      dx_dc = dx_dc_of(side, place.at[0], Sphere{center, 0, 0});
+      motion.parameters.row(0) = tangent.transpose() * dx_dc / tangent.squaredNorm();
+    }
+    motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
+  }
+  // Where the center moves, so do the place and the normal.
+  const auto local_at = [&](const Vec3& moved, double length2) -> CurvatureField::Local {
+    Place there = place;
+    there.at += motion.parameters * moved;
+    if (place.feature != Feature::Face)
+      return between_walls(there, (normal + motion.normal * moved).normalized(), length2);
+    const Vec3 point = face ? face->onto(center + moved) : there.point();
+    return sign * field_.at({place.facet, there.at, point}, length2);
+  };
+  // The square of the radius of contact on a plane, over which joints are blended.
+  const double length2 = radius * depth, step = kMove * radius;
+  const CurvatureField::Local local = local_at(Vec3::Zero(), length2);
   Eigen::Matrix<double, 7, 3> local_by;
   local_by.setZero();
-  if (const Primitive* face = face_at(place)) {
-    // Seen from the other side a surface curves the other way.
-    const double sign = direction_of(place, center).dot(normal) < 0 ? -1 : 1;
-    // The Hessian of a face's distance on the face is its curvature tensor.
-    const auto tensor_at = [&](const Vec3& from) -> CurvatureField::Tensor {
-      return sign * CurvatureField::tensor(face->hessian(face->onto(from)));
-    };
-    local << tensor_at(center), 0;
-    const double step = kMove * radius;
-    for (int i = 0; i < 3 && moves; ++i) {
-      const Vec3 moved = step * Vec3::Unit(i);
-      local_by.col(i).head<6>() =
-          (tensor_at(center + moved) - tensor_at(center - moved)) / (2 * step);
-    }
-    if (moves) motion.normal = sign * face->hessian(center);
-  } else if (place.feature == Feature::Face) {
-    const double u = place.at[0], v = place.at[1];
-    if (moves) {
-      const Mat3 dx_dc = dx_dc_of(patch, u, v, Sphere{center, 0, 0});
-      motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
-      motion.parameters = parameters_by(patch, u, v) * dx_dc;
-    }
-    const double sign = normal_of(patch, u, v).dot(normal) < 0 ? -1 : 1;
-    // By the chain rule: the field's derivatives by u, v times those of u, v by the center.
-    const CurvatureField::Expansion here = sign * field_.at(place.facet, u, v);
-    local = here.col(0);
-    local_by = here.rightCols<2>() * motion.parameters;
-  } else {
-    if (moves) {
-      Mat3 dx_dc = Mat3::Zero();
-      if (place.feature == Feature::Edge) {
-        const Shell& shell = field_.shell();
-        const CubicCurve side =
-            shell.curved()->facets()[place.facet].side(shell.facets()[place.facet], place.index);
-        const Vec3 along = side.tangent(place.at[0]);
-        dx_dc = dx_dc_of(side, place.at[0], Sphere{center, 0, 0});
-        motion.parameters.row(0) = along.transpose() * dx_dc / along.squaredNorm();
-      }
-      motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
-    }
-    local = between_walls(place, normal);
-    const double step = kMove * radius;
-    for (int i = 0; i < 3 && moves; ++i)
-      for (int sign : {1, -1}) {
-        Place there = place;
-        there.at += sign * step * motion.parameters.col(i);
-        // On a side or a corner the curvature also depends on the normal's angle between the walls.
-        const Vec3 turned = (normal + sign * step * motion.normal.col(i)).normalized();
-        local_by.col(i) += sign / (2 * step) * between_walls(there, turned);
-      }
-  }
+  for (int i = 0; i < 3 && moves; ++i)
+    for (int way : {1, -1})
+      local_by.col(i) += way / (2 * step) * local_at(way * step * Vec3::Unit(i), length2);
+  // It grows with the depth, which falls along the normal.
+  for (int way : {1, -1})
+    if (depth > 0 && moves)
+      local_by -= way / (2 * kDeeper * depth) *
+                  local_at(Vec3::Zero(), (1 + way * kDeeper) * length2) * normal.transpose();
   const Mat3 curvature = CurvatureField::matrix(local.head<6>());
   Mat3 slope;
   ContactShape out = shape_of_gap(curvature + Mat3::Identity() / radius, normal, radius, &slope);
@@ -206,7 +206,6 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
   // > 0 and depth - size (1 - e^-x) for rise < 0: zero at zero depth, the full rise a few sizes
   // deeper. Its derivative gives the tilt.
   const double rise = local[6];
-  depth = std::max(depth, 0.0);  // where a difference reaches beyond it
   const double size = std::abs(rise), x = rise == 0 ? 0 : depth / size;
   const double share = rise == 0 ? 0 : std::exp(-x);
   out.depth = rise == 0  ? depth
@@ -219,12 +218,13 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
 
 // Shepard's interpolation between the arcs from wall to wall, each weighted by the inverse square
 // of what the way over the normal is longer than the arc; along an arc by the angle.
-CurvatureField::Local Curvature::between_walls(const Place& place, const Vec3& normal) {
+CurvatureField::Local Curvature::between_walls(const Place& place, const Vec3& normal,
+                                               double length2) {
   walls_.clear();
   if (place.feature == Feature::Edge)
-    find_walls_of_side(place.facet, place.index, place.at[0]);
+    find_walls_of_side(place.facet, place.index, place.at[0], length2);
   else
-    find_walls_of_vertex(place.facet, place.index);
+    find_walls_of_vertex(place.facet, place.index, length2);
   // One wall on both sides means that the walls do not differ.
   if (walls_.size() == 1 && walls_[0].first.normal == walls_[0].second.normal) {
     // A border: from one side of the only wall to its other side.
@@ -251,15 +251,15 @@ CurvatureField::Local Curvature::between_walls(const Place& place, const Vec3& n
   return sign / weights * sum;
 }
 
-Curvature::Wall Curvature::wall(int facet, double u, double v) {
+Curvature::Wall Curvature::wall(int facet, double u, double v, double length2) {
   const Shell& shell = field_.shell();
   const CubicPatch patch = shell.curved()->facets()[facet].patch(shell.facets()[facet]);
-  return {field_.at(facet, u, v).col(0), normal_of(patch, u, v)};
+  return {field_.at({facet, {u, v}, patch.point(u, v)}, length2), normal_of(patch, u, v)};
 }
 
 // The elements at an edge in their order; neighbors are a pair of walls. Of the other triangle the
 // half-edge may run the other way: then t counts from its other end.
-void Curvature::find_walls_of_side(int facet, int side, double t) {
+void Curvature::find_walls_of_side(int facet, int side, double t, double length2) {
   const Shell& shell = field_.shell();
   const Topology& topology = shell.topology();
   const Edge& edge = edge_at(shell, facet, side);
@@ -270,17 +270,17 @@ void Curvature::find_walls_of_side(int facet, int side, double t) {
     const int other = triangle_of(h), k = side_of(h);
     const bool along = shell.triangles()[shell.triangle_of_facet(other)][k] == first;
     const auto [u, v] = on_side(k, along ? t : 1 - t);
-    const Wall here = wall(other, u, v);
+    const Wall here = wall(other, u, v, length2);
     if (i > 0 || edge.count == 1) walls_.emplace_back(i > 0 ? last : here, here);
     last = here;
   }
 }
 
-void Curvature::find_walls_of_vertex(int facet, int corner) {
+void Curvature::find_walls_of_vertex(int facet, int corner, double length2) {
   const Shell& shell = field_.shell();
   const auto wall_at = [&](int c) {
     const auto [u, v] = corner_parameters(c % 3);
-    return wall(c / 3, u, v);
+    return wall(c / 3, u, v, length2);
   };
   connected_corners(shell, 3 * facet + corner, corners_,
                     [](int, int, const Edge&) { return true; });

@@ -49,12 +49,12 @@ class Curvature {
   ContactShape shape_at(const Place& place, double depth, const Vec3& center, const Vec3& normal,
                         double radius, Motion& motion);
   // Curvature and rise on a side or a corner, at the angle of the normal.
-  CurvatureField::Local between_walls(const Place& place, const Vec3& normal);
+  CurvatureField::Local between_walls(const Place& place, const Vec3& normal, double length2);
   // Both fill walls_ with the pairs of walls that meet there.
-  void find_walls_of_side(int facet, int side, double t);
-  void find_walls_of_vertex(int facet, int corner);
+  void find_walls_of_side(int facet, int side, double t, double length2);
+  void find_walls_of_vertex(int facet, int corner, double length2);
   // What the field and the element say at a point.
-  Wall wall(int facet, double u, double v);
+  Wall wall(int facet, double u, double v, double length2);
 
   CurvatureField field_;
   std::vector<std::pair<Wall, Wall>> walls_;  // those that meet at a crease

@@ -18,9 +18,6 @@ constexpr double kJump = 1.5;
 // What elements leave of a surface that they resolve is a small share of their own bulge: more is
 // noise.
 constexpr double kLargestRise = 0.1;
-// A step of an element's parameters for the derivatives of a face's curvature.
-constexpr double kStep = 1e-4;
-
 // Whether two half-edges of one edge begin at its other ends.
 bool is_reversed(const Shell& shell, int half_edge, int other) {
   return vertex_of(shell, half_edge) != vertex_of(shell, other);
@@ -48,20 +45,6 @@ bool is_jump(const Shell& shell, int facet, int other) {
   return std::max(a, b) > kJump * std::min(a, b);
 }
 
-// The half-edge, given in facets, of the neighbor that an element is joined to smoothly over a
-// side; -1: there is none.
-int joined_over(const Shell& shell, int facet, int side) {
-  const int h = shell.topology().other_half_edge(3 * shell.triangle_of_facet(facet) + side);
-  if (h < 0) return -1;
-  const int other = shell.facet_half_edge(h);
-  for (int k : {side, next_corner(side)}) {
-    const int corner = 3 * facet + k;
-    const int beside = corner_of(shell, other, vertex_of(shell, corner));
-    if (!is_one_normal(normal_at(shell, corner), normal_at(shell, beside))) return -1;
-  }
-  return other;
-}
-
 }  // namespace
 
 Mat3 CurvatureField::matrix(const Tensor& t) {
@@ -72,24 +55,14 @@ Mat3 CurvatureField::matrix(const Tensor& t) {
 
 // Each side's polynomial is blended into the element, and the middle is lifted by what is missing
 // there.
-Eigen::RowVector3d CurvatureField::Rise::at(double u, double v) const {
+double CurvatureField::Rise::at(double u, double v) const {
   const double b[3] = {1 - u - v, u, v};
-  static constexpr double kBy[3][2] = {{-1, -1}, {1, 0}, {0, 1}};
-  Eigen::RowVector3d out(27 * middle * b[0] * b[1] * b[2], 0, 0);
-  for (int d = 0; d < 2; ++d)
-    out[1 + d] =
-        27 * middle * (kBy[0][d] * b[1] * b[2] + b[0] * kBy[1][d] * b[2] + b[0] * b[1] * kBy[2][d]);
+  double out = 27 * middle * b[0] * b[1] * b[2];
   for (int k = 0; k < 3; ++k) {
     const int n = next_corner(k);
-    const double both = b[k] * b[n], along = b[n] - b[k];
-    const double even = even_[k][0] + both * even_[k][1], odd = odd_[k][0] + both * odd_[k][1];
-    out[0] += both * (even + along * odd);
-    for (int d = 0; d < 2; ++d) {
-      const double both_by = kBy[k][d] * b[n] + b[k] * kBy[n][d];
-      out[1 + d] +=
-          both_by * (even + along * odd) +
-          both * (both_by * (even_[k][1] + along * odd_[k][1]) + (kBy[n][d] - kBy[k][d]) * odd);
-    }
+    const double both = b[k] * b[n];
+    out += both *
+           (even_[k][0] + both * even_[k][1] + (b[n] - b[k]) * (odd_[k][0] + both * odd_[k][1]));
   }
   return out;
 }
@@ -103,25 +76,17 @@ void CurvatureField::Rise::set_side(int k, const double (&at)[4]) {
   odd_[k][1] = (near - apart) / 0.08, odd_[k][0] = apart - 0.16 * odd_[k][1];
 }
 
-// From the shape of the face, by central differences of its curvature; from the cubic of the cell;
-// or zero where the element is flat.
-CurvatureField::Expansion CurvatureField::at(int facet, double u, double v) {
-  Expansion out = Expansion::Zero();
-  if (const Primitive* face = shell_->curved()->face_of(facet)) {
-    const CubicPatch patch = shell_->curved()->facets()[facet].patch(shell_->facets()[facet]);
-    const int sign = shell_->curved()->face_cells()[facet].sign;
-    const auto tensor_at = [&](double a, double b) {
-      return Tensor(sign * tensor(face->hessian(face->onto(patch.point(a, b)))));
-    };
-    out.topRows<6>() << tensor_at(u, v),
-        (tensor_at(u + kStep, v) - tensor_at(u - kStep, v)) / (2 * kStep),
-        (tensor_at(u, v + kStep) - tensor_at(u, v - kStep)) / (2 * kStep);
-    return out;
+// From the shape of the face; from the cubic of the cell; or zero where the element is flat.
+CurvatureField::Local CurvatureField::own(const Place& place) {
+  Local out = Local::Zero();
+  if (const Primitive* face = shell_->curved()->face_of(place.facet)) {
+    // The Hessian of a face's distance on the face is its curvature tensor.
+    const int sign = shell_->curved()->face_cells()[place.facet].sign;
+    out.head<6>() = sign * tensor(face->hessian(face->onto(place.point)));
+  } else if (!shell_->curved()->facets()[place.facet].flat) {
+    const Cell& here = cell(place.facet);
+    out << here.tensor.point(place.at[0], place.at[1]), here.rise.at(place.at[0], place.at[1]);
   }
-  if (shell_->curved()->facets()[facet].flat) return out;
-  const Cell& here = cell(facet);
-  out.topRows<6>() << here.tensor.point(u, v), here.tensor.along_u(u, v), here.tensor.along_v(u, v);
-  out.row(6) = here.rise.at(u, v);
   return out;
 }
 
@@ -149,7 +114,7 @@ std::pair<CurvatureField::Tensor, CurvatureField::Tensor> CurvatureField::along_
 // Where two surfaces of other curvatures meet smoothly, the flatter one's holds on their border: it
 // has the larger elements. The half-edge, given in facets, whose element says what holds.
 int CurvatureField::owner_of_side(int facet, int side) {
-  const int other = joined_over(*shell_, facet, side);
+  const int other = smooth_over(*shell_, facet, side);
   if (other < 0 || !is_jump(*shell_, facet, triangle_of(other))) return 3 * facet + side;
   const auto here = along_side(facet, side);
   const auto there = along_side(triangle_of(other), side_of(other));
@@ -225,7 +190,7 @@ CurvatureField::Rise CurvatureField::rise_of(int facet) {
   for (int k = 0; k < 3; ++k) {
     const int owner = owner_of_side(facet, k);
     const bool reversed = is_reversed(*shell_, 3 * facet + k, owner);
-    const int other = joined_over(*shell_, facet, k);
+    const int other = smooth_over(*shell_, facet, k);
     const double most =
         kLargestRise * std::min(bulge, other < 0 ? bulge : cells[triangle_of(other)].bulge);
     double at[4];
@@ -237,16 +202,15 @@ CurvatureField::Rise CurvatureField::rise_of(int facet) {
   }
   const double middle = beyond(facet, 1.0 / 3, 1.0 / 3);
   out.middle =
-      std::clamp(middle, -kLargestRise * bulge, kLargestRise * bulge) - out.at(1.0 / 3, 1.0 / 3)[0];
+      std::clamp(middle, -kLargestRise * bulge, kLargestRise * bulge) - out.at(1.0 / 3, 1.0 / 3);
   return out;
 }
 
 // The corners of elements that are joined smoothly at a vertex, in ascending order; `all`: those of
 // other curvatures as well.
 void CurvatureField::collect_fan(int corner, bool all, std::vector<int>& corners) const {
-  const Vec3 normal = normal_at(*shell_, corner);
   connected_corners(*shell_, corner, corners, [&](int c, int other, const Edge& edge) {
-    return edge.count == 2 && is_one_normal(normal, normal_at(*shell_, other)) &&
+    return edge.count == 2 && is_smooth(normal_at(*shell_, c), normal_at(*shell_, other)) &&
            (all || !is_jump(*shell_, c / 3, other / 3));
   });
   std::sort(corners.begin(), corners.end());

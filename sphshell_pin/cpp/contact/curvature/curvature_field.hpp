@@ -1,6 +1,7 @@
 // The curvature of the surface that curved elements were made from.
 #pragma once
 
+#include <cstdint>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -25,14 +26,25 @@ class CurvatureField {
   // The curvature [1/m], positive where the surface bends away from the element's normal, and how
   // far it lies beyond the element along that normal [m].
   using Local = Eigen::Matrix<double, 7, 1>;
-  // The same in the first column, and its derivatives by the element's parameters u and v.
-  using Expansion = Eigen::Matrix<double, 7, 3>;
+  // A point of a facet, with its parameters.
+  struct Place {
+    int facet;
+    Eigen::Vector2d at;
+    Vec3 point;
+  };
 
   explicit CurvatureField(const Shell& shell) : shell_(&shell) {}
   const Shell& shell() const { return *shell_; }
 
-  // Of a facet at its parameters; of a face of known shape, from that shape.
-  Expansion at(int facet, double u, double v);
+  // Of the facet alone: of a face of known shape, from that shape, else from the fits.
+  Local own(const Place& place);
+  // Next to a joint, where faces of known shape go on smoothly into others, the mean of what they
+  // have there, over a length whose square is `length2`: see blending.cpp. The place is within the
+  // `reach` [m] of the point that was last given to look_about().
+  Local at(const Place& place, double length2);
+  void look_about(const Vec3& point, double reach);
+  // Whether there is such a joint about a facet.
+  bool near_joint(int facet) { return !joints_about(facet).empty(); }
 
   // Between a symmetric matrix and its six numbers.
   static Mat3 matrix(const Tensor& t);
@@ -46,8 +58,7 @@ class CurvatureField {
     double middle = 0;  // beyond what the sides give there
 
     void set_side(int k, const double (&at)[4]);
-    // Value and derivatives by u and v.
-    Eigen::RowVector3d at(double u, double v) const;
+    double at(double u, double v) const;
 
    private:
     double even_[3][2] = {}, odd_[3][2] = {};
@@ -74,6 +85,10 @@ class CurvatureField {
   // How far the fits say that the surface lies beyond the element [m].
   double beyond(int facet, double u, double v);
   Rise rise_of(int facet);
+  // The face of known shape that a facet lies on; -1: the fits hold.
+  int region_of(int facet) const;
+  const std::vector<int>& joints_about(int facet);
+  Local on_half_edge(int half_edge, const Vec3& point);
 
   const Shell* shell_;
   std::unordered_map<int, int> fan_of_, cell_of_;  // of corners (3 facet + k), of facets
@@ -81,6 +96,23 @@ class CurvatureField {
   std::vector<Cell> cells_;
   std::vector<int> corners_, beside_;
   std::vector<OrientedPoint> around_;
+  Vec3 about_ = Vec3::Zero();
+  double reach_ = 0;
+  // Half-edges at joints about a facet, of each side one; found where they are asked for.
+  struct Joints {
+    int facet;
+    std::vector<int> half_edges;
+  };
+  std::vector<Joints> joints_;
+  std::size_t looked_ = 0;  // so many of them are about the point
+  struct Neighbor {
+    int region;
+    double least2, weights;
+    Local sum;
+  };
+  std::vector<Neighbor> neighbors_;
+  std::vector<std::uint32_t> visited_;  // per facet the last walk that came there
+  std::uint32_t walk_ = 0;
 };
 
 }  // namespace sphshell

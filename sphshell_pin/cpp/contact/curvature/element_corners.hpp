@@ -27,6 +27,10 @@ inline std::pair<double, double> corner_parameters(int k) {
 // Whether two unit normals are one: those of a smooth vertex agree to round-off.
 inline bool is_one_normal(const Vec3& a, const Vec3& b) { return a.dot(b) > 1 - 1e-10; }
 
+// Whether surfaces with these unit normals go on into each other, by less than 3 degrees: tangent
+// joints of CAD are off by up to a degree, and curved elements leave small angles too.
+inline bool is_smooth(const Vec3& a, const Vec3& b) { return a.dot(b) > 0.99863; }
+
 // The vertex at a corner.
 inline int vertex_of(const Shell& shell, int corner) {
   return shell.triangles()[shell.triangle_of_facet(corner / 3)][corner % 3];
@@ -78,6 +82,18 @@ void connected_corners(const Shell& shell, int first, std::vector<int>& out, Joi
         out.push_back(other);
     });
   }
+}
+
+// The half-edge, given in facets, of the neighbor that a facet goes on into over a side; -1: none.
+inline int smooth_over(const Shell& shell, int facet, int side) {
+  const int h = shell.topology().other_half_edge(3 * shell.triangle_of_facet(facet) + side);
+  if (h < 0) return -1;
+  const int other = shell.facet_half_edge(h);
+  for (int corner : {3 * facet + side, 3 * facet + next_corner(side)})
+    if (!is_smooth(normal_at(shell, corner),
+                   normal_at(shell, corner_of(shell, other, vertex_of(shell, corner)))))
+      return -1;
+  return other;
 }
 
 }  // namespace sphshell

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/query/closest_on_side.hpp"
@@ -12,8 +13,8 @@ namespace {
 
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
-constexpr int kMostRepeats = 8;
-
+constexpr double kNearAxis = 1e-6;
+constexpr int kMostRepeats = 20;
 }  // namespace
 
 void FaceFeet::clear(const CurvedShell& surface) {
@@ -40,22 +41,27 @@ void FaceFeet::add(const Shell& shell, int f, const Sphere& sphere, bool want_dn
     foot.anywhere = shape.singular(sphere.center, kOnAxis);
     foot.point = sphere.center - foot.distance * foot.normal;
     foot.claimed = !(std::abs(foot.distance) < sphere.radius) || !(shape.radius_at(foot.point) > 0);
+    if (!foot.claimed && shape.has_parameters())
+      foot.place = shape.parameters(foot.point, shell.size());
   }
   if (foot.claimed) return;
   const NormalCone& cone = surface.cones()[f];
   // The facet's ball excludes most facets before the exact test.
   const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
   Vec3 point = foot.point, normal = foot.normal;
+  Eigen::Vector2d place = foot.place;
   // On the axis any direction will do: towards this facet.
   if (foot.anywhere) {
     shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
     point = sphere.center - foot.distance * normal;
+    if (shape.has_parameters()) place = shape.parameters(point, shell.size());
   }
   const double reach = cone.reach + 1e-6 * shell.size();
   if ((point - middle).squaredNorm() > reach * reach) return;
   const Vec3 outward = cell.sign < 0 ? Vec3(-normal) : normal;
   const Facet& facet = shell.facets()[f];
-  if (!holds(shell, f, point, outward, sphere.tolerance + surface.gap())) return;
+  if (!holds(shell, f, {point, outward, sphere.center, place}, sphere.tolerance + surface.gap()))
+    return;
   foot.claimed = true;
   // Away from the face; where the center is on it, to the facet's side.
   const bool within = foot.distance < 0;
@@ -92,7 +98,9 @@ void FaceFeet::add(const Shell& shell, int f, const Plane& plane, bool want_dx_d
   const double reach = cone.reach + 1e-6 * shell.size();
   if (!plane.reaches(point) || (point - middle).squaredNorm() > reach * reach) return;
   const Vec3 outward = cell.sign < 0 ? n : Vec3(-n);
-  if (!holds(shell, f, point, outward, plane.tolerance + surface.gap())) return;
+  const Eigen::Vector2d place =
+      torus ? shape.parameters(point, shell.size()) : Eigen::Vector2d(0, 0);
+  if (!holds(shell, f, {point, outward, point, place}, plane.tolerance + surface.gap())) return;
   foot.claimed = !anywhere;
   const int element = shell.facets()[f].element;
   Contact contact = contact_at(point, outward, plane, element, Feature::Face);
@@ -106,85 +114,161 @@ void FaceFeet::add(const Shell& shell, int f, const Plane& plane, bool want_dx_d
   minima.push_back({contact, f, 0, cell.sign < 0});
 }
 
-// Side by side of the facet: the point must be on the inner side of what bounds it there. Inner: a
-// plane between facets of one face. Shared: the other face cuts. Tangent: both faces touch along
-// the side, and the sign of their distance says nothing. Cubic: the curve itself.
-bool holds(const Shell& shell, int f, const Vec3& point, const Vec3& outward, double tolerance) {
+namespace {
+
+// Whether a point is on the inner side of what bounds a facet on its side k. Inner: facets of a
+// face are divided by straight lines of its parameters, those of planes and spheres by the planes
+// through their chords and the face's normals. Border: by what divides the joint's faces. Cubic: by
+// the curve itself.
+bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tolerance) {
   const CurvedShell& surface = *shell.curved();
-  const std::vector<Primitive>& shapes = surface.faces().shapes;
   const FaceCell& cell = surface.face_cells()[f];
   const Facet& facet = shell.facets()[f];
+  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)], d = q - p;
+  if (cell.side[k] == FaceCell::Side::Inner) {
+    const auto [inside, overlap] = within_line(surface.faces().shapes[cell.face], cell, facet, k,
+                                               at.point, at.place, tolerance);
+    return !(inside < -overlap);
+  }
+  const Vec3 in = at.outward.cross(d).normalized();
+  const double inside = in.dot(at.point - p);
+  // Farther from the chord than the curve bulges: the curve need not be looked at.
+  if (inside > cell.bulge[k]) return true;
+  if (inside < -double(cell.bulge[k])) return false;
+  if (cell.side[k] == FaceCell::Side::Border) {
+    const FaceJoint& joint = surface.faces().joints[cell.joint[k]];
+    const bool crossing = joint.kind == FaceJoint::Kind::Crossing;
+    const double away = joint.across_of(cell.face).distance(crossing ? at.point : at.center);
+    return !(cell.turn[k] * away < -tolerance);
+  }
+  const CubicCurve side = surface.facets()[f].side(facet, k);
+  const double t = nearest_on_side(side, at.point);
+  return !(at.outward.cross(side.tangent(t)).normalized().dot(at.point - side.point(t)) <
+           -tolerance);
+}
+
+}  // namespace
+
+bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
+  const CurvedShell& surface = *shell.curved();
+  const FaceCell& cell = surface.face_cells()[f];
   // Not on the other side of the axis.
-  if (!(outward.dot(Vec3(cell.upright[0], cell.upright[1], cell.upright[2])) > 0)) return false;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)], d = q - p;
-    if (cell.side[k] == FaceCell::Side::Inner) {
-      // Facets of a face are divided by the planes through their chords and the face's normals.
-      Vec3 n;
-      shapes[cell.face].distance((p + q) / 2, n);
-      const double inside = cell.sign * n.cross(d).dot(point - p);
-      if (inside < 0 && inside * inside > tolerance * tolerance * d.squaredNorm()) return false;
-      continue;
-    }
-    const Vec3 in = outward.cross(d).normalized();
-    const double inside = in.dot(point - p);
-    // Farther from the chord than the curve bulges: the curve need not be looked at.
-    if (inside > cell.bulge[k]) continue;
-    if (inside < -double(cell.bulge[k])) return false;
-    if (cell.side[k] == FaceCell::Side::Shared) {
-      Vec3 m;
-      const double away = shapes[cell.beyond[k]].distance(point, m);
-      if ((m.dot(in) < 0 ? -away : away) < -tolerance) return false;
-      continue;
-    }
-    if (cell.side[k] == FaceCell::Side::Tangent) {
-      const double turn = cell.turn[k] * turn_between(shapes, cell.face, cell.beyond[k], d, point);
-      if (turn < -kMostGap * d.norm()) return false;
-      continue;
-    }
-    const CubicCurve side = surface.facets()[f].side(facet, k);
-    const double t = nearest_on_side(side, point);
-    if (outward.cross(side.tangent(t)).normalized().dot(point - side.point(t)) < -tolerance)
+  if (!(at.outward.dot(Vec3(cell.upright[0], cell.upright[1], cell.upright[2])) > 0)) return false;
+  for (int k = 0; k < 3; ++k)
+    if (!is_inside(shell, f, k, at, tolerance)) return false;
+  // Borders of facets beside this one that bulge into it count along their own chord.
+  for (int i = cell.intruder; i >= 0; i = surface.intruders()[i].second) {
+    const int g = triangle_of(surface.intruders()[i].first);
+    const int k = side_of(surface.intruders()[i].first);
+    const Vec3 &p = shell.facets()[g].corner[k], &q = shell.facets()[g].corner[next_corner(k)];
+    const double along = (at.point - p).dot(q - p);
+    if (along > 0 && along < (q - p).squaredNorm() && !is_inside(shell, g, k, at, tolerance))
       return false;
   }
   return true;
 }
 
+namespace {
+
+// On the line of a face's parameters that divides two facets of it: where the distance stops
+// falling, by the rule of false position (Illinois). False if it has none.
+template <class Probe>
+bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideFoot& out) {
+  const CurvedShell& surface = *shell.curved();
+  const FaceCell& cell = surface.face_cells()[f];
+  if (!cell.closed || cell.side[k] != FaceCell::Side::Inner) return false;
+  const Primitive& shape = surface.faces().shapes[cell.face];
+  const double *p = cell.place[k], *q = cell.place[next_corner(k)];
+  if (!shape.has_parameters() || std::isnan(p[0]) || std::isnan(q[0])) return false;
+  const double du = q[0] - p[0], dv = q[1] - p[1], size = shell.size();
+  const Vec3 &axis = shape.axis, east = axis.unitOrthogonal(), north = axis.cross(east);
+  const double slope = shape.kind == FaceKind::Cone ? std::tan(shape.second) : 0;
+  const auto pull = [&](double t) {
+    const double u = p[0] + t * du, v = p[1] + t * dv, c = std::cos(u), s = std::sin(u);
+    // The radius and the height, and how they change.
+    double radius = shape.radius + slope * v * size, widens = slope * size;
+    double height = v * size, rises = size;
+    if (shape.kind == FaceKind::Torus) {
+      rises = shape.second * std::cos(v), height = shape.second * std::sin(v);
+      radius = shape.radius + rises, widens = -height;
+    }
+    const Vec3 out_from_axis = c * east + s * north;
+    out.t = t;
+    out.point = shape.point + radius * out_from_axis + height * axis;
+    out.tangent =
+        widens * dv * out_from_axis + radius * du * (c * north - s * east) + rises * dv * axis;
+    return probe.pull(out.point).dot(out.tangent);
+  };
+  double low = 0, high = 1, last = pull(1), first = pull(0);
+  if (!(first > 0)) return true;
+  if (!(last < 0)) return pull(1), true;
+  for (int i = 0, side = 0; i < 40; ++i) {
+    const double t = low + first / (first - last) * (high - low);
+    const double moved = std::min(t - low, high - t), here = pull(t);
+    if (here == 0 || !(moved > 1e-9)) break;
+    if (here > 0) {
+      low = t, first = here;
+      if (side > 0) last /= 2;
+    } else {
+      high = t, last = here;
+      if (side < 0) first /= 2;
+    }
+    side = here > 0 ? 1 : -1;
+  }
+  return true;
+}
+
+}  // namespace
+
 template <class Probe>
 SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   const CurvedShell& surface = *shell.curved();
-  const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
   SideFoot out;
-  out.t = nearest_on_side(side, probe);
-  out.point = side.point(out.t);
-  out.tangent = side.tangent(out.t);
-  if (surface.face_cells().empty() || surface.face_cells()[f].face < 0) return out;
+  if (!surface.face_cells().empty() && nearest_on_line(shell, f, k, probe, out)) return out;
+  const LargeArray<FaceCell>& cells = surface.face_cells();
+  const bool border = !cells.empty() && cells[f].side[k] == FaceCell::Side::Border;
+  const FaceJoint* known = border ? &surface.faces().joints[cells[f].joint[k]] : nullptr;
+  // A line or circle has its closest point in closed form, but from the axis.
+  constexpr bool sphere = std::is_same_v<Probe, Sphere>;
+  bool closed = false;
+  if constexpr (sphere)
+    closed = border && known->kind != FaceJoint::Kind::Crossing &&
+             known->axis.cross(probe.center - known->point).norm() > kNearAxis * known->radius;
+  if (!closed) {
+    const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
+    out.t = nearest_on_side(side, probe);
+    out.point = side.point(out.t);
+    out.tangent = side.tangent(out.t);
+    if (!cells.empty() && cells[f].face >= 0 && cells[f].side[k] == FaceCell::Side::Inner &&
+        out.t > 0 && out.t < 1)
+      out.point = surface.faces().shapes[cells[f].face].onto(out.point);
+    if (!border) return out;
+  }
+  const FaceJoint& joint = *known;
   const std::vector<Primitive>& shapes = surface.faces().shapes;
-  const FaceCell& cell = surface.face_cells()[f];
-  const Primitive& shape = shapes[cell.face];
-  if (cell.side[k] == FaceCell::Side::Inner && out.t > 0 && out.t < 1)
-    out.point = shape.onto(out.point);
-  if (cell.across[k] < 0 || cell.side[k] == FaceCell::Side::Cubic) return out;
-  const Primitive& other = shapes[cell.across[k]];
   const Vec3 &p = shell.facets()[f].corner[k], &q = shell.facets()[f].corner[next_corner(k)];
   const Vec3 chord = q - p;
   // Along the half-edge's direction.
   const auto tangent_at = [&](const Vec3& x) -> Vec3 {
-    const Vec3 tangent = intersection_at(shape, other, x).tangent;
-    if (tangent.isZero(0)) return chord.normalized();  // an end where both are tangent
+    const auto [tangent, curvature, offset, sine] = joint.at(shapes, x);
+    // An end where both are tangent: the cross product of equal normals is rounding, and only where
+    // Newton's method went says whether the nearest point is beyond it.
+    if (!(sine > kLeastAngle)) return Vec3::Zero();
     return tangent.dot(chord) < 0 ? Vec3(-tangent) : tangent;
   };
   const double most = chord.norm() / 2;
   Vec3 x = out.point;
-  for (int i = 0; i < kMostRepeats; ++i) {
-    const Intersection here = intersection_at(shape, other, x);
+  if constexpr (sphere)
+    if (closed) x = joint.nearest(probe.center), out.t = 0.5;
+  for (int i = 0; i < kMostRepeats && !closed; ++i) {
+    const Intersection here = joint.at(shapes, x);
     const Vec3 from = -probe.pull(x);
     // Newton's method on the curve that is the intersection of two faces: a step along the tangent
     // by the second-order expansion of the distance, and back onto both faces by `offset`. Where
     // the distance is not convex the step is that of steepest descent.
     const double bend = Probe::kMetric + from.dot(here.curvature);
     const double step =
-        std::clamp(-from.dot(here.tangent) / (bend > 0.05 ? bend : 1.0), -most, most);
+        std::clamp(-from.dot(here.tangent) / (bend > 1e-4 ? bend : 1.0), -most, most);
     const Vec3 moved = here.offset + step * (here.tangent + step / 2 * here.curvature);
     x += moved;
     if (moved.squaredNorm() < 1e-30 * from.squaredNorm()) break;
@@ -192,14 +276,19 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   // Beyond an end that end is the nearest.
   // Regions of features overlap by this: no center is between two of them.
   const double gap = surface.gap();
-  if (probe.pull(p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm()) {
+  const bool before =
+      probe.pull(p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm();
+  const bool after =
+      probe.pull(q).dot(tangent_at(q)) >= gap || (q - x).dot(chord) <= -gap * chord.norm();
+  if (before && !(after && probe.depth(q) > probe.depth(p))) {
     out.t = 0, out.point = p;
-  } else if (probe.pull(q).dot(tangent_at(q)) >= gap || (q - x).dot(chord) <= -gap * chord.norm()) {
+  } else if (after) {
     out.t = 1, out.point = q;
   } else {
     if (out.t <= 0 || out.t >= 1) out.t = 0.5;
     out.point = x;
-    out.tangent = tangent_at(x);
+    const Vec3 along = tangent_at(x);
+    out.tangent = along.isZero(0) ? chord : along;
   }
   return out;
 }
@@ -209,11 +298,10 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
 template <class Probe>
 Mat3 dx_dc_of(const Shell& shell, int f, int k, const SideFoot& foot, const Probe& probe) {
   const CurvedShell& surface = *shell.curved();
-  if (!surface.face_cells().empty() && surface.face_cells()[f].side[k] != FaceCell::Side::Cubic &&
-      surface.face_cells()[f].across[k] >= 0) {
-    const FaceCell& cell = surface.face_cells()[f];
-    const std::vector<Primitive>& shapes = surface.faces().shapes;
-    const Intersection at = intersection_at(shapes[cell.face], shapes[cell.across[k]], foot.point);
+  if (!surface.face_cells().empty() && surface.face_cells()[f].side[k] == FaceCell::Side::Border) {
+    const Faces& faces = surface.faces();
+    const Intersection at =
+        faces.joints[surface.face_cells()[f].joint[k]].at(faces.shapes, foot.point);
     const double bend = Probe::kMetric - probe.pull(foot.point).dot(at.curvature);
     return bend == 0 ? Mat3(Mat3::Zero())
                      : Mat3(probe.follow() * at.tangent * at.tangent.transpose() / bend);

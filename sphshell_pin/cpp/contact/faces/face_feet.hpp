@@ -29,15 +29,22 @@ class FaceFeet {
     bool claimed;   // or out of reach
     bool anywhere;  // all around the axis, or the center
     double distance;
-    Vec3 point, normal;  // the normal as the shape has it
+    Vec3 point, normal;     // the normal as the shape has it
+    Eigen::Vector2d place;  // the point's Primitive::parameters()
   };
   std::vector<Foot> feet_;  // beside the faces
   std::uint32_t round_ = 0;
   const CurvedShell* of_ = nullptr;
 };
 
-// Whether a point of a face, with its unit normal on the facet's side, is in a facet.
-bool holds(const Shell& shell, int facet, const Vec3& point, const Vec3& outward, double tolerance);
+// A point of a face and its unit normal on the facet's side; `place`: its Primitive::parameters();
+// `center`: of the sphere whose closest point it is, or again the point.
+struct FacePoint {
+  const Vec3 &point, &outward, &center;
+  Eigen::Vector2d place;
+};
+// Whether it is in a facet.
+bool holds(const Shell& shell, int facet, const FacePoint& at, double tolerance);
 
 // The point of a side nearest to a center, or lowest: of the curve that it is between two faces, or
 // within one, or of its cubic.

@@ -78,11 +78,10 @@ bool is_whole(const Shell& shell, int face, const Circle& circle, const Vec3& fo
 bool circle_of_border(const Shell& shell, const Minimum& at, const Vec3& center, Circle& out) {
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[at.facet];
-  if (cell.face < 0 || cell.across[at.index] < 0 || cell.side[at.index] == FaceCell::Side::Cubic)
-    return false;
-  const std::vector<Primitive>& shapes = surface.faces().shapes;
+  if (cell.face < 0 || cell.side[at.index] != FaceCell::Side::Border) return false;
   const Vec3& foot = at.contact.point;
-  const Intersection here = intersection_at(shapes[cell.face], shapes[cell.across[at.index]], foot);
+  const Faces& faces = surface.faces();
+  const Intersection here = faces.joints[cell.joint[at.index]].at(faces.shapes, foot);
   out.off = share_of(std::abs(1 + (foot - center).dot(here.curvature)));
   const double bend = here.curvature.norm();
   if (!(out.off < 1) || !(bend > 0)) return false;

@@ -237,6 +237,8 @@ void CurvedQuery::add_border(const Task<Probe>& task, int f) {
   for (int k = 0; k < 3; ++k) {
     if (owned.vertex[k] >= 0) add_vertex(task, f, k);
     if (owned.twin[k] == kNotOwned) continue;
+    // Beside its axis a face has one closest point, and none on a line within it.
+    if (std::is_same_v<Probe, Sphere> && cell.side[k] == FaceCell::Side::Inner) continue;
     const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
     if (probe.bound_along(facet.corner[k], d, double(cell.bulge[k])) > 0) add_edge(task, f, k);
   }

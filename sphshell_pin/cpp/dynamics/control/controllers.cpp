@@ -57,6 +57,7 @@ struct ImpedanceSettings {
         stiffness(f.number("stiffness")),
         damping(f.number("damping")),
         normal_force(f.number("normal_force")),
+        force_rise(f.number("force_rise")),
         rotational_stiffness(f.number("rotational_stiffness")),
         rotational_damping(f.number("rotational_damping")),
         posture_stiffness(f.vector("posture_stiffness")),
@@ -69,6 +70,7 @@ struct ImpedanceSettings {
   SE3 frame, path_placement;                        // in those joints
   double stiffness, damping;                        // [N/m], [N s/m]
   double normal_force;                              // pressed against the normal [N]
+  double force_rise;                                // time in which that comes on [s]
   double rotational_stiffness, rotational_damping;  // [N m], [N m s]
   VectorX posture_stiffness, joint_damping, q_ref, actuated;
   bool decoupled;  // the inertia of the robot does not disturb the frame
@@ -94,8 +96,11 @@ class CartesianImpedance : public Controller {
   void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
               VectorX& tau) override;
   void take_over(const Controller& before, double t) override;
-  bool follows_time() const override { return path_.moves(); }
-  double next_kink(double t) const override { return path_.next_kink(t - late_) + late_; }
+  bool follows_time() const override { return path_.moves() || s_.force_rise > 0; }
+  double next_kink(double t) const override {
+    const double on_path = path_.next_kink(t - late_) + late_;
+    return t < s_.force_rise ? std::min(on_path, s_.force_rise) : on_path;
+  }
 
  private:
   ImpedanceSettings s_;
@@ -145,7 +150,10 @@ void CartesianImpedance::torque(SceneData& scene, double t, const VectorX& q, co
   // Spring and damper towards the target; along the normal the constant force instead of the
   // spring.
   Vec3 force = s_.stiffness * offset + s_.damping * (target_velocity - velocity);
-  if (s_.normal_force != 0) force -= s_.normal_force * normal;
+  if (s_.normal_force != 0) {
+    const double share = t < s_.force_rise ? std::max(t / s_.force_rise, 0.0) : 1.0;
+    force -= share * share * (3 - 2 * share) * s_.normal_force * normal;
+  }
   Vec3 moment = -s_.rotational_damping * spin;
   if (s_.rotational_stiffness != 0)
     // log3: the rotation vector from the frame's orientation to the held one.

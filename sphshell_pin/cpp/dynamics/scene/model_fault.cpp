@@ -21,6 +21,13 @@ bool add_joint(const pinocchio::Model& from, int j, pinocchio::Model& to) {
   return true;
 }
 
+// Pinocchio's transformJointIntoMimic sorts the joints that are mimicked apart from those that
+// mimic them.
+std::vector<std::size_t> sorted(std::vector<std::size_t> joints) {
+  std::sort(joints.begin(), joints.end());
+  return joints;
+}
+
 // What is wrong with the indices of a model; empty if nothing is. Its lists have one entry per
 // joint, parents first.
 std::string index_fault(const pinocchio::Model& model) {
@@ -39,7 +46,7 @@ std::string index_fault(const pinocchio::Model& model) {
       right.idx_vExtendeds != model.idx_vExtendeds || right.nvExtendeds != model.nvExtendeds ||
       right.children != model.children || right.supports != model.supports ||
       right.subtrees != model.subtrees || right.mimicking_joints != model.mimicking_joints ||
-      right.mimicked_joints != model.mimicked_joints)
+      sorted(right.mimicked_joints) != sorted(model.mimicked_joints))
     return "its lists of indices, children, supports or subtrees are not those of its joints" +
            again;
   if (static_cast<std::size_t>(model.nframes) != model.frames.size())

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <pinocchio/algorithm/aba-derivatives.hpp>
 #include <pinocchio/algorithm/aba.hpp>
-#include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/energy.hpp>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
@@ -79,8 +78,36 @@ void Multibody::kinematics(const VectorX& q, const VectorX& v) {
     Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, v));
 }
 
-// In reduced coordinates: with G the velocities of all joints per independent one, G^T M G, and
-// G^T of the bias forces, which is what Pinocchio's CRBA and RNEA return.
+// The composite-rigid-body algorithm (Featherstone 2008, section 6.2) on all joints in world axes.
+// Each product of two axes is added where the coordinates of their joints meet: G^T M G, with G the
+// velocities of all joints per independent one. Pinocchio's crba is not used, since it is wrong
+// where joints are not numbered depth first and where a tree branches behind a mimic joint.
+void Multibody::compute_mass(const VectorX& q) {
+  using Step =
+      pinocchio::impl::JointJacobiansForwardStep<double, 0, pinocchio::JointCollectionDefaultTpl,
+                                                 VectorX, Matrix6X>;
+  for (int j = 1; j < model_.njoints; ++j) {
+    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, data_.J));
+    data_.oYcrb[j] = data_.oMi[j].act(model_.inertias[j]);
+  }
+  data_.M.setZero();
+  data_.M.diagonal() = model_.armature;
+  for (int j = model_.njoints - 1; j > 0; --j) {
+    for (int c = 0; c < model_.nvExtendeds[j]; ++c) {
+      const pinocchio::Motion axis(data_.J.col(model_.idx_vExtendeds[j] + c));
+      const pinocchio::Force momentum = data_.oYcrb[j] * axis;
+      const int column = model_.idx_vs[j] + c;
+      for (int i = j; i > 0; i = static_cast<int>(model_.parents[i]))
+        for (int d = 0; d < model_.nvExtendeds[i]; ++d) {
+          const double product = data_.J.col(model_.idx_vExtendeds[i] + d).dot(momentum.toVector());
+          data_.M(model_.idx_vs[i] + d, column) += product;
+          if (i != j) data_.M(column, model_.idx_vs[i] + d) += product;
+        }
+    }
+    if (model_.parents[j] > 0) data_.oYcrb[model_.parents[j]] += data_.oYcrb[j];
+  }
+}
+
 // M a = tau - bias, by Cholesky's factorization.
 const VectorX& Multibody::solve(const VectorX& tau, const VectorX& bias) {
   mass_.compute(data_.M);
@@ -92,7 +119,7 @@ const VectorX& Multibody::solve(const VectorX& tau, const VectorX& bias) {
 const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                                        const Forces* external) {
   if (mimics_) {
-    pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
+    compute_mass(q);
     return solve(tau, external ? pinocchio::rnea(model_, data_, q, v, zero_, *external)
                                : pinocchio::rnea(model_, data_, q, v, zero_));
   }
@@ -236,8 +263,7 @@ pinocchio::Motion Multibody::drift(int joint) const {
 // M^-1 J^T by the factorized mass matrix; J is brought from the joint's frame to the task's.
 void Multibody::task(const VectorX& q, int joint, const pinocchio::SE3& frame, Matrix6X& jacobian,
                      MatrixX& mobility) {
-  using pinocchio::Convention;
-  pinocchio::crba(model_, data_, q, mimics_ ? Convention::WORLD : Convention::LOCAL);
+  compute_mass(q);
   mass_.compute(data_.M);
   jacobian.setZero(6, model_.nv);
   pinocchio::computeJointJacobian(model_, data_, q, joint, jacobian);
@@ -290,8 +316,8 @@ void Multibody::speeds(const VectorRef& v, VectorX& out) const {
 
 double Multibody::kinetic_energy(const VectorX& q, const VectorX& v) {
   if (!mimics_) return pinocchio::computeKineticEnergy(model_, data_, q, v);
-  pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
-  return 0.5 * v.dot(data_.M.selfadjointView<Eigen::Upper>() * v);
+  compute_mass(q);
+  return 0.5 * v.dot(data_.M * v);
 }
 
 // Of models with mimic joints by hand: - sum of m g . (center of mass).

@@ -131,7 +131,9 @@ class Multibody {
 
   // Fills by_q of a joint at q.
   void turn_axes(const VectorX& q, TurningAxes& axes);
-  // M^-1 (tau - bias), with the mass matrix that CRBA has just left in data_.
+  // Writes the mass matrix (nv, nv) into data_.M, both triangles.
+  void compute_mass(const VectorX& q);
+  // M^-1 (tau - bias), with the mass matrix that compute_mass() has just left in data_.
   const VectorX& solve(const VectorX& tau, const VectorX& bias);
 
   pinocchio::Model model_;

@@ -42,6 +42,18 @@ bool PointForces::changed(SceneData& scene, const Pair& pair, const ActiveContac
   other.disc_radius = pair.disc_radius();
   if (site.shape) {
     shape = scene.shape_of(active.pair, pair, site.contact);
+    // A radius makes the contact deeper as well, and the shape follows: next to joints.
+    const double deeper = pair.radius - site.radius, step = 1e-3 * site.contact.depth;
+    for (int way : {1, -1}) {
+      if (deeper == 0 || !(step > 0)) break;
+      Contact moved = site.contact;
+      moved.depth += way * step;
+      const ContactShape there = scene.shape_of(active.pair, scene.pair_of(active), moved);
+      const double share = way * deeper / (2 * step);
+      shape.scale += share * there.scale;
+      shape.gradient += share * there.gradient;
+      shape.tilt += share * there.tilt;
+    }
     shape.depth = site.shape->depth;
     other.shape = &shape;
     other.disc_radius = shape.disc_radius();

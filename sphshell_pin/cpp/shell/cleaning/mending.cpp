@@ -201,7 +201,7 @@ std::vector<double> triangle_shapes(const PolygonView& polygons, const double* p
   return out;
 }
 
-// Signed volume, area, the area that flips turn over, and the largest triangle.
+// Signed volume, area, and the area that flips turn over.
 ComponentSums component_sums(const double* points, const std::int32_t* triangles,
                              const std::int32_t* triangle_polygon, std::size_t triangle_count,
                              const std::int32_t* component, const std::uint8_t* flip,
@@ -209,8 +209,6 @@ ComponentSums component_sums(const double* points, const std::int32_t* triangles
   ComponentSums out;
   out.volume.assign(component_count, 0.0);
   out.area = out.turned_area = out.volume;
-  out.largest.assign(component_count, 0);
-  std::vector<double> most(component_count, -1.0);
   const Vec3 middle(center[0], center[1], center[2]);
   for (std::size_t t = 0; t < triangle_count; ++t) {
     const std::size_t p = triangle_polygon == nullptr ? t : triangle_polygon[t];
@@ -223,7 +221,6 @@ ComponentSums component_sums(const double* points, const std::int32_t* triangles
     out.volume[owner] += flip[p] ? -share : share;
     out.area[owner] += area;
     out.turned_area[owner] += flip[p] ? area : -area;
-    if (area >= most[owner]) most[owner] = area, out.largest[owner] = static_cast<std::int32_t>(t);
   }
   return out;
 }

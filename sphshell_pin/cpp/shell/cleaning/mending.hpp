@@ -59,10 +59,9 @@ std::vector<std::uint8_t> repeated_corners(const PolygonView& polygons);
 std::vector<double> triangle_shapes(const PolygonView& polygons, const double* points);
 
 struct ComponentSums {
-  std::vector<double> volume;         // enclosed, with the sign of the winding [m^3]
-  std::vector<double> area;           // [m^2]
-  std::vector<double> turned_area;    // of the polygons that are to be turned less the others
-  std::vector<std::int32_t> largest;  // the last of the largest triangles
+  std::vector<double> volume;       // enclosed, with the sign of the winding [m^3]
+  std::vector<double> area;         // [m^2]
+  std::vector<double> turned_area;  // of the polygons that are to be turned less the others
 };
 
 // Sums over the triangles (t, 3) of each component, polygons turned where `flip` says so; volumes
@@ -113,11 +112,18 @@ Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edg
 std::vector<std::int32_t> connected_components(std::size_t nodes, const std::int32_t* pairs,
                                                std::size_t pair_count);
 
-// How many closed components other than its own enclose each query point. Triangles (t, 3) and
-// the component of each; queries (c, 3), one per component; `closed` (c) tells which take part.
-std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t* triangles,
-                                        const std::int32_t* triangle_component,
-                                        std::size_t triangle_count, const double* queries,
-                                        const std::uint8_t* closed, std::size_t component_count);
+struct Overlaps {
+  std::vector<std::int32_t> pairs;  // (p, 2) a component, and another that shares room with it
+  std::vector<double> share;        // how much of the inside of the first is in the second
+};
+
+// Where the insides of closed components lie in one another, measured along a line through each of
+// the `places` (n, 3), which are near the inside of `place_component` (n). Triangles (t, 3) and the
+// component of each; `group` of each component: only those of one group are compared, and none
+// that has -1, as one that is not closed must have.
+Overlaps overlaps(const double* points, const std::int32_t* triangles,
+                  const std::int32_t* triangle_component, std::size_t triangle_count,
+                  const double* places, const std::int32_t* place_component,
+                  std::size_t place_count, const std::int32_t* group);
 
 }  // namespace sphshell

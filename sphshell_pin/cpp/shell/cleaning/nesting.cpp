@@ -1,9 +1,10 @@
-// Which closed components of a surface lie inside which others.
+// How much of each closed component of a surface lies inside which others, along lines.
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <map>
 #include <tuple>
-#include <unordered_map>
 #include <utility>
 
 #include "shell/cleaning/mending.hpp"
@@ -11,19 +12,12 @@
 
 namespace sphshell {
 
-std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t* triangles,
-                                        const std::int32_t* triangle_component,
-                                        std::size_t triangle_count, const double* queries,
-                                        const std::uint8_t* closed, std::size_t component_count) {
-  // Parity of crossings of a ray from each query, in a generic direction so that rays do not run
-  // along the axis-aligned faces and edges CAD is full of. The queries are in a tree
-  // across the ray, so each triangle meets only those near it.
-  std::vector<std::int32_t> depth(component_count, 0);
-  std::vector<std::int32_t> active;
-  for (std::size_t c = 0; c < component_count; ++c) {
-    if (closed[c]) active.push_back(static_cast<std::int32_t>(c));
-  }
-  if (active.size() < 2) return depth;
+Overlaps overlaps(const double* points, const std::int32_t* triangles,
+                  const std::int32_t* triangle_component, std::size_t triangle_count,
+                  const double* places, const std::int32_t* place_component,
+                  std::size_t place_count, const std::int32_t* group) {
+  // Lines in a generic direction, so that they do not run along the axis-aligned faces and edges
+  // CAD is full of. They are in a tree across that direction: each triangle meets only those near.
   using Vec = std::array<double, 3>;
   // Orthonormal rows, none of them along an axis.
   constexpr std::array<Vec, 3> kAxes = {{{0.81649658, -0.35355339, 0.45643546},
@@ -36,18 +30,24 @@ std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t
     }
     return out;
   };
-  // In the plane across the ray, by component.
-  std::vector<Vec> query(component_count);
-  std::vector<double> place(2 * component_count);
-  for (const std::int32_t c : active) {
-    query[c] = turned(queries + 3 * static_cast<std::size_t>(c));
-    place[2 * c] = query[c][0], place[2 * c + 1] = query[c][1];
+  // In the plane across the lines.
+  std::vector<double> place(2 * place_count);
+  std::vector<std::int32_t> lines(place_count);
+  for (std::size_t k = 0; k < place_count; ++k) {
+    const Vec q = turned(places + 3 * k);
+    place[2 * k] = q[0], place[2 * k + 1] = q[1];
+    lines[k] = static_cast<std::int32_t>(k);
   }
-  const PointTree<2> tree(place.data(), std::move(active));
-  std::unordered_map<std::uint64_t, bool> odd;
+  const PointTree<2> tree(place.data(), std::move(lines));
+  struct Crossing {
+    std::int32_t line;
+    double height;
+    std::int32_t component;
+  };
+  std::vector<Crossing> crossings;
   for (std::size_t t = 0; t < triangle_count; ++t) {
     const std::int32_t owner = triangle_component[t];
-    if (!closed[owner]) continue;
+    if (group[owner] < 0) continue;
     std::array<std::int32_t, 3> index{};
     std::array<Vec, 3> corner{};
     PointTree<2>::Box span{};
@@ -61,9 +61,9 @@ std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t
       return box.low[0] <= span.high[0] && box.high[0] >= span.low[0] &&
              box.low[1] <= span.high[1] && box.high[1] >= span.low[1];
     };
-    tree.search(meets, [&](std::int32_t c) {
-      if (c == owner) return false;
-      const Vec& q = query[c];
+    tree.search(meets, [&](std::int32_t line) {
+      if (group[place_component[line]] != group[owner]) return false;
+      const double* q = place.data() + 2 * static_cast<std::size_t>(line);
       bool inside = false;
       for (int k = 0; k < 3; ++k) {
         // Low index first, so that both users of an edge compute the very same number.
@@ -76,24 +76,47 @@ std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t
       if (!inside) return false;
       const Vec &a = corner[0], &b = corner[1], &d = corner[2];
       const double ux = b[0] - a[0], uy = b[1] - a[1], vx = d[0] - a[0], vy = d[1] - a[1];
-      // Barycentric coordinates of the query in the projection: the height of the triangle
-      // there.
-      const double area = ux * vy - uy * vx;
-      if (area == 0.0) return false;
-      const double s = ((q[0] - a[0]) * vy - (q[1] - a[1]) * vx) / area;
-      const double r = ((q[1] - a[1]) * ux - (q[0] - a[0]) * uy) / area;
-      if (a[2] + s * (b[2] - a[2]) + r * (d[2] - a[2]) <= q[2]) return false;
-      const std::uint64_t key = (std::uint64_t(c) << 32) | std::uint64_t(owner);
-      // The ray along the third axis crosses this triangle above the query.
-      odd[key] = !odd[key];
+      // Barycentric coordinates of the line in the projection: the height of the triangle there. A
+      // triangle on edge has one as well, for every component must be left as often as entered.
+      const double area = ux * vy - uy * vx, scale = area == 0.0 ? 0.0 : 1.0 / area;
+      const double s = ((q[0] - a[0]) * vy - (q[1] - a[1]) * vx) * scale;
+      const double r = ((q[1] - a[1]) * ux - (q[0] - a[0]) * uy) * scale;
+      const double height =
+          a[2] + std::clamp(s, 0.0, 1.0) * (b[2] - a[2]) + std::clamp(r, 0.0, 1.0) * (d[2] - a[2]);
+      crossings.push_back({line, height, owner});
       return false;
     });
   }
-  for (const auto& [key, value] : odd) {
-    // Inside each component with an odd number of crossings.
-    if (value) ++depth[key >> 32];
+  std::sort(crossings.begin(), crossings.end(), [](const Crossing& x, const Crossing& y) {
+    return std::tie(x.line, x.height, x.component) < std::tie(y.line, y.height, y.component);
+  });
+  // Along each line, the pieces inside the line's own component: their length, and how much of it
+  // is inside each other component as well.
+  std::map<std::pair<std::int32_t, std::int32_t>, double> shared;
+  std::vector<std::int32_t> in;  // components the line is in
+  for (std::size_t k = 0; k < crossings.size(); ++k) {
+    const Crossing& here = crossings[k];
+    if (k == 0 || crossings[k - 1].line != here.line) in.clear();
+    const auto known = std::find(in.begin(), in.end(), here.component);
+    if (known == in.end()) {
+      in.push_back(here.component);
+    } else {
+      in.erase(known);
+    }
+    const std::int32_t own = place_component[here.line];
+    if (std::find(in.begin(), in.end(), own) == in.end()) continue;
+    // Closed components leave every line outside: another crossing follows.
+    const double length = crossings[k + 1].height - here.height;
+    for (const std::int32_t component : in) shared[{own, component}] += length;
   }
-  return depth;
+  Overlaps out;
+  for (const auto& [pair, length] : shared) {
+    const double own = shared.at({pair.first, pair.first});
+    if (pair.first == pair.second || !(own > 0.0)) continue;
+    out.pairs.insert(out.pairs.end(), {pair.first, pair.second});
+    out.share.push_back(length / own);
+  }
+  return out;
 }
 
 }  // namespace sphshell

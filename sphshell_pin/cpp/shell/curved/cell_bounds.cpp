@@ -177,7 +177,10 @@ void CurvedShell::build_cones(const Shell& shell) {
       const double along = std::abs(n.dot(axis)), across = n.cross(axis).norm();
       tangent = std::max(tangent, along > 0 ? 1.001 * across / along + 1e-6 : kAny);
     }
-    const double sagitta = face != nullptr ? sagitta_of(facet, *face) : 0;
+    // Borders of a closed cell bulge beyond its chords, in a flat one, too.
+    double sagitta = face != nullptr ? sagitta_of(facet, *face) : 0;
+    for (int k = 0; k < 3 && closed; ++k)
+      sagitta = std::max<double>(sagitta, face_cells_[f].bulge[k]);
     NormalCone& cone = cones_[f];
     const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
     double reach = cone.reach;
@@ -200,6 +203,7 @@ void CurvedShell::bound_cells(const Shell& shell) {
   for_each_in_parallel(facets_.size(), [&](std::size_t f) {
     const Facet& facet = shell.facets()[f];
     if (!facets_[f].flat) cells_[f] = bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
+    cells_[f].bulge = facets_[f].bulge;
     for (int k = 0; k < 3; ++k) {
       const int h = 3 * shell.triangle_of_facet(static_cast<int>(f)) + k;
       const Edge& edge = topology.edge_at(h);

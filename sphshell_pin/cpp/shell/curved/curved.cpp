@@ -235,6 +235,14 @@ std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions o
                                     shell->crease_angle(), shell->side());
     }
   }
+  // Vertices of CAD files are off the faces by the tolerance of the system that wrote them.
+  if (out == shell && options.known) {
+    std::vector<Vec3> moved =
+        snapped_vertices(*shell, *options.known, kMostMoved * kSinglePrecision * shell->size());
+    if (!moved.empty())
+      out = std::make_shared<Shell>(std::move(moved), shell->triangles(), shell->element(),
+                                    shell->crease_angle(), shell->side());
+  }
   out->curve(std::move(options));
   return out;
 }
@@ -273,7 +281,10 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   std::vector<Trust>().swap(trust);
   raise_centers(shell);
   normals_ = {};
-  face_cells_ = make_face_cells(shell, faces_, facets_);
+  FaceCells cells = make_face_cells(shell, faces_, facets_);
+  face_cells_ = std::move(cells.of);
+  intruders_ = std::move(cells.intruders);
+  inexact_ = std::move(cells.inexact);
   if (std::any_of(face_cells_.begin(), face_cells_.end(),
                   [](const FaceCell& cell) { return cell.closed; }))
     gap_ = kMostGap * shell.size();

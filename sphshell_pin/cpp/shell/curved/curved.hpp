@@ -136,6 +136,9 @@ class CurvedShell {
   const Faces& faces() const { return faces_; }
   // Per facet what it is of its face; empty where there are no faces.
   const LargeArray<FaceCell>& face_cells() const { return face_cells_; }
+  // FaceCells::intruders, and why faces do not give closest points.
+  const std::vector<std::pair<int, int>>& intruders() const { return intruders_; }
+  const std::vector<Inexact>& inexact() const { return inexact_; }
   // By so much regions of features overlap where faces give closest points [m].
   double gap() const { return gap_; }
   // That which gives the closest points of a facet; null: the facet's own cubic does.
@@ -169,6 +172,8 @@ class CurvedShell {
 
   Faces faces_;
   LargeArray<FaceCell> face_cells_;
+  std::vector<std::pair<int, int>> intruders_;
+  std::vector<Inexact> inexact_;
   double gap_ = 0;
   SharedNormals normals_;  // let go when the elements are bent
   std::vector<char> divided_;

@@ -26,6 +26,8 @@ constexpr double kSmallTurn = 0.005, kLikely = 0.25;
 // sampled unevenly: up to this ratio of heights, if two fits leave little and agree within a share
 // of the spread.
 constexpr double kMostUnevenHeights = 10, kLittle = 0.02, kSurelyAlike = 0.1;
+// A tilt is taken if its standard error is below this share of the spread.
+constexpr double kMostDoubt = 0.1;
 // A given normal contradicts a face that is off by more than this.
 constexpr double kContradiction = 0.01;
 // Corners take the normal of a face in their fan within this angle [rad] of their own facet's.
@@ -55,9 +57,10 @@ bool is_cone_apex(const Shell& shell, const std::vector<Vec3>& normals, const in
 // the tangent plane are those of circular arcs whose curvature is a quadratic form of the
 // direction, z = a x + b y + (A x^2 + 2 B x y + C y^2) (x^2 + y^2 + z^2) / (2 (x^2 + y^2)), so that
 // spheres are exact; with 9 terms the cubics too. False where the points do not determine it, or do
-// not fit.
+// not fit. `doubt`: the standard error of the tilt [rad]: two stations across a strip cannot tell
+// tilt from curvature.
 template <int Terms>
-bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& normal,
+bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& normal, double& doubt,
                 double most_uneven = kMostUneven) {
   using Row = Eigen::Matrix<double, Terms, 1>;
   using Square = Eigen::Matrix<double, Terms, Terms>;
@@ -97,7 +100,16 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
                                      size.cwiseInverse().asDiagonal());
     if (!(solver.vectorD().cwiseAbs().minCoeff() > kLeastPivot)) return false;
     const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
-    if (round > 0 && heights2 - fit.dot(along) > most_uneven * heights2) return false;
+    const double left = std::max(heights2 - fit.dot(along), 0.0);
+    if (round > 0 && left > most_uneven * heights2) return false;
+    // The variances of the first two coefficients: what is left, over the degrees of freedom, times
+    // the diagonal of the inverse.
+    double variance = 0;
+    for (int k = 0; k < 2; ++k) {
+      const double inverse = solver.solve(Row(Row::Unit(k)))[k] / (size[k] * size[k]);
+      variance = std::max(variance, left / double(points.size() - Terms) * inverse);
+    }
+    doubt = std::sqrt(variance);
     // The gradient of the height at the origin tilts the normal.
     n = (n - fit[0] * east - fit[1] * north).normalized();
     // What a further round would turn it by is smaller than this by as much as it is small.
@@ -178,8 +190,9 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   const auto fits_surely = [&](int fan) {
     const Vec3 origin = gather(fan, none, around, points);
     Vec3 quadratic = plain[*fans.begin(fan)], cubic = quadratic;
-    return fit_normal<5>(origin, points, quadratic, kLittle) &&
-           fit_normal<9>(origin, points, cubic, kLittle) &&
+    double doubt;
+    return fit_normal<5>(origin, points, quadratic, doubt, kLittle) &&
+           fit_normal<9>(origin, points, cubic, doubt, kLittle) &&
            quadratic.cross(cubic).norm() <= kSurelyAlike * spread(fan, false);
   };
   // Takes the normals of the faces in a fan over: the one that a facet has too, else their mean.
@@ -235,8 +248,10 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     const Vec3 own = plain[*fans.begin(fan)];
     Vec3 quadratic = own, cubic = own;
     // Two models of different order: where both fit and agree the points determine the normal.
-    const bool fits = fit_normal<5>(origin, at, quadratic);
-    const bool fits_better = fit_normal<9>(origin, at, cubic);
+    double doubt;
+    const double most = kMostDoubt * spread(fan, true) + kSettledTilt;
+    const bool fits = fit_normal<5>(origin, at, quadratic, doubt) && doubt <= most;
+    const bool fits_better = fit_normal<9>(origin, at, cubic, doubt) && doubt <= most;
     const auto agree = [](const Vec3& a, const Vec3& b, double angle) {
       return a.cross(b).norm() <= kSmallTurn + angle;
     };

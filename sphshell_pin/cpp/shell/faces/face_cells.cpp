@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "shell/curved/curved.hpp"
 
@@ -10,31 +11,16 @@ namespace {
 
 // What is measured at a few places may be larger between them.
 constexpr double kMargin = 1.5;
-constexpr int kMostRepeats = 12;
-// Tangent faces turn from each other within a facet by this at least.
-constexpr double kLeastTurn = 1e-6;
+constexpr double kTurn = 6.283185307179586;
+// Facets of one face overlap by this share of their parameters: one of them has each point.
+constexpr double kOverlap = 1e-9;
+
+// The difference of two parameters, of angles by the shorter way.
+double difference(double from, double to, bool angle) {
+  return angle ? to - from - kTurn * std::round((to - from) / kTurn) : to - from;
+}
 
 }  // namespace
-
-// Newton's method on both distances; quadratic where the faces cross at an angle.
-bool onto_both(const Primitive& one, const Primitive& other, Vec3& x) {
-  for (int i = 0; i < kMostRepeats; ++i) {
-    const Intersection here = intersection_at(one, other, x);
-    if (!(here.sine > kLeastAngle)) return false;
-    x += here.offset;
-    if (here.offset.squaredNorm() < 1e-30 * x.squaredNorm()) break;
-  }
-  return x.allFinite();
-}
-
-// The triple product chord . (n x m): zero where both normals are one along the chord, with a sign
-// to either side.
-double turn_between(const std::vector<Primitive>& shapes, int face, int other, const Vec3& chord,
-                    const Vec3& x) {
-  Vec3 n, m;
-  shapes[face].distance(x, n), shapes[other].distance(x, m);
-  return chord.dot(n.cross(m));
-}
 
 // The most that a face is off a facet of it, by its middle and those of its sides.
 double sagitta_of(const Facet& facet, const Primitive& shape) {
@@ -45,167 +31,314 @@ double sagitta_of(const Facet& facet, const Primitive& shape) {
   return kMargin * most;
 }
 
+WithinLine within_line(const Primitive& shape, const FaceCell& cell, const Facet& facet, int k,
+                       const Vec3& point, const Eigen::Vector2d& place, double tolerance) {
+  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
+  if (!shape.has_parameters()) {
+    Vec3 n;
+    shape.distance((p + q) / 2, n);
+    return {cell.sign * n.cross(q - p).dot(point - p), tolerance * (q - p).norm()};
+  }
+  const double *a = cell.place[k], *b = cell.place[next_corner(k)];
+  // At a cone's tip every angle will do: that of the other end.
+  const double begin = std::isnan(a[0]) ? b[0] : a[0];
+  const double u = std::isnan(b[0]) ? 0 : b[0] - begin, v = b[1] - a[1];
+  const double inside = u * difference(a[1], place[1], shape.kind == FaceKind::Torus) -
+                        v * difference(begin, place[0], true);
+  return {cell.sign * inside, kOverlap * (std::abs(u) + std::abs(v))};
+}
+
 namespace {
 
-// A plane or a cylinder through three points of a line or circle that is upright on a face with
-// normal n there.
-Primitive cutting(const Vec3& p, const Vec3& middle, const Vec3& q, const Vec3& n) {
-  // On a straight line: the plane through it and the normal. On a circle: its own plane where that
-  // is steep, else the cylinder over it.
-  const Vec3 d = q - p, up = (middle - p).cross(q - middle);
-  Primitive out{FaceKind::Plane, p, d.cross(n).normalized(), 0, 0};
-  if (!(up.norm() > 1e-7 * d.squaredNorm())) return out;
-  // The center of the circle, from the middle of its chord.
-  const Vec3 axis = up.normalized(), toward = axis.cross(d).normalized();
-  const double half = d.norm() / 2, rise = (middle - (p + q) / 2).dot(toward);
-  // Of the chord theorem: rise (2 r - rise) = half^2.
-  const double away = (rise * rise - half * half) / (2 * rise);
-  const Vec3 center = (p + q) / 2 + away * toward;
-  if (std::abs(n.dot(axis)) < 0.7) return {FaceKind::Plane, center, axis, 0, 0};
-  return {FaceKind::Cylinder, center, axis, (p - center).norm(), 0};
-}
+// Makes the cells: what each side is is decided once, for the facets on both sides of it.
+class CellMaker {
+ public:
+  CellMaker(const Shell& shell, Faces& faces, const LargeArray<CurvedFacet>& facets)
+      : shell_(shell), faces_(faces), facets_(facets), gap_(kMostGap * shell.size()) {}
 
-// Whether two faces touch along side k of a facet; sets its bulge and turn.
-bool is_tangent(const Shell& shell, std::vector<Primitive>& shapes, int other, const Facet& facet,
-                int k, FaceCell& cell) {
-  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
-  const Primitive face = shapes[cell.face];
-  const Vec3 inward = facet.normal.cross(q - p).normalized();
-  const double height = inward.dot(facet.corner[previous_corner(k)] - p);
-  double bulge = 0;
-  Vec3 middle;
-  for (const double s : {0.0, 0.25, 0.75, 1.0, 0.5}) {
-    // The border by the rule of false position: the turn grows evenly across it.
-    Vec3 x = face.onto(p + s * (q - p));
-    const Vec3 within = face.onto(x + 0.1 * height * inward);
-    const double here = turn_between(shapes, cell.face, other, q - p, x);
-    const double there = turn_between(shapes, cell.face, other, q - p, within);
-    const double rise = (there - here) / (0.1 * height);
-    const Vec3 start = x;
-    for (int i = 0; i < 4; ++i)
-      x = face.onto(x - turn_between(shapes, cell.face, other, q - p, x) / rise * inward);
-    const double off = (x - start).norm();
-    if (!(std::abs(rise) * height > kLeastTurn * (q - p).norm()) || !(off < 0.9 * height))
-      return false;
-    if (!(std::abs(shapes[other].distance(x)) <= kMostGap * shell.size())) return false;
-    bulge = std::max(bulge, off);
-    middle = x;
-    cell.turn[k] = rise < 0 ? -1 : 1;
+  FaceCells make() {
+    if (faces_.of.empty()) return {};
+    out_.of.resize(facets_.size());
+    off_.assign(3 * facets_.size(), 0);
+    open_.assign(faces_.shapes.size(), 0);
+    for (std::size_t f = 0; f < facets_.size(); ++f) place(static_cast<int>(f));
+    for (std::size_t f = 0; f < facets_.size(); ++f)
+      for (int k = 0; k < 3; ++k) decide(static_cast<int>(f), k);
+    settle();
+    find_intruders();
+    return std::move(out_);
   }
-  cell.bulge[k] = static_cast<float>(kMargin * bulge + kMostGap * shell.size());
-  cell.across[k] = static_cast<int>(shapes.size());
-  Vec3 n;
-  face.distance(middle, n);
-  shapes.push_back(cutting(p, middle, q, n));
-  return true;
-}
 
-}  // namespace
+ private:
+  int face_of_facet(int f) const { return faces_.of_triangle(shell_.triangle_of_facet(f)); }
+  bool is_round(int face) const { return face >= 0 && faces_.shapes[face].kind != FaceKind::Plane; }
 
-LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
-                                     const LargeArray<CurvedFacet>& facets) {
-  LargeArray<FaceCell> out;
-  if (faces.of.empty()) return out;
-  const Topology& topology = shell.topology();
-  out.resize(facets.size());
-  for (std::size_t f = 0; f < out.size(); ++f) {
-    out[f] = FaceCell();
-    out[f].face = faces.of_triangle(shell.triangle_of_facet(static_cast<int>(f)));
+  // The half-edge of the facet beyond a side, if the surface goes on there; else -1.
+  int beyond(int f, int k) const {
+    const int h = 3 * shell_.triangle_of_facet(f) + k, g = shell_.topology().other_half_edge(h);
+    if (g < 0) return -1;
+    const auto vertex = [&](int i) { return shell_.triangles()[triangle_of(i)][side_of(i)]; };
+    return vertex(h) != vertex(g) ? shell_.facet_half_edge(g) : -1;
   }
-  // What is bent, or has borders that ought to be.
-  // Flat facets of planes far from anything round stay as they are.
-  std::vector<char> bent(out.size(), 0);
-  const auto is_round = [&](int face) {
-    return face >= 0 && faces.shapes[face].kind != FaceKind::Plane;
-  };
-  for (std::size_t f = 0; f < out.size(); ++f) {
-    if (out[f].face < 0) continue;
-    bent[f] = is_round(out[f].face) || !facets[f].flat;
-    const int t = shell.triangle_of_facet(static_cast<int>(f));
-    for (int k = 0; k < 3; ++k) {
-      const int g = topology.other_half_edge(3 * t + k);
-      if (g >= 0 && is_round(faces.of_triangle(triangle_of(g)))) bent[f] = 1;
-    }
+
+  void give_up(int face, int other, double off) {
+    if (!open_[face]) out_.inexact.push_back({face, other, off});
+    open_[face] = 1;
   }
-  // open: faces that do not hold their own facets exactly, and are left to the cubics.
-  std::vector<char> open(faces.shapes.size(), 0);
-  std::vector<float> off(3 * out.size(), 0);  // of a cubic side from the face [m]
-  for (std::size_t f = 0; f < out.size(); ++f) {
-    const Facet& facet = shell.facets()[f];
-    const int t = shell.triangle_of_facet(static_cast<int>(f));
-    FaceCell& cell = out[f];
-    if (cell.face < 0) continue;
-    const Primitive shape = faces.shapes[cell.face];
+
+  void place(int f) {
+    FaceCell& cell = out_.of[f] = FaceCell();
+    cell.face = face_of_facet(f);
+    if (cell.face < 0) return;
+    const Facet& facet = shell_.facets()[f];
+    const Primitive& shape = faces_.shapes[cell.face];
     Vec3 n;
     shape.distance((facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3, n);
     cell.sign = n.dot(facet.normal) < 0 ? -1 : 1;
-    for (int i = 0; i < 3; ++i) cell.upright[i] = static_cast<float>(cell.sign * n[i]);
-    for (const Vec3& p : facet.corner)
-      if (!(std::abs(shape.distance(p)) <= kMostGap * shell.size())) open[cell.face] = 1;
-    for (int k = 0; k < 3; ++k) {
-      const int g = topology.other_half_edge(3 * t + k);
-      const bool wound =
-          g >= 0 && shell.triangles()[t][k] != shell.triangles()[triangle_of(g)][side_of(g)];
-      const int beyond = wound ? triangle_of(shell.facet_half_edge(g)) : -1;
-      const int other = beyond >= 0 ? out[beyond].face : -1;
-      if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
-      if (other == cell.face || !(bent[f] || (beyond >= 0 && bent[beyond]))) continue;
-      const Vec3 one = facets[f].control_offset(k, 0), two = facets[f].control_offset(k, 1);
-      double bulge = std::max(one.norm(), two.norm()), apart = 0;
-      bool shared = other >= 0;
-      const CubicCurve side = facets[f].side(facet, k);
-      for (const Vec3& end : {facet.corner[k], facet.corner[next_corner(k)]})
-        shared = shared && std::abs(faces.shapes[other].distance(end)) <= kMostGap * shell.size();
-      for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85}) {
-        // Where both hold at the ends, in which they may be tangent, and cut each other between.
-        const Vec3 x = side.point(s);
-        Vec3 both = x;
-        shared = shared && onto_both(shape, faces.shapes[other], both);
-        bulge = std::max(bulge, (both - x).norm() + std::max(one.norm(), two.norm()));
-        apart = std::max(apart, std::abs(shape.distance(x)));
+    double first[2] = {0, 0};
+    for (int i = 0; i < 3; ++i) {
+      cell.upright[i] = static_cast<float>(cell.sign * n[i]);
+      const double off = std::abs(shape.distance(facet.corner[i]));
+      if (!(off <= gap_)) give_up(cell.face, -1, off);
+      if (!shape.has_parameters()) continue;
+      const Eigen::Vector2d at = shape.parameters(facet.corner[i], shell_.size());
+      for (int c = 0; c < 2; ++c) {
+        double& mine = cell.place[i][c] = at[c];
+        if (i == 0 || std::isnan(first[c])) first[c] = mine;
+        const bool angle = c == 0 || shape.kind == FaceKind::Torus;
+        if (angle && !std::isnan(mine)) mine -= kTurn * std::round((mine - first[c]) / kTurn);
       }
-      const double length = (facet.corner[next_corner(k)] - facet.corner[k]).norm();
-      off[3 * f + k] = static_cast<float>(apart);
-      if (shared && bulge < length) {
-        cell.side[k] = FaceCell::Side::Shared;
-        cell.beyond[k] = cell.across[k] = other;
-      } else if (other >= 0 && is_tangent(shell, faces.shapes, other, facet, k, cell)) {
-        cell.side[k] = FaceCell::Side::Tangent;
-        cell.beyond[k] = other;
-        continue;
-      } else if (apart > kMostGap * shell.size()) {
-        open[cell.face] = 1;
-      }
-      cell.bulge[k] = static_cast<float>(kMargin * bulge + kMostGap * shell.size());
     }
   }
-  // A side is what it is for the sake of faces that give closest points.
-  const auto gives = [&](int face) { return face >= 0 && !open[face]; };
-  // Giving up one face changes the sides of its neighbors, until nothing changes.
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (std::size_t f = 0; f < out.size(); ++f)
-      for (int k = 0; k < 3; ++k) {
-        FaceCell& cell = out[f];
-        const bool here = gives(cell.face), there = gives(cell.beyond[k]);
-        const bool tangent = cell.side[k] == FaceCell::Side::Tangent;
-        if (tangent ? here && there : here || there) continue;
-        cell.side[k] = FaceCell::Side::Cubic;
-        if (here && off[3 * f + k] > kMostGap * shell.size()) open[cell.face] = changed = true;
+
+  // Flat facets of planes far from anything round stay as they are.
+  bool is_bent(int f) const {
+    const int face = out_.of[f].face;
+    if (face < 0) return false;
+    if (is_round(face) || !facets_[f].flat) return true;
+    for (int k = 0; k < 3; ++k) {
+      const int h = beyond(f, k);
+      if (h >= 0 && is_round(out_.of[triangle_of(h)].face)) return true;
+    }
+    return false;
+  }
+
+  void decide(int f, int k) {
+    FaceCell& cell = out_.of[f];
+    const int h = beyond(f, k), other = h < 0 ? -1 : out_.of[triangle_of(h)].face;
+    if (cell.face < 0 || cell.side[k] == FaceCell::Side::Border) return;  // decided from beyond it
+    if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
+    if (other == cell.face || !(is_bent(f) || (h >= 0 && is_bent(triangle_of(h))))) return;
+    const Facet& facet = shell_.facets()[f];
+    const Primitive& shape = faces_.shapes[cell.face];
+    const CubicCurve side = facets_[f].side(facet, k);
+    double apart = 0;
+    for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85})
+      apart = std::max(apart, std::abs(shape.distance(side.point(s))));
+    off_[3 * f + k] = static_cast<float>(apart);
+    cell.bulge[k] = static_cast<float>(kMargin * bulge_of(f, k) + gap_);
+    const int joint = other >= 0 && h > 3 * f + k ? joint_of(f, k, cell.face, other) : -1;
+    if (joint >= 0 && agree(joint, 3 * f + k, h)) return;
+    if (apart > gap_) give_up(cell.face, other, apart);
+  }
+
+  double bulge_of(int f, int k) const {
+    return std::max(facets_[f].control_offset(k, 0).norm(), facets_[f].control_offset(k, 1).norm());
+  }
+
+  // The joint of two faces at a side, new or known; -1 if they have none there.
+  int joint_of(int f, int k, int face, int other) {
+    const Facet& facet = shell_.facets()[f];
+    const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
+    const int a = std::min(face, other), b = std::max(face, other);
+    const Primitive &one = faces_.shapes[a], &two = faces_.shapes[b];
+    std::optional<FaceJoint> found = find_joint(faces_.shapes, a, b, p, q, gap_);
+    if (!found) {
+      // Where both hold at the ends, in which they may be tangent, and cut each other between.
+      for (const Vec3& end : {p, q})
+        if (!(std::abs(one.distance(end)) <= gap_ && std::abs(two.distance(end)) <= gap_))
+          return -1;
+      const CubicCurve side = facets_[f].side(facet, k);
+      for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85}) {
+        Vec3 both = side.point(s);
+        if (!onto_both(one, two, both)) return -1;
       }
+      found.emplace();
+      found->face[0] = a, found->face[1] = b;
+      found->across[0] = two, found->across[1] = one;
+    }
+    std::vector<int>& known = joints_[{a, b}];
+    for (const int j : known) {
+      const FaceJoint& it = faces_.joints[j];
+      if (it.kind == found->kind && (it.point - found->point).norm() <= gap_ &&
+          std::abs(it.radius - found->radius) <= gap_ &&
+          (it.kind != FaceJoint::Kind::Line || it.axis.cross(found->axis).norm() <= kMostGap))
+        return j;
+    }
+    known.push_back(static_cast<int>(faces_.joints.size()));
+    faces_.joints.push_back(*found);
+    return known.back();
   }
-  for (std::size_t f = 0; f < out.size(); ++f) {
-    FaceCell& cell = out[f];
-    if (cell.face < 0) continue;
-    const auto curved = [&](int face) { return is_round(face) && gives(face); };
-    // A face is asked for closest points where it, its elements or a neighbor is curved.
-    const bool needed =
-        is_round(cell.face) || !facets[f].flat || std::any_of(cell.beyond, cell.beyond + 3, curved);
-    cell.exact = !needed || gives(cell.face);
-    cell.closed = needed && gives(cell.face);
-    for (int k = 0; k < 3 && !cell.closed; ++k) cell.side[k] = FaceCell::Side::Cubic;
+
+  // Writes a joint to the facets on both sides of it. False, and to none, if it does not divide
+  // them: where a joint is tangent and the surface smooth, they are on two sides of one shape.
+  bool agree(int j, int h, int g) {
+    const FaceJoint& joint = faces_.joints[j];
+    const int halves[2] = {h, g};
+    std::int8_t turn[2];
+    Vec3 outward[2];
+    double bulge = 0;
+    for (int i = 0; i < 2; ++i) {
+      const int f = triangle_of(halves[i]), k = side_of(halves[i]);
+      const Facet& facet = shell_.facets()[f];
+      const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
+      const CubicCurve side = facets_[f].side(facet, k);
+      for (const double s : {0.0, 0.15, 0.3, 0.5, 0.7, 0.85, 1.0}) {
+        const Vec3 x = side.point(s);
+        Vec3 on = x;
+        if (joint.kind == FaceJoint::Kind::Crossing) {
+          if (s > 0 && s < 1) onto_both(faces_.shapes[joint.face[0]], joint.across[0], on);
+        } else {
+          on = joint.nearest(x);
+        }
+        bulge = std::max(bulge, (on - p - s * (q - p)).norm());
+        if (s != 0.5) continue;
+        const int face = out_.of[f].face;
+        Vec3 n, away;
+        faces_.shapes[face].distance(on, n);
+        joint.across_of(face).distance(on, away);
+        outward[i] = out_.of[f].sign * n;
+        turn[i] = outward[i].cross(q - p).dot(away) < 0 ? -1 : 1;
+      }
+      if (!(bulge < (q - p).norm())) return false;
+    }
+    if (joint.tangent && (outward[0].dot(outward[1]) > 0) == (turn[0] == turn[1])) return false;
+    for (int i = 0; i < 2; ++i) {
+      FaceCell& cell = out_.of[triangle_of(halves[i])];
+      const int k = side_of(halves[i]);
+      cell.side[k] = FaceCell::Side::Border;
+      cell.joint[k] = j, cell.turn[k] = turn[i];
+      cell.bulge[k] = static_cast<float>(kMargin * bulge + gap_);
+    }
+    // Of a face that is given up its cubic side counts.
+    const int f = triangle_of(g), k = side_of(g);
+    const Primitive& shape = faces_.shapes[out_.of[f].face];
+    for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85})
+      off_[g] = std::max<float>(
+          off_[g], std::abs(shape.distance(facets_[f].side(shell_.facets()[f], k).point(s))));
+    return true;
   }
-  return out;
+
+  // Giving up one face changes the sides of its neighbors, until nothing changes. Then what each
+  // facet is.
+  void settle() {
+    const auto gives = [&](int face) { return face >= 0 && !open_[face]; };
+    const auto other_face = [&](const FaceCell& cell, int k) {
+      const FaceJoint& joint = faces_.joints[cell.joint[k]];
+      return joint.face[1 - joint.which(cell.face)];
+    };
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (std::size_t f = 0; f < out_.of.size(); ++f)
+        for (int k = 0; k < 3; ++k) {
+          FaceCell& cell = out_.of[f];
+          if (cell.side[k] != FaceCell::Side::Border) continue;
+          const int other = other_face(cell, k);
+          const bool here = gives(cell.face), there = gives(other);
+          if (faces_.joints[cell.joint[k]].tangent ? here && there : here || there) continue;
+          cell.side[k] = FaceCell::Side::Cubic;
+          if (here && off_[3 * f + k] > gap_)
+            give_up(cell.face, other, off_[3 * f + k]), changed = true;
+        }
+    }
+    for (std::size_t f = 0; f < out_.of.size(); ++f) {
+      FaceCell& cell = out_.of[f];
+      if (cell.face < 0) continue;
+      // A face is asked for closest points where it, its elements or a neighbor is curved.
+      bool needed = is_round(cell.face) || !facets_[f].flat;
+      for (int k = 0; k < 3; ++k)
+        if (cell.side[k] == FaceCell::Side::Border) {
+          const int other = other_face(cell, k);
+          needed = needed || (is_round(other) && gives(other));
+        }
+      cell.exact = !needed || gives(cell.face);
+      cell.closed = needed && gives(cell.face);
+      for (int k = 0; k < 3 && !cell.closed; ++k) cell.side[k] = FaceCell::Side::Cubic;
+    }
+  }
+
+  // Where a border bulges inward of its chord it may pass through facets that have but a corner on
+  // it: they must know of it.
+  void find_intruders() {
+    std::map<int, std::vector<int>> around;  // facets at the vertices of such borders
+    std::vector<int> borders;
+    const auto vertex = [&](int h) {
+      return shell_.triangles()[shell_.triangle_of_facet(triangle_of(h))][side_of(h)];
+    };
+    const auto on_border = [&](int h, double s) -> Vec3 {
+      const int f = triangle_of(h), k = side_of(h);
+      const FaceJoint& joint = faces_.joints[out_.of[f].joint[k]];
+      Vec3 x = facets_[f].side(shell_.facets()[f], k).point(s);
+      if (joint.kind != FaceJoint::Kind::Crossing) return joint.nearest(x);
+      onto_both(faces_.shapes[joint.face[0]], joint.across[0], x);
+      return x;
+    };
+    const auto inside = [&](int f, int k, const Vec3& x, double margin) {
+      const FaceCell& cell = out_.of[f];
+      const Primitive& shape = faces_.shapes[cell.face];
+      const Eigen::Vector2d at = shape.has_parameters() ? shape.parameters(x, shell_.size())
+                                                        : Eigen::Vector2d(Eigen::Vector2d::Zero());
+      const WithinLine line = within_line(shape, cell, shell_.facets()[f], k, x, at, gap_);
+      return line.inside > margin * line.overlap;
+    };
+    for (std::size_t f = 0; f < out_.of.size(); ++f)
+      for (int k = 0; k < 3 && out_.of[f].closed; ++k) {
+        const int h = 3 * static_cast<int>(f) + k;
+        if (out_.of[f].side[k] != FaceCell::Side::Border || !inside(f, k, on_border(h, 0.5), 1))
+          continue;
+        borders.push_back(h);
+        around[vertex(h)], around[vertex(3 * static_cast<int>(f) + next_corner(k))];
+      }
+    if (borders.empty()) return;
+    for (std::size_t f = 0; f < out_.of.size(); ++f)
+      for (int k = 0; k < 3; ++k) {
+        const auto at = around.find(vertex(3 * static_cast<int>(f) + k));
+        if (at != around.end()) at->second.push_back(static_cast<int>(f));
+      }
+    for (const int h : borders) {
+      const int f = triangle_of(h), next = 3 * f + next_corner(side_of(h));
+      std::vector<int> near = around[vertex(h)];
+      near.insert(near.end(), around[vertex(next)].begin(), around[vertex(next)].end());
+      std::sort(near.begin(), near.end());
+      near.erase(std::unique(near.begin(), near.end()), near.end());
+      for (const int g : near) {
+        FaceCell& cell = out_.of[g];
+        if (g == f || cell.face != out_.of[f].face) continue;
+        for (const double s : {0.01, 0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95, 0.99}) {
+          const Vec3 x = on_border(h, s);
+          if (!inside(g, 0, x, -1) || !inside(g, 1, x, -1) || !inside(g, 2, x, -1)) continue;
+          out_.intruders.push_back({h, cell.intruder});
+          cell.intruder = static_cast<int>(out_.intruders.size()) - 1;
+          break;
+        }
+      }
+    }
+  }
+
+  const Shell& shell_;
+  Faces& faces_;
+  const LargeArray<CurvedFacet>& facets_;
+  const double gap_;
+  FaceCells out_;
+  std::vector<char> open_;  // faces that do not hold their own facets exactly: left to the cubics
+  std::vector<float> off_;  // of cubic sides from the face [m]
+  std::map<std::pair<int, int>, std::vector<int>> joints_;
+};
+
+}  // namespace
+
+FaceCells make_face_cells(const Shell& shell, Faces& faces, const LargeArray<CurvedFacet>& facets) {
+  return CellMaker(shell, faces, facets).make();
 }
 
 }  // namespace sphshell

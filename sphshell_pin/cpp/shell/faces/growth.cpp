@@ -25,13 +25,6 @@ constexpr int kMostRefits = 8, kMostSweeps = 40;
 constexpr int kFewOfBand = 3;
 constexpr std::size_t kVerticesOfPlane = 5;
 
-// Without interpolation.
-double quantile(std::vector<double> values, double share) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * double(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 // The normals of a shape at the corners of a facet. At the tip of a cone, where it has none, each
 // facet takes that of its own middle.
 std::array<Vec3, 3> normals_at(const Primitive& shape, const std::array<Vec3, 3>& corners) {
@@ -135,6 +128,7 @@ Growth Recognizer::grow(int seed, const Primitive& shape, double tolerance) {
     const int t = open.back();
     open.pop_back();
     ++visits_;
+    if (inscribed_[regions_.of(t)] == Inscribed::Belt && shape.kind >= FaceKind::Sphere) continue;
     const Explained one = explain(t, shape, tolerance, kMostLeanOnFace);
     if (!one.explained || (out.sign != 0 && one.sign != out.sign)) continue;
     out.sign = one.sign;
@@ -196,8 +190,10 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
       by_region.push_back({regions_.of(all[i]), static_cast<int>(i)});
   std::sort(by_region.begin(), by_region.end());
   std::vector<char> keep(all.size());
-  for (std::size_t i = 0; i < all.size(); ++i)
+  for (std::size_t i = 0; i < all.size(); ++i) {
     keep[i] = leans[i] <= most_lean && off[i] <= most_off;
+    if (!keep[i]) growth.left_out.push_back(all[i]);
+  }
   for (std::size_t i = 0, j; i < by_region.size(); i = j) {
     std::vector<int> members;
     for (j = i; j < by_region.size() && by_region[j].first == by_region[i].first; ++j)
@@ -255,7 +251,9 @@ void Recognizer::absorb_slivers(Growth& growth) {
         const int h = topology.other_half_edge(3 * all[from] + k);
         if (h < 0) continue;
         const int u = triangle_of(h);
-        if (is_marked(u) || of_[u] >= 0 || regions_.count(regions_.of(u)) >= kFewOfBand) continue;
+        if (is_marked(u) || of_[u] >= 0 || inscribed_[regions_.of(u)] != Inscribed::No ||
+            regions_.count(regions_.of(u)) >= kFewOfBand)
+          continue;
         const Explained one = explain(u, growth.shape, growth.window, kMostLeanOfSlivers);
         if (!one.explained || one.sign != growth.sign ||
             one.deviation > growth.deviation + growth.window)

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace sphshell {
 namespace {
@@ -196,6 +197,15 @@ Mat3 Primitive::hessian(const Vec3& x) const {
     out += meridian * meridian.transpose() / std::max(q, 1e-300);
   }
   return out;
+}
+
+Eigen::Vector2d Primitive::parameters(const Vec3& x, double size) const {
+  const AboutAxis at(*this, x);
+  const Vec3 east = axis.unitOrthogonal();
+  const double u = at.off > 1e-9 * size
+                       ? std::atan2(at.across.dot(axis.cross(east)), at.across.dot(east))
+                       : std::numeric_limits<double>::quiet_NaN();
+  return {u, kind == FaceKind::Torus ? std::atan2(at.h, at.off - radius) : at.h / size};
 }
 
 // Of the circle about the axis, at the height of x.

@@ -35,6 +35,11 @@ struct Primitive {
     const double off = distance(x, normal);
     return x - off * normal;
   }
+  // Of cylinders, cones and tori: the angle about the axis [rad], and the height along it as a
+  // share of `size`, or the angle of the tube. Right-handed about the normal; the first is not
+  // finite on the axis.
+  Eigen::Vector2d parameters(const Vec3& x, double size) const;
+  bool has_parameters() const { return kind != FaceKind::Plane && kind != FaceKind::Sphere; }
   // The second derivatives of the distance at x [1/m]: how its gradient turns.
   Mat3 hessian(const Vec3& x) const;
   // Whether x is so near the axis or the center, to this share of the radius, that the gradient has

@@ -55,6 +55,7 @@ Recognizer::Recognizer(const Shell& shell, const CoplanarRegions& regions, doubl
       wide_(std::max(3 * tolerance, 1e-6 * shell.size())),
       tries_(shell.triangles().size(), 0),
       of_(shell.triangles().size(), -1),
+      inscribed_(static_cast<std::size_t>(regions.size()), Inscribed::No),
       mark_(shell.triangles().size(), 0) {
   list_neighbors();
   find_candidates();
@@ -220,6 +221,8 @@ bool Recognizer::recognize_from(int seed) {
 
 // What lies on faces found before is taken from them as a whole, or not at all.
 bool Recognizer::take(Growth growth) {
+  if (growth.triangles.empty()) return false;
+  leave_wide_bands_out(growth);
   std::vector<int>& all = growth.triangles;
   std::vector<int> shared(faces_.size(), 0);
   for (const int t : all)
@@ -229,10 +232,15 @@ bool Recognizer::take(Growth growth) {
     const double own = double(faces_[f].triangles.size());
     return shared[f] < 0.9 * own || double(all.size()) < 1.3 * own;
   };
-  all.erase(
-      std::remove_if(all.begin(), all.end(), [&](int t) { return of_[t] >= 0 && stays(of_[t]); }),
-      all.end());
+  // Its flats go with it.
+  for (std::size_t f = 0; f < shared.size(); ++f)
+    for (const int region : faces_[f].wide)
+      if (shared[f] > 0 && !stays(int(f))) inscribed_[region] = Inscribed::No;
+  const auto is_taken = [&](int t) { return is_own_plane(t) || (of_[t] >= 0 && stays(of_[t])); };
+  all.erase(std::remove_if(all.begin(), all.end(), is_taken), all.end());
   if (all.size() < 3) return false;
+  for (const int region : growth.wide)
+    inscribed_[region] = growth.shape.kind == FaceKind::Sphere ? Inscribed::Belt : Inscribed::Plane;
   if (!is_weak(growth)) absorb_slivers(growth);
   for (const int t : all) of_[t] = static_cast<int>(faces_.size());
   faces_.push_back(std::move(growth));
@@ -272,7 +280,8 @@ void Recognizer::drop_zones_of_free_shapes() {
         if (u < 0 || of_[u] == int(f)) continue;
         ++smooth;
         if (!(of_[u] >= 0 ? weak[of_[u]]
-                          : curved_[u] && regions_.area(regions_.of(u)) < 2 * kFarLarger * mean))
+                          : curved_[u] && !is_own_plane(u) &&
+                                regions_.area(regions_.of(u)) < 2 * kFarLarger * mean))
           continue;
         ++vague;
         const double side = (point(corners(t)[next_corner(k)]) - here).norm();
@@ -301,6 +310,7 @@ void Recognizer::add_planes(Faces& faces) const {
     // Each triangle may speak against its region.
     char& is_plane = plane[regions_.of(int(t))];
     some[regions_.of(int(t))] = static_cast<int>(t);
+    if (is_own_plane(int(t))) continue;
     if (of_[t] >= 0 || regions_.count(regions_.of(int(t))) < 2) is_plane = 0;
     for (int k = 0; k < 3 && is_plane; ++k) {
       const int h = 3 * static_cast<int>(t) + k, u = beside_[h];
@@ -312,11 +322,12 @@ void Recognizer::add_planes(Faces& faces) const {
   }
   for (std::size_t t = 0; t < of_.size(); ++t) {
     const int r = regions_.of(int(t));
-    if (!plane[r]) continue;
+    if (!plane[r] || of_[t] >= 0) continue;
     if (number[r] < 0) {
       number[r] = static_cast<int>(faces.shapes.size());
-      faces.shapes.push_back(
-          {FaceKind::Plane, point(corners(some[r])[0]), regions_.normal(r), 0, 0});
+      // A plane has no second number: it says whether the plane is inscribed in a round face.
+      faces.shapes.push_back({FaceKind::Plane, point(corners(some[r])[0]), regions_.normal(r), 0,
+                              double(is_own_plane(int(t)))});
     }
     faces.of[t] = number[r];
   }

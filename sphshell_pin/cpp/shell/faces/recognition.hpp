@@ -4,13 +4,14 @@
 #include <vector>
 
 #include "shell/faces/coplanar.hpp"
-#include "shell/faces/primitive.hpp"
+#include "shell/faces/face_joints.hpp"
 
 namespace sphshell {
 
 // The faces of a shell, and which triangles lie on them.
 struct Faces {
   std::vector<Primitive> shapes;
+  std::vector<FaceJoint> joints;  // the borders between them, where they give closest points
   std::vector<int> of;  // per triangle, in `shapes`; -1: of no kind known; empty: none at all
 
   int of_triangle(int t) const { return of.empty() ? -1 : of[t]; }

@@ -1,4 +1,5 @@
-// Inside of recognition.cpp, growth.cpp and evidence.cpp: the search for faces in a mesh.
+// Inside of recognition.cpp, growth.cpp, evidence.cpp and steps.cpp: the search for faces in a
+// mesh.
 #pragma once
 
 #include <algorithm>
@@ -15,6 +16,13 @@ inline double median(std::vector<double>& values) {
   return *middle;
 }
 
+// Without interpolation.
+inline double quantile(std::vector<double> values, double share) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * double(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
 // A connected part of the mesh that a primitive explains.
 struct Growth {
   Primitive shape;
@@ -22,7 +30,11 @@ struct Growth {
   int sign = 1;          // of the triangles' normals along the shape's
   double deviation = 0;  // of the flat sides from the shape, the largest [m]
   double window = 0;     // the vertices are as close as that to the shape [m]
+  // Triangles that lean or stand off more than the others; regions wider than the regular step.
+  std::vector<int> left_out = {}, wide = {};
 };
+
+enum class Inscribed : char { No, Plane, Belt };
 
 // Finds faces from seeds: a patch, a fit, growth over all that it explains, evidence.
 class Recognizer {
@@ -53,6 +65,7 @@ class Recognizer {
   FacetSample sample(const std::vector<int>& triangles) const;
   // These alone are marked from now on.
   void mark(const std::vector<int>& triangles);
+  bool is_own_plane(int t) const { return inscribed_[regions_.of(t)] == Inscribed::Plane; }
   bool is_marked(int t) const { return mark_[t] == round_; }
 
   // growth.cpp
@@ -65,6 +78,11 @@ class Recognizer {
   Growth grow_and_refit(int seed, const Primitive& shape);
   void leave_own_faces_out(Growth& growth);
   void absorb_slivers(Growth& growth);
+
+  // steps.cpp
+  double widest_step(const Growth& growth);
+  double slack(const Growth& growth, double step) const;
+  void leave_wide_bands_out(Growth& growth);
 
   // evidence.cpp
   std::vector<int> inner_vertices(const Growth& growth);
@@ -89,11 +107,13 @@ class Recognizer {
   const Shell& shell_;
   const CoplanarRegions& regions_;
   const double tolerance_, wide_;
-  std::vector<int> beside_;    // per half-edge: the triangle across a smooth edge, else -1
-  std::vector<float> turn_;    // per triangle: the largest turn at its smooth edges [rad]
-  std::vector<char> curved_;   // per triangle: may belong to a curved face
-  std::vector<char> tries_;    // per triangle: in how many failures
-  std::vector<int> of_;        // per triangle: in faces_
+  std::vector<int> beside_;   // per half-edge: the triangle across a smooth edge, else -1
+  std::vector<float> turn_;   // per triangle: the largest turn at its smooth edges [rad]
+  std::vector<char> curved_;  // per triangle: may belong to a curved face
+  std::vector<char> tries_;   // per triangle: in how many failures
+  std::vector<int> of_;       // per triangle: in faces_
+  // Per coplanar region: inscribed in a round face, but a plane of its own, or part of a belt.
+  std::vector<Inscribed> inscribed_;
   std::vector<Growth> faces_;  // triangles as they were found; others may have taken some since
   std::vector<int> mark_;
   int round_ = 0;

@@ -1,0 +1,155 @@
+"""Masses of links whose URDF states none, from their geometry, and what to do without them."""
+
+from __future__ import annotations
+
+import copy
+import xml.etree.ElementTree as ET
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.arrays import Array
+from sphshell_pin.checks import check_positive
+from sphshell_pin.dynamics.scene.models import mass_matrix
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.robots.description import Description
+from sphshell_pin.robots.files import build_geometry, build_model, keep_geometry_of
+from sphshell_pin.shell.shell import Shell
+
+# Names that a sentence lists; a part of the largest inertia below which a joint moves no mass.
+_LISTED, _NONE = 8, 1e-14
+
+
+def with_density(description: Description, density: float) -> tuple[Description, str]:
+    """Return a URDF in which each link has an inertial that states none, and what was added.
+
+    `density` [kg/m^3] is that of its collision geometry, or of its visual one if it has no other;
+    open meshes are taken for their convex hulls. Links without geometry stay as they are.
+    """
+    check_positive("density", density, "kg/m^3")
+    if description.is_mjcf:
+        raise InvalidParameter("density", density, "is for URDF files: MJCF states its own")
+    root, added = copy.deepcopy(description.root), dict[str, float]()
+    model = build_model(description)
+    frames = {f.name: k for k, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
+    for kind in ("collision", "visual"):
+        bare = [one for one in root.findall("link") if not _mass(one)]
+        part = copy.deepcopy(description)
+        keep_geometry_of(part, {one.get("name", "") for one in bare}, kind)
+        geometry, _ = build_geometry(part, model, getattr(pin.GeometryType, kind.upper()))
+        for link in bare:
+            inertia = _inertia(model, geometry, frames.get(link.get("name", "")), density)
+            if inertia.mass > 0.0:
+                for stated in link.findall("inertial"):
+                    link.remove(stated)
+                link.insert(0, _element(inertia))
+                added[link.get("name", "")] = inertia.mass
+    note = (
+        f"the masses of {_list(list(added))} are those of their geometry at {density:g} kg/m^3, "
+        f"{sum(added.values()):.3g} kg in all, as the file states none"
+    )
+    return replace(description, root=root), note if added else ""
+
+
+def mass_fault(
+    model: pin.Model, q: Array, description: Description | None, lock: Collection[str] = ()
+) -> str | None:
+    """Say which links lack a mass that a joint not in `lock` needs, and what to do; None if none.
+
+    `q` (nq,) is any configuration.
+    """
+    inertia = np.diag(mass_matrix(model, q))
+    bare = [
+        name
+        for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True)
+        if name not in lock
+        and joint.nv
+        and inertia[joint.idx_v] <= _NONE * inertia.max(initial=0.0)
+    ]
+    if not bare:
+        return None
+    said = f"nothing that joint '{bare[0]}' moves has a mass"
+    if description is None or description.is_mjcf:
+        return f"{said}: give its links masses, or lock the joint"
+    moved = {f.name for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint > 0}
+    links = [one for one in description.root.iter("link") if one.get("name") in moved]
+    empty = [one for one in links if not _mass(one)]
+    solid = [str(one.get("name")) for one in empty if one.find(".//geometry") is not None]
+    if not solid:
+        names = _list([str(one.get("name")) for one in empty])
+        return f"{said}: {names} have neither a mass nor geometry: write their <inertial>"
+    return (
+        f"{said}, as the file states none of {_list(solid)}: take them from the meshes with "
+        "--density 2700 [kg/m^3] (density = 2700 in a scenario), or write such a file with "
+        "check-robot FILE --density 2700 --mend OUT.urdf"
+    )
+
+
+def _mass(link: ET.Element) -> float:
+    """Return the mass that a link of a URDF states [kg], 0 where it states none."""
+    mass = link.find("inertial/mass")
+    try:
+        return max(float(mass.get("value", "0")), 0.0) if mass is not None else 0.0
+    except ValueError:
+        return 1.0  # left to the parser, which refuses it
+
+
+def _inertia(
+    model: pin.Model, geometry: pin.GeometryModel, frame: int | None, density: float
+) -> pin.Inertia:
+    """Return the inertia of the solids on a link's frame, in that frame."""
+    total = pin.Inertia.Zero()
+    for part in geometry.geometryObjects:
+        if part.parentFrame == frame:
+            place = model.frames[frame].placement.actInv(part.placement)
+            total += place.act(_of_solid(Shell.from_geometry(part), density))
+    return total
+
+
+def _of_solid(shell: Shell, density: float) -> pin.Inertia:
+    """Return the inertia of what a shell encloses, or of its convex hull where it is open.
+
+    Summed over tetrahedra with one corner inside.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = np.asarray(shell.vertices)
+    inside = points.mean(axis=0)
+    try:
+        triangles = shell.triangles if shell.is_closed else ConvexHull(points).simplices
+    except (QhullError, ValueError):  # flat
+        return pin.Inertia.Zero()
+    corners = points[triangles] - inside
+    volumes = np.linalg.det(corners) / 6.0
+    volumes = volumes if shell.is_closed else np.abs(volumes)
+    volume = float(volumes.sum())
+    if volume < 0.0:
+        volumes, volume = -volumes, -volume
+    if not volume > 0.0:
+        return pin.Inertia.Zero()
+    sums = corners.sum(axis=1)
+    center = volumes @ sums / (4.0 * volume)
+    squares = np.einsum("i,ij,ik->jk", volumes, sums, sums)
+    squares += np.einsum("i,icj,ick->jk", volumes, corners, corners)
+    about = squares / 20.0 - volume * np.outer(center, center)
+    return pin.Inertia(
+        density * volume, inside + center, density * (np.trace(about) * np.eye(3) - about)
+    )
+
+
+def _element(inertia: pin.Inertia) -> ET.Element:
+    out = ET.Element("inertial")
+    ET.SubElement(out, "origin", xyz=" ".join(f"{x:.9g}" for x in inertia.lever), rpy="0 0 0")
+    ET.SubElement(out, "mass", value=f"{inertia.mass:.9g}")
+    of = inertia.inertia
+    places = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2)}
+    places |= {"iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    ET.SubElement(out, "inertia", {name: f"{of[at]:.9g}" for name, at in places.items()})
+    return out
+
+
+def _list(links: list[str]) -> str:
+    more = f" and {len(links) - _LISTED} others" if len(links) > _LISTED else ""
+    return f"link{'s' * (len(links) > 1)} {', '.join(links[:_LISTED])}{more}"

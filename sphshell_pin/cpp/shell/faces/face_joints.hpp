@@ -1,0 +1,50 @@
+// Where two faces meet: one record for the whole border between them, read from both sides.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "shell/faces/primitive.hpp"
+
+namespace sphshell {
+
+// A face gives closest points where it holds its vertices, and its borders, to this share of the
+// size: so much the potential may jump there.
+constexpr double kMostGap = 4e-9;
+// Faces that meet at less than this angle (its sine) do not determine where by Newton's method.
+constexpr double kLeastAngle = 0.003;
+
+// The border of two faces. Lines and circles follow from both shapes in closed form, whatever their
+// angle; of others the shapes are all that is known, and they must cross.
+struct FaceJoint {
+  enum class Kind : std::uint8_t { Line, Circle, Crossing };
+
+  Kind kind = Kind::Crossing;
+  int face[2] = {-1, -1};     // in Faces::shapes
+  bool tangent = false;       // both faces have one normal here, and one shape divides them
+  Vec3 point = Vec3::Zero();  // of a line; the center of a circle
+  Vec3 axis = Vec3::UnitZ();  // along a line; of a circle. Unit
+  double radius = 0;          // of a circle [m]
+  // Per face the shape that its normals on the border span: a center is on one side of it where its
+  // closest point on the face is on that side of the border. Of crossings the other face, or the
+  // plane that the curve lies in.
+  Primitive across[2];
+
+  int which(int of_face) const { return of_face == face[0] ? 0 : 1; }
+  const Primitive& across_of(int of_face) const { return across[tangent ? 0 : which(of_face)]; }
+  // The point of a line or circle nearest to x.
+  Vec3 nearest(const Vec3& x) const;
+  // How the border goes next to x.
+  Intersection at(const std::vector<Primitive>& shapes, const Vec3& x) const;
+};
+
+// The line or circle from p to q in which two shapes meet, if they do: it is on both all along to
+// `gap` [m]. That it is one follows from their kinds and places and is never fitted.
+std::optional<FaceJoint> find_joint(const std::vector<Primitive>& shapes, int one, int other,
+                                    const Vec3& p, const Vec3& q, double gap);
+
+// The point next to x where both shapes are zero. False where they do not cross there.
+bool onto_both(const Primitive& one, const Primitive& other, Vec3& x);
+
+}  // namespace sphshell

@@ -1,0 +1,107 @@
+"""`HertzLaw` where a flat goes on smoothly into a fillet: the energy does not jump."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from tests.contact.test_hertz_law import MODULUS
+from tests.models import ball
+from tests.oracle.hertz import hertz_contact
+
+RADIUS, BEND, HALF, DEPTH = 0.01, 0.015, 0.02, 4e-5
+LAW = sp.HertzLaw(1e7, 0.3)
+LENGTH = np.sqrt(RADIUS * DEPTH)  # of contact
+
+
+def halfpipe(**more) -> sp.Shell:
+    """A flat floor between two quarter cylinders that are tangent to it."""
+    angle = np.linspace(0, np.pi / 2, 25)
+    right = np.stack([HALF + BEND * np.sin(angle), BEND - BEND * np.cos(angle)], -1)
+    profile = np.concatenate([right[::-1] * [-1, 1], right])
+    n = len(profile)
+    vertices = np.concatenate(
+        [np.stack([profile[:, 0], np.full(n, y), profile[:, 1]], -1) for y in (-0.03, 0.03)]
+    )
+    return sp.Shell(vertices, [[i, i + 1, n + i + 1, n + i] for i in range(n - 1)], **more)
+
+
+def scene(law=LAW, shell=None, gravity=0.0) -> sp.Scene:
+    model = ball(0.0, 0.05, RADIUS, pin.JointModelTranslation())
+    model.gravity.linear = np.array([0.0, 0.0, -gravity])
+    out = sp.Scene(model)
+    out.add_contact(
+        sp.Sphere(RADIUS, "ball"), shell or halfpipe(), law=law, friction=None, name="c"
+    )
+    return out
+
+
+def center(beyond: float) -> np.ndarray:
+    """Where the ball is DEPTH deep, its closest point so far beyond the joint."""
+    if beyond <= 0:
+        return np.array([HALF + beyond, 0.002, RADIUS - DEPTH])
+    angle, reach = beyond / BEND, BEND - RADIUS + DEPTH
+    return np.array([HALF + reach * np.sin(angle), 0.002, BEND - reach * np.cos(angle)])
+
+
+def force(one: sp.Scene, at: np.ndarray) -> np.ndarray:
+    return one.external_forces(at, np.zeros(3))[1].linear
+
+
+def test_away_from_the_joint_each_face_has_its_own_curvature() -> None:
+    one = scene()
+    for beyond, curvature in ((-1.001, 0.0), (1.001, -1 / BEND)):
+        expected, *_ = hertz_contact(0.5 / RADIUS, 0.5 * (1 / RADIUS + curvature), MODULUS, DEPTH)
+        found = np.linalg.norm(force(one, center(beyond * LENGTH)))
+        assert np.isclose(found, expected, rtol=1e-5)
+
+
+def test_the_force_is_continuous_and_small_beside_the_normal() -> None:
+    one = scene()
+    places = np.linspace(-1.2, 1.2, 401) * LENGTH
+    forces = np.array([force(one, center(x)) for x in places])
+    size = np.linalg.norm(forces, axis=1)
+    per_micrometer = np.abs(np.diff(forces, axis=0)).max() / (places[1] - places[0]) * 1e-6
+    assert per_micrometer < 0.01 * size.max()
+    assert np.all(np.diff(size) > -1e-9 * size.max())
+    # On the flat nothing but the law pushes aside, by at most the root of depth over radius.
+    flat = places < 0
+    assert np.abs(forces[flat, 0]).max() < 0.3 * np.sqrt(DEPTH / RADIUS) * size.max()
+    across = force(one, center(1e-9)) - force(one, center(-1e-9))
+    assert np.abs(across).max() < 1e-6 * size.max()
+
+
+@pytest.mark.parametrize("beyond", [-0.9, -0.5, -0.1, 0.1, 0.5, 0.9])
+def test_derivatives_are_those_of_differences(beyond: float) -> None:
+    one, at, step = scene(), center(beyond * LENGTH), 1e-8
+    names = ["c.sphere.radius", "c.law.young"]
+    found = one.contact_force_derivatives(at, np.zeros(3), parameters=names)
+    by_q = np.stack(
+        [(force(one, at + step * e) - force(one, at - step * e)) / (2 * step) for e in np.eye(3)],
+        axis=-1,
+    )
+    assert np.abs(found.by_q[0] - by_q).max() < 1e-5 * np.abs(by_q).max()
+    assert np.abs(by_q - by_q.T).max() < 1e-5 * np.abs(by_q).max()  # the force is a gradient
+    larger, smaller = (sp.Scene(one.model) for _ in range(2))
+    for other, sign in ((larger, 1), (smaller, -1)):
+        sphere = sp.Sphere(RADIUS + sign * step, "ball")
+        other.add_contact(sphere, halfpipe(), law=LAW, friction=None, name="c")
+    by_radius = (force(larger, at) - force(smaller, at)) / (2 * step)
+    assert np.abs(found.by_parameters[0][:, 0] - by_radius).max() < 1e-5 * np.abs(by_radius).max()
+
+
+@pytest.mark.parametrize("faces", [True, False])
+def test_a_ball_that_slides_over_joints_keeps_its_energy(faces: bool) -> None:
+    law = sp.HertzLaw(1e6, 0.4)
+    depth = law.on_plane(RADIUS).depth_at(0.05 * 9.81)
+    residuals = []
+    for one in (law, law.on_plane(RADIUS)):
+        several = scene(one, halfpipe(faces=faces), 9.81)
+        start = np.array([0.0, 0.002, RADIUS - depth])
+        run = sp.Simulation(several, sp.Adaptive(1e-8, 1e-11)).run(
+            start, np.array([0.25, 0.0, 0.0]), 1.0
+        )
+        residuals.append(np.abs(run.energy.residual).max() / run.energy.kinetic[0])
+    assert residuals[0] < 5 * residuals[1] + 1e-6

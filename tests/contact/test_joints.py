@@ -1,0 +1,98 @@
+"""Where exact faces meet: of two tangent faces one has the contact, whatever the facets are."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from tests.contact.test_faces import VALVE_BODY, written
+from tests.parts import occ
+
+MM = 1e-3
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("joints")
+
+
+def step_of(solid, folder: Path) -> Path:
+    return written(solid, folder / f"{len(list(folder.iterdir()))}.step")
+
+
+def disc(radius: float, fillet: float):
+    """With rounded rims, upright from z = 0 to 20 [mm]."""
+    solid = occ.cylinder(radius, 20.0)
+    return occ.filleted(solid, occ.edges_where(solid, lambda p: np.ptp(p[:, 2]) < 1e-6), fillet)
+
+
+@pytest.mark.parametrize(
+    ("radius", "fillet"), [(100.0, 2.0), (40.0, 1.0), (40.0, 0.2), (20.0, 8.0), (5.0, 0.05)]
+)
+def test_no_sphere_is_lost_beside_a_rounded_rim(radius, fillet, folder):
+    shell = sp.Shell.from_file(step_of(disc(radius, fillet), folder))
+    assert all(face.exact for face in shell.faces)
+    rng, count, ball, depth = np.random.default_rng(0), 4000, 6e-3, 0.7e-3
+    rim = (radius - fillet) * MM
+    # Over the last of the plane and the first of the fillet, in its joint and next to it.
+    widest = min(2e-4, 0.2 * fillet * MM)
+    off = np.where(rng.random(count) < 0.5, widest, 1e-9) * rng.uniform(-1, 1, count)
+    off[:100] = 0.0
+    angle = rng.uniform(0, 2 * np.pi, count)
+    lean = np.clip(off / (fillet * MM), 0, None)  # of the normal, over the fillet
+    away = ball - depth
+    beside = rim + np.where(off < 0, off, (fillet * MM + away) * np.sin(lean))
+    height = np.where(off < 0, 20 * MM + away, 20 * MM + away * np.cos(lean))
+    height -= np.where(off < 0, 0, fillet * MM * (1 - np.cos(lean)))
+    centers = np.stack([beside * np.cos(angle), beside * np.sin(angle), height], axis=1)
+    deepest, counts = shell.contacts_batch(centers, np.full(count, ball))
+    assert (counts == 1).all()
+    assert np.abs(deepest - depth).max() <= 1e-10 * ball
+
+
+def test_no_sphere_is_lost_beside_the_rounded_rim_of_the_valve_body():
+    shell, center = sp.Shell.from_file(VALVE_BODY), [0.040307777, 0.003406919, -0.005294333]
+    around = center + np.random.default_rng(0).uniform(-1e-4, 1e-4, (500, 3))
+    deepest, counts = shell.contacts_batch(around, np.full(500, 6e-3))
+    assert (counts == 1).all()
+    flat, _ = shell.contacts_batch(around, np.full(500, 6e-3), method="facets")
+    assert np.abs(deepest - flat).max() <= 1e-3 * 6e-3
+
+
+def with_few_digits(path: Path, digits: int) -> Path:
+    """The file with the coordinates of its vertices rounded [mm]."""
+    text = path.read_text()
+    for point in re.findall(r"VERTEX_POINT\('',#(\d+)\)", text):
+        old = re.search(rf"#{point} = CARTESIAN_POINT\('',\((.*?)\)\)", text, re.DOTALL)
+        numbers = [round(float(x), digits) for x in old[1].split(",")]
+        new = f"#{point} = CARTESIAN_POINT('',({','.join(map(str, numbers))}))"
+        text = text.replace(old[0], new)
+    out = path.with_name(f"few_{path.name}")
+    out.write_text(text)
+    return out
+
+
+def tee():
+    """Two pipes that cross [mm]."""
+    outside = occ.fuse(occ.cylinder(12.3, 80.0, [-40, 0, 0], [1, 0, 0]), occ.cylinder(9.9, 40.0))
+    inside = (occ.cylinder(9.781, 82.0, [-41, 0, 0], [1, 0, 0]), occ.cylinder(7.0, 41.0))
+    return occ.placed(occ.cut(outside, *inside), np.random.default_rng(1), 20.0)
+
+
+def test_vertices_of_a_file_are_moved_onto_its_faces(folder):
+    path = step_of(tee(), folder)
+    few = sp.Shell.from_file(with_few_digits(path, 5))
+    assert all(face.exact for face in few.faces)
+    bore = next(f for f in few.faces if f.kind == "cylinder" and abs(f.radius - 9.781e-3) < 1e-9)
+    rng, ball = np.random.default_rng(0), 0.9 * bore.radius
+    side = np.cross(bore.axis, rng.normal(size=(50, 3)))
+    middle = few.vertices.mean(axis=0)
+    along = bore.point + (middle - bore.point) @ bore.axis * bore.axis + 20 * MM * bore.axis
+    centers = along + 0.11 * bore.radius * side / np.linalg.norm(side, axis=1)[:, None]
+    deepest, counts = few.contacts_batch(centers, np.full(50, ball))
+    assert (counts == 1).all()
+    assert np.abs(deepest - 0.01 * bore.radius).max() <= 1e-12 * ball

@@ -1,0 +1,158 @@
+"""One mass matrix for any tree: joints in any order, branches behind joints that mimic others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin import testing
+from sphshell_pin.arrays import Array
+from sphshell_pin.dynamics.scene.mimic import Mimic, mimics, with_mimics
+from sphshell_pin.dynamics.scene.models import mass_matrix
+from tests import meshes
+
+pytestmark = pytest.mark.filterwarnings("ignore::sphshell_pin.errors.UnitWarning")
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A random tree, and the rules by which some of its joints mimic others."""
+
+    free: pin.Model
+    model: pin.Model
+
+    def expanded(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
+        """Return q and v of all joints, and G (nv of all joints, nv)."""
+        rules = mimics(self.model)
+        q_all, matrix = np.zeros(self.free.nq), np.zeros((self.free.nv, self.model.nv))
+        for name in list(self.free.names)[1:]:
+            rule = rules.get(name, Mimic(name, name))
+            joint = self.free.joints[self.free.getJointId(name)]
+            leader = self.model.joints[self.model.getJointId(rule.of)]
+            q_all[joint.idx_q] = rule.ratio * q[leader.idx_q] + rule.offset
+            matrix[joint.idx_v, leader.idx_v] = rule.ratio
+        return q_all, matrix @ v, matrix
+
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        """Solve for the acceleration with what recursive Newton-Euler says of the free model."""
+        q_all, v_all, matrix = self.expanded(q, v)
+        data = self.free.createData()
+        bias = pin.rnea(self.free, data, q_all, v_all, np.zeros(self.free.nv))
+        columns = [
+            pin.rnea(self.free, data, q_all, v_all, matrix[:, k]) - bias
+            for k in range(self.model.nv)
+        ]
+        mass = matrix.T @ np.stack(columns, axis=1) + np.diag(self.model.armature)
+        return np.asarray(np.linalg.solve(mass, tau - matrix.T @ bias))
+
+
+def random_tree(rng: np.random.Generator) -> Tree:
+    """Return a tree of 3 to 8 joints, each on any joint before it, of which about half mimic."""
+    n = int(rng.integers(3, 9))
+    free = pin.Model()
+    for j in range(1, n + 1):
+        placement = pin.SE3.Random()
+        placement.translation = rng.uniform(-0.2, 0.2, 3)
+        kind = pin.JointModelRZ() if rng.random() < 0.7 else pin.JointModelPX()
+        joint = free.addJoint(int(rng.integers(0, j)), kind, placement, f"j{j}")
+        free.addJointFrame(joint)
+        inertia = pin.Inertia.FromBox(rng.uniform(0.5, 2.0), *rng.uniform(0.05, 0.3, 3))
+        body = pin.SE3.Random()
+        body.translation = rng.uniform(-0.1, 0.1, 3)
+        free.appendBodyToJoint(joint, inertia, body)
+        free.addFrame(pin.Frame(f"tip{j}", joint, pin.SE3.Random(), pin.FrameType.OP_FRAME))
+    order = rng.permutation(n) + 1
+    rules = [
+        Mimic(
+            f"j{one}", f"j{rng.choice(order[:k])}", rng.uniform(0.3, 2) * rng.choice([-1, 1]), 0.1
+        )
+        for k, one in enumerate(order)
+        if k and rng.random() < 0.5
+    ]
+    return Tree(free, with_mimics(free, rules))
+
+
+def check(tree: Tree, rng: np.random.Generator) -> float:
+    """Return the largest relative error of the accelerations of a scene of `tree`."""
+    model = tree.model
+    scene = sp.Scene(model)
+    worst = 0.0
+    for _ in range(2):
+        q, v, tau = (rng.uniform(-1, 1, model.nv) for _ in range(3))
+        expected = tree.acceleration(q, v, tau)
+        found = scene._binding.rates(q, v, np.zeros(0), tau)[: model.nv]
+        worst = max(worst, float(abs(found - expected).max() / abs(expected).max()))
+    return worst
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_accelerations_of_random_trees_are_those_of_recursive_newton_euler(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    assert check(random_tree(rng), rng) < 1e-9
+
+
+@pytest.mark.study
+def test_accelerations_of_1500_random_trees() -> None:
+    worst = 0.0
+    for seed in range(1500):
+        rng = np.random.default_rng([7, seed])
+        worst = max(worst, check(random_tree(rng), rng))
+    assert worst < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_energy_forces_task_and_derivatives_use_the_same_mass(seed: int) -> None:
+    rng = np.random.default_rng([3, seed])
+    tree = random_tree(rng)
+    model = tree.model
+    tip = list(model.names)[-1].replace("j", "tip")
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Sphere(5.0, frame=tip),
+        sp.Shell(*meshes.grid_plate(2, 2, 20.0)),
+        law=sp.ImpactLaw(100.0, 1.5, 1.0, 0.1),
+        friction=sp.CoulombFriction(0.3, 0.2, 0.1, 1.0),
+    )
+    q, v, tau = (rng.uniform(-1, 1, model.nv) for _ in range(3))
+    testing.assert_forces_balance(scene, q, v, tau, tolerance=1e-8)
+    testing.assert_derivatives(scene, q, v, tau)
+    # Kinetic energy: the sum over the bodies of the model in which all joints move freely.
+    q_all, v_all, _ = tree.expanded(q, v)
+    energy = pin.computeKineticEnergy(tree.free, tree.free.createData(), q_all, v_all)
+    assert 0.5 * v @ mass_matrix(model, q) @ v == pytest.approx(energy, rel=1e-12)
+    free = sp.Scene(model)
+    run = sp.Simulation(free, sp.Adaptive(1e-9, 1e-11)).run(q, 0.1 * v, 0.05, record_dt=0.025)
+    for row, rate, kinetic in zip(run.q, run.v, run.energy.kinetic, strict=True):
+        moved = tree.expanded(row, rate)[:2]
+        expected = pin.computeKineticEnergy(tree.free, tree.free.createData(), *moved)
+        assert kinetic == pytest.approx(expected, rel=1e-9)
+    assert abs(run.energy.residual).max() <= 1e-6 * max(run.energy.exchanged, 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_explain_calls_effective_mass_is_that_of_newton_euler(seed: int) -> None:
+    rng = np.random.default_rng([5, seed])
+    tree = random_tree(rng)
+    model = tree.model
+    tip = list(model.names)[-1].replace("j", "tip")
+    scene = sp.Scene(model)
+    plate = sp.Shell(*meshes.grid_plate(2, 2, 20.0))
+    scene.add_contact(sp.Sphere(0.02, tip), plate, law=sp.ImpactLaw(1e5, 1.5))
+    q = rng.uniform(-1, 1, model.nv)
+    q_all, _, matrix = tree.expanded(q, np.zeros(model.nv))
+    data = tree.free.createData()
+    columns = np.stack(
+        [pin.rnea(tree.free, data, q_all, 0 * q_all, one) for one in np.eye(len(q_all))], axis=1
+    )
+    columns -= pin.rnea(tree.free, data, q_all, 0 * q_all, 0 * q_all)[:, None]
+    jacobian = pin.computeFrameJacobian(
+        tree.free, data, q_all, tree.free.getFrameId(tip), pin.LOCAL_WORLD_ALIGNED
+    )[2]
+    row = jacobian @ matrix
+    expected = 1.0 / (row @ np.linalg.solve(matrix.T @ columns @ matrix, row))
+    found = scene.explain(q).pairs[0].effective_mass
+    assert found == pytest.approx(expected, rel=1e-7)

@@ -1,0 +1,1 @@
+"""Spheres where faces meet, judged by exact truth: `python -m tests.joints`."""

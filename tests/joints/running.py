@@ -1,0 +1,82 @@
+"""Walks over one part: as a file, and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import sphshell_pin as sp
+from tests.joints.boxes import BOXES
+from tests.joints.solid_walk import judge_solid, read_step, spheres_of
+from tests.joints.solids import FAMILIES, Part, write_step, write_stl
+from tests.joints.trimmed import TrimmedSolid
+from tests.joints.verdict import Verdict
+from tests.joints.walk import chord_error, judge, spheres
+from tests.parts.occ import Rng, checked
+
+PER_PART = 4000
+TRIMMED = tuple(BOXES)
+"""Families that are judged by their trimmed faces."""
+
+CHORD = 3e-4
+"""Deflection of STL files over the size."""
+
+STEP_CHORD = 1e-3
+"""That of STEP files, unless asked for another."""
+
+DIGITS = {False: 2e-12, True: 2e-7}
+"""What the digits of STEP files leave open, and the single precision of STL, over the size."""
+
+
+def walk_part(
+    family: str,
+    folder: Path,
+    rng: Rng,
+    stl: bool = False,
+    moved: bool = False,
+    most: int = PER_PART,
+) -> Verdict:
+    """Walk over a random part of a family."""
+    if family in BOXES:
+        path = write_step(checked(BOXES[family](rng)), folder / f"{family}.step")
+        return walk_file(path, family, min(PER_PART, most), rng, stl)
+    part = FAMILIES[family](rng)
+    return walk_outline(part.moved(rng) if moved else part, folder, rng, stl, min(PER_PART, most))
+
+
+def walk_outline(
+    part: Part, folder: Path, rng: Rng, stl: bool = False, count: int = PER_PART
+) -> Verdict:
+    """Walk over a part that is judged by its outline."""
+    solid = part.solid()
+    if stl:
+        size = 2 * max(np.abs(piece.begin).max() for piece in part.profile.pieces)
+        shell = sp.Shell.from_file(write_stl(solid, folder / "part.stl", CHORD * size), unit="mm")
+    else:
+        shell = sp.Shell.from_file(write_step(solid, folder / "part.step"))
+    asked, digits = spheres(part, count, rng), DIGITS[stl] * shell.size
+    out = judge(shell, part, asked, digits, chord_error(shell, part))
+    return _named(out, shell)
+
+
+def walk_file(path: Path, name: str, count: int, rng: Rng, stl: bool = False) -> Verdict:
+    """Walk over a STEP file, or the STL file of its solid; judged by its trimmed faces."""
+    solid = read_step(path)
+    trimmed = TrimmedSolid(solid)
+    asked = spheres_of(trimmed, count, rng)
+    chord = (CHORD if stl else STEP_CHORD) * trimmed.size
+    if stl:
+        mesh = write_stl(solid, path.with_suffix(".stl"), chord)
+        shell = sp.Shell.from_file(mesh, unit="mm")
+    else:
+        shell = sp.Shell.from_file(path)
+    rough = 2 * chord  # OpenCASCADE's deflection is no guarantee
+    digits = DIGITS[stl] * trimmed.size
+    return _named(judge_solid(shell, trimmed, name, asked, digits, rough), shell)
+
+
+def _named(verdict: Verdict, shell: sp.Shell) -> Verdict:
+    exact = sum(face.exact for face in shell.faces)
+    verdict.part += f" (exact {exact} of {len(shell.faces)})"
+    return verdict

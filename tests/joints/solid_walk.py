@@ -1,0 +1,206 @@
+"""Spheres over the edges, corners and seams of any solid, judged by its trimmed faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from OCP.STEPControl import STEPControl_Reader
+
+import sphshell_pin as sp
+from sphshell_pin.arrays import Array
+from tests.joints.trimmed import Edge, Minima, TrimmedSolid
+from tests.joints.verdict import MM, Verdict, exact_elements
+from tests.joints.walk import BESIDE, DEPTHS, SMOOTH
+from tests.parts.cad_mesh import Ints
+from tests.parts.occ import Rng, Solid
+
+RADII = 0.2, 8.0
+"""Of spheres [mm]."""
+
+ELEMENTS = 1
+NEAR = 1e-3
+"""Points of one minimum are nearer than this to each other [radii]."""
+
+
+def read_step(path: Path) -> Solid:
+    """The shape of a file [mm]."""
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    return reader.OneShape()
+
+
+@dataclass(frozen=True)
+class SolidSpheres:
+    """Centers (n, 3) and radii (n,) [mm], and the names of the joints."""
+
+    centers: Array
+    radii: Array
+    joints: list[str]
+
+
+def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> SolidSpheres:
+    """Return up to `count` spheres over both sides of edges, corners and seams, on all sides."""
+    centers, radii, joints = [], [], []
+    sides = [
+        (edge, k)
+        for edge in solid.edges
+        for k in range(len(edge.faces))
+        if all(solid.surfaces[f].kind for f in edge.faces)
+    ]
+    sides += [(Edge(curve, 0.0, [row], [True], (0, 0)), 0) for row, curve in solid.seams]
+    per = -(-count // max(len(sides), 1))
+    for edge, k in sides:
+        if not solid.surfaces[edge.faces[k]].kind:
+            continue
+        r = np.exp(rng.uniform(*np.log(RADII), per))
+        low, high = edge.span
+        at, near = rng.uniform(low, high, per), rng.random(per) < 0.35
+        # Beside the ends of the edge, where other joints come.
+        length = max(np.linalg.norm(np.diff(edge.grid[1], axis=0), axis=1).sum(), 1e-9)
+        hair = np.exp(rng.uniform(*np.log(BESIDE), per)) / MM / length * (high - low)
+        hair = np.minimum(hair, (high - low) / 2)
+        at = np.where(near, np.where(rng.random(per) < 0.5, low + hair, high - hair), at)
+        points, tangents = edge.at(at)
+        into = solid.inward(edge, k, points, tangents)
+        beside = np.exp(rng.uniform(*np.log(BESIDE), per)) / MM
+        if edge in sides[-len(solid.seams) :] and solid.seams:
+            beside *= rng.choice([-1, 1], per)
+        surface = solid.surfaces[edge.faces[k]]
+        other = solid.surfaces[edge.faces[-1 - k]]
+        lean = rng.random((per, 1)) * (rng.random((per, 1)) < 0.3)
+        points = points + np.where(lean > 0, 0.0, beside[:, None]) * into
+        distance, normal = surface.closest(points)
+        points = points - distance[:, None] * normal
+        out = rng.choice([-1.0, 1.0], (per, 1))
+        # The same side of the solid on both faces.
+        m = other.closest(points)[1] * _side(solid, edge, k)
+        normal = (1 - lean) * normal + lean * m
+        normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+        depth = r * np.exp(rng.uniform(*np.log(DEPTHS), per))
+        centers.append(points + out * (r - depth)[:, None] * normal)
+        radii.append(r)
+        joints += [_name(solid, edge, points[0])] * per
+    at, r = np.concatenate(centers), np.concatenate(radii)
+    if len(solid.free):
+        away = np.array([np.linalg.norm(solid.free - c, axis=1).min() for c in at])
+        kept = away > r + solid.size / 100
+    else:
+        kept = np.ones(len(r), bool)
+    return SolidSpheres(at[kept], r[kept], [joints[k] for k in np.flatnonzero(kept)])
+
+
+def _side(solid: TrimmedSolid, edge: Edge, k: int) -> float:
+    """Whether the normals of both faces of an edge are on one side of the solid."""
+    if len(edge.faces) < 2:
+        return 1.0
+    # An edge is on the left of one face and on the right of the other if their normals agree.
+    return -1.0 if edge.left[0] == edge.left[1] else 1.0
+
+
+def _name(solid: TrimmedSolid, edge: Edge, point: Array) -> str:
+    kinds = sorted(solid.surfaces[k].kind.lower() or "free" for k in edge.faces)
+    if len(kinds) == 1:
+        return f"{kinds[0]} seam"
+    normals = [solid.surfaces[k].closest(point[None])[1][0] for k in edge.faces[:2]]
+    sine = float(np.linalg.norm(np.cross(*normals)))
+    return f"{'-'.join(kinds)} {'tangent' if sine < 1e-6 else 'nearly' if sine < 0.03 else 'angle'}"
+
+
+def judge_solid(
+    shell: sp.Shell,
+    solid: TrimmedSolid,
+    name: str,
+    asked: SolidSpheres,
+    digits: float,
+    rough: float,
+) -> Verdict:
+    """Compare the contacts of every sphere with the local minima of the distance.
+
+    digits, rough : tolerances of depths on exact faces, beside 1e-10 r, and on other ones [mm]
+    """
+    truth = solid.minima(asked.centers, asked.radii)
+    core, exact = shell.core_for("smooth"), exact_elements(shell)
+    out = Verdict(name, asked.centers * MM, asked.radii * MM, asked.joints)
+    for row, (center, r) in enumerate(zip(asked.centers, asked.radii.tolist(), strict=True)):
+        shown, terms = core.contacts(center * MM, r * MM, SMOOTH)
+        point, normal, depth, element, _, weight, _ = shown if terms is None else terms
+        found = Found(point / MM, normal, depth / MM, weight)
+        for strict in (True, False):
+            fault, detail = _fault(truth[row], found, r, 1e-10 * r + digits if strict else rough)
+            if not fault:
+                break
+            # Where a face is not exact, the chord error is allowed.
+            if strict:
+                near = [truth[row].points] if len(truth[row].points) else []
+                places = np.concatenate([*near, found.points])
+                elements = [element, *(_elements_at(core, p, rough) for p in places)]
+                if exact[np.concatenate(elements)].all():
+                    break
+        if fault:
+            out.add(fault, row, detail)
+    return out
+
+
+@dataclass(frozen=True)
+class Found:
+    """The minima and saddles of a shell's contacts [mm]."""
+
+    points: Array
+    normals: Array
+    depths: Array
+    weights: Array
+
+
+def _elements_at(core: Any, point: Array, radius: float) -> Ints:
+    found: Ints = core.contacts(point * MM, radius * MM, ELEMENTS)[0][3]
+    return found
+
+
+def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str, str]:
+    sure = truth.sure & (truth.depths > tolerance)
+    if not len(found.depths):
+        return ("lost", f"depth {truth.depths.max()}") if sure.any() else ("", "")
+    if not len(truth.depths):
+        return (
+            ("phantom", f"depth {found.depths.max()}")
+            if found.depths.max() > tolerance
+            else ("", "")
+        )
+    deepest, most = truth.depths.max(), found.depths.max()
+    if most > deepest + tolerance:
+        return "deep", f"{most} instead of {deepest}"
+    if most < deepest - tolerance:
+        return "shallow", f"{most} instead of {deepest}"
+    apart = np.abs(truth.depths[:, None] - found.depths)
+    away = np.linalg.norm(truth.points[:, None] - found.points, axis=2)
+    # A closest point is worse determined than its distance.
+    same = (apart <= tolerance) & (away <= NEAR * r + np.sqrt(r * tolerance))
+    plus = found.weights > 0
+    if (sure & ~same[:, plus].any(axis=1)).any():
+        k = int(np.argmax(sure & ~same[:, plus].any(axis=1)))
+        return "missing", f"{truth.depths[k]} at {truth.points[k].tolist()}"
+    level = np.abs(found.depths[:, None] - found.depths) <= np.maximum(
+        tolerance, 1e-6 * found.depths
+    )
+    if tolerance < 1e-6 * r:
+        alone = plus & ~same.any(axis=0) & ~(level & (found.weights < 0)).any(axis=1)
+        if (alone & (found.depths > tolerance)).any():
+            k = int(np.argmax(alone & (found.depths > tolerance)))
+            return "phantom", f"{found.depths[k]} at {found.points[k].tolist()}"
+        for k in np.flatnonzero(truth.depths > tolerance).tolist():
+            total = found.weights[same[k]].sum()
+            several = (truth.sure & same[:, same[k]].any(axis=1)).sum()
+            if total > max(1, several):
+                return "double", f"weights {total} at {truth.points[k].tolist()}"
+    apart = np.linalg.norm(truth.points - truth.points[truth.depths.argmax()], axis=1)
+    single = (apart <= NEAR * r) & (np.abs(truth.depths - deepest) <= 1e-9 * r)
+    if single.all() and truth.plane[truth.depths.argmax()]:
+        push = np.linalg.norm((found.weights * found.depths**2) @ found.normals)
+        off = abs(push / deepest**2 - 1)
+        if off > 1e-6 + 4 * tolerance / deepest:
+            return "force", f"{off}"
+    return "", ""

@@ -1,0 +1,246 @@
+"""Parts whose faces meet in every way, with their outlines [mm]: turned and extruded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakeWire,
+    BRepBuilderAPI_Transform,
+)
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
+from OCP.BRepTools import BRepTools
+from OCP.GC import GC_MakeArcOfCircle
+from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.Message import Message
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+from OCP.StlAPI import StlAPI_Writer
+
+from sphshell_pin.arrays import Array
+from tests.joints.profile import Piece, Profile, outline
+from tests.parts.occ import Rng, Solid, checked
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part: an outline (x, z) turned about z, or if it has a `height` (x, y) extruded along z.
+
+    `place` (3, 4) moves it from there.
+    """
+
+    name: str
+    profile: Profile
+    height: float = 0.0
+    place: Array = field(default_factory=lambda: np.eye(3, 4))
+
+    @property
+    def turned(self) -> bool:
+        return self.height == 0.0
+
+    def solid(self) -> Solid:
+        """The solid [mm]."""
+        wire = BRepBuilderAPI_MakeWire()
+        pieces = list(self.profile.pieces)
+        if not self.profile.closed:
+            pieces.append(Piece(pieces[-1].end, pieces[0].begin))
+        for piece in pieces:
+            wire.Add(self._edge(piece))
+        face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
+        if self.turned:
+            solid = BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(), gp_Dir(0, 0, 1))).Shape()
+        else:
+            solid = BRepPrimAPI_MakePrism(face, gp_Vec(0, 0, self.height)).Shape()
+        move = gp_Trsf()
+        move.SetValues(*self.place.ravel().tolist())
+        return checked(BRepBuilderAPI_Transform(solid, move, True).Shape())
+
+    def in_space(self, flat: Array, angle: Array | float, share: Array | float) -> Array:
+        """Points (n, 3) of those of the outline (n, 2), at angles or at shares of the height."""
+        x, y = flat.T
+        if self.turned:
+            at = np.column_stack([x * np.cos(angle), x * np.sin(angle), y])
+        else:
+            at = np.column_stack([x, y, np.broadcast_to(self.height * np.asarray(share), x.shape)])
+        return at @ self.place[:, :3].T + self.place[:, 3]
+
+    def in_plane(self, points: Array) -> Array:
+        """Points (n, 2) in the plane of the outline of points (n, 3) of a surface."""
+        at = (points - self.place[:, 3]) @ self.place[:, :3]
+        return (
+            np.column_stack([np.hypot(at[:, 0], at[:, 1]), at[:, 2]]) if self.turned else at[:, :2]
+        )
+
+    def moved(self, rng: Rng) -> Part:
+        """The same part, turned at random and moved."""
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        turn *= np.linalg.det(turn)
+        return Part(self.name, self.profile, self.height, np.c_[turn, rng.uniform(-50, 50, 3)])
+
+    def _edge(self, piece: Piece) -> Solid:
+        ends = [self._point(piece.begin), self._point(piece.end)]
+        if piece.middle is None:
+            return BRepBuilderAPI_MakeEdge(*ends).Edge()
+        half = self._point(piece.at(np.array([piece.length / 2]))[0][0])
+        return BRepBuilderAPI_MakeEdge(GC_MakeArcOfCircle(ends[0], half, ends[1]).Value()).Edge()
+
+    def _point(self, at: Array) -> gp_Pnt:
+        return gp_Pnt(at[0], 0.0, at[1]) if self.turned else gp_Pnt(at[0], at[1], 0.0)
+
+
+def write_step(solid: Solid, path: Path) -> Path:
+    Message.DefaultMessenger_s().ChangePrinters().Clear()
+    writer = STEPControl_Writer()
+    writer.Transfer(solid, STEPControl_AsIs)
+    writer.Write(str(path))
+    return path
+
+
+def write_stl(solid: Solid, path: Path, deflection: float, angle: float = 0.3) -> Path:
+    """A binary file: single precision."""
+    BRepTools.Clean_s(solid)
+    BRepMesh_IncrementalMesh(solid, deflection, False, angle, False)
+    writer = StlAPI_Writer()
+    writer.ASCIIMode = False
+    writer.Write(solid, str(path))
+    return path
+
+
+def disc(radius: float, fillet: float, miss: float = 0.0) -> Part:
+    """A disc with rounded rims, which may miss the tangents."""
+    height = max(20.0, 3 * fillet)
+    corners = [[0, 0], [radius, 0], [radius, height], [0, height]]
+    missed = dict.fromkeys((1, 2), (miss, 0.7 * miss))
+    name = f"disc {radius:g} fillet {fillet:g}" + (f" off {miss:g}" if miss else "")
+    return Part(name, outline(corners, {1: fillet, 2: fillet}, missed))
+
+
+def pocket(radius: float, floor: float, rim: float) -> Part:
+    """A round pocket with a fillet at its floor, its rim rounded outward."""
+    deep, wide = 3 * floor + 2 * rim + 5, radius + 3 * rim + 5
+    top = deep + 8.0
+    corners = [[0, 0], [wide, 0], [wide, top], [radius, top], [radius, 8.0], [0, 8.0]]
+    return Part(
+        f"pocket {radius:g} floor {floor:g} rim {rim:g}",
+        outline(corners, {3: rim, 4: floor, 2: rim}),
+    )
+
+
+def shaft(radius: float, fillet: float, miss: float = 0.0) -> Part:
+    """A shaft on a flange, a fillet between them, a chamfer and a rounded rim."""
+    wide, long = radius + 2 * fillet + 4, 4 * fillet + 20
+    corners = [[0, 0], [wide, 0], [wide, 6], [radius, 6], [radius, 6 + long], [0, 6 + long]]
+    name = f"shaft {radius:g} fillet {fillet:g}" + (f" off {miss:g}" if miss else "")
+    rim = min(fillet, radius / 3)
+    missed = {3: (miss, -miss), 4: (0.5 * miss, miss)}
+    return Part(name, outline(corners, {3: fillet, 4: rim}, missed, {1: 1.0}))
+
+
+def ring(radius: float, fillet: float) -> Part:
+    """A tube whose four rims are rounded."""
+    inner, high = radius - 3 * fillet - 1, 3 * fillet + 4
+    corners = [[inner, 0], [radius, 0], [radius, high], [inner, high]]
+    return Part(
+        f"ring {radius:g} fillet {fillet:g}",
+        outline(corners, dict.fromkeys(range(4), fillet), closed=True),
+    )
+
+
+def cones(radius: float, lean: float, fillet: float = 0.0) -> Part:
+    """A cone on a cylinder, and a tip; rounded between if there is a fillet."""
+    rise = 15.0
+    top = radius - rise * np.tan(lean)
+    corners = [[0, 0], [radius, 0], [radius, 20], [top, 20 + rise], [0, 20 + rise + top]]
+    radii = {2: fillet, 3: fillet} if fillet else {}
+    return Part(f"cones {radius:g} lean {lean:g} fillet {fillet:g}", outline(corners, radii))
+
+
+def dome(radius: float, length: float) -> Part:
+    """A rod with a ball end that is tangent, and a flatter dome at the other."""
+    tip, flat = np.array([0.0, length]), 1.7 * radius
+    deep = flat - np.sqrt(flat**2 - radius**2)
+    center = np.array([0.0, flat - deep])
+    low = np.array([0.0, -deep])
+    turn = float(np.arcsin(radius / flat))
+    pieces = (
+        Piece(low, np.array([radius, 0.0]), center, turn),
+        Piece(np.array([radius, 0.0]), np.array([radius, length - radius])),
+        Piece(np.array([radius, length - radius]), tip, tip - [0.0, radius], np.pi / 2),
+    )
+    return Part(f"dome {radius:g}", Profile(pieces))
+
+
+def slot(length: float, radius: float, depth: float = 20.0) -> Part:
+    """A stadium, extruded: two lines and two arcs that are tangent."""
+    corners = [[0, 0], [length, 0], [length, 2 * radius], [0, 2 * radius]]
+    # Arcs of half a turn are two quarters.
+    return Part(
+        f"slot {length:g} radius {radius:g}",
+        outline(corners, dict.fromkeys(range(4), radius), closed=True),
+        depth,
+    )
+
+
+def bar(side: float, radii: tuple[float, float], miss: float) -> Part:
+    """A bar, its edges rounded, which may miss the tangents; one corner is hollow."""
+    a, b = radii
+    corners = [[0, 0], [2 * side, 0], [2 * side, side], [side, side], [side, 2 * side]]
+    corners += [[0, 2 * side]]
+    rounds = {0: a, 1: b, 3: a, 4: b}
+    missed = dict.fromkeys(rounds, (miss, -0.6 * miss))
+    return Part(
+        f"bar {side:g} radii {a:g} {b:g} off {miss:g}",
+        outline(corners, rounds, missed, {2: min(a, side / 4)}, closed=True),
+        80.0,
+    )
+
+
+def d_shaft(radius: float, cut: float) -> Part:
+    """A shaft with a flat, whose corners lie on the cylinder."""
+    half = float(np.arccos(1 - cut / radius))
+    ends = radius * np.array([[np.cos(half), np.sin(half)], [np.cos(half), -np.sin(half)]])
+    middle = np.zeros(2)
+    back = np.array([-radius, 0.0])
+    pieces = (
+        Piece(ends[0], back, middle, np.pi - half),
+        Piece(back, ends[1], middle, np.pi - half),
+        Piece(ends[1], ends[0]),
+    )
+    return Part(f"d-shaft {radius:g} cut {cut:g}", Profile(pieces), 60.0)
+
+
+FAMILIES: dict[str, Callable[[Rng], Part]] = {
+    "disc": lambda rng: disc(_size(rng, 12, 200), _size(rng, 0.05, 5.5)),
+    "disc off": lambda rng: disc(_size(rng, 12, 200), _size(rng, 0.05, 5.5), _miss(rng)),
+    "pocket": lambda rng: pocket(_size(rng, 25, 200), _size(rng, 0.05, 10), _size(rng, 0.05, 10)),
+    "shaft": lambda rng: shaft(_size(rng, 5, 100), _size(rng, 0.05, 10)),
+    "shaft off": lambda rng: shaft(_size(rng, 5, 100), _size(rng, 0.05, 10), _miss(rng)),
+    "ring": lambda rng: ring(_size(rng, 35, 200), _size(rng, 0.05, 10)),
+    "cones": lambda rng: cones(_size(rng, 20, 100), rng.uniform(0.02, 0.6)),
+    "cones filleted": lambda rng: cones(
+        _size(rng, 20, 100), rng.uniform(0.1, 0.6), _size(rng, 0.1, 10)
+    ),
+    "dome": lambda rng: dome(_size(rng, 5, 50), 120.0),
+    "slot": lambda rng: slot(_size(rng, 25, 100), _size(rng, 1, 10)),
+    "bar": lambda rng: bar(_size(rng, 25, 80), (_size(rng, 0.05, 5), _size(rng, 0.05, 10)), 0.0),
+    "bar off": lambda rng: bar(
+        _size(rng, 25, 80), (_size(rng, 0.05, 5), _size(rng, 0.05, 10)), _miss(rng)
+    ),
+    "d-shaft": lambda rng: d_shaft(_size(rng, 3, 40), _size(rng, 0.005, 1.0)),
+}
+"""Random parts of a family."""
+
+
+def _size(rng: Rng, low: float, high: float) -> float:
+    """A length with few digits, as people state them."""
+    return float(f"{np.exp(rng.uniform(*np.log([low, high]))):.2g}")
+
+
+def _miss(rng: Rng) -> float:
+    """An angle by which a joint is off tangent [rad]."""
+    return float(10 ** rng.uniform(-5, -2) * rng.choice([-1.0, 1.0]))

@@ -1,0 +1,104 @@
+"""Spheres over every joint of parts: none lost, none counted twice, depths and forces exact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage, sparse
+
+from tests.joints.running import walk_outline, walk_part
+from tests.joints.solids import Part, bar, cones, d_shaft, disc, dome, ring, shaft, slot
+from tests.joints.trimmed import TrimmedSolid
+from tests.joints.verdict import MM
+from tests.joints.walk import spheres
+
+PARTS = [
+    cones(30.0, 0.3),
+    cones(25.0, 0.02),
+    cones(36.0, 0.4, 1.9),
+    d_shaft(20.0, 0.1),
+    d_shaft(17.0, 0.066),
+    slot(40.0, 5.0),
+    bar(40.0, (1.0, 3.0), 0.0),
+    bar(63.0, (0.12, 0.3), 0.0),
+]
+
+
+def assert_right(part: Part, tmp_path, stl: bool) -> None:
+    verdict = walk_outline(part, tmp_path, np.random.default_rng(1), stl, count=3000)
+    assert verdict.found() == {}
+
+
+@pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
+def test_no_sphere_is_lost_or_counted_twice(part, tmp_path):
+    assert_right(part, tmp_path, stl=False)
+
+
+@pytest.mark.parametrize("part", [cones(30.0, 0.3), dome(20.0, 100.0)], ids=lambda part: part.name)
+def test_none_is_on_meshes_of_single_precision(part, tmp_path):
+    assert_right(part, tmp_path, stl=True)
+
+
+@pytest.mark.parametrize("family", ["slots", "chamfered_block"])
+def test_no_contact_is_lost_or_made_up_at_corners(family, tmp_path):
+    verdict = walk_part(family, tmp_path, np.random.default_rng(0), most=1000)
+    assert verdict.found() == {}
+
+
+@pytest.mark.parametrize(
+    "part", [disc(40.0, 2.0), shaft(20.0, 2.0), cones(30.0, 0.3, 4.0), d_shaft(20.0, 0.1)],
+    ids=lambda part: part.name,
+)  # fmt: skip
+def test_the_trimmed_faces_are_those_of_the_outline(part):
+    """The two truths, of different numbers, against each other."""
+    asked = spheres(part, 300, np.random.default_rng(0))
+    truth = part.profile.truth(asked.flat, asked.radii / MM)
+    found = TrimmedSolid(part.solid()).minima(asked.centers / MM, asked.radii / MM)
+    for row, minima in enumerate(found):
+        assert minima.depths.max() == pytest.approx(truth.depth[row], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "part", [disc(12.0, 2.0), shaft(6.0, 3.0), ring(20.0, 1.5)], ids=lambda part: part.name
+)
+def test_the_truth_is_that_of_a_grid_of_points(part):
+    """Depths, and components as those of a graph of points of the surface."""
+    rng = np.random.default_rng(0)
+    asked = spheres(part, 60, rng)
+    flat, radii = asked.flat, rng.uniform(0.5, 12.0, len(asked.flat))
+    truth = part.profile.truth(flat, radii)
+    away = np.linalg.norm(sampled(part, 5000)[None] - flat[:, None], axis=2)
+    assert np.abs(truth.depth - (radii - away.min(axis=1))).max() < 0.01
+    points = sampled(part, 150)
+    angles = np.linspace(0, 2 * np.pi, 180, endpoint=False)
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    space = np.concatenate(
+        [points[:, None, :1] * around, np.repeat(points[:, None, 1:], 180, 1)], axis=2
+    )
+    compared = 0
+    for center, radius, count in zip(flat, radii, truth.count, strict=True):
+        sizes = part.profile.truth(np.array([center] * 3), radius * np.array([0.98, 1.0, 1.02]))
+        if len({*sizes.count}) == 1:
+            inside = np.linalg.norm(space - [center[0], 0.0, center[1]], axis=2) < radius
+            assert components(inside, part.profile.closed) == count
+            compared += 1
+    assert compared > 30
+
+
+def sampled(part: Part, count: int) -> np.ndarray:
+    """Points of an outline, `count` on each piece."""
+    pieces = part.profile.pieces
+    return np.concatenate([piece.at(np.linspace(0, piece.length, count))[0] for piece in pieces])
+
+
+def components(inside: np.ndarray, closed: bool) -> int:
+    """Connected components of a grid that is periodic in its second, perhaps its first index."""
+    labels, count = ndimage.label(inside)
+    pairs = [(labels[:, 0], labels[:, -1])] + ([(labels[0], labels[-1])] if closed else [])
+    if not closed:
+        # Both ends are points on the axis.
+        pairs += [(row[:-1], row[1:]) for row in (labels[0], labels[-1])]
+    one, two = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    both = (one > 0) & (two > 0)
+    graph = sparse.coo_array((both[both], (one[both], two[both])), shape=(count + 1, count + 1))
+    return int(sparse.csgraph.connected_components(graph, directed=False)[0]) - 1

@@ -1,0 +1,402 @@
+"""The trimmed faces of a solid: closest points and local minima of the distance, for many spheres.
+
+Faces are planes, cylinders, cones, spheres and tori with OpenCASCADE's own numbers, and closest
+points closed forms; OpenCASCADE says whether one lies within the trimming. Edges that are neither
+lines nor circles are approximations in files: from there Newton's method goes on to the curve on
+which both faces are zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.BRepTools import BRepTools
+from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
+from OCP.gp import gp_Pnt2d
+from OCP.IntTools import IntTools_FClass2d
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_IN, TopAbs_OUT, TopAbs_REVERSED
+from OCP.TopExp import TopExp, TopExp_Explorer
+from OCP.TopoDS import TopoDS
+
+from sphshell_pin.arrays import Array
+from tests.parts.cad_mesh import Ints
+from tests.parts.occ import Solid, faces
+
+KINDS = ("Plane", "Cylinder", "Cone", "Sphere", "Torus")
+TRIMMING = 1e-9
+"""Closest points nearer to a border than this, in parameters, may be on either face."""
+
+PERSISTENCE = 1e-5
+"""A minimum that is deeper by less than that than a place on an edge counts little [radii]."""
+
+BESIDE_EDGE = 1e-3
+"""Beside an edge its own curve decides what is inside [mm]."""
+
+SAMPLES = 129
+STEPS = 12
+
+
+class Surface:
+    """The surface below a face [mm], without its trimming if it is of one of the five kinds."""
+
+    def __init__(self, face: Any) -> None:
+        self.face = TopoDS.Face(face.Oriented(TopAbs_FORWARD))
+        self.adaptor = BRepAdaptor_Surface(self.face)
+        number = int(self.adaptor.GetType())
+        self.kind = KINDS[number] if number < len(KINDS) else ""
+        self.inner = IntTools_FClass2d(self.face, TRIMMING)
+        self.radius = self.second = 0.0
+        if not self.kind:
+            return
+        shape = getattr(self.adaptor, self.kind)()
+        frame = shape.Position()
+        self.point = np.array(frame.Location().Coord())
+        self.x, self.y, self.axis = (
+            np.array(one().Coord()) for one in (frame.XDirection, frame.YDirection, frame.Direction)
+        )
+        # The surface's own normal is du x dv.
+        self.sense = 1.0 if frame.Direct() else -1.0
+        if self.kind in ("Cylinder", "Sphere"):
+            self.radius = shape.Radius()
+        elif self.kind == "Cone":
+            self.radius, self.second = shape.RefRadius(), shape.SemiAngle()
+        elif self.kind == "Torus":
+            self.radius, self.second = shape.MajorRadius(), shape.MinorRadius()
+
+    def closest(self, points: Array) -> tuple[Array, Array]:
+        """Signed distances (n,) of points (n, 3) and the normals (n, 3), which are du x dv."""
+        away = points - self.point
+        high = away @ self.axis
+        if self.kind == "Plane":
+            return self.sense * high, np.broadcast_to(self.sense * self.axis, points.shape)
+        if self.kind == "Sphere":
+            length = np.linalg.norm(away, axis=1)
+            normal = away / np.maximum(length, 1e-300)[:, None]
+            return self.sense * (length - self.radius), self.sense * normal
+        across = away - high[:, None] * self.axis
+        wide = np.linalg.norm(across, axis=1)
+        out = across / np.maximum(wide, 1e-300)[:, None]
+        if self.kind == "Cylinder":
+            return self.sense * (wide - self.radius), self.sense * out
+        if self.kind == "Cone":
+            c, s = np.cos(self.second), np.sin(self.second)
+            distance = (wide - self.radius) * c - high * s
+            return self.sense * distance, self.sense * (c * out - s * self.axis)
+        beside = wide - self.radius
+        length = np.hypot(beside, high)
+        normal = (beside[:, None] * out + high[:, None] * self.axis) / length[:, None]
+        return self.sense * (length - self.second), self.sense * normal
+
+    def parameters(self, points: Array) -> Array:
+        """Parameters (n, 2) of points (n, 3) on the surface."""
+        away = points - self.point
+        x, y, z = away @ self.x, away @ self.y, away @ self.axis
+        if self.kind == "Plane":
+            return np.column_stack([x, y])
+        turn = np.mod(np.arctan2(y, x), 2 * np.pi)
+        if self.kind == "Cylinder":
+            return np.column_stack([turn, z])
+        if self.kind == "Cone":
+            return np.column_stack([turn, z / np.cos(self.second)])
+        if self.kind == "Sphere":
+            return np.column_stack([turn, np.arctan2(z, np.hypot(x, y))])
+        return np.column_stack(
+            [turn, np.mod(np.arctan2(z, np.hypot(x, y) - self.radius), 2 * np.pi)]
+        )
+
+    def state(self, uv: Array) -> int:
+        """1 inside, 0 on the border, -1 outside."""
+        found = self.inner.Perform(gp_Pnt2d(*uv.tolist()))
+        return 1 if found == TopAbs_IN else -1 if found == TopAbs_OUT else 0
+
+    def samples(self, spacing: float) -> Array:
+        """Points (n, 3) of a grid within the bounds of the parameters."""
+        u0, u1, v0, v1 = BRepTools.UVBounds_s(self.face)
+        grid = np.stack(np.meshgrid(np.linspace(u0, u1, 30), np.linspace(v0, v1, 30)), -1)
+        return np.array([self.adaptor.Value(u, v).Coord() for u, v in grid.reshape(-1, 2).tolist()])
+
+
+@dataclass
+class Edge:
+    """An edge with the rows of its faces, and whether each is on the left of its direction."""
+
+    curve: Any
+    tolerance: float
+    faces: list[int]
+    left: list[bool]
+    ends: tuple[int, int]
+
+    @cached_property
+    def span(self) -> tuple[float, float]:
+        return self.curve.FirstParameter(), self.curve.LastParameter()
+
+    @cached_property
+    def grid(self) -> tuple[Array, Array]:
+        at = np.linspace(*self.span, SAMPLES)
+        return at, np.array([self.curve.Value(t).Coord() for t in at.tolist()])
+
+    def at(self, parameters: Array) -> tuple[Array, Array]:
+        """Points (n, 3) and unit tangents (n, 3)."""
+        rows = [self.curve.DN(t, 1).Coord() for t in parameters.tolist()]
+        points = np.array([self.curve.Value(t).Coord() for t in parameters.tolist()])
+        tangents = np.array(rows)
+        return points, tangents / np.linalg.norm(tangents, axis=1)[:, None]
+
+    def closest(self, centers: Array) -> tuple[Ints, Array, Array]:
+        """Local minima of the distance of centers (n, 3): rows, parameters, and whether inside."""
+        low, high = self.span
+        kind, rows = self.curve.GetType(), np.arange(len(centers))
+        if kind == GeomAbs_Line:
+            line = self.curve.Line()
+            at = (centers - line.Location().Coord()) @ np.array(line.Direction().Coord())
+        elif kind == GeomAbs_Circle:
+            frame = self.curve.Circle().Position()
+            away = centers - frame.Location().Coord()
+            x, y = (np.array(one().Coord()) for one in (frame.XDirection, frame.YDirection))
+            at = low + np.mod(np.arctan2(away @ y, away @ x) - low, 2 * np.pi)
+        else:
+            grid, points = self.grid
+            far = np.linalg.norm(centers[:, None] - points, axis=2)
+            if self.closed:
+                before, after = np.roll(far[:, :-1], 1, 1), np.roll(far[:, :-1], -1, 1)
+            else:
+                before = np.pad(far[:, :-1], ((0, 0), (1, 0)), constant_values=np.inf)
+                after = np.pad(far[:, 1:], ((0, 0), (0, 1)), constant_values=np.inf)
+            here = far[:, : before.shape[1]]
+            rows, near = np.nonzero((here <= before) & (here < after))
+            pairs = zip(rows.tolist(), grid[near].tolist(), strict=True)
+            at = np.array([self._newton(centers[row], t) for row, t in pairs])
+        # Round a closed edge there is no end.
+        within = (at > low) & (at < high) | self.closed
+        return rows, np.clip(at, low, high), within
+
+    @property
+    def closed(self) -> bool:
+        return self.ends[0] == self.ends[1]
+
+    def _newton(self, center: Array, at: float) -> float:
+        step = (self.span[1] - self.span[0]) / (SAMPLES - 1)
+        low, high = at - step, at + step
+        for _ in range(STEPS):
+            away = np.array(self.curve.Value(at).Coord()) - center
+            one, two = (np.array(self.curve.DN(at, k).Coord()) for k in (1, 2))
+            bend = one @ one + away @ two
+            move = -(away @ one) / (bend if bend > 0 else one @ one)
+            at = float(np.clip(at + move, low, high))
+            if self.closed:
+                begin, end = self.span
+                wrapped = begin + (at - begin) % (end - begin)
+                low, high, at = low + wrapped - at, high + wrapped - at, wrapped
+            if abs(move) < 1e-15:
+                break
+        return at
+
+
+@dataclass(frozen=True)
+class Minima:
+    """Local minima of the distance from one center, with depths above zero.
+
+    `sure` says which are so beyond rounding: not within rounding of a border or of another one.
+    """
+
+    points: Array
+    depths: Array
+    sure: Array
+    plane: Array
+
+
+class TrimmedSolid:
+    """The faces, edges and vertices of a solid [mm]."""
+
+    def __init__(self, solid: Solid) -> None:
+        found = faces(solid)
+        self.surfaces = [Surface(face) for face in found]
+        self.edges: list[Edge] = []
+        self.seams: list[tuple[int, Any]] = []
+        shapes: list[Any] = []
+        places: list[Any] = []
+        for row, surface in enumerate(self.surfaces):
+            explorer = TopExp_Explorer(surface.face, TopAbs_EDGE)
+            own = []
+            while explorer.More():
+                own.append(TopoDS.Edge(explorer.Current()))
+                explorer.Next()
+            for edge in own:
+                if BRep_Tool.Degenerated_s(edge):
+                    _number(places, TopExp.FirstVertex_s(edge))  # an apex or a pole
+                    continue
+                if sum(edge.IsSame(other) for other in own) > 1:
+                    self.seams.append((row, BRepAdaptor_Curve(edge)))
+                    continue
+                left = edge.Orientation() != TopAbs_REVERSED
+                known = next((k for k, one in enumerate(shapes) if one.IsSame(edge)), None)
+                if known is not None:
+                    self.edges[known].faces.append(row)
+                    self.edges[known].left.append(left)
+                    continue
+                shapes.append(edge)
+                ends = (TopExp.FirstVertex_s(edge), TopExp.LastVertex_s(edge))
+                numbers = [_number(places, vertex) for vertex in ends]
+                curve = BRepAdaptor_Curve(edge)
+                tolerance = BRep_Tool.Tolerance_s(edge)
+                self.edges.append(Edge(curve, tolerance, [row], [left], (numbers[0], numbers[1])))
+        self.vertices = np.array([BRep_Tool.Pnt_s(one).Coord() for one in places]).reshape(-1, 3)
+        self.size = float(
+            np.linalg.norm(np.ptp(np.concatenate([e.grid[1] for e in self.edges]), 0))
+        )
+        free = [one.samples(1.0) for one in self.surfaces if not one.kind]
+        self.free = np.concatenate(free) if free else np.zeros((0, 3))
+
+    def inward(self, edge: Edge, side: int, points: Array, tangents: Array) -> Array:
+        """Unit directions (n, 3) from points of an edge into the face on a side of it."""
+        _, normal = self.surfaces[edge.faces[side]].closest(points)
+        into = np.cross(normal, tangents) * (1.0 if edge.left[side] else -1.0)
+        return into / np.linalg.norm(into, axis=1)[:, None]
+
+    def minima(self, centers: Array, radii: Array) -> list[Minima]:
+        """Local minima of the distance of centers (n, 3) that are nearer than radii (n,)."""
+        found: list[list[tuple[Array, float, bool, bool]]] = [[] for _ in centers]
+        passes: list[list[float]] = [[] for _ in centers]
+        for number, surface in enumerate(self.surfaces):
+            if surface.kind:
+                self._on_face(number, centers, radii, found)
+        for edge in self.edges:
+            self._on_edge(edge, centers, radii, found, passes)
+        self._on_vertices(centers, radii, found)
+        out = []
+        for rows, saddles, r in zip(found, passes, radii.tolist(), strict=True):
+            rows.sort(key=lambda one: -one[1])
+            points = np.array([row[0] for row in rows]).reshape(-1, 3)
+            depths = np.array([row[1] for row in rows], float)
+            sure, plane = (np.array([row[k] for row in rows], bool) for k in (2, 3))
+            if saddles and len(rows):
+                # As deep as a place on an edge: it ends there, or merges with another minimum.
+                apart = np.abs(depths[:, None] - np.array(saddles)).min(axis=1)
+                sure &= (apart > PERSISTENCE * r) | (depths == depths.max())
+            out.append(Minima(points, depths, sure, plane))
+        return out
+
+    def _on_face(self, number: int, centers: Array, radii: Array, found: Any) -> None:
+        surface = self.surfaces[number]
+        distance, normal = surface.closest(centers)
+        points = centers - distance[:, None] * normal
+        rows = np.flatnonzero(np.abs(distance) < radii)
+        uv = surface.parameters(points[rows])
+        states = np.array([surface.state(one) for one in uv], int)
+        self._beside_edges(number, points[rows], states)
+        for row, state in zip(rows.tolist(), states.tolist(), strict=True):
+            if state >= 0:
+                depth = radii[row] - abs(distance[row])
+                found[row].append((points[row], depth, state > 0, surface.kind == "Plane"))
+
+    def _beside_edges(self, number: int, points: Array, states: Ints) -> None:
+        """Decide by the edges themselves about points (n, 3) of a face that are beside one.
+
+        OpenCASCADE's answer is off by 1e-5 mm beside edges whose parameter curves are splines.
+        """
+        nearest = np.full(len(points), BESIDE_EDGE)
+        for edge in self.edges:
+            if number not in edge.faces or not len(points):
+                continue
+            reach = np.linalg.norm(points[:, None] - edge.grid[1], axis=2).min(axis=1)
+            step = np.linalg.norm(np.diff(edge.grid[1], axis=0), axis=1).max()
+            rows = np.flatnonzero(reach < step)
+            if not len(rows):
+                continue
+            which, at, inside = edge.closest(points[rows])
+            rows = rows[which]
+            on, tangents = edge.at(at)
+            away = points[rows] - self._on_both(edge, on)
+            off = np.linalg.norm(away, axis=1)
+            into = self.inward(edge, edge.faces.index(number), on, tangents)
+            within = np.einsum("nx,nx->n", away, into)
+            for k in np.flatnonzero(off < nearest[rows]).tolist():
+                if off[k] < nearest[rows[k]]:
+                    nearest[rows[k]] = off[k]
+                    # At an end of the edge it is another one that decides.
+                    if inside[k]:
+                        states[rows[k]] = 0 if abs(within[k]) < 1e-9 else np.sign(within[k])
+
+    def _on_edge(
+        self, edge: Edge, centers: Array, radii: Array, found: Any, passes: list[list[float]]
+    ) -> None:
+        reach = np.linalg.norm(centers[:, None] - edge.grid[1], axis=2).min(axis=1)
+        step = np.linalg.norm(np.diff(edge.grid[1], axis=0), axis=1).max()
+        rows = np.flatnonzero(reach < radii + step)
+        if not len(rows):
+            return
+        which, at, inside = edge.closest(centers[rows])
+        rows, at = rows[which][inside], at[inside]
+        if not len(rows):
+            return
+        points, tangents = edge.at(at)
+        points = self._on_both(edge, points)
+        away = points - centers[rows]
+        distance = np.linalg.norm(away, axis=1)
+        # Into both faces the distance grows.
+        rise = [
+            np.einsum("nx,nx->n", away, self.inward(edge, k, points, tangents)) / distance
+            for k in range(len(edge.faces))
+            if self.surfaces[edge.faces[k]].kind
+        ]
+        least = np.min(rise, axis=0) if rise else np.full(len(rows), -1.0)
+        for k, row in enumerate(rows.tolist()):
+            if distance[k] < radii[row]:
+                passes[row].append(radii[row] - distance[k])
+            if distance[k] < radii[row] and least[k] > -1e-6:
+                found[row].append(
+                    (points[k], radii[row] - distance[k], bool(least[k] > 1e-6), False)
+                )
+
+    def _on_both(self, edge: Edge, points: Array) -> Array:
+        """Points on the curve where both faces are zero, from those of the file's curve."""
+        pair = [self.surfaces[k] for k in edge.faces]
+        if edge.curve.GetType() in (GeomAbs_Line, GeomAbs_Circle):
+            return points
+        if len(pair) != 2 or not all(one.kind for one in pair):
+            return points
+        at = points.copy()
+        for k, start in enumerate(points):
+            x = start
+            for _ in range(STEPS):
+                (d, n), (e, m) = (one.closest(x[None]) for one in pair)
+                along = np.cross(n[0], m[0])
+                if np.linalg.norm(along) < 1e-4:
+                    break
+                along /= np.linalg.norm(along)
+                matrix = np.array([n[0], m[0], along])
+                move = np.linalg.solve(matrix, [-d[0], -e[0], 0.0])
+                x = x + move
+                if np.linalg.norm(move) < 1e-14 * self.size:
+                    break
+            if np.linalg.norm(x - start) < 10 * edge.tolerance:
+                at[k] = x
+        return at
+
+    def _on_vertices(self, centers: Array, radii: Array, found: Any) -> None:
+        leave: list[list[Array]] = [[] for _ in self.vertices]
+        for edge in self.edges:
+            for t, end, sign in zip(edge.span, edge.ends, (1.0, -1.0), strict=True):
+                leave[end].append(sign * edge.at(np.array([t]))[1][0])
+        for vertex, ways in zip(self.vertices, leave, strict=True):
+            away = vertex - centers
+            distance = np.linalg.norm(away, axis=1)
+            for row in np.flatnonzero(distance < radii).tolist():
+                rise = np.array(ways).reshape(-1, 3) @ away[row] / distance[row]
+                if rise.min(initial=0.0) > -1e-6:
+                    depth = radii[row] - distance[row]
+                    # Between two edges the distance may fall where they turn by more than half.
+                    found[row].append((vertex, depth, False, False))
+
+
+def _number(places: list[Any], vertex: Any) -> int:
+    for k, place in enumerate(places):
+        if place.IsSame(vertex):
+            return k
+    places.append(vertex)
+    return len(places) - 1

@@ -1,0 +1,83 @@
+"""What is wrong with the contacts of spheres."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from sphshell_pin.arrays import Array
+
+MM = 1e-3
+
+FAULTS = {
+    "lost": "no contact where the sphere touches",
+    "missing": "a minimum of the distance has no contact",
+    "shallow": "the deepest contact is too shallow",
+    "deep": "the deepest contact is too deep",
+    "phantom": "a contact is at no minimum of the distance",
+    "double": "the weights add up to more than the components of the surface inside the sphere",
+    "energy": "one minimum, of the right depth, and another energy",
+    "force": "one minimum, on a plane, and another force",
+    "bridge": "several minima, and another energy or fewer components",
+}
+
+ALLOWED = ("bridge",)
+"""Faults that the documentation states: spheres larger than a hollow fillet."""
+
+
+@dataclass
+class Verdict:
+    """Spheres that were asked, and the rows of those with faults.
+
+    Attributes
+    ----------
+    centers, radii : (n, 3) and (n,) [m]; joints : what meets there, one a sphere
+    faults : rows by the name of the fault; details : of rows
+    worst : largest error of the depth over the radius, of spheres without fault
+    """
+
+    part: str
+    centers: Array
+    radii: Array
+    joints: list[str]
+    faults: dict[str, list[int]] = field(default_factory=lambda: {name: [] for name in FAULTS})
+    details: dict[int, str] = field(default_factory=dict)
+    worst: float = 0.0
+
+    def add(self, fault: str, row: int, detail: str) -> None:
+        self.faults[fault].append(row)
+        self.details[row] = detail
+
+    def found(self) -> dict[str, list[str]]:
+        """Faults that are not allowed, with a description of each sphere."""
+        return {
+            name: [self.describe(row) for row in rows]
+            for name, rows in self.faults.items()
+            if rows and name not in ALLOWED
+        }
+
+    def describe(self, row: int) -> str:
+        where = f"center {self.centers[row].tolist()}, radius {float(self.radii[row])}"
+        return f"{self.joints[row]}: {where}: {self.details[row]}"
+
+    def by_joint(self) -> dict[str, Counter[str]]:
+        """Return the number of spheres and of faults of each kind of joint."""
+        counts: dict[str, Counter[str]] = {}
+        for joint in self.joints:
+            counts.setdefault(joint, Counter())["spheres"] += 1
+        for name, rows in self.faults.items():
+            for row in rows:
+                counts[self.joints[row]][name] += 1
+        return counts
+
+
+def exact_elements(shell: sp.Shell) -> NDArray[np.bool_]:
+    """Whether each element belongs to an exact face."""
+    out = np.zeros(len(shell.elements), bool)
+    for face in shell.faces:
+        out[face.elements] = face.exact
+    return out

@@ -1,0 +1,195 @@
+"""Reports about surfaces: distances, depths, holes, units, files of other programs."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import sphshell_pin as sp
+from sphshell_pin import robots
+from tests.public_cases import case
+from tests.public_cases.shapes import binary_stl, block, terrain
+
+HEIGHT = 0.2
+
+
+@case(
+    "google-deepmind/mujoco#2206",
+    wanted="the depth of a sphere stays right when more than half of it is in a box",
+    figure="depth of a sphere of 5 mm that is 9 mm deep [m]",
+    truth=0.009,
+    bound=1e-15,
+)
+def deeper_than_half() -> float:
+    box = sp.Shell(*block((-0.5, -0.5, -0.5), (0.5, 0.5, 0)), side="outside")
+    return float(box.contacts([0, 0, 0.005 - 0.009], 0.005).depth.max())
+
+
+@case(
+    "google-deepmind/mujoco#1784",
+    "google-deepmind/mujoco#2688",
+    wanted="points above a terrain have no negative distance from it",
+    figure="of 2000 points, those with a distance off by more than the terrain's roughness",
+    truth=0,
+    bound=0,
+)
+def above_a_terrain() -> float:
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return HEIGHT * np.sin(3 * x) * np.cos(2 * y)
+
+    shell = sp.Shell(*terrain(41, 1.0, height))
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-0.8, 0.8, (2, 2000))
+    above = rng.uniform(0.02, 0.5, 2000)
+    found = shell.closest_points(np.stack((x, y, height(x, y) + above), axis=1)).distances
+    # The slope is at most 3 HEIGHT: so much shorter than the vertical one may the distance be.
+    least = above / np.hypot(1.0, 3 * HEIGHT) - 1e-3
+    return int(np.sum((found < least) | (found > above + 1e-3)))
+
+
+def bored_plate(suffix: str) -> sp.Shell:
+    """Return a plate of 20 mm with a bore of 10 mm, from a CAD file or its STL."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+    from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+    from OCP.StlAPI import StlAPI_Writer
+
+    box = BRepPrimAPI_MakeBox(gp_Pnt(-20, -20, -10), 40, 40, 20).Shape()
+    bore = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(0, 0, -15), gp_Dir(0, 0, 1)), 5.0, 30).Shape()
+    plate = BRepAlgoAPI_Cut(box, bore).Shape()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"plate.{suffix}"
+        if suffix == "step":
+            writer = STEPControl_Writer()
+            writer.Transfer(plate, STEPControl_AsIs)
+            writer.Write(str(path))
+            return sp.Shell.from_file(path)
+        BRepMesh_IncrementalMesh(plate, 0.1, False, 0.5)
+        StlAPI_Writer().Write(plate, str(path))
+        return sp.Shell.from_file(path, unit="mm")
+
+
+def deepest_in_bore(suffix: str, gap: float) -> float:
+    shell = bored_plate(suffix)
+    found = [shell.contacts([0, 0, z], 0.005 - gap) for z in np.linspace(-0.008, 0.008, 9)]
+    return max(float(one.depth.max(initial=0.0)) for one in found)
+
+
+HOLE = (
+    "bulletphysics/bullet3#4278",
+    "bulletphysics/bullet3#2148",
+    "bulletphysics/bullet3#1636",
+    "bulletphysics/bullet3#4589",
+    "google-deepmind/mujoco#393",
+)
+
+
+@case(
+    *HOLE,
+    wanted="a ball fits through a round hole that is 20 um wider (STEP)",
+    figure="deepest contact [m]",
+    truth=0.0,
+    bound=0.0,
+)
+def through_a_round_hole() -> float:
+    return deepest_in_bore("step", 1e-5)
+
+
+@case(
+    *HOLE,
+    wanted="the same through the STL of that part",
+    figure="deepest contact [m]",
+    truth=0.0,
+    bound=0.0,
+)
+def through_a_round_hole_of_triangles() -> float:
+    return deepest_in_bore("stl", 1e-5)
+
+
+@case(
+    *HOLE,
+    wanted="a ball that is 20 um wider than the hole is stopped by its wall (STL)",
+    figure="deepest contact [m]",
+    truth=1e-5,
+    bound=1e-9,
+)
+def too_wide_for_a_round_hole() -> float:
+    return deepest_in_bore("stl", -1e-5)
+
+
+@case(
+    "gazebosim/gz-sim#2656",
+    "iory/scikit-robot#770",
+    "ros-visualization/rviz#517",
+    wanted="a mesh with scale 1 -1 1 is mirrored, and its normals still point outwards",
+    figure="depth of a sphere 1 mm in the mirrored tetrahedron [m]",
+    truth=1e-3,
+    bound=1e-9,
+)
+def mirrored_mesh() -> float:
+    link = (
+        '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
+        'ixz="0" iyz="0"/></inertial>{}</link>'
+    )
+    mesh = '<collision><geometry><mesh filename="part.stl" scale="1 -1 1"/></geometry></collision>'
+    joint = (
+        '<joint name="j" type="prismatic"><parent link="base"/><child link="part"/><axis '
+        'xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "part.stl").write_bytes(binary_stl(b"part"))
+        robot = Path(folder) / "mirrored.urdf"
+        links = link.format("base", "") + link.format("part", mesh)
+        robot.write_text(f'<robot name="mirrored">{links}{joint}</robot>', encoding="utf-8")
+        geometry = robots.load_file(robot).collision_model.geometryObjects[0]
+        shell = sp.Shell.from_geometry(geometry, side="outside")
+    return float(shell.contacts([0.02, -0.04, -0.009], 0.01).depth.max())
+
+
+@case(
+    "FreeCAD/FreeCAD#18078",
+    "FreeCAD/FreeCAD#20546",
+    "CadQuery/cadquery#1375",
+    "CadQuery/cadquery#1829",
+    wanted="a cube of one inch is as large whatever the unit of its STEP file: mm, inch, m, ft, um",
+    figure="side that is farthest from it [m]",
+    truth=0.0254,
+    bound=1e-14,
+)
+def units_of_a_step_file() -> float:
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.Interface import Interface_Static
+    from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+
+    sides = []
+    with tempfile.TemporaryDirectory() as folder:
+        for unit in ("INCH", "M", "FT", "UM", "MM"):  # the last is the setting of a new process
+            STEPControl_Writer()
+            Interface_Static.SetCVal_s("write.step.unit", unit)
+            writer = STEPControl_Writer()
+            writer.Transfer(BRepPrimAPI_MakeBox(25.4, 25.4, 25.4).Shape(), STEPControl_AsIs)
+            path = Path(folder) / f"{unit}.step"
+            writer.Write(str(path))
+            sides += list(np.ptp(sp.Shell.from_file(path).vertices, axis=0))
+    return float(max(sides, key=lambda side: abs(side - 0.0254)))
+
+
+@case(
+    "ros-visualization/rviz#1244",
+    "ros-industrial/abb#104",
+    "ros-industrial/abb_experimental#5",
+    "ros-industrial/motoman#123",
+    wanted='a binary STL whose header begins with "solid" is read as binary',
+    figure="elements read",
+    truth=4,
+    bound=0,
+)
+def binary_stl_called_solid() -> float:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "part.stl"
+        path.write_bytes(binary_stl(b"solid exported by a CAD program"))
+        return sp.Shell.from_file(path, unit="m").num_elements

@@ -1,0 +1,143 @@
+"""Masses that a file does not state, and files that need mending."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import robots
+from sphshell_pin.arrays import Array
+from sphshell_pin.errors import InvalidParameter, RobotWarning
+from sphshell_pin.robots.mending import mended
+from sphshell_pin.study.robot_check import QUICK, check_robot
+from tests import meshes
+from tests.command import call
+
+JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
+<origin xyz="0.1 0 0.2"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" velocity="2"/>
+{more}</joint>"""
+
+
+def arm(folder: Path, geometry: str, *, name: str = "arm") -> Path:
+    """Write an arm of two links of which none has a mass."""
+    links = "".join(
+        f'<link name="{one}"><collision><origin xyz="0.05 0 0" rpy="0 0 0.3"/><geometry>{geometry}'
+        "</geometry></collision></link>"
+        for one in ("upper", "lower")
+    )
+    joints = JOINT.format(name="j1", kind="revolute", parent="base", child="upper", more="")
+    joints += JOINT.format(name="j2", kind="revolute", parent="upper", child="lower", more="")
+    joints += (
+        '<link name="tool0"/><joint name="flange" type="fixed"><parent link="lower"/>'
+        '<child link="tool0"/><origin xyz="0.1 0 0"/></joint>'
+    )
+    file = folder / f"{name}.urdf"
+    file.write_text(f'<robot name="{name}"><link name="base"/>{links}{joints}</robot>')
+    return file
+
+
+def write_obj(path: Path, vertices: Array, elements: Array) -> None:
+    lines = [f"v {x} {y} {z}" for x, y, z in np.asarray(vertices).tolist()]
+    lines += ["f " + " ".join(str(int(k) + 1) for k in row) for row in elements]
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.mark.parametrize("what", ["box", "mesh", "open mesh"])
+def test_links_get_the_inertia_of_their_solid(tmp_path: Path, what: str) -> None:
+    size, density = 0.1, 2000.0
+    geometry = f'<box size="{size} {size} {size}"/>'
+    if what != "box":
+        vertices, elements = meshes.cube(size)
+        kept = elements if what == "mesh" else elements[:-1]
+        write_obj(tmp_path / "cube.obj", vertices, kept)
+        geometry = '<mesh filename="cube.obj"/>'
+    robot = robots.load_file(arm(tmp_path, geometry), density=density)
+    mass = density * size**3
+    placed = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 0.3), np.array([0.05, 0.0, 0.0]))
+    expected = placed.act(pin.Inertia.FromBox(mass, size, size, size))
+    for joint in (1, 2):
+        found = robot.model.inertias[joint]
+        np.testing.assert_allclose(found.matrix(), expected.matrix(), rtol=1e-6, atol=1e-9)
+    assert "upper, lower" in robot.assumed
+    assert "2000 kg/m^3" in robot.assumed
+
+
+def test_a_stated_mass_stays(tmp_path: Path) -> None:
+    file = arm(tmp_path, '<sphere radius="0.1"/>')
+    stated = '<link name="upper"><inertial><mass value="3"/><inertia ixx="1" iyy="1" izz="1" '
+    stated += 'ixy="0" ixz="0" iyz="0"/></inertial>'
+    file.write_text(file.read_text().replace('<link name="upper">', stated))
+    robot = robots.load_file(file, density=1000.0)
+    assert robot.model.inertias[1].mass == 3.0
+    assert robot.model.inertias[2].mass == pytest.approx(1000.0 * 4 / 3 * np.pi * 1e-3, rel=1e-2)
+
+
+def test_without_masses_one_sentence_lists_the_links(tmp_path: Path) -> None:
+    file = arm(tmp_path, '<box size="0.1 0.1 0.1"/>')
+    for command in (
+        ["check-robot", str(file), "--quick"],
+        ["new", "--robot", str(file), "--out", str(tmp_path / "a.toml")],
+    ):
+        done = call(*command)
+        assert done.exit_code == 2
+        said = " ".join(done.output.split())
+        assert "none of links upper, lower" in said
+        assert "--density 2700" in said
+    with pytest.raises(InvalidParameter, match="density"):
+        robots.load_file(file, density=-1.0)
+
+
+def test_a_mended_file_needs_no_options(tmp_path: Path) -> None:
+    folder = tmp_path / "pkg"
+    (folder / "meshes").mkdir(parents=True)
+    (folder / "package.xml").write_text("<package><name>pkg</name></package>")
+    write_obj(folder / "meshes" / "cube.obj", *meshes.cube(0.05))
+    file = arm(folder, '<mesh filename="package://pkg/meshes/cube.obj"/>')
+    text = file.read_text()
+    mimic = '<mimic joint="j2" multiplier="-0.5"/>'
+    third = '<link name="last"><collision><geometry><sphere radius="0.02"/></geometry></collision>'
+    third += '<visual><geometry><mesh filename="gone.stl"/></geometry></visual></link>'
+    third += JOINT.format(name="j3", kind="continuous", parent="lower", child="last", more=mimic)
+    file.write_text(text.replace("</robot>", f'{third}<gazebo:plugin name="x"/></robot>'))
+    made, changes = mended(file, density=2700.0)
+    assert made.count("<!--") == len(changes)
+    for part in ("mass of its geometry", "was continuous", "prefix gazebo", "gone.stl", "by its"):
+        assert any(part in one for one in changes), part
+    elsewhere = tmp_path / "elsewhere.urdf"
+    elsewhere.write_text(made)
+    with pytest.warns(RobotWarning, match="gone"):
+        first = robots.load_file(file, density=2700.0, mimic=True).model
+    second = robots.load_file(elsewhere, mimic=True).model
+    assert (first.nq, list(first.names)) == (second.nq, list(second.names))
+    for one, other in zip(first.inertias, second.inertias, strict=True):
+        np.testing.assert_allclose(one.matrix(), other.matrix(), rtol=1e-6, atol=1e-12)
+    assert check_robot(elsewhere, sizes=QUICK).verdict == "pass"
+
+
+def test_a_broken_visual_mesh_is_left_out_with_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "bad.stl").write_text("solid")
+    file = arm(tmp_path, '<sphere radius="0.1"/>')
+    bad = '<visual><geometry><mesh filename="bad.stl"/></geometry></visual>'
+    bad += '<visual><geometry><box size="1 1 1"/></geometry></visual>'
+    file.write_text(file.read_text().replace('<link name="upper">', f'<link name="upper">{bad}'))
+    with pytest.warns(RobotWarning, match=r"bad\.stl"):
+        robot = robots.load_file(file)
+    assert len(robot.visual_model.geometryObjects) == 1
+
+
+def test_a_continuous_joint_mimics_by_its_whole_angle(tmp_path: Path) -> None:
+    file = arm(tmp_path, '<sphere radius="0.1"/>')
+    text = file.read_text().replace('name="j2" type="revolute"', 'name="j2" type="continuous"')
+    mimic = '<mimic joint="j1" multiplier="3.5"/></joint>'
+    at = text.index("</joint>", text.index('name="j2"'))
+    file.write_text(text[:at] + mimic + text[at + len("</joint>") :])
+    model = robots.load_file(file, density=1000.0, mimic=True).model
+    assert (model.nq, model.nv) == (1, 1)
+    data = model.createData()
+    pin.forwardKinematics(model, data, np.array([1.0]))
+    turned = data.oMi[1].rotation.T @ data.oMi[2].rotation
+    np.testing.assert_allclose(turned, pin.rpy.rpyToMatrix(0.0, 3.5, 0.0), atol=1e-12)
+    assert robots.load_file(file, mimic=False).model.nv == 2

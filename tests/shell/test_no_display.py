@@ -1,0 +1,43 @@
+"""CAD files on a machine without the libraries of a display, which OpenCASCADE links to."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+VALVE_BODY = Path(__file__).parents[2] / "scenarios" / "surfaces" / "valve_body.step"
+HIDE = """
+for name in libGL.so.1 libX11.so.6; do
+  for file in $(PATH="$PATH:/usr/sbin:/sbin" ldconfig -p | sed -n "s/.*$name .* => //p"); do
+    mount --bind /dev/null "$(readlink -f "$file")"
+  done
+done
+exec "$@"
+"""
+READ = """
+import ctypes, sys
+import sphshell_pin as sp
+for name in ("libGL.so.1", "libX11.so.6"):
+    try:
+        ctypes.CDLL(name)
+    except OSError:
+        continue
+    sys.exit(f"{name} is there")
+print(len(sp.Shell.from_file(sys.argv[1]).faces))
+"""
+
+
+def test_a_step_file_is_read_without_them():
+    unshare = shutil.which("unshare")
+    hidden = [str(unshare), "--mount", "bash", "-c", HIDE, "-"]
+    if unshare is None or subprocess.run([*hidden, "true"], check=False, stderr=-3).returncode:
+        pytest.skip("hiding a library needs the rights to make a mount namespace")
+    read = subprocess.run(
+        [*hidden, sys.executable, "-c", READ, VALVE_BODY],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (read.returncode, read.stdout, read.stderr) == (0, "27\n", "")

@@ -1,0 +1,145 @@
+"""Planes and belts that are inscribed in round faces: a face is sampled in equal steps.
+
+Shafts and bores with flats, cones with flats through their tip, balls with a belt and rings with a
+plane side have all their vertices on one cylinder, cone, sphere or torus.
+"""
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from tests.meshes import random_rotation
+
+RADIUS, LENGTH = 0.005, 0.02
+
+
+def turned(angles, profile):
+    """Return the shell (in single precision) of a closed profile (n, 2) turned by angles (m,)."""
+    angles, profile = np.asarray(angles), np.asarray(profile)
+    n, m = len(profile), len(angles)
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    points = np.concatenate(
+        [profile[:, None, :1] * ring[None], np.repeat(profile[:, None, 1:], m, axis=1)], axis=2
+    )
+    i, j = np.meshgrid(np.arange(n - 1), np.arange(m), indexing="ij")
+    k = (j + 1) % m
+    quads = np.stack([i * m + j, i * m + k, (i + 1) * m + k, (i + 1) * m + j], axis=2)
+    rows = quads.reshape(-1, 4)
+    triangles = np.concatenate([rows[:, [0, 1, 2]], rows[:, [0, 2, 3]]])
+    vertices = points.reshape(-1, 3).astype(np.float32).astype(float)
+    return sp.Shell(vertices, triangles)
+
+
+def angles_with_flats(steps, flats):
+    """Angles of a circle in equal steps between flats, (middle, half-angle) each [rad]."""
+    out = []
+    for (middle, half), (following, other) in zip(flats, [*flats[1:], flats[0]], strict=True):
+        arc = (following - other - middle - half) % (2 * np.pi)
+        count = int(np.ceil(arc / steps))
+        out.append(middle + half + arc / count * np.arange(count + 1))
+    return np.concatenate(out) % (2 * np.pi), arc / count
+
+
+def error(shell, points, true):
+    found = shell.closest_points(np.atleast_2d(points))
+    return np.abs(np.abs(found.distances) - true).max()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_flat_on_a_shaft_or_in_a_bore_is_plane(seed):
+    rng = np.random.default_rng(seed)
+    half = np.radians(rng.uniform(2, 30))
+    chord = np.exp(rng.uniform(*np.log([0.005, 0.1]))) * 1e-3
+    limit = 2 * np.arccos(1 - chord / RADIUS)
+    middle, taper = rng.uniform(0, 2 * np.pi), rng.choice([0.0, 0.2])
+    flats = [(middle, half), (middle + np.pi, half)][: rng.integers(1, 3)]
+    angles, step = angles_with_flats(limit, flats)
+    shell = turned(angles, [(RADIUS * (1 + taper), 0.0), (RADIUS * (1 - taper), LENGTH)])
+    # Beside the middle of the flat, outside or inside.
+    lean = np.arctan(2 * taper * RADIUS * np.cos(half) / LENGTH)
+    normal = np.array([np.cos(middle) * np.cos(lean), np.sin(middle) * np.cos(lean), np.sin(lean)])
+    away = 5e-4 * rng.choice([-1, 1])
+    on = np.array([np.cos(middle), np.sin(middle), 0]) * RADIUS * np.cos(half)
+    off = error(shell, on + [0, 0, LENGTH / 2] + away * normal, abs(away))
+    if 2 * half > 1.02 * step:
+        assert off < 1e-9
+        assert sum(face.kind == "plane" for face in shell.faces) == len(flats)
+    else:
+        # No farther off than the facets of a regular step.
+        assert off < 1.1 * RADIUS * (1 - np.cos(step / 2))
+    # Two flats that turn by more than the crease angle divide the round face.
+    rest = [face for face in shell.faces if face.kind != "plane"]
+    assert {face.kind for face in rest} == {"cone" if taper else "cylinder"}
+    assert len(rest) <= len(flats)
+    assert sum(len(face.elements) for face in rest) >= 2 * (len(angles) - len(flats))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_belt_on_a_ball_is_a_cylinder(seed):
+    rng = np.random.default_rng(seed)
+    half, step = np.radians([rng.uniform(4, 20), rng.uniform(3, 9)])
+    around = 2 * np.pi / np.ceil(2 * np.pi / step) * np.arange(np.ceil(2 * np.pi / step))
+    count = int(np.ceil((1.4 - half) / step))
+    arc = np.linspace(half, 1.4, count + 1)
+    latitude = np.concatenate([-arc[::-1], arc])
+    profile = RADIUS * np.stack([np.cos(latitude), np.sin(latitude)], axis=1)
+    shell = turned(around, profile)
+    wide = 2 * half > 1.05 * max(step, around[1])
+    radius = RADIUS * np.cos(half)
+    points = [((radius + 5e-4) * np.cos(a), (radius + 5e-4) * np.sin(a), 0) for a in (0.1, 1, 2)]
+    off = error(shell, points, 5e-4)
+    assert off < (1e-8 if wide else RADIUS * (1 - np.cos(step / 2)))
+    assert sorted(face.kind for face in shell.faces) == ["cylinder"] * int(wide) + ["sphere"]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_plane_side_of_a_ring_is_plane(seed):
+    rng = np.random.default_rng(seed)
+    half, step = np.radians([rng.uniform(5, 20), rng.uniform(4, 8)])
+    around = 2 * np.pi / 90 * np.arange(90)
+    count = int(np.ceil((2 * np.pi - 2 * half) / step))
+    across = np.pi / 2 + half + (2 * np.pi - 2 * half) / count * np.arange(count + 1)
+    tube = 0.003
+    shell = turned(around, np.stack([0.01 + tube * np.cos(across), tube * np.sin(across)], axis=1))
+    row = np.stack([across[-1:], across[:1] + 2 * np.pi], axis=1)
+    ring = np.stack([0.01 + tube * np.cos(row[0]), tube * np.sin(row[0])], axis=1)
+    cover = turned(around, ring)
+    shell = sp.Shell(
+        np.concatenate([shell.vertices, cover.vertices]),
+        np.concatenate([shell.elements[:, :3], cover.elements[:, :3] + len(shell.vertices)]),
+    )
+    height = tube * np.cos(half)
+    points = [(0.01 * np.cos(a), 0.01 * np.sin(a), height + 3e-4) for a in (0.1, 1.0, 2.0)]
+    assert error(shell, points, 3e-4) < 1e-8
+    assert sorted(face.kind for face in shell.faces) == ["plane", "torus"]
+
+
+@pytest.mark.parametrize("kind", ["irregular", "unequal rows", "ends"])
+@pytest.mark.parametrize("seed", range(5))
+def test_steps_that_are_not_equal_stay_in_one_face(kind, seed):
+    rng = np.random.default_rng(seed)
+    if kind == "ends":
+        # A quarter of a circle between planes that are tangent to it; the last steps are wider.
+        angles = np.cumsum([0.0, 2.0, 1.0, 1.0, 1.0, 1.0, 2.0])
+        angles *= np.pi / 2 / angles[-1]
+        x, y = RADIUS * np.cos(angles), RADIUS * np.sin(angles)
+        outline = np.concatenate(
+            [[[RADIUS, -20 * RADIUS]], np.stack([x, y], axis=1), [[-20 * RADIUS, RADIUS]]]
+        )
+        points = np.concatenate([np.c_[outline, z * np.ones(len(outline))] for z in (0, LENGTH)])
+        m = len(outline)
+        quads = [[i, i + 1, m + i + 1, m + i] for i in range(m - 1)]
+        shell = sp.Shell(points @ random_rotation(seed).T, quads)
+        (face,) = (face for face in shell.faces if face.kind == "cylinder")
+        assert len(face.elements) == 6
+        return
+    if kind == "irregular":
+        widths = rng.uniform(0.6, 1.4, 40)
+        angles = 2 * np.pi * np.cumsum(widths) / widths.sum()
+        shell = turned(angles, [(RADIUS, 0.0), (RADIUS, LENGTH)])
+    else:
+        latitude = np.cumsum(np.linspace(1.0, 1.6, 24)) * 2.4 / 31 - 1.2
+        profile = RADIUS * np.stack([np.cos(latitude), np.sin(latitude)], axis=1)
+        shell = turned(2 * np.pi / 40 * np.arange(40), profile)
+    (face,) = shell.faces
+    assert len(face.elements) == len(shell.elements)
