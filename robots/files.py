@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import os
-import re
 import tempfile
 import xml.etree.ElementTree as ET
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
+from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
@@ -52,6 +54,7 @@ _REFUSED = {
 MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
 """Formats of the meshes that a robot may name."""
 
+_NO_LIMITS = {"effort": "1e30", "velocity": "1e30"}
 _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files"
 
 
@@ -84,11 +87,7 @@ def read(
         else:
             text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
-        reason = _line(error)
-        argument = re.search(r"Undefined substitution argument (\w+)", reason)
-        if argument is not None:
-            reason += f": give it, --xacro-arg {argument[1]}=VALUE (xacro_args in a scenario)"
-        raise RobotError(f"{file}: not a URDF that can be read: {reason}") from None
+        raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
     return described(text, folders, free_flyer=free_flyer)
 
 
@@ -135,12 +134,18 @@ def _reason(suffix: str) -> str:
     return next((reason for ends, reason in _REFUSED.items() if suffix in ends), "")
 
 
-def build_model(description: Description, *, free_flyer: bool | None = None) -> pin.Model:
+def build_model(
+    description: Description, *, free_flyer: bool | None = None, mimic: bool = False
+) -> pin.Model:
     """Return the model, in which every joint moves freely; with `free_flyer` a URDF's root floats.
 
-    Raises RobotError.
+    With `mimic` continuous joints are without limits, but not wound round, where joints that mimic
+    one another need it. Raises RobotError.
     """
     file = description.file
+    wound: list[str] = []
+    if mimic:
+        description, wound = unwound(description)
     try:
         if not description.is_mjcf:
             root = [pin.JointModelFreeFlyer()] if free_flyer else []
@@ -156,6 +161,9 @@ def build_model(description: Description, *, free_flyer: bool | None = None) -> 
     except (ValueError, RuntimeError, OSError) as error:
         what = "MJCF" if description.is_mjcf else "URDF"
         raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None
+    for name in wound:
+        at = model.joints[model.getJointId(name)].idx_q
+        model.lowerPositionLimit[at], model.upperPositionLimit[at] = -np.inf, np.inf
     if free_flyer and not description.is_mjcf:
         _check_root(model, file)
     return model
@@ -168,15 +176,44 @@ def build_geometry(
 
     Raises RobotError for a collision mesh that is missing, and for a mesh that cannot be read.
     """
-    root, missing = _with_meshes(description, visual=kind == pin.GeometryType.VISUAL)
+    visual = kind == pin.GeometryType.VISUAL
+    root, missing = _with_meshes(description, visual=visual)
+    try:
+        return _geometry(description, root, model, kind), missing
+    except RobotError:
+        if not visual or description.is_mjcf:
+            raise
+    missing += _without_broken(root, model)
+    return _geometry(description, root, model, kind), missing
+
+
+def _geometry(
+    description: Description, root: ET.Element, model: pin.Model, kind: pin.GeometryType
+) -> pin.GeometryModel:
     try:
         if description.is_mjcf:
             with _written(root) as path:
-                return pin.buildGeomFromMJCF(model, path, kind), missing
+                return pin.buildGeomFromMJCF(model, path, kind)
         text = ET.tostring(root, encoding="unicode")
-        return pin.buildGeomFromUrdfString(model, text, kind), missing
+        return pin.buildGeomFromUrdfString(model, text, kind)
     except (ValueError, RuntimeError) as error:
         raise _mesh_fault(description, _line(error).rstrip(".")) from None
+
+
+def _without_broken(root: ET.Element, model: pin.Model) -> list[str]:
+    """Take the visual meshes that cannot be read out of a URDF; return their files."""
+    broken = []
+    for link in root.findall("link"):
+        for shape in link.findall("visual"):
+            alone = ET.Element("robot", name="one")
+            ET.SubElement(alone, "link", name=link.get("name", "")).append(shape)
+            text = ET.tostring(alone, encoding="unicode")
+            try:
+                pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL)
+            except (ValueError, RuntimeError):
+                link.remove(shape)
+                broken += [one.get("filename", "") for one in shape.iter("mesh")]
+    return broken
 
 
 def keep_spheres(description: Description) -> None:
@@ -185,21 +222,25 @@ def keep_spheres(description: Description) -> None:
     def is_sphere(_: str, part: ET.Element) -> bool:
         return part.get("type") == "sphere" or part.find("geometry/sphere") is not None
 
-    _keep_collision(description, is_sphere)
+    _keep(description, is_sphere)
     for asset in description.root.findall("asset"):
         description.root.remove(asset)
 
 
-def keep_collision_of(description: Description, link: str) -> None:
-    """Drop every geometry but the collision geometry of one link."""
-    _keep_collision(description, lambda name, _: name == link)
+def keep_geometry_of(
+    description: Description, links: Collection[str], kind: str = "collision"
+) -> None:
+    """Drop every geometry but that of a `kind`, "collision" or "visual", of some links."""
+    _keep(description, lambda name, _: name in links, kind)
 
 
-def _keep_collision(description: Description, wanted: Callable[[str, ET.Element], bool]) -> None:
-    """Drop every geometry but that of collision that is `wanted`, by its link and element."""
+def _keep(
+    description: Description, wanted: Callable[[str, ET.Element], bool], kind: str = "collision"
+) -> None:
+    """Drop every geometry but that of a `kind` that is `wanted`, by its link and element."""
     for link in description.root.iter("body" if description.is_mjcf else "link"):
         for part in [one for one in link if one.tag in ("geom", "visual", "collision")]:
-            if _is_visual(part) or not wanted(link.get("name", ""), part):
+            if _is_visual(part) != (kind == "visual") or not wanted(link.get("name", ""), part):
                 link.remove(part)
 
 
@@ -221,7 +262,8 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
                 if mesh is None:
                     continue
                 if os.path.isfile(mesh.get("file", "")):
-                    _check_mesh(description, Path(mesh.get("file", "")))
+                    if reason := _mesh_reason(Path(mesh.get("file", ""))):
+                        raise _mesh_fault(description, reason)
                 elif _is_visual(geom) or description.folders.kept is not None:
                     missing[mesh.get("file", "")] = None
                     body.remove(geom)
@@ -238,36 +280,35 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
                 continue
             uri = mesh.get("filename", "")
             found = description.folders.find(uri)
-            if found is not None:
-                _check_mesh(description, found)
+            reason = f"{uri} is not there" if found is None else _mesh_reason(found)
+            if found is not None and not reason:
                 mesh.set("filename", str(found.absolute()))
             elif visual:
                 missing[uri] = None
                 link.remove(part)
             else:
-                raise _mesh_fault(description, f"{uri} is not there")
+                raise _mesh_fault(description, reason)
     return root, list(missing)
 
 
-def _check_mesh(description: Description, path: Path) -> None:
-    """Raise RobotError for a mesh at which the reader that Pinocchio has may crash.
+def _mesh_reason(path: Path) -> str:
+    """Say why a mesh is not given to the reader that Pinocchio has, which may crash at it.
 
     It knows 40 formats; those of robots have been tried, damaged .ply files alone made it crash.
     """
-    reason, suffix = "", path.suffix.lower()
+    suffix = path.suffix.lower()
     try:
         open_regular(path).close()
     except OSError as error:
-        reason = f"{path}: {error.strerror}"
+        return f"{path}: {error.strerror}"
     if suffix not in MESHES:
-        reason = f"{path}: not one of the formats {', '.join(MESHES)}"
-    elif suffix == ".ply":
+        return f"{path}: not one of the formats {', '.join(MESHES)}"
+    if suffix == ".ply":
         try:
             read_ply(path)
         except ShellFileError as error:
-            reason = str(error)
-    if reason:
-        raise RobotError(f"{description.file}: a mesh cannot be loaded ({reason})")
+            return str(error)
+    return ""
 
 
 def _mesh_fault(description: Description, reason: str) -> RobotError:
@@ -292,6 +333,34 @@ def _mimics(root: ET.Element) -> Iterable[Mimic]:
         except ValueError:
             raise ValueError(f"joint '{name}' mimics '{of}' by what is no number") from None
         yield Mimic(name, of, ratio, offset)
+
+
+def unwound(description: Description) -> tuple[Description, list[str]]:
+    """Return a URDF whose continuous joints are revolute where mimicking needs their whole angle.
+
+    Their names are returned too: `build_model` takes the limits away that a URDF has to state.
+    A continuous joint is stored by cosine and sine: what mimics it by a ratio that is not a whole
+    number, or with limits, would jump once a turn.
+    """
+    root = copy.deepcopy(description.root)
+    joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
+    group = {name: name for name in joints}
+    wound = {name for name, joint in joints.items() if joint.get("type") == "continuous"}
+    for rule in description.mimics:
+        of = {name for name in joints if group[name] in (group.get(rule.joint), group.get(rule.of))}
+        group |= dict.fromkeys(of, rule.of)
+    turned = {
+        group.get(rule.of)
+        for rule in description.mimics
+        if not rule.ratio.is_integer() or (rule.joint in wound) != (rule.of in wound)
+    }
+    changed = [name for name in sorted(wound) if group[name] in turned]
+    for name in changed:
+        joints[name].set("type", "revolute")
+        limit = joints[name].find("limit")
+        limit = ET.SubElement(joints[name], "limit") if limit is None else limit
+        limit.attrib.update(_NO_LIMITS | limit.attrib | {"lower": "-1e9", "upper": "1e9"})
+    return replace(description, root=root), changed
 
 
 def _check_tree(root: ET.Element) -> None:
@@ -326,8 +395,7 @@ def _check_root(model: pin.Model, file: Path) -> None:
     if model.inertias[1].mass > 0.0 or model.nv < 6:
         return
     q = pin.randomConfiguration(model, np.full(model.nq, -1.0), np.full(model.nq, 1.0))
-    mass = np.triu(pin.crba(model, model.createData(), q))
-    least, *_, most = np.linalg.eigvalsh(mass + np.triu(mass, 1).T)
+    least, *_, most = np.linalg.eigvalsh(mass_matrix(model, q))
     if least <= 1e-12 * most:
         bodies = [one.name for one in model.frames if one.parentJoint == 1]
         link = next((name for name in bodies if name != model.names[1]), model.names[1])

@@ -113,7 +113,9 @@ def test_meshes_beyond_the_limit_are_named(
     assert f"file.{digest}" in whole.arrays
     urdf = whole.contents["robots"][0]
     urdf["meshes"] = dict.fromkeys(urdf["meshes"], "0" * 64)  # of one that is not kept
-    with pytest.warns(RobotWarning, match=r"which the results do not hold: .*package://finger.*cube"):
+    with pytest.warns(
+        RobotWarning, match=r"which the results do not hold: .*package://finger.*cube"
+    ):
         Replay(with_kept(result, whole))
 
 
