@@ -173,3 +173,13 @@ def test_the_closest_point_of_a_rim_from_far_away():
     found = shell.closest_points(rim + far[:, None] * away, method="smooth")
     assert np.abs(found.points - rim).max() < 1e-14
     assert np.abs(np.abs(found.distances) - far).max() < 1e-14
+
+
+def test_two_triangles_of_a_coarse_bend_are_no_plane():
+    """Strips that go on smoothly into others nothing is known of: who knows how they bend."""
+    at = np.linspace(0.0, np.pi / 2, 3)
+    profile = [(-0.2, 1.0), *zip(np.sin(at), np.cos(at), strict=True), (1.0, -0.2)]
+    vertices = [(x, y, z) for x, z in profile for y in (0.0, 1.5)]
+    strips = [[k, k + 2, k + 3, k + 1] for k in range(0, 2 * len(profile) - 2, 2)]
+    triangles = [[q[0], *pair] for q in strips for pair in (q[1:3], q[2:4])]
+    assert not sp.Shell(vertices, triangles).faces
