@@ -246,14 +246,20 @@ bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, S
   // Regions of features overlap by this: no center is between two of them.
   const double gap = surface.gap(), t = std::clamp(out.t, kEnd, 1 - kEnd), middle = pull(t);
   const bool ahead = middle > 0;
-  const double end = ahead ? 1 - kEnd : kEnd, other = pull(end);
-  if (ahead ? other >= gap : other <= -gap) {
-    out.t = ahead ? 1 : 0, out.point = ahead ? q : p;
-  } else if (ahead ? other < 0 : other > 0) {
-    if (ahead)
-      find_rest(pull, t, end, middle, other);
-    else
-      find_rest(pull, end, t, other, middle);
+  const double end = ahead ? 1 - kEnd : kEnd;
+  // The first rest that way: in steps that double, as there may be several.
+  double from = t, to = t, last = middle, next = middle;
+  for (double step = 1.0 / 64; next != 0 && (next > 0) == ahead && to != end; step *= 2) {
+    from = to, last = next;
+    to = ahead ? std::min(end, to + step) : std::max(end, to - step);
+    next = pull(to);
+  }
+  if (next != 0 && (next > 0) == ahead) {
+    if (std::abs(next) >= gap) out.t = ahead ? 1 : 0, out.point = ahead ? q : p;
+  } else if (ahead && next < 0) {
+    find_rest(pull, from, to, last, next);
+  } else if (next > 0) {
+    find_rest(pull, to, from, next, last);
   }
   return true;
 }
