@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair
 
 
+_IDENTITY = np.eye(3)
+
+
 class Touch(NamedTuple):
     """Gap [m], effective masses [kg] along and across the normal, speed along it [m/s].
 
@@ -133,7 +136,7 @@ def _touches(
     mobilities = np.zeros((len(places), 3, 3))
     if v.size:
         mobilities = jacobians @ np.linalg.solve(mass_matrix(model, q), jacobians.swapaxes(1, 2))
-    tangents = np.eye(3) - normals[:, :, None] * normals[:, None, :]
+    tangents = _IDENTITY - normals[:, :, None] * normals[:, None, :]
     slips = np.linalg.eigvalsh(tangents @ mobilities @ tangents).max(axis=1)
     return [
         Touch(
