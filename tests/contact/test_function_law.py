@@ -274,3 +274,13 @@ def test_a_scenario_names_a_function_which_looking_does_not_execute(tmp_path) ->
     with pytest.raises(errors.ScenarioError, match="no such file") as caught:
         build(write(tmp_path, DROP.replace(LAW_LINE, STATED.replace("own", "other"))))
     assert caught.value.key == "contact.ball-plate.law.function"
+
+
+@pytest.mark.parametrize("rate", [0.0, 1e-9, -1e-5])
+def test_slopes_near_rest_are_not_those_of_rounding(rate) -> None:
+    """A law that is known to a micronewton has its damping at rest, too."""
+    law = python_law(lambda depth, speed, _: round(1e4 * depth - 500.0 * speed, 6), {})
+    scene = models.on_plate(models.slider(), law)
+    by_depth, by_rate = scene.contact_derivatives([0.049], [rate])
+    assert by_depth[0, 0] == pytest.approx(-1e4, rel=1e-2)
+    assert by_rate[0, 0] == pytest.approx(-500.0, rel=1e-2)

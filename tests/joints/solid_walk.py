@@ -189,7 +189,9 @@ def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str
             k = int(np.argmax(alone & (found.depths > tolerance)))
             return "phantom", f"{found.depths[k]} at {found.points[k].tolist()}"
         for k in np.flatnonzero(truth.depths > tolerance).tolist():
-            total = found.weights[same[k]].sum()
+            # The saddle between two that are nearly one is hardly shallower.
+            beside = (away[k] <= NEAR * r) & (apart[k] <= np.maximum(tolerance, 1e-6 * r))
+            total = found.weights[same[k] | (beside & ~plus)].sum()
             several = (truth.sure & same[:, same[k]].any(axis=1)).sum()
             if total > max(1, several):
                 return "double", f"weights {total} at {truth.points[k].tolist()}"

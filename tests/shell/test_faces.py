@@ -160,3 +160,26 @@ def test_the_caps_of_a_fine_sphere_do_not_cost_its_square():
         return time.process_time() - start
 
     assert cost(True) < 15 * cost(False)  # measured: 3; 80 without a bound
+
+
+def test_the_closest_point_of_a_rim_from_far_away():
+    """To a circle from up to six of its radii: there the distance bends far more than in a line."""
+    shell, rng = mesh(coal.Cylinder(0.1, 0.3), segments=24), np.random.default_rng(0)
+    turn, far = rng.uniform(0.0, 2 * np.pi, 200), rng.uniform(0.02, 0.6, 200)
+    tilt = rng.uniform(0.2, 1.3, 200)
+    around = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    rim = 0.1 * around + [0.0, 0.0, 0.15]
+    away = np.cos(tilt)[:, None] * around + np.sin(tilt)[:, None] * [0.0, 0.0, 1.0]
+    found = shell.closest_points(rim + far[:, None] * away, method="smooth")
+    assert np.abs(found.points - rim).max() < 1e-14
+    assert np.abs(np.abs(found.distances) - far).max() < 1e-14
+
+
+def test_two_triangles_of_a_coarse_bend_are_no_plane():
+    """Strips that go on smoothly into others nothing is known of: who knows how they bend."""
+    at = np.linspace(0.0, np.pi / 2, 3)
+    profile = [(-0.2, 1.0), *zip(np.sin(at), np.cos(at), strict=True), (1.0, -0.2)]
+    vertices = [(x, y, z) for x, z in profile for y in (0.0, 1.5)]
+    strips = [[k, k + 2, k + 3, k + 1] for k in range(0, 2 * len(profile) - 2, 2)]
+    triangles = [[q[0], *pair] for q in strips for pair in (q[1:3], q[2:4])]
+    assert not sp.Shell(vertices, triangles).faces

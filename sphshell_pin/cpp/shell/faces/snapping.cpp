@@ -86,11 +86,18 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
 void settle_on_faces(const Shell& shell, const Edge& edge, const Faces& faces, const Vec3& begin,
                      const Vec3& d, std::array<Vec3, 2>& offset) {
   if (faces.of.empty() || edge.kind == EdgeClass::Boundary) return;
+  const auto face_at = [&](int i) {
+    return faces.of_triangle(triangle_of(shell.topology().incidence[edge.begin + i]));
+  };
+  // Within a face the curve has the face's own normals at its ends, which it keeps.
+  bool border = false;
+  for (int i = 1; i < edge.count; ++i) border = border || face_at(i) != face_at(0);
+  if (!border) return;
   const std::array<Vec3, 2> before = offset;
   for (int round = 0; round < kMostRounds; ++round)
     for (const bool flat : {false, true})
       for (int i = 0; i < edge.count; ++i) {
-        const int face = faces.of_triangle(triangle_of(shell.topology().incidence[edge.begin + i]));
+        const int face = face_at(i);
         if (face < 0) continue;
         const Primitive& shape = faces.shapes[face];
         if ((shape.kind == FaceKind::Plane) != flat) continue;

@@ -69,11 +69,11 @@ double width_between(const Primitive& s, const std::vector<Vec3>& points) {
     angles.push_back(std::remainder(angle - first, 2 * M_PI));
     least = std::min(least, angles.back()), most = std::max(most, angles.back());
   }
+  // A ruling is an edge at least: of two points, not the tip of a triangle.
   const double same = kSameRuling * (most - least);
-  return std::all_of(angles.begin(), angles.end(),
-                     [&](double a) { return a - least < same || most - a < same; })
-             ? most - least
-             : 0;
+  std::size_t low = 0, high = 0;
+  for (const double angle : angles) low += angle - least < same, high += most - angle < same;
+  return low > 1 && high > 1 && low + high >= angles.size() ? most - least : 0;
 }
 
 }  // namespace
