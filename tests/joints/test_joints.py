@@ -49,7 +49,9 @@ def test_none_is_on_meshes_of_single_precision(part, tmp_path):
     assert_right(part, tmp_path, stl=True)
 
 
-@pytest.mark.parametrize("family", ["rounded_box", "mitre", "sharp_tray", "slots"])
+@pytest.mark.parametrize(
+    "family", ["rounded_box", "mitre", "unequal_mitre", "sharp_tray", "slots", "tee"]
+)
 def test_no_contact_is_lost_or_made_up_at_corners(family, tmp_path):
     verdict = walk_part(family, tmp_path, np.random.default_rng(0), most=1000)
     assert verdict.found() == {}

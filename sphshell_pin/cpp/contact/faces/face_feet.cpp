@@ -138,7 +138,9 @@ bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tol
   if (cell.side[k] == FaceCell::Side::Border) {
     const FaceJoint& joint = surface.faces().joints[cell.joint[k]];
     const bool crossing = joint.kind == FaceJoint::Kind::Crossing;
-    const double away = joint.across_of(cell.face).distance(crossing ? at.point : at.center);
+    Vec3 towards;
+    const double away =
+        joint.divide(surface.faces().shapes, cell.face, crossing ? at.point : at.center, towards);
     return !(cell.turn[k] * away < -tolerance);
   }
   const CubicCurve side = surface.facets()[f].side(facet, k);
@@ -170,8 +172,26 @@ bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
 
 namespace {
 
-// On the line of a face's parameters that divides two facets of it: where the distance stops
-// falling, by the rule of false position (Illinois). False if it has none.
+// Where a pull along a side turns from forward to backward, between low and high where it has both
+// signs: by the rule of false position (Illinois).
+template <class Pull>
+void find_rest(const Pull& pull, double low, double high, double first, double last) {
+  for (int i = 0, side = 0; i < 40; ++i) {
+    const double t = low + first / (first - last) * (high - low);
+    const double moved = std::min(t - low, high - t), here = pull(t);
+    if (here == 0 || !(moved > 1e-9)) break;
+    if (here > 0) {
+      low = t, first = here;
+      if (side > 0) last /= 2;
+    } else {
+      high = t, last = here;
+      if (side < 0) first /= 2;
+    }
+    side = here > 0 ? 1 : -1;
+  }
+}
+
+// On the line of a face's parameters that divides two facets of it. False if it has none.
 template <class Probe>
 bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideFoot& out) {
   const CurvedShell& surface = *shell.curved();
@@ -199,21 +219,41 @@ bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideF
         widens * dv * out_from_axis + radius * du * (c * north - s * east) + rises * dv * axis;
     return probe.pull(out.point).dot(out.tangent);
   };
-  double low = 0, high = 1, last = pull(1), first = pull(0);
+  const double last = pull(1), first = pull(0);
   if (!(first > 0)) return true;
   if (!(last < 0)) return pull(1), true;
-  for (int i = 0, side = 0; i < 40; ++i) {
-    const double t = low + first / (first - last) * (high - low);
-    const double moved = std::min(t - low, high - t), here = pull(t);
-    if (here == 0 || !(moved > 1e-9)) break;
-    if (here > 0) {
-      low = t, first = here;
-      if (side > 0) last /= 2;
-    } else {
-      high = t, last = here;
-      if (side < 0) first /= 2;
-    }
-    side = here > 0 ? 1 : -1;
+  find_rest(pull, 0, 1, first, last);
+  return true;
+}
+
+// On the crossing of two faces, whose points follow in closed form from those of the chord along
+// the rulings of one; from the cubic's closest point on. False where they do not follow.
+template <class Probe>
+bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, SideFoot& out) {
+  constexpr double kEnd = 1e-6;  // as near to an end that is tangent there is a direction
+  const CurvedShell& surface = *shell.curved();
+  const Faces& faces = surface.faces();
+  const FaceJoint& joint = faces.joints[surface.face_cells()[f].joint[k]];
+  if (joint.ruled() < 0) return false;
+  const Primitive& shape = faces.shapes[joint.face[joint.ruled()]];
+  const Vec3 &p = shell.facets()[f].corner[k], &q = shell.facets()[f].corner[next_corner(k)];
+  const double turn = shape.axis.cross(p - shape.point).dot(q - p) < 0 ? -1 : 1;
+  const auto pull = [&](double t) {
+    out.t = t, out.point = shape.onto(p + t * (q - p));
+    out.tangent = turn * joint.tangent_on_ruling(faces.shapes, out.point);
+    return probe.pull(out.point).dot(out.tangent);
+  };
+  // Regions of features overlap by this: no center is between two of them.
+  const double gap = surface.gap(), t = std::clamp(out.t, kEnd, 1 - kEnd), middle = pull(t);
+  const bool ahead = middle > 0;
+  const double end = ahead ? 1 - kEnd : kEnd, other = pull(end);
+  if (ahead ? other >= gap : other <= -gap) {
+    out.t = ahead ? 1 : 0, out.point = ahead ? q : p;
+  } else if (ahead ? other < 0 : other > 0) {
+    if (ahead)
+      find_rest(pull, t, end, middle, other);
+    else
+      find_rest(pull, end, t, other, middle);
   }
   return true;
 }
@@ -245,6 +285,7 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
     if (!border) return out;
   }
   const FaceJoint& joint = *known;
+  if (!closed && nearest_on_crossing(shell, f, k, probe, out)) return out;
   const std::vector<Primitive>& shapes = surface.faces().shapes;
   const Vec3 &p = shell.facets()[f].corner[k], &q = shell.facets()[f].corner[next_corner(k)];
   const Vec3 chord = q - p;

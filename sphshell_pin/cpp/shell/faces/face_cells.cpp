@@ -159,19 +159,23 @@ class CellMaker {
         if (!(std::abs(one.distance(end)) <= gap_ && std::abs(two.distance(end)) <= gap_))
           return -1;
       const CubicCurve side = facets_[f].side(facet, k);
+      std::vector<Vec3> points{p};
       for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85}) {
-        Vec3 both = side.point(s);
-        if (!onto_both(one, two, both)) return -1;
+        points.push_back(side.point(s));
+        if (!onto_both(one, two, points.back())) return -1;
       }
+      points.push_back(q);
       found.emplace();
       found->face[0] = a, found->face[1] = b;
       found->across[0] = two, found->across[1] = one;
+      find_branches(faces_.shapes, points, *found);
     }
     std::vector<int>& known = joints_[{a, b}];
     for (const int j : known) {
       const FaceJoint& it = faces_.joints[j];
-      if (it.kind == found->kind && (it.point - found->point).norm() <= gap_ &&
-          std::abs(it.radius - found->radius) <= gap_ &&
+      if (it.kind == found->kind && it.ends_tangent == found->ends_tangent &&
+          std::equal(it.branch, it.branch + 2, found->branch) &&
+          (it.point - found->point).norm() <= gap_ && std::abs(it.radius - found->radius) <= gap_ &&
           (it.kind != FaceJoint::Kind::Line || it.axis.cross(found->axis).norm() <= kMostGap))
         return j;
     }
@@ -206,7 +210,7 @@ class CellMaker {
         const int face = out_.of[f].face;
         Vec3 n, away;
         faces_.shapes[face].distance(on, n);
-        joint.across_of(face).distance(on, away);
+        joint.divide(faces_.shapes, face, on, away);
         outward[i] = out_.of[f].sign * n;
         turn[i] = outward[i].cross(q - p).dot(away) < 0 ? -1 : 1;
       }

@@ -30,11 +30,23 @@ struct FaceJoint {
   // closest point on the face is on that side of the border. Of crossings the other face, or the
   // plane that the curve lies in.
   Primitive across[2];
+  // Of crossings of cylinders and cones with quadrics, per face: which of the two points of its
+  // rulings on the other face the curve has; 0: the rulings do not tell.
+  std::int8_t branch[2] = {0, 0};
+  bool ends_tangent = false;  // the curve crosses itself at an end
 
   int which(int of_face) const { return of_face == face[0] ? 0 : 1; }
   const Primitive& across_of(int of_face) const { return across[tangent ? 0 : which(of_face)]; }
   // The point of a line or circle nearest to x.
   Vec3 nearest(const Vec3& x) const;
+  // How far a center (of crossings: a point of the face) is on one side of the border of a face,
+  // and about towards where.
+  double divide(const std::vector<Primitive>& shapes, int of_face, const Vec3& x, Vec3& away) const;
+  // The face of a crossing whose rulings give its points in closed form; -1: none.
+  int ruled() const { return branch[0] != 0 ? 0 : branch[1] != 0 ? 1 : -1; }
+  // Moves a point of that face along its ruling onto the curve, whose unit tangent is along the
+  // angle about the face's axis.
+  Vec3 tangent_on_ruling(const std::vector<Primitive>& shapes, Vec3& x) const;
   // How the border goes next to x.
   Intersection at(const std::vector<Primitive>& shapes, const Vec3& x) const;
 };
@@ -43,6 +55,10 @@ struct FaceJoint {
 // `gap` [m]. That it is one follows from their kinds and places and is never fitted.
 std::optional<FaceJoint> find_joint(const std::vector<Primitive>& shapes, int one, int other,
                                     const Vec3& p, const Vec3& q, double gap);
+
+// Finds out what the rulings tell of a crossing, whose points from one end to the other these are.
+void find_branches(const std::vector<Primitive>& shapes, const std::vector<Vec3>& points,
+                   FaceJoint& joint);
 
 // The point next to x where both shapes are zero. False where they do not cross there.
 bool onto_both(const Primitive& one, const Primitive& other, Vec3& x);
