@@ -56,9 +56,9 @@ def _is_sphere(center: npt.ArrayLike, radius: float) -> bool:
         type(center) is np.ndarray
         and center.dtype is _FLOAT64
         and center.shape == (3,)
-        and math.isfinite(center.dot(center))
         and isinstance(radius, float)
         and 0.0 < radius < math.inf
+        and center.dot(center) < math.inf  # not of nan
     )
 
 
@@ -98,7 +98,7 @@ class Queries(ShellBase):
         if gradient and number is Method.ELEMENTS:
             raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
         core = self.core_for(method)
-        shown, terms = core.contacts(center, radius, number.value, gradient)  # type: ignore[arg-type]
+        shown, terms = core.contacts(center, radius, number, gradient)  # type: ignore[arg-type]
         return ContactSet.from_rows(shown, terms, gradient, self.element_patch)
 
     def contacts_batch(
