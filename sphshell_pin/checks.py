@@ -34,6 +34,8 @@ def check_not_negative(name: str, value: object, unit: str = "") -> float:
 
 def check_finite(name: str, value: object) -> float:
     """Return `value` as a float; raise InvalidParameter unless it is one finite number."""
+    if type(value) is float and math.isfinite(value):
+        return value
     array = check_floats(name, value, "must be a number")
     if array.ndim:
         raise InvalidParameter(name, value, "must be one number")

@@ -47,6 +47,7 @@ def run(
     recording: Annotated[
         bool, option("Write recording.html.", "--recording/--no-recording")
     ] = True,
+    figures: Annotated[bool, option("Draw the figures.", "--figures/--no-figures")] = True,
     audit_cad: Annotated[
         bool,
         option(
@@ -71,6 +72,7 @@ def run(
             built,
             out,
             recording=recording,
+            figures=figures,
             audit_cad=audit_cad,
             progress=lambda fraction: update(completed=fraction),
         )

@@ -186,8 +186,8 @@ def _save(path: str | PathLike[str], arrays: dict[str, Array | Longs]) -> Path:
     return Path(path)
 
 
-def save_wear(maps: Sequence[WearMap], folder: str | PathLike[str]) -> None:
-    """Write wear.npz, the arrays of all maps, and wear.png into `folder`.
+def save_wear(maps: Sequence[WearMap], folder: str | PathLike[str], *, figure: bool = True) -> None:
+    """Write wear.npz, the arrays of all maps, and with `figure` wear.png into `folder`.
 
     Of several maps the names of the arrays begin with that of the shell. Raises MissingExtra
     without matplotlib.
@@ -197,8 +197,9 @@ def save_wear(maps: Sequence[WearMap], folder: str | PathLike[str]) -> None:
         prefix = "" if len(maps) == 1 else f"{one.shell.name}."
         arrays |= {f"{prefix}{name}": array for name, array in one.arrays().items()}
     _save(Path(folder) / "wear.npz", arrays)
-    figure = offered("sphshell_pin.plot.wear:plot_wear")(maps)
-    offered("sphshell_pin.plot.figure:write_figure")(Path(folder) / "wear.png", figure)
+    if figure:
+        drawn = offered("sphshell_pin.plot.wear:plot_wear")(maps)
+        offered("sphshell_pin.plot.figure:write_figure")(Path(folder) / "wear.png", drawn)
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin import _core
 from sphshell_pin.arrays import Array
+from sphshell_pin.checks import read_only
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized
 
@@ -33,10 +35,12 @@ class Method(IntEnum):
     @classmethod
     def from_name(cls, name: str) -> Method:
         """Look up "facets", "elements" or "smooth"; NameNotFound lists the valid ones."""
-        for method in cls:
-            if isinstance(name, str) and method.name.lower() == name:
-                return method
+        if isinstance(name, str) and name in _METHODS:
+            return _METHODS[name]
         raise NameNotFound("method", str(name), "the contact query", [m.name.lower() for m in cls])
+
+
+_METHODS = {method.name.lower(): method for method in Method}
 
 
 class ElasticLaw(Protocol):
@@ -77,6 +81,39 @@ class ContactSet(Summarized):
     weight: Array
     turn: Array | None = None
     summed: ContactSet | None = None
+
+    @classmethod
+    def from_rows(
+        cls, rows: bytes, terms: bytes | None, gradient: bool, patches: NDArray[np.int32]
+    ) -> ContactSet:
+        """Build from the core's rows of contacts, and of `terms` where these are more.
+
+        A column is made when it is first read. `patches` (m,) are those of the elements.
+        """
+        contacts = object.__new__(cls)
+        kept = contacts.__dict__
+        kept["_rows_of_core"], kept["_patches"] = rows, patches
+        if gradient:
+            kept["turn"] = _column(rows, "turn").reshape(-1, 3, 3)
+        if terms is not None:
+            kept["summed"] = cls.from_rows(terms, None, gradient, patches)
+        return contacts
+
+    def __getattr__(self, name: str) -> NDArray[np.generic]:
+        """Return a column that has not been read yet."""
+        kept = self.__dict__
+        if "_rows_of_core" not in kept or name not in _COLUMNS:
+            raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
+        if name == "patch":
+            column = read_only(kept["_patches"][self.element])
+        else:
+            column = _column(kept["_rows_of_core"], name)
+        kept[name] = column
+        return column
+
+    def __reduce__(self) -> tuple[type[ContactSet], tuple[object, ...]]:
+        """Pickle the columns, not what they are made of."""
+        return type(self), tuple(getattr(self, one.name) for one in fields(self))
 
     @property
     def terms(self) -> ContactSet:
@@ -144,3 +181,12 @@ class ContactSet(Summarized):
             np.einsum("k,kxy->xy", force, terms.turn)
             - np.einsum("k,kx,ky->xy", stiffness * terms.weight, terms.normal, terms.normal)
         )
+
+
+_ROW = np.dtype(_core.shell_contact_row_type())
+_COLUMNS = frozenset(("patch", *(_ROW.names or ())))
+
+
+def _column(rows: bytes, name: str) -> NDArray[np.generic]:
+    """Return a field of the core's rows."""
+    return read_only(np.ascontiguousarray(np.frombuffer(rows, _ROW)[name]))

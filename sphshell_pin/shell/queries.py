@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin.checks import (
@@ -18,7 +20,7 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.contact_set import ContactSet, Method
 from sphshell_pin.shell.options import thread_count
-from sphshell_pin.shell.raw import Bytes, Floats, Ints
+from sphshell_pin.shell.raw import Floats, Ints
 from sphshell_pin.summary import Summarized
 
 
@@ -45,7 +47,19 @@ class ClosestPoints(Summarized):
         return len(self.distances)
 
 
-Columns = tuple[Floats, Floats, Floats, Ints, Bytes, Floats, Floats]
+_FLOAT64 = np.dtype(np.float64)
+
+
+def _is_sphere(center: npt.ArrayLike, radius: float) -> bool:
+    """Whether both are sound as they are, which is found faster than what is wrong with them."""
+    return (
+        type(center) is np.ndarray
+        and center.dtype is _FLOAT64
+        and center.shape == (3,)
+        and isinstance(radius, float)
+        and 0.0 < radius < math.inf
+        and center.dot(center) < math.inf  # not of nan
+    )
 
 
 class Queries(ShellBase):
@@ -76,24 +90,16 @@ class Queries(ShellBase):
         InvalidParameter, NameNotFound
             If center or radius is out of range, or the method unknown.
         """
-        place = check_vector("center", center, 3, " [m]")
-        radius = check_positive("radius", radius, "m")
         number = Method.from_name(method)
+        if not _is_sphere(center, radius):
+            center = check_vector("center", center, 3, " [m]")
+            radius = check_positive("radius", radius, "m")
         gradient = check_flag("gradient", gradient)
         if gradient and number is Method.ELEMENTS:
             raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
-        shown, terms = self.core_for(method).contacts(place, radius, int(number), gradient)
-        summed = None if terms is None else self._contact_set(terms, gradient)
-        return self._contact_set(shown, gradient, summed)
-
-    def _contact_set(
-        self, columns: Columns, gradient: bool, summed: ContactSet | None = None
-    ) -> ContactSet:
-        point, normal, depth, element, feature, weight, turn = columns
-        for column in (*columns, patch := self.element_patch[element]):
-            read_only(column)
-        turned = turn if gradient else None
-        return ContactSet(point, normal, depth, element, patch, feature, weight, turned, summed)
+        core = self.core_for(method)
+        shown, terms = core.contacts(center, radius, number, gradient)  # type: ignore[arg-type]
+        return ContactSet.from_rows(shown, terms, gradient, self.element_patch)
 
     def contacts_batch(
         self,

@@ -9,7 +9,6 @@ import numpy as np
 
 from sphshell_pin import Shell
 
-NUMBERS = {"facets": 0, "smooth": 2}
 # Two centres this share of the radius apart are on two sides of a border of regions.
 WIDTH = 1e-12
 
@@ -52,12 +51,12 @@ class State:
 
 
 def state(shell: Shell, method: str, center: np.ndarray, radius: float) -> State:
-    shown, terms = shell.core_for(method).contacts(center, radius, NUMBERS[method])
-    point, _, depth, element, feature, weight, _ = shown if terms is None else terms
-    share = depth / radius
-    label = sorted(zip(element.tolist(), feature.tolist(), weight.tolist(), strict=True))
+    found = shell.contacts(center, radius, method).terms
+    share, weight = found.depth / radius, found.weight
+    columns = (found.element, found.feature, weight)
+    label = sorted(zip(*(column.tolist() for column in columns), strict=True))
     energy = float(weight @ share**2.5) / 2.5
-    return State(energy, float(np.abs(weight) @ share**1.5), label, point)
+    return State(energy, float(np.abs(weight) @ share**1.5), label, found.point)
 
 
 def jumps(shell, method, path, radius=1.0, limit=1e-9):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from OCP.STEPControl import STEPControl_Reader
@@ -13,14 +12,13 @@ import sphshell_pin as sp
 from sphshell_pin.arrays import Array
 from tests.joints.trimmed import Edge, Minima, TrimmedSolid
 from tests.joints.verdict import MM, Verdict, exact_elements
-from tests.joints.walk import BESIDE, DEPTHS, SMOOTH
+from tests.joints.walk import BESIDE, DEPTHS
 from tests.parts.cad_mesh import Ints
 from tests.parts.occ import Rng, Solid
 
 RADII = 0.2, 8.0
 """Of spheres [mm]."""
 
-ELEMENTS = 1
 NEAR = 1e-3
 """Points of one minimum are nearer than this to each other [radii]."""
 
@@ -123,12 +121,12 @@ def judge_solid(
     digits, rough : tolerances of depths on exact faces, beside 1e-10 r, and on other ones [mm]
     """
     truth = solid.minima(asked.centers, asked.radii)
-    core, exact = shell.core_for("smooth"), exact_elements(shell)
+    exact = exact_elements(shell)
     out = Verdict(name, asked.centers * MM, asked.radii * MM, asked.joints)
     for row, (center, r) in enumerate(zip(asked.centers, asked.radii.tolist(), strict=True)):
-        shown, terms = core.contacts(center * MM, r * MM, SMOOTH)
-        point, normal, depth, element, _, weight, _ = shown if terms is None else terms
-        found = Found(point / MM, normal, depth / MM, weight)
+        terms = shell.contacts(center * MM, r * MM).terms
+        element = terms.element
+        found = Found(terms.point / MM, terms.normal, terms.depth / MM, terms.weight)
         for strict in (True, False):
             fault, detail = _fault(truth[row], found, r, 1e-10 * r + digits if strict else rough)
             if not fault:
@@ -137,7 +135,7 @@ def judge_solid(
             if strict:
                 near = [truth[row].points] if len(truth[row].points) else []
                 places = np.concatenate([*near, found.points])
-                elements = [element, *(_elements_at(core, p, rough) for p in places)]
+                elements = [element, *(_elements_at(shell, p, rough) for p in places)]
                 if exact[np.concatenate(elements)].all():
                     break
         if fault:
@@ -155,9 +153,8 @@ class Found:
     weights: Array
 
 
-def _elements_at(core: Any, point: Array, radius: float) -> Ints:
-    found: Ints = core.contacts(point * MM, radius * MM, ELEMENTS)[0][3]
-    return found
+def _elements_at(shell: sp.Shell, point: Array, radius: float) -> Ints:
+    return shell.contacts(point * MM, radius * MM, "elements").element
 
 
 def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str, str]:

@@ -12,7 +12,6 @@ from tests.joints.solids import Part
 from tests.joints.verdict import MM, Verdict, exact_elements
 from tests.parts.occ import Rng
 
-SMOOTH = 2
 RADII = 0.2e-3, 20e-3
 """Of spheres [m]."""
 
@@ -124,7 +123,7 @@ def judge(
     exact : tolerance of depths on exact faces [radii], beside that of the `digits` of the file [m]
     rough : tolerance of depths on other faces [m]
     """
-    kinds, names, core = kinds_of(part), joints_of(part), shell.core_for("smooth")
+    kinds, names = kinds_of(part), joints_of(part)
     truth = part.profile.truth(asked.flat, asked.radii / MM)
     strict, known = exact_pieces(shell, part), exact_elements(shell)
     joints = [names[k] for k in asked.joint.tolist()]
@@ -136,8 +135,8 @@ def judge(
     less = part.profile.truth(asked.flat, asked.radii / MM - hair).count
     most = np.maximum(np.maximum(more, less), truth.count)
     for row, (center, radius) in enumerate(zip(asked.centers, asked.radii.tolist(), strict=True)):
-        shown, terms = core.contacts(center, radius, SMOOTH)
-        _, normal, depth, element, _, weight, _ = shown if terms is None else terms
+        terms = shell.contacts(center, radius).terms
+        normal, depth, element, weight = terms.normal, terms.depth, terms.element, terms.weight
         deepest, tolerance = truth.depth[row] * MM, tolerances[row]
         if len(depth) == 0:
             if deepest > tolerance:

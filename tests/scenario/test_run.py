@@ -3,6 +3,8 @@
 import csv
 import json
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from sphshell_pin.errors import (
     ScenarioError,
     SimulationDiverged,
 )
-from sphshell_pin.scenario import build, run_built, run_scenario
+from sphshell_pin.scenario import build, explain_built, run_built, run_scenario
 from sphshell_pin.scenario.running.figures import figure_names, measuring
 from tests.scenario.files import DROP, write
 
@@ -23,6 +25,31 @@ from tests.scenario.files import DROP, write
 @pytest.fixture
 def built(tmp_path, no_pictures):
     return build(write(tmp_path))
+
+
+def test_a_run_without_figures_writes_all_else_and_imports_no_matplotlib(tmp_path):
+    program = (
+        "import sys; from sphshell_pin.scenario import run_scenario; "
+        "run_scenario(sys.argv[1], sys.argv[2], recording=False, figures=False); "
+        "assert 'matplotlib' not in sys.modules"
+    )
+    path, out = write(tmp_path), tmp_path / "out"
+    subprocess.run([sys.executable, "-c", program, path, out], check=True)
+    assert {"run.npz", "contacts.csv", "summary.json"} == set(os.listdir(out))
+
+
+def test_figures_of_an_earlier_run_go_with_its_numbers(tmp_path):
+    built, out = build(write(tmp_path)), tmp_path / "out"
+    run_built(built, out, recording=False)
+    assert "energy.png" in os.listdir(out)
+    run_built(built, out, recording=False, figures=False)
+    assert not [name for name in os.listdir(out) if name.endswith(".png")]
+
+
+def test_rows_beyond_a_million_are_announced_by_explain(tmp_path):
+    changes = {"run.duration": "4000", "run.dt": "1e-3", "run.record_dt": "1e-3"}
+    said = explain_built(build(write(tmp_path), changes)).warnings
+    assert [one for one in said if "4e+06 rows" in one]
 
 
 def test_the_folder_holds_what_was_computed(tmp_path):

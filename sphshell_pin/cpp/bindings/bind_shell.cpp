@@ -1,10 +1,12 @@
 #include <algorithm>
+#include <cstddef>
 #include <memory>
 #include <optional>
 
 #include "bindings/arrays.hpp"
 #include "bindings/gil.hpp"
 #include "bindings/own_errors.hpp"
+#include "bindings/records.hpp"
 #include "contact/query/query.hpp"
 #include "shell/curved/curved.hpp"
 #include "shell/in_parallel.hpp"
@@ -47,25 +49,37 @@ std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& tria
                                  crease_angle, static_cast<Side>(side), cad);
 }
 
-// Points, normals, depths, elements, features, weights, and dn_dc where asked for.
-nb::tuple columns(const std::vector<Contact>& contacts, bool dn_dc) {
-  const std::size_t k = contacts.size();
-  std::vector<double> point, normal, depth, weight, slope;
-  std::vector<int> element;
-  std::vector<std::uint8_t> feature;
-  for (const Contact& c : contacts) {
-    append(point, c.point);
-    append(normal, c.normal);
-    depth.push_back(c.depth);
-    element.push_back(c.element);
-    feature.push_back(static_cast<std::uint8_t>(c.feature));
-    weight.push_back(c.weight);
-    for (int k = 0; dn_dc && k < 3; ++k) append(slope, c.dn_dc.row(k));
+// A contact as Python reads it; dn_dc is zero unless it was asked for.
+struct ShellContactRow {
+  double point[3], normal[3], depth, weight, turn[9];
+  std::int32_t element;
+  Feature feature;
+};
+
+constexpr RowField kShellContactFields[] = {
+    {"point", "f8", 3, offsetof(ShellContactRow, point)},
+    {"normal", "f8", 3, offsetof(ShellContactRow, normal)},
+    {"depth", "f8", 1, offsetof(ShellContactRow, depth)},
+    {"element", "i4", 1, offsetof(ShellContactRow, element)},
+    {"feature", "u1", 1, offsetof(ShellContactRow, feature)},
+    {"weight", "f8", 1, offsetof(ShellContactRow, weight)},
+    {"turn", "f8", 9, offsetof(ShellContactRow, turn)},
+};
+
+nb::bytes contact_rows(const std::vector<Contact>& contacts, bool dn_dc) {
+  std::vector<ShellContactRow> rows(contacts.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Contact& c = contacts[i];
+    ShellContactRow& row = rows[i];
+    Eigen::Map<Vec3>(row.point) = c.point;
+    Eigen::Map<Vec3>(row.normal) = c.normal;
+    row.depth = c.depth;
+    row.weight = c.weight;
+    for (int k = 0; dn_dc && k < 3; ++k) Eigen::Map<Vec3>(row.turn + 3 * k) = c.dn_dc.row(k);
+    row.element = c.element;
+    row.feature = c.feature;
   }
-  return nb::make_tuple(to_array(std::move(point), {k, 3}), to_array(std::move(normal), {k, 3}),
-                        to_array(std::move(depth)), to_array(std::move(element)),
-                        to_array(std::move(feature)), to_array(std::move(weight)),
-                        to_array(std::move(slope), {dn_dc ? k : 0, 3, 3}));
+  return nb::bytes(rows.data(), rows.size() * sizeof(ShellContactRow));
 }
 
 // The Python face has made the curved elements before it asks for them.
@@ -76,16 +90,19 @@ Method checked_method(const Shell& shell, int number) {
   return method;
 }
 
+using Place = nb::ndarray<const double, nb::shape<3>, nb::device::cpu>;
+
 // The contacts as shown, and those that are summed, where these are more.
-nb::tuple contacts(const Shell& shell, const Vec3& center, double radius, int method, bool dn_dc) {
+nb::tuple contacts(const Shell& shell, const Place& at, double radius, int method, bool dn_dc) {
+  const Vec3 center(at(0), at(1), at(2));
   const Method how = checked_method(shell, method);
   Query query;
   if (dn_dc) query.want_dn_dc();
   std::vector<Contact> shown;
   merge_groups(query.find(shell, center, radius, how), center, radius, shown);
   const bool same = shown.size() == query.contacts.size();
-  return nb::make_tuple(columns(shown, dn_dc),
-                        same ? nb::object(nb::none()) : columns(query.contacts, dn_dc));
+  return nb::make_tuple(contact_rows(shown, dn_dc),
+                        same ? nb::object(nb::none()) : contact_rows(query.contacts, dn_dc));
 }
 
 constexpr std::size_t kGrain = 64;  // fewer queries are not worth a thread
@@ -286,6 +303,7 @@ Array<std::uint8_t> normals_set_aside(const Shell& shell) {
 void bind_shell(nanobind::module_& m) {
   using namespace sphshell;
   // Behind the Shell of Python, which has read, checked and triangulated the surface.
+  m.def("shell_contact_row_type", [] { return row_type<ShellContactRow>(kShellContactFields); });
   nb::class_<Shell> shell(m, "Shell");
   shell
       .def(nb::new_(&make_shell), "vertices"_a, "triangles"_a, "triangle_element"_a,

@@ -50,6 +50,8 @@ _DIVERGED, _STUCK = 2, 3
 # Python looks up this often [s] while compiled code runs: progress, Ctrl-C.
 GLANCE = 0.05
 _MOST_STEPS = 2.0**31 - 1
+# More rows than these are announced before a run.
+_MANY_ROWS = 1_000_000
 # The compiled loop gives up beyond this position [m or rad].
 _FARTHEST = 1e12
 
@@ -74,7 +76,7 @@ def start_run(
 
     `prepare` is called with it before its first row is recorded. With `warn`, a law that cannot
     stop its sphere causes a WeakLawWarning, and a controller whose parameters are probably a
-    mistake, or steps that are longer than recommended, a SetupWarning.
+    mistake, steps that are longer than recommended, or more than a million rows, a SetupWarning.
     """
     resumed = None
     if isinstance(q0, RunState):
@@ -88,6 +90,9 @@ def start_run(
     if warn and isinstance(controller, Controller):
         for text in controller._setup_warnings(scene, q):
             warnings.warn(text, SetupWarning, stacklevel=3)
+    rows = many_rows(integrator, duration, record_dt) if warn else None
+    if rows is not None:
+        warnings.warn(rows, SetupWarning, stacklevel=3)
     settings = run_settings(
         scene, integrator, duration, hold, record_dt=record_dt, record=record, t0=t0
     )
@@ -105,6 +110,21 @@ def start_run(
     if deep is not None:
         raise deep_start(scene, *deep)
     return core
+
+
+def many_rows(integrator: Integrator, duration: float, record_dt: object) -> str | None:
+    """Say so where a run of `duration` [s] would record more than a million rows.
+
+    How many those of a variable step without `record_dt` [s] are is not known before.
+    """
+    stated = 0.0 if record_dt is None else check_positive("record_dt", record_dt, "s")
+    between = max(stated, step_of(integrator))
+    if between == 0 or duration / between <= _MANY_ROWS:
+        return None
+    return (
+        f"the run will record {duration / between:.3g} rows, one every {between:.3g} s, and keep "
+        f"them in memory: record_dt = {duration / 1e4:.1g} s gives ten thousand"
+    )
 
 
 def run_settings(

@@ -118,8 +118,9 @@ class Simulation(Summarized):
         with their touch. A controller is then asked at states nearby as well, so that one with a
         memory, or that reads sensors, cannot be taken.
 
-        A law that cannot stop its sphere earns a WeakLawWarning; a path off its shell, and steps of
-        SemiImplicitEuler that are longer than `Scene.explain` recommends, a SetupWarning.
+        A law that cannot stop its sphere earns a WeakLawWarning; a path off its shell, steps of
+        SemiImplicitEuler that are longer than `Scene.explain` recommends, and more than a million
+        rows, a SetupWarning.
 
         Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.

@@ -11,15 +11,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from sphshell_pin import _core
 from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
-from sphshell_pin.dynamics.scene.models import beyond_limits, mass_matrix, unit_warning
-from sphshell_pin.dynamics.scene.sources import checked_source
+from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
+from sphshell_pin.dynamics.scene.touches import Touch, touches_at
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair
@@ -214,9 +213,15 @@ def _names(names: list[str]) -> str:
 
 def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:
     """Work out the explanation of each pair of `scene` at q (nq,), v (nv,)."""
-    data, matrix = _mass_at(scene, q, v)
-    gravity = float(np.linalg.norm(scene.model.gravity.linear))
-    return tuple(_explain_pair(scene, pair, data, matrix, v, gravity) for pair in scene.pairs)
+    pairs = scene.pairs
+    if not pairs:
+        return ()
+    model = scene.model
+    gravity = float(np.linalg.norm(model.gravity.linear))
+    touches = touches_at(model, pairs, q, v)
+    return tuple(
+        _explain_pair(pair, touch, gravity) for pair, touch in zip(pairs, touches, strict=True)
+    )
 
 
 def _with_curvature(pair: ContactPair, figures: PairExplanation) -> PairExplanation:
@@ -263,74 +268,12 @@ def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
     )
 
 
-def _mass_at(scene: Scene, q: Array, v: Array) -> tuple[pin.Data, Array]:
-    """Return the data with placements and Jacobians, and the mass matrix (nv, nv)."""
-    model = scene.model
-    data = model.createData()
-    pin.forwardKinematics(model, data, q, v)
-    pin.computeJointJacobians(model, data, q)
-    return data, mass_matrix(model, q)
-
-
-@dataclass(frozen=True)
-class _Touch:
-    """Where a pair touches, or would: in the world."""
-
-    gap: float
-    point: Array
-    normal: Array
-
-
-def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
-    pose_i = data.oMi[pair.joint_i] * pair.placement_i
-    pose_j = data.oMi[pair.joint_j] * pair.placement_j
-    if pair.find is not None:
-        points, normals, depths = checked_source(pair.find, pair.name)(pose_i, pose_j)
-        if not len(depths):
-            return None
-        deepest = int(np.argmax(depths))
-        return _Touch(-float(depths[deepest]), points[deepest], normals[deepest])
-    center = pose_i.translation
-    if pair.other_sphere is not None and pair.sphere is not None:
-        away = center - pose_j.translation
-        length = float(np.linalg.norm(away))
-        normal = away / length if length > 0 else np.array([0.0, 0.0, 1.0])
-        point = pose_j.translation + pair.other_sphere.radius * normal
-        return _Touch(length - pair.other_sphere.radius - pair.sphere.radius, point, normal)
-    if pair.plane is not None and pair.shell is not None:
-        over = pose_i.actInv(pose_j)  # the shell from the plane
-        heights = pair.shell.vertices @ over.rotation[2] + over.translation[2]
-        lowest = int(np.argmin(heights))
-        point = pose_j.act(pair.shell.vertices[lowest])
-        return _Touch(float(heights[lowest]), point, -pose_i.rotation[:, 2])
-    if pair.sphere is None or pair.shell is None:
-        return None
-    at = pair.shell.closest_points(pose_j.actInv(center)[None], method=pair.method)
-    distance = float(at.distances[0])
-    signed = {"both": abs(distance), "outside": distance, "inside": -distance}[pair.shell.side]
-    point = pose_j.act(at.points[0])
-    away = center - point
-    length = float(np.linalg.norm(away))
-    normal = away / length if length > 0 else pose_j.rotation @ at.normals[0]
-    return _Touch(signed - pair.sphere.radius, point, normal)
-
-
-def _explain_pair(
-    scene: Scene, pair: ContactPair, data: pin.Data, matrix: Array, v: Array, gravity: float
-) -> PairExplanation:
+def _explain_pair(pair: ContactPair, touch: Touch | None, gravity: float) -> PairExplanation:
     gap = mass = slip_mass = speed = math.nan
-    touch = _touch_of(pair, data)
     if touch is not None:
-        gap = touch.gap
-        jacobian = _point_jacobian(scene, data, pair.joint_i, touch.point) - _point_jacobian(
-            scene, data, pair.joint_j, touch.point
-        )
-        mobility = jacobian @ np.linalg.solve(matrix, jacobian.T) if v.size else np.eye(3) * 0
-        mass = _mass(float(touch.normal @ mobility @ touch.normal))
-        tangent = np.eye(3) - np.outer(touch.normal, touch.normal)
-        slip_mass = _mass(float(np.linalg.eigvalsh(tangent @ mobility @ tangent).max()))
+        gap, mass, slip_mass, closing = touch
         fall = math.sqrt(2 * gravity * max(gap, 0.0))
-        speed = max(abs(float(touch.normal @ jacobian @ v)), fall) or DEFAULT_SPEED
+        speed = max(closing, fall) or DEFAULT_SPEED
     law = pair.plane_law
     weight = mass * gravity
     load = depth = contact_time = resting_depth = limit = math.nan
@@ -347,7 +290,7 @@ def _explain_pair(
         times.append(pair.friction.slip_time(slip_mass, load, _disc(pair, max(depth, -gap))))
     return PairExplanation(
         name=pair.name,
-        modelled=_components(pair),
+        modelled=pair.modelled,
         gap=gap,
         effective_mass=mass,
         approach_speed=speed,
@@ -364,43 +307,6 @@ def _disc(pair: ContactPair, depth: float) -> float:
     """Return the radius [m] of the disc of contact at this depth, nan of a source."""
     curvature = sum(1 / one.radius for one in pair.spheres)
     return math.sqrt(depth / curvature) if curvature and depth > 0 else math.nan
-
-
-def _mass(mobility: float) -> float:
-    return 1 / mobility if mobility > 1e-12 else math.nan
-
-
-def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> Array:
-    """Jacobian (3, nv) of the velocity of the world point `point` as fixed to `joint`."""
-    if joint == 0:
-        return np.zeros((3, scene.model.nv))
-    jacobian = pin.getJointJacobian(scene.model, data, joint, pin.WORLD).reshape(6, -1)
-    moved: Array = jacobian[:3] - pin.skew(point) @ jacobian[3:]
-    return moved
-
-
-def _components(pair: ContactPair) -> tuple[str, ...]:
-    shell, frame_i, frame_j = pair.shell, pair.frame_i, pair.frame_j
-    bodies = [
-        f"sphere of radius {one.radius * 1e3:.4g} mm on frame '{one.frame}'"
-        for one in (pair.sphere, pair.other_sphere)
-        if one is not None
-    ]
-    lines = []
-    if shell is not None:
-        bodies = bodies or [f"plane on frame '{frame_i}'"]
-        bodies.append(f"shell '{shell.name}' on frame '{frame_j}'")
-        moving = "moves with its frame" if pair.joint_j else "does not move: no wrench on its side"
-        lines.append(
-            f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
-            f"side '{shell.side}', method '{pair.method}'; the shell {moving}"
-        )
-    own = f"contact points of the user's own routine between frames '{frame_i}' and '{frame_j}'"
-    friction = "no friction: no tangential force is computed"
-    if pair.friction is not None:
-        friction = f"friction: {pair.friction.text}"
-    first = " against ".join(bodies) or own
-    return first, *lines, f"normal force: {pair.law.text}", friction
 
 
 def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:

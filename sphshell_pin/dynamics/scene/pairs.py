@@ -99,7 +99,7 @@ class ContactPair(Summarized):
             for label, text in zip(labels, self.shown[1:], strict=True)
         ]
 
-    @property
+    @cached_property
     def plane_law(self) -> NormalLaw:
         """The law, and of one that follows the curvature of the shell that of a plane shell."""
         if not self.law.needs_shape:
@@ -115,7 +115,7 @@ class ContactPair(Summarized):
             return "plane-shell"
         return "sphere-shell" if self.other_sphere is None else "sphere-sphere"
 
-    @property
+    @cached_property
     def spheres(self) -> tuple[PlacedSphere, ...]:
         """The spheres of this pair: one, two, or none of a source."""
         out = []
@@ -125,7 +125,7 @@ class ContactPair(Summarized):
             out.append(PlacedSphere(self.joint_j, self.placement_j, self.other_sphere.radius))
         return tuple(out)
 
-    @property
+    @cached_property
     def least_radius(self) -> float:
         """The radius of the smallest of `spheres` [m], nan without any."""
         return min((one.radius for one in self.spheres), default=math.nan)
@@ -190,6 +190,33 @@ class ContactPair(Summarized):
             self.law.text,
             ("none" if self.friction is None else self.friction.text),
         )
+
+    @cached_property
+    def modelled(self) -> tuple[str, ...]:
+        """What is modeled of this pair, in sentences."""
+        shell, frame_i, frame_j = self.shell, self.frame_i, self.frame_j
+        bodies = [
+            f"sphere of radius {one.radius * 1e3:.4g} mm on frame '{one.frame}'"
+            for one in (self.sphere, self.other_sphere)
+            if one is not None
+        ]
+        lines = []
+        if shell is not None:
+            bodies = bodies or [f"plane on frame '{frame_i}'"]
+            bodies.append(f"shell '{shell.name}' on frame '{frame_j}'")
+            moving = (
+                "moves with its frame" if self.joint_j else "does not move: no wrench on its side"
+            )
+            lines.append(
+                f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
+                f"side '{shell.side}', method '{self.method}'; the shell {moving}"
+            )
+        own = f"contact points of the user's own routine between frames '{frame_i}' and '{frame_j}'"
+        friction = "no friction: no tangential force is computed"
+        if self.friction is not None:
+            friction = f"friction: {self.friction.text}"
+        first = " against ".join(bodies) or own
+        return first, *lines, f"normal force: {self.law.text}", friction
 
     def _bind(self) -> _core.Pair:
         """Build the C++ binding of this pair."""

@@ -26,6 +26,7 @@ from sphshell_pin.dynamics.control.controllers import (
     PythonFunction,
     ShellPlace,
 )
+from sphshell_pin.dynamics.run.advance import many_rows
 from sphshell_pin.dynamics.scene.explain import Explanation
 from sphshell_pin.dynamics.sensing.sensors import Sensor, check_sensors
 from sphshell_pin.errors import (
@@ -257,7 +258,10 @@ def explain_built(built: Built) -> Explanation:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
     said = built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
     assumed = tuple(one.assumed for one in built.assembly.loaded if one.assumed)
-    said = replace(said, modelled=(*said.modelled, *assumed))
+    run = built.scenario.run
+    rows = many_rows(built.simulation.integrator, run.duration, run.record_dt)
+    told = said.warnings if rows is None else (*said.warnings, rows)
+    said = replace(said, modelled=(*said.modelled, *assumed), warnings=told)
     if not isinstance(built.controller, Controller):
         return said
     setup = built.controller._setup_warnings(built.scene, built.q0)

@@ -87,6 +87,7 @@ def run_scenario(
     *,
     changes: Mapping[str, str] | None = None,
     recording: bool = True,
+    figures: bool = True,
     audit_cad: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> RunReport:
@@ -95,7 +96,9 @@ def run_scenario(
     `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
     interrupted or diverged run is written like any other, and `stopped` says so; where the folder
     has the results of a complete run, it is written to the subfolder `stopped`. Files take the
-    place of an earlier run's all at once, when all are on disk (see `sphshell_pin.atomic`). With
+    place of an earlier run's all at once, when all are on disk (see `sphshell_pin.atomic`). Without
+    `recording` or `figures` no recording.html or no pictures are made, which take most of the time
+    of a short run. With
     `audit_cad` each contact with a CAD surface is compared with that on the exact faces (see
     `scenario.audit`).
 
@@ -111,7 +114,9 @@ def run_scenario(
         On Ctrl-C while the results are written; its text says so if they are there.
     """
     built = build(name, changes)
-    return run_built(built, out, recording=recording, audit_cad=audit_cad, progress=progress)
+    return run_built(
+        built, out, recording=recording, figures=figures, audit_cad=audit_cad, progress=progress
+    )
 
 
 def run_built(
@@ -119,6 +124,7 @@ def run_built(
     out: str | PathLike[str] | None = None,
     *,
     recording: bool = True,
+    figures: bool = True,
     audit_cad: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> RunReport:
@@ -143,7 +149,7 @@ def run_built(
             write_contacts(staging / "contacts.csv", result, audit)
             if result.sensors:
                 write_sensors(staging / "sensors.csv", result)
-            interrupted = _draw(built, result, staging, notes, recording=recording)
+            interrupted = _draw(built, result, staging, notes, recording=recording, figures=figures)
             _write_summary(staging, built, result, verdicts, stopped, audit)
             files = tuple(folder / name for name in RESULTS if (staging / name).exists())
             if folder / RECORDING not in files and (folder / RECORDING).exists():
@@ -252,7 +258,13 @@ def _holds_complete(folder: Path) -> bool:
 
 
 def _draw(
-    built: Built, result: Result, staging: Path, notes: list[str], *, recording: bool
+    built: Built,
+    result: Result,
+    staging: Path,
+    notes: list[str],
+    *,
+    recording: bool,
+    figures: bool,
 ) -> bool:
     """Write the pictures; note which of them cannot be made, as the numbers matter more.
 
@@ -269,16 +281,16 @@ def _draw(
         if scenario.run.wear is not None:
             from sphshell_pin.patches.wear import save_wear, wear_maps
 
-            save_wear(wear_maps(result, scenario.run.wear, built.scene), staging)
+            maps = wear_maps(result, scenario.run.wear, built.scene)
+            save_wear(maps, staging, figure=figures)
 
-    writers: dict[str, Callable[[], object]] = {
-        "figures": lambda: result.save_figures(staging, built.scene),
-        "wear": write_wear,
-        RECORDING: write_recording,
-    }
+    writers: dict[str, Callable[[], object]] = {}
+    if figures:
+        writers["figures"] = lambda: result.save_figures(staging, built.scene)
+    writers["wear"] = write_wear
+    if recording:
+        writers[RECORDING] = write_recording
     for what, write in writers.items():
-        if what == RECORDING and not recording:
-            continue
         try:
             write()
         except KeyboardInterrupt:

@@ -1,0 +1,84 @@
+"""The columns of a contact query: made when they are read, and the same however it is asked."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.shell.contact_set import ContactSet
+from tests import meshes
+
+RADIUS = 0.3
+
+
+@pytest.fixture(scope="module")
+def shell() -> sp.Shell:
+    return sp.Shell(*meshes.cube(), crease_angle=0.5)
+
+
+def at_a_corner(shell: sp.Shell) -> np.ndarray:
+    return np.asarray(shell.vertices.max(axis=0)) + 0.1
+
+
+def columns_of(contacts: ContactSet) -> list[object]:
+    return [getattr(contacts, one.name) for one in fields(contacts)]
+
+
+@pytest.mark.parametrize("method", ["smooth", "facets", "elements"])
+@pytest.mark.parametrize("away", [0.0, 9.0])
+def test_all_ways_to_give_a_sphere_have_the_same_bits(shell, method, away) -> None:
+    center = at_a_corner(shell) + away
+    wide = np.repeat(center, 2)[::2]
+    expected = columns_of(shell.contacts(center, RADIUS, method))
+    for place in (center.tolist(), tuple(center), wide, center.astype(">f8")):
+        for radius in (RADIUS, np.float64(RADIUS), np.array(RADIUS)):
+            found = columns_of(shell.contacts(place, radius, method))
+            np.testing.assert_equal(found, expected)
+
+
+def test_columns_are_contiguous_and_only_to_be_read(shell) -> None:
+    found = shell.contacts(at_a_corner(shell), RADIUS, gradient=True)
+    for column in columns_of(found):
+        if column is not None:
+            assert isinstance(column, np.ndarray)
+            assert column.flags.c_contiguous
+            assert not column.flags.writeable
+    assert found.turn is not None
+    assert found.turn.shape == (len(found), 3, 3)
+    assert np.array_equal(found.patch, shell.element_patch[found.element])
+    with pytest.raises(AttributeError, match="no attribute 'depths'"):
+        _ = found.depths
+
+
+@pytest.mark.parametrize("gradient", [False, True])
+@pytest.mark.parametrize("away", [0.0, 9.0])
+def test_contacts_that_nobody_has_read_are_copied_and_pickled(shell, gradient, away) -> None:
+    found = shell.contacts(at_a_corner(shell) + away, RADIUS, gradient=gradient)
+    others = copy.copy(found), copy.deepcopy(found), pickle.loads(pickle.dumps(found))
+    for other in others:
+        np.testing.assert_equal(columns_of(other), columns_of(found))
+
+
+@pytest.mark.parametrize(
+    ("center", "radius"),
+    [
+        ([0.0, 0.0, np.nan], RADIUS),
+        (np.array([0.0, 0.0, np.inf]), RADIUS),
+        (np.zeros(4), RADIUS),
+        (np.zeros((1, 3)), RADIUS),
+        (np.zeros(3, dtype=complex), RADIUS),
+        (np.ma.masked_array(np.zeros(3), [True, False, False]), RADIUS),
+        (np.zeros(3), 0.0),
+        (np.zeros(3), np.nan),
+        (np.zeros(3), np.inf),
+        (np.zeros(3), True),
+    ],
+)
+def test_what_is_no_sphere_is_refused(shell, center, radius) -> None:
+    with pytest.raises(sp.InvalidParameter):
+        shell.contacts(center, radius)
