@@ -327,6 +327,8 @@ void Components::find_saddles(const Shell& shell, const Probe& probe, bool want_
         candidate.kind == SaddleCandidate::Kind::Side
             ? on_side(shell, candidate.facet, candidate.side, candidate.t, probe, want_dn_dc)
             : minima[candidate.minimum];
+    // At the moment at which it is as far as the radius, to rounding.
+    if (!(saddle.contact.depth > 0)) continue;
     // Force and energy of a saddle are subtracted; so is the derivative of its normal, which dn_dc
     // holds with the weight.
     saddle.contact.weight = -1;
