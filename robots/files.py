@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
+import re
 import tempfile
 import xml.etree.ElementTree as ET
 from collections import defaultdict
@@ -87,7 +88,11 @@ def read(
         else:
             text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
-        raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
+        reason = _line(error)
+        argument = re.search(r"Undefined substitution argument (\w+)", reason)
+        if argument is not None:
+            reason += f": give it, --xacro-arg {argument[1]}=VALUE (xacro_args in a scenario)"
+        raise RobotError(f"{file}: not a URDF that can be read: {reason}") from None
     return described(text, folders, free_flyer=free_flyer)
 
 

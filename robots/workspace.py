@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.regular_file import open_regular
 from sphshell_pin.robots.files import build_model, read
 from sphshell_pin.robots.inertia import mass_fault
 
@@ -68,7 +69,7 @@ def _candidates(folder: Path) -> Iterator[Path]:
             if file.suffix not in (".urdf", ".xacro", ".xml") or "macro" in name:
                 continue
             try:
-                with file.open("rb") as opened:
+                with open_regular(file) as opened:
                     head = opened.read(_HEAD)
             except OSError:
                 continue

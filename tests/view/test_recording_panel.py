@@ -201,7 +201,7 @@ def test_cameras(page):
 @pytest.mark.browser
 def test_switches_hide_what_they_name(page):
     labels = page.locator("#parts label").all_inner_texts()
-    assert " ".join(labels) == "Robot Spheres Arrows Points Path Wireframe"
+    assert " ".join(labels) == "Robot Spheres Arrows Points Path Wireframe Grid"
     visible = "viewer.scene_tree.find(['meshcat', 'spheres']).object.visible"
     box = page.locator("#parts label", has_text="Spheres").locator("input")
     box.uncheck()
