@@ -6,7 +6,7 @@
 namespace sphshell {
 namespace {
 
-using Vec2 = Eigen::Vector2d;
+using Planar = Eigen::Vector2d;
 
 constexpr int kMostRepeats = 12;
 // Faces whose normals differ by less are tangent: the depth beside their border is then exact to
@@ -21,7 +21,7 @@ struct Section {
   Vec3 origin, axis;  // the direction, or the axis of revolution
   Vec3 east, north;   // of a half-plane only `north`, which is the axis
   bool turned;
-  Vec2 of(const Vec3& x) const {
+  Planar of(const Vec3& x) const {
     const Vec3 y = x - origin;
     const double h = y.dot(turned ? axis : north);
     return {turned ? (y - h * axis).norm() : y.dot(east), h};
@@ -31,12 +31,14 @@ struct Section {
 // A line of points with normal . x = `level`, or a circle.
 struct Trace {
   bool circle = false;
-  Vec2 normal = Vec2::UnitX(), center = Vec2::Zero();
+  Planar normal = Planar::UnitX(), center = Planar::Zero();
   double level = 0, radius = 0;
-  Vec2 normal_at(const Vec2& x) const { return circle ? Vec2((x - center).normalized()) : normal; }
-  Vec2 onto(const Vec2& x) const {
-    return circle ? Vec2(center + radius * normal_at(x))
-                  : Vec2(x - (normal.dot(x) - level) * normal);
+  Planar normal_at(const Planar& x) const {
+    return circle ? Planar((x - center).normalized()) : normal;
+  }
+  Planar onto(const Planar& x) const {
+    return circle ? Planar(center + radius * normal_at(x))
+                  : Planar(x - (normal.dot(x) - level) * normal);
   }
 };
 
@@ -45,10 +47,10 @@ bool trace_of(const Primitive& shape, const Section& in, double gap, Trace& out)
   const Vec3 y = shape.point - in.origin;
   const bool along = shape.axis.cross(in.axis).norm() <= kParallel;
   const bool coaxial = (y - y.dot(in.axis) * in.axis).norm() <= gap;
-  const Vec2 at(0, y.dot(in.axis));
+  const Planar at(0, y.dot(in.axis));
   if (!in.turned) {
     if (shape.kind == FaceKind::Plane && std::abs(shape.axis.dot(in.axis)) <= kParallel) {
-      out.normal = Vec2(shape.axis.dot(in.east), shape.axis.dot(in.north)).normalized();
+      out.normal = Planar(shape.axis.dot(in.east), shape.axis.dot(in.north)).normalized();
       out.level = out.normal.dot(in.of(shape.point));
       return true;
     }
@@ -56,40 +58,40 @@ bool trace_of(const Primitive& shape, const Section& in, double gap, Trace& out)
     return shape.kind == FaceKind::Cylinder && along;
   }
   if (shape.kind == FaceKind::Sphere) {
-    out = {true, Vec2::UnitX(), at, 0, shape.radius};
+    out = {true, Planar::UnitX(), at, 0, shape.radius};
     return coaxial;
   }
   if (shape.kind == FaceKind::Plane) {
-    out.normal = Vec2::UnitY(), out.level = at.y();
+    out.normal = Planar::UnitY(), out.level = at.y();
     return along;
   }
   if (!along || !coaxial) return false;
   if (shape.kind == FaceKind::Torus) {
-    out = {true, Vec2::UnitX(), Vec2(shape.radius, at.y()), 0, shape.second};
+    out = {true, Planar::UnitX(), Planar(shape.radius, at.y()), 0, shape.second};
   } else if (shape.kind == FaceKind::Cylinder) {
-    out.normal = Vec2::UnitX(), out.level = shape.radius;
+    out.normal = Planar::UnitX(), out.level = shape.radius;
   } else {
     const double turn = shape.axis.dot(in.axis) < 0 ? -1 : 1;
-    out.normal = Vec2(std::cos(shape.second), -turn * std::sin(shape.second));
-    out.level = out.normal.dot(Vec2(shape.radius, at.y()));
+    out.normal = Planar(std::cos(shape.second), -turn * std::sin(shape.second));
+    out.level = out.normal.dot(Planar(shape.radius, at.y()));
   }
   return true;
 }
 
 // Where two traces meet next to x, or touch: then midway between their nearest points.
-bool meet(const Trace& one, const Trace& two, Vec2& x, bool& tangent) {
+bool meet(const Trace& one, const Trace& two, Planar& x, bool& tangent) {
   if (!one.circle && two.circle) return meet(two, one, x, tangent);
   tangent = false;
   if (!one.circle) {
     const double sine = one.normal.x() * two.normal.y() - one.normal.y() * two.normal.x();
     if (!(std::abs(sine) > kTangent)) return false;
-    x = Vec2(one.level * two.normal.y() - two.level * one.normal.y(),
-             two.level * one.normal.x() - one.level * two.normal.x()) /
+    x = Planar(one.level * two.normal.y() - two.level * one.normal.y(),
+               two.level * one.normal.x() - one.level * two.normal.x()) /
         sine;
     return true;
   }
   // Of two circles the points of both are on a line, across that of their centers.
-  Vec2 normal = two.normal;
+  Planar normal = two.normal;
   double along = two.level - normal.dot(one.center);
   if (two.circle) {
     const double apart = (two.center - one.center).norm();
@@ -98,11 +100,11 @@ bool meet(const Trace& one, const Trace& two, Vec2& x, bool& tangent) {
     along = (apart * apart + one.radius * one.radius - two.radius * two.radius) / (2 * apart);
   }
   const double square = one.radius * one.radius - along * along;
-  const Vec2 aside(-normal.y(), normal.x());
+  const Planar aside(-normal.y(), normal.x());
   const double half = square > 0 ? std::sqrt(square) : 0;
-  const Vec2 crossing =
+  const Planar crossing =
       one.center + along * normal + (aside.dot(x - one.center) < 0 ? -half : half) * aside;
-  const Vec2 n = one.normal_at(crossing), m = two.normal_at(crossing);
+  const Planar n = one.normal_at(crossing), m = two.normal_at(crossing);
   tangent = !(std::abs(n.x() * m.y() - n.y() * m.x()) > kTangent);
   x = crossing;
   if (tangent) {
@@ -113,14 +115,14 @@ bool meet(const Trace& one, const Trace& two, Vec2& x, bool& tangent) {
 }
 
 // The line or circle of a section's point.
-FaceJoint joint_at(const Section& in, const Vec2& x, const Vec2& n, const Vec2& m) {
+FaceJoint joint_at(const Section& in, const Planar& x, const Planar& n, const Planar& m) {
   FaceJoint out;
   out.axis = in.axis;
   if (!in.turned) {
     out.kind = FaceJoint::Kind::Line;
     out.point = in.origin + x.x() * in.east + x.y() * in.north;
     for (int i = 0; i < 2; ++i) {
-      const Vec2 up = i == 0 ? n : m;
+      const Planar up = i == 0 ? n : m;
       const Vec3 normal = up.x() * in.east + up.y() * in.north;
       out.across[i] = {FaceKind::Plane, out.point, in.axis.cross(normal), 0, 0};
     }
@@ -130,7 +132,7 @@ FaceJoint joint_at(const Section& in, const Vec2& x, const Vec2& n, const Vec2& 
   out.point = in.origin + x.y() * in.axis, out.radius = x.x();
   // The normals span a plane, a cylinder or a cone.
   for (int i = 0; i < 2; ++i) {
-    const Vec2 up = i == 0 ? n : m;
+    const Planar up = i == 0 ? n : m;
     const FaceKind kind = std::abs(up.x()) < kParallel * kParallel   ? FaceKind::Cylinder
                           : std::abs(up.y()) < kParallel * kParallel ? FaceKind::Plane
                                                                      : FaceKind::Cone;
@@ -349,7 +351,7 @@ std::optional<FaceJoint> find_joint(const std::vector<Primitive>& shapes, int a,
   std::vector<FaceJoint> found;
   for (const Section& in : sections(one, two, p, q)) {
     Trace first, second;
-    Vec2 x = in.of((p + q) / 2);
+    Planar x = in.of((p + q) / 2);
     if (in.turned) x = (in.of(p) + in.of(q)) / 2;
     bool tangent = false;
     if (!trace_of(one, in, gap, first) || !trace_of(two, in, gap, second)) continue;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kMostSnaps = 8;
 // Curves are settled on faces in so many rounds, by at most this share of their chord.
-constexpr int kMostRounds = 3;
+constexpr int kMostSettlings = 3;
 constexpr double kMostSettled = 0.02;
 // A triangle may turn by 25 degrees (cosine): beyond that, its height is of the rounding.
 constexpr double kLeastAlike = 0.9;
@@ -98,7 +98,7 @@ void settle_on_faces(const Shell& shell, const Edge& edge, const Faces& faces, c
   }
   if (!border || !round) return;
   const std::array<Vec3, 2> before = offset;
-  for (int repeat = 0; repeat < kMostRounds; ++repeat)
+  for (int repeat = 0; repeat < kMostSettlings; ++repeat)
     for (const bool flat : {false, true})
       for (int i = 0; i < edge.count; ++i) {
         const int face = face_at(i);

@@ -22,7 +22,7 @@ constexpr std::size_t kPole = 32;
 constexpr double kSameRuling = 0.02;
 // A smooth neighbor whose normal is that of the shape within this angle (cosine, 0.6 degrees) goes
 // on from it.
-constexpr double kTangent = 0.99995;
+constexpr double kGoesOn = 0.99995;
 // Nearer to the axis than this share of the radius an angle means nothing.
 constexpr double kOnAxis = 1e-3;
 
@@ -153,7 +153,7 @@ void Recognizer::leave_wide_bands_out(Growth& growth) {
       if (u < 0 || is_marked(u) || regions_.of(u) == regions_.of(t)) continue;
       Vec3 n;
       s.distance((point(corners(t)[k]) + point(corners(t)[next_corner(k)])) / 2, n);
-      if (std::abs(n.dot(facet_normal(u))) > kTangent) return true;
+      if (std::abs(n.dot(facet_normal(u))) > kGoesOn) return true;
     }
     return false;
   };
