@@ -203,7 +203,7 @@ Eigen::Vector2d Primitive::parameters(const Vec3& x, double size) const {
   const AboutAxis at(*this, x);
   const Vec3 east = axis.unitOrthogonal();
   // The tip of a cone is a vertex of the file, off the axis by the rounding of its coordinates.
-  const double u = at.off > (kind == FaceKind::Cone ? 1e-6 : 1e-9) * size
+  const double u = at.off > (kind == FaceKind::Cone ? 2e-7 : 1e-9) * size
                        ? std::atan2(at.across.dot(axis.cross(east)), at.across.dot(east))
                        : std::numeric_limits<double>::quiet_NaN();
   return {u, kind == FaceKind::Torus ? std::atan2(at.h, at.off - radius) : at.h / size};

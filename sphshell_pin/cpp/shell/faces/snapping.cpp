@@ -89,14 +89,15 @@ void settle_on_faces(const Shell& shell, const Edge& edge, const Faces& faces, c
   const auto face_at = [&](int i) {
     return faces.of_triangle(triangle_of(shell.topology().incidence[edge.begin + i]));
   };
-  // Within a face the curve has the face's own normals at its ends, which it keeps; between planes
-  // it is straight.
+  // Within a face the curve has the face's own normals at its ends, which it keeps, but at the tip
+  // of a cone there are none; between planes it is straight.
   bool border = false, round = false;
   for (int i = 0; i < edge.count; ++i) {
     border = border || face_at(i) != face_at(0);
     round = round || (face_at(i) >= 0 && faces.shapes[face_at(i)].kind != FaceKind::Plane);
   }
-  if (!border || !round) return;
+  const bool at_tip = face_at(0) >= 0 && faces.shapes[face_at(0)].kind == FaceKind::Cone;
+  if (!(border || at_tip) || !round) return;
   const std::array<Vec3, 2> before = offset;
   for (int repeat = 0; repeat < kMostSettlings; ++repeat)
     for (const bool flat : {false, true})
