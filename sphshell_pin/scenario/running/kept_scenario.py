@@ -218,7 +218,7 @@ def _place(kept: Kept, digest: str, suffix: str) -> Path | None:
     if array is None or array.dtype != np.uint8:
         return None
     content = array.tobytes()
-    if suffix in FORMATS:  # whoever wrote the results
+    if suffix in FORMATS:  # written anew, also from older results
         content = plain_mesh(suffix, content) or b""
     if not content:
         return None
