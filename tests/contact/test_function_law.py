@@ -7,6 +7,7 @@ import ctypes
 import gc
 import math
 import pickle
+import random
 import weakref
 
 import numpy as np
@@ -201,6 +202,17 @@ def test_a_law_that_cannot_carry_the_load_is_refused_at_once() -> None:
     with pytest.raises(errors.SphshellError, match="energy of a law stays below 2 at any depth"):
         law.depth_of(2.0)
     assert len(calls) < 3000
+
+
+def test_the_energy_of_noise_takes_no_longer_than_that_of_jumps() -> None:
+    rng, calls = random.Random(1), []
+
+    def noise(depth, rate, p):
+        calls.append(depth)
+        return rng.random()
+
+    assert python_law(noise, {}).energy(1e-3) == pytest.approx(0.5e-3, rel=0.2)
+    assert len(calls) < 100_000
 
 
 def test_a_scene_that_a_law_changes_has_no_result() -> None:
