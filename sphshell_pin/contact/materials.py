@@ -88,14 +88,12 @@ class TwoMaterials:
         unit="Pa",
         label="Young's modulus",
         help="Young's modulus of the sphere",
-        former="young_1",
     )
     poisson: Named = parameter(
         above=-1,
         at_most=0.5,
         label="Poisson's ratio",
         help="Poisson's ratio of the sphere",
-        former="poisson_1",
     )
     young_2: float | None = parameter(
         None,
