@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import check_finite, check_type
-from sphshell_pin.deprecation import former_names
 from sphshell_pin.errors import InvalidParameter
 
 _KEY = "parameter"
@@ -43,8 +42,6 @@ class Parameter:
     at_most: float | None = None
     log: bool | None = None
     """Whether a slider multiplies (else it adds); None: it follows from the range."""
-    former: str = ""
-    """A name that it had, and that still works with a warning."""
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -91,7 +88,6 @@ def parameter(
     at_least: float | None = None,
     at_most: float | None = None,
     log: bool | None = None,
-    former: str = "",
     **more: object,
 ) -> Any:
     """Return the field of a dataclass that is a parameter.
@@ -99,7 +95,7 @@ def parameter(
     The bounds hold for numbers; `more` is what pydantic takes for the field in a file
     (`min_length`). A field that is not made by this function cannot be stated in a file.
     """
-    about = Parameter(unit, label, help, above, at_least, at_most, log, former)
+    about = Parameter(unit, label, help, above, at_least, at_most, log)
     # Pydantic reads the bounds and the description in a field's metadata.
     metadata = {_KEY: about, "description": help, **about.bounds, **more}
     return field(default=default, metadata=metadata)
@@ -198,7 +194,3 @@ class Component:
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""
         return {k: v for k, v in self.__dict__.items() if k != "_binding"}
-
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__, {"Ingredient": "Component"})
