@@ -187,12 +187,12 @@ def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, word
         ("<replicate count='2'/>", "", "<replicate> is not supported"),
         (ARM, "<compiler coordinate='global'/>", "coordinate"),
         (ARM, "<include file='nix.xml'/>", "includes nix.xml, which is not there"),
-        ("<body><joint class='x'/></body>", "", "class 'x', which has no <default>"),
-        ("<body><joint type='screw'/></body>", "", "unknown type, 'screw'"),
+        ("<body><joint class='x'/></body>", "", "unknown default class name 'x'"),
+        ("<body><joint type='screw'/></body>", "", "invalid keyword: 'screw'"),
         ("<geom size='1'/>", "", "has no <body>"),
         ("<body><joint/><geom size='a'/></body>", "", "."),
         ("<body name='b'><joint/></body>", "<compiler inertiafromgeom='false'/>", "'b' moves"),
-        (f"<body name='b'>{7 * '<joint/>'}</body>", "", "body 'b' has 7 joints"),
+        (f"<body name='b'>{7 * '<joint/>'}</body>", "", "more than 6 dofs in body 'b'"),
     ],
 )
 def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, inside, head, words):

@@ -48,7 +48,7 @@ class Setting:
         """Return the law along the normal and that of friction at a normal `speed` [m/s]."""
         damping = (self.restitution, speed) if self.restitution is not None else (None, None)
         law = sp.HertzLaw(*self.materials, *damping)
-        return law, sp.BristleFriction.mindlin(self.mu, None, *self.materials, rings=self.rings)
+        return law, sp.MindlinFriction(self.mu, self.mu, *self.materials, rings=self.rings)
 
     def impact(self, normal: float, tangential: float, spin: float = 0.0) -> Rebound:
         """Shoot the ball down at `normal` and along x at `tangential` speed [m/s].

@@ -115,9 +115,7 @@ def curved_track() -> Outcome:
     b = ball.beta()
     exact = np.cos(tilt) + 2 / (1 + b) * (np.cos(tilt) - math.cos(angle))
     speed = np.linalg.norm(velocities(result), axis=1)
-    resisting = sp.BristleFriction.mindlin(
-        1.0, None, WOOD, 0.3, damping_time=1e-4, rolling=RESISTANCE
-    )
+    resisting = sp.MindlinFriction(1.0, 1.0, WOOD, 0.3, damping_time=1e-4, rolling=RESISTANCE)
     damped = in_bowl(ball, shell, bend, angle, stiffness=1e6, friction=resisting, periods=4).result
     place = bend * np.arctan2(damped.q[:, 0], -damped.q[:, 2])
     turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(place))))

@@ -1,5 +1,6 @@
-// Normal force of one contact, from depth and gap rate. Templated, so that automatic
-// differentiation gives the slopes of what the simulation runs.
+// The normal laws: their parameters (namespace sphshell_pin), and the force of one contact from
+// depth and gap rate, as the core computes it. Equations and how to choose the parameters:
+// docs/laws.md.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +16,91 @@
 #include <Eigen/Core>
 
 #include "contact/laws/gauss.hpp"
-#include "contact/laws/kinds.hpp"
+#include "sphshell_pin/laws/parameters.hpp"
+
+namespace sphshell_pin {
+
+/// ADAMS's IMPACT: max(0, stiffness depth^exponent - STEP(depth, damping) gap_rate).
+struct ImpactLaw {
+  static constexpr const char* kind = "impact";
+  double stiffness;                  ///< > 0 [N/m^exponent]
+  double exponent = 1.5;             ///< > 0
+  double damping = 0;                ///< >= 0 [N s/m]
+  double full_damping_depth = 1e-4;  ///< > 0 [m]
+
+  template <class Law, class Visit>
+  static void each(Law& law, Visit&& visit) {
+    visit("stiffness", law.stiffness, Bounds::positive("N/m^exponent"));
+    visit("exponent", law.exponent, Bounds::positive());
+    visit("damping", law.damping, Bounds::not_negative("N s/m"));
+    visit("full_damping_depth", law.full_damping_depth, Bounds::positive("m"));
+  }
+};
+
+/// Hunt and Crossley: max(0, stiffness depth^exponent (1 - dissipation gap_rate)).
+struct HuntCrossleyLaw {
+  static constexpr const char* kind = "hunt-crossley";
+  double stiffness;        ///< > 0 [N/m^exponent]
+  double exponent = 1.5;   ///< > 0
+  double dissipation = 0;  ///< >= 0 [s/m]
+
+  template <class Law, class Visit>
+  static void each(Law& law, Visit&& visit) {
+    visit("stiffness", law.stiffness, Bounds::positive("N/m^exponent"));
+    visit("exponent", law.exponent, Bounds::positive());
+    visit("dissipation", law.dissipation, Bounds::not_negative("s/m"));
+  }
+};
+
+/// Hertz's law: its stiffness follows the curvatures of sphere and shell at each contact.
+struct HertzLaw {
+  static constexpr const char* kind = "hertz";
+  Materials materials;
+  double dissipation = 0;      ///< b of Hunt and Crossley, >= 0 [s/m]
+  double relaxation_time = 0;  ///< of a viscoelastic material, >= 0 [s]
+  double radius = 0;           ///< > 0: of a sphere on a plane, whatever it touches [m]
+
+  template <class Law, class Visit>
+  static void each(Law& law, Visit&& visit) {
+    Materials::each(law.materials, visit);
+    visit("dissipation", law.dissipation, Bounds::not_negative("s/m"));
+    visit("relaxation_time", law.relaxation_time, Bounds::not_negative("s"));
+    visit("radius", law.radius, Bounds::not_negative("m"));
+  }
+};
+
+/// Elastic, from a table: depths and forces start at zero and increase.
+struct TableLaw {
+  static constexpr const char* kind = "table";
+  std::vector<double> depth;  ///< (k >= 2) [m]
+  std::vector<double> force;  ///< (k) [N]
+
+  template <class Law, class Visit>
+  static void each(Law& law, Visit&& visit) {
+    visit("depth", law.depth, Bounds{"m"});
+    visit("force", law.force, Bounds{"N"}.beside("depth", double(law.depth.size()), false));
+  }
+};
+
+/// An elastic layer on the sphere, pressed wherever it overlaps the body behind the shell; with the
+/// methods Facets and Smooth.
+struct FoundationLaw {
+  static constexpr const char* kind = "foundation";
+  double modulus;          ///< > 0 [Pa]
+  double thickness;        ///< > 0 [m]
+  double dissipation = 0;  ///< >= 0 [s/m]
+  double radius = 0;       ///< > 0: of a sphere on a plane, whatever it touches [m]
+
+  template <class Law, class Visit>
+  static void each(Law& law, Visit&& visit) {
+    visit("modulus", law.modulus, Bounds::positive("Pa"));
+    visit("thickness", law.thickness, Bounds::positive("m"));
+    visit("dissipation", law.dissipation, Bounds::not_negative("s/m"));
+    visit("radius", law.radius, Bounds::not_negative("m"));
+  }
+};
+
+}  // namespace sphshell_pin
 
 namespace sphshell {
 
@@ -54,30 +139,29 @@ NormalForce<S> push(const S& total, const S& elastic) {
   return {total < 0 ? S(0) : total, elastic};
 }
 
-// The laws. Each has its name, its parameters, and
-// - force: at depth > 0 [m] and gap_rate = n . v_rel [m/s], negative while closing;
+// The laws as the core computes them. Each has its Parameters, and
+// - force: a template, as dual numbers give its slopes; at depth > 0 [m] and gap_rate = n . v_rel
+// [m/s], negative while closing;
 // - energy: the potential of the elastic part [J];
 // - needs_rate: whether the force depends on gap_rate.
 // Hertz's law also gets the scale of the gap, see Hertz [m^0.5].
 
 // What the laws have in common whose spring is k depth^e.
-struct PowerLaw {
-  double stiffness, exponent;  // [N/m^e], 1
+template <class Stated>
+struct PowerLaw : Stated {
+  using Parameters = Stated;
+  explicit PowerLaw(const Parameters& p) : Parameters(p) {}
 
   template <class S>
   S elastic(const S& depth) const {
-    return stiffness * power(depth, exponent);
+    return this->stiffness * power(depth, this->exponent);
   }
-  double energy(double depth) const { return elastic(depth) * depth / (exponent + 1); }
+  double energy(double depth) const { return elastic(depth) * depth / (this->exponent + 1); }
 };
 
 // max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate)
-struct ImpactLaw : PowerLaw {
-  static constexpr const char* kind = "impact";
-  double damping, full_damping_depth;  // [N s/m], [m]
-
-  explicit ImpactLaw(const Numbers& p)
-      : PowerLaw{p.at(0), p.at(1)}, damping(p.at(2)), full_damping_depth(p.at(3)) {}
+struct ImpactLaw : PowerLaw<sphshell_pin::ImpactLaw> {
+  using PowerLaw::PowerLaw;
 
   bool needs_rate() const { return damping > 0; }
 
@@ -90,11 +174,8 @@ struct ImpactLaw : PowerLaw {
 };
 
 // max(0, k depth^e (1 - b gap_rate))
-struct HuntCrossleyLaw : PowerLaw {
-  static constexpr const char* kind = "hunt-crossley";
-  double dissipation;  // [s/m]
-
-  explicit HuntCrossleyLaw(const Numbers& p) : PowerLaw{p.at(0), p.at(1)}, dissipation(p.at(2)) {}
+struct HuntCrossleyLaw : PowerLaw<sphshell_pin::HuntCrossleyLaw> {
+  using PowerLaw::PowerLaw;
 
   bool needs_rate() const { return dissipation > 0; }
 
@@ -109,15 +190,16 @@ struct HuntCrossleyLaw : PowerLaw {
 // Hertz's force between a sphere and whatever it touches, E* scale depth^1.5, with the damping of
 // Hunt and Crossley (1 - b gap_rate), or that of a viscoelastic material that relaxes in a time
 // tau, 1.5 tau E* scale depth^0.5 gap_rate (Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230).
-struct HertzLaw {
-  static constexpr const char* kind = "hertz";
-  double modulus, dissipation, relaxation;  // E* [Pa], b [s/m], tau [s]
-  double fixed_scale;                       // whatever it touches; 0: that of the gap [m^0.5]
+struct HertzLaw : sphshell_pin::HertzLaw {
+  using Parameters = sphshell_pin::HertzLaw;
+  double modulus;      // E* [Pa]
+  double fixed_scale;  // whatever it touches; 0: that of the gap [m^0.5]
 
-  explicit HertzLaw(const Numbers& p)
-      : modulus(p.at(0)), dissipation(p.at(1)), relaxation(p.at(2)), fixed_scale(p.at(3)) {}
+  // 4/3 sqrt(R): the scale of a sphere of that radius on a plane.
+  explicit HertzLaw(const Parameters& p)
+      : Parameters(p), modulus(materials.modulus()), fixed_scale(4.0 / 3 * std::sqrt(radius)) {}
 
-  bool needs_rate() const { return dissipation > 0 || relaxation > 0; }
+  bool needs_rate() const { return dissipation > 0 || relaxation_time > 0; }
 
   template <class S>
   NormalForce<S> force(const S& depth, const S& gap_rate, const S& scale) const {
@@ -125,7 +207,8 @@ struct HertzLaw {
     const S used = fixed_scale > 0 ? S(fixed_scale) : scale;
     const S root = modulus * used * sqrt(depth), elastic = root * depth;
     if (!needs_rate()) return {elastic, elastic};
-    return push(S(elastic - (elastic * dissipation + 1.5 * relaxation * root) * gap_rate), elastic);
+    return push(S(elastic - (elastic * dissipation + 1.5 * relaxation_time * root) * gap_rate),
+                elastic);
   }
 
   double energy(double depth, double scale) const {
@@ -138,7 +221,8 @@ struct HertzLaw {
 // interpolant of Fritsch and Carlson (SIAM J. Numer. Anal. 17 (1980) 238), with three-point slopes
 // limited as by de Boor and Swartz; beyond the last row it goes on with the last slope.
 struct TableLaw {
-  static constexpr const char* kind = "table";
+  using Parameters = sphshell_pin::TableLaw;
+  static constexpr const char* kind = Parameters::kind;
 
   // Of the depth x beyond the start of a piece: force c[0] + c[1] x + c[2] x^2 + c[3] x^3 [N], and
   // energy [J] stored down to its start.
@@ -151,10 +235,9 @@ struct TableLaw {
   std::vector<std::uint32_t> cells;
   double cells_per_depth = 0;  // [1/m]
 
-  // All depths, then all forces.
-  explicit TableLaw(const Numbers& p) : starts(p.begin(), p.begin() + p.size() / 2) {
+  explicit TableLaw(const Parameters& p) : starts(p.depth) {
     if (starts.size() < 2) throw std::invalid_argument("a table of a law needs 2 rows");
-    const std::vector<double> forces(p.begin() + starts.size(), p.end());
+    const std::vector<double>& forces = p.force;
     const std::size_t last = starts.size() - 1;
     std::vector<double> h, secants, slopes(last + 1);
     for (std::size_t i = 0; i < last; ++i) {
@@ -232,12 +315,9 @@ struct TableLaw {
 
 // The elastic foundation of contact/laws/foundation.hpp; with a radius that of a ball on a plane,
 // where the depth is all that counts.
-struct FoundationLaw {
-  static constexpr const char* kind = "foundation";
-  double modulus, thickness, dissipation, radius;  // [Pa], [m], [s/m], [m]
-
-  explicit FoundationLaw(const Numbers& p)
-      : modulus(p.at(0)), thickness(p.at(1)), dissipation(p.at(2)), radius(p.at(3)) {}
+struct FoundationLaw : sphshell_pin::FoundationLaw {
+  using Parameters = sphshell_pin::FoundationLaw;
+  explicit FoundationLaw(const Parameters& p) : Parameters(p) {}
 
   bool needs_rate() const { return dissipation > 0; }
 
@@ -286,6 +366,7 @@ struct OwnFunction {
 
 // Of depth [m] and gap rate [m/s]; its elastic part is that at rest.
 struct FunctionLaw : OwnFunction {
+  using Parameters = void;  // a user's functions, see bindings/bind_contact.cpp
   static constexpr const char* kind = "function";
   static constexpr double kLeastRate = 1e-2;  // over which slopes are taken at rest [m/s]
 
@@ -340,7 +421,7 @@ struct FunctionLaw : OwnFunction {
 // One of the laws.
 struct NormalLaw {
   std::variant<ImpactLaw, HuntCrossleyLaw, HertzLaw, TableLaw, FoundationLaw, FunctionLaw> law =
-      ImpactLaw({0, 1, 0, 1});
+      ImpactLaw({0, 1});
 
   bool needs_rate() const {
     return std::visit([](const auto& one) { return one.needs_rate(); }, law);

@@ -1,4 +1,5 @@
-// Tangential force of one contact, and both forces together.
+// The friction laws: their parameters (namespace sphshell_pin), the tangential force of one
+// contact, and both forces together.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +7,89 @@
 
 #include <Eigen/Geometry>
 
-#include "contact/laws/laws.hpp"
+#include "sphshell_pin/laws/normal.hpp"
+
+namespace sphshell_pin {
+
+/// A frictionless contact.
+struct NoFriction {
+  static constexpr const char* kind = "none";
+
+  template <class Law, class Visit>
+  static void each(Law&, Visit&&) {}
+};
+
+/// ADAMS's Coulomb friction, regularized over two slip speeds: a loaded contact creeps.
+struct CoulombFriction {
+  static constexpr const char* kind = "coulomb";
+  double mu_static = 0.3;   ///< >= 0, at v_static
+  double mu_dynamic = 0.1;  ///< >= 0, not above mu_static
+  double v_static = 0.1;    ///< > 0 [m/s]
+  double v_dynamic = 1.0;   ///< > v_static [m/s]
+
+  template <class Law, class Visit>
+  static void each(Law& law, Visit&& visit) {
+    visit("mu_static", law.mu_static, Bounds::not_negative());
+    visit("mu_dynamic", law.mu_dynamic,
+          Bounds::not_negative().not_above("mu_static", law.mu_static));
+    visit("v_static", law.v_static, Bounds::positive("m/s"));
+    visit("v_dynamic", law.v_dynamic, Bounds::positive("m/s").more_than("v_static", law.v_static));
+  }
+};
+
+/// Friction that sticks: an elastic, perfectly plastic spring, whose stretch is a state of the
+/// contact; see SceneState::advance.
+struct BristleFriction {
+  static constexpr const char* kind = "bristle";
+  double mu_static;          ///< >= 0
+  double mu_dynamic;         ///< >= 0, not above mu_static
+  double stiffness;          ///< > 0 [N/m]
+  double damping = 0;        ///< >= 0 [N s/m]
+  double v_stribeck = 0.01;  ///< > 0 [m/s]
+  bool torsional = false;    ///< also against spin about the normal, as a soft finger
+
+  template <class Law, class Visit>
+  static void each(Law& law, Visit&& visit) {
+    visit("mu_static", law.mu_static, Bounds::not_negative());
+    visit("mu_dynamic", law.mu_dynamic,
+          Bounds::not_negative().not_above("mu_static", law.mu_static));
+    visit("stiffness", law.stiffness, Bounds::positive("N/m"));
+    visit("damping", law.damping, Bounds::not_negative("N s/m"));
+    visit("v_stribeck", law.v_stribeck, Bounds::positive("m/s"));
+    visit("torsional", law.torsional, Bounds{});
+  }
+};
+
+/// The same with the stiffness of two elastic bodies, after Mindlin.
+struct MindlinFriction {
+  static constexpr const char* kind = "mindlin";
+  static constexpr int kMostRings = 8;
+  double mu_static;   ///< >= 0
+  double mu_dynamic;  ///< >= 0, not above mu_static
+  Materials materials;
+  double v_stribeck = 0.01;     ///< > 0 [m/s]
+  double damping_time = 0;      ///< >= 0 [s]
+  bool torsional = false;       ///< also against spin about the normal
+  double rolling = 0;           ///< >= 0, moment against rolling over radius and normal force
+  double rolling_speed = 1e-3;  ///< > 0 [m/s]
+  int rings = 1;                ///< 1 to 8, of the disc of contact; each sticks or slips for itself
+
+  template <class Law, class Visit>
+  static void each(Law& law, Visit&& visit) {
+    visit("mu_static", law.mu_static, Bounds::not_negative());
+    visit("mu_dynamic", law.mu_dynamic,
+          Bounds::not_negative().not_above("mu_static", law.mu_static));
+    Materials::each(law.materials, visit);
+    visit("v_stribeck", law.v_stribeck, Bounds::positive("m/s"));
+    visit("damping_time", law.damping_time, Bounds::not_negative("s"));
+    visit("torsional", law.torsional, Bounds{});
+    visit("rolling", law.rolling, Bounds::not_negative());
+    visit("rolling_speed", law.rolling_speed, Bounds::positive("m/s"));
+    visit("rings", law.rings, Bounds{"", -std::numeric_limits<double>::infinity(), 1, kMostRings});
+  }
+};
+
+}  // namespace sphshell_pin
 
 namespace sphshell {
 
@@ -51,7 +134,7 @@ struct ContactKinematics {
   S scale = S(0);  // of the gap, for Hertz's law [m^0.5]
 };
 
-// The friction laws. Each has its name, its parameters, and
+// The friction laws as the core computes them. Each has its Parameters, and
 // - coefficient: of steady sliding at a slip speed [m/s] under a load [N];
 // - add: writes friction, torsion and the bristle's rates to the force at a contact. `radius` [m]
 //   is that of the sphere, `relaxation` [s] that of the bristles.
@@ -60,9 +143,9 @@ struct ContactKinematics {
 // in
 //   one frame, where the bristle has this stiffness [N/m].
 
-struct NoFriction {
-  static constexpr const char* kind = "none";
-  explicit NoFriction(const Numbers&) {}
+struct NoFriction : sphshell_pin::NoFriction {
+  using Parameters = sphshell_pin::NoFriction;
+  explicit NoFriction(const Parameters&) {}
 
   double coefficient(double, double) const { return 0; }
 
@@ -71,12 +154,9 @@ struct NoFriction {
 };
 
 // ADAMS's Coulomb friction, regularized over two slip speeds: it creeps.
-struct CoulombFriction {
-  static constexpr const char* kind = "coulomb";
-  double mu_static, mu_dynamic, v_static, v_dynamic;  // 1, 1, [m/s], [m/s]
-
-  explicit CoulombFriction(const Numbers& p)
-      : mu_static(p.at(0)), mu_dynamic(p.at(1)), v_static(p.at(2)), v_dynamic(p.at(3)) {}
+struct CoulombFriction : sphshell_pin::CoulombFriction {
+  using Parameters = sphshell_pin::CoulombFriction;
+  explicit CoulombFriction(const Parameters& p) : Parameters(p) {}
 
   // coefficient / slip speed [s/m]: finite at rest, so that no direction is divided by zero.
   template <class S>
@@ -100,6 +180,7 @@ struct CoulombFriction {
 // Of slip speed [m/s] and normal force [N], against the slip: it creeps. Negative values count as
 // zero.
 struct FunctionFriction : OwnFunction {
+  using Parameters = void;  // a user's function, see bindings/bind_contact.cpp
   static constexpr const char* kind = "function";
   static constexpr double kLeast = 1e-6;  // a slower slip bears a force in proportion [m/s]
 
@@ -179,13 +260,14 @@ struct Sticking {
 // limit is mu N rho, and P couples it with the force as in Howe and Cutkosky's limit surface
 // (1996).
 struct BristleFriction : Sticking {
-  static constexpr const char* kind = "bristle";
+  using Parameters = sphshell_pin::BristleFriction;
+  static constexpr const char* kind = Parameters::kind;
   double stiffness, damping;  // [N/m], [N s/m]
 
-  explicit BristleFriction(const Numbers& p)
-      : Sticking{p.at(0), p.at(1), p.at(4), p.at(5) != 0, 1},
-        stiffness(p.at(2)),
-        damping(p.at(3)) {}
+  explicit BristleFriction(const Parameters& p)
+      : Sticking{p.mu_static, p.mu_dynamic, p.v_stribeck, p.torsional},
+        stiffness(p.stiffness),
+        damping(p.damping) {}
 
   double stretch(const Vec3& z, const Vec3&, double) const { return z.norm(); }
 
@@ -217,7 +299,7 @@ struct BristleFriction : Sticking {
 };
 
 // Most rings of a bristle, for arrays of fixed size.
-inline constexpr int kMostRings = 8;
+inline constexpr int kMostRings = sphshell_pin::MindlinFriction::kMostRings;
 
 // The same with the stiffness of two elastic bodies that touch on a disc of radius a (Mindlin, J.
 // Appl. Mech. 16 (1949) 259; Johnson 1985, ch. 7): 8 G* a against slip, 16/3 G a^3 against spin.
@@ -236,7 +318,8 @@ inline constexpr int kMostRings = 8;
 // to ring with the mean stretch of the ring that they leave: the upwind scheme of finite volumes,
 // in which one ring is the law above, and which cannot gain energy, as a mean stretch holds less.
 struct MindlinFriction : Sticking {
-  static constexpr const char* kind = "mindlin";
+  using Parameters = sphshell_pin::MindlinFriction;
+  static constexpr const char* kind = Parameters::kind;
   double shear, twist;            // 8 G*, 16/3 G [Pa]
   double damping_time;            // of a damper beside the spring, over its stiffness [s]
   double rolling, rolling_speed;  // 1, [m/s]
@@ -247,13 +330,13 @@ struct MindlinFriction : Sticking {
   };
   std::array<Ring, kMostRings> parts;
 
-  explicit MindlinFriction(const Numbers& p)
-      : Sticking{p.at(0), p.at(1), p.at(4), p.at(6) != 0, static_cast<int>(p.at(9))},
-        shear(p.at(2)),
-        twist(p.at(3)),
-        damping_time(p.at(5)),
-        rolling(p.at(7)),
-        rolling_speed(p.at(8)) {
+  explicit MindlinFriction(const Parameters& p)
+      : Sticking{p.mu_static, p.mu_dynamic, p.v_stribeck, p.torsional, p.rings},
+        shear(p.materials.shear()),
+        twist(p.materials.twist()),
+        damping_time(p.damping_time),
+        rolling(p.rolling),
+        rolling_speed(p.rolling_speed) {
     // Of the moment of Hertz's pressure within r, over that of all of it.
     const auto moment = [](double r) {
       return (std::asin(r) - r * (1 - 2 * r * r) * std::sqrt(1 - r * r)) / M_PI_2;
