@@ -6,6 +6,7 @@ benchmarks/measured.py writes them; the blocks of a report are those of quote.py
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -73,7 +74,7 @@ def of_robots(data: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def of_hard_cases(data: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the groups, the verdict of each that comes nearest to its bound, and their laws."""
+    """Return the groups, and the verdict of each that comes nearest to its bound."""
     first, *groups = data["sections"]
     rows = [["group", "verdicts", "out of bounds", "nearest to its bound", "error", "bound"]]
     for group in groups:
@@ -84,8 +85,7 @@ def of_hard_cases(data: dict[str, Any]) -> list[dict[str, Any]]:
         what = f"{nearest['case']}: {nearest['what is tried']}"
         counts = [group["title"], str(len(verdicts)), str(out)]
         rows.append([*counts, what, nearest["error"], nearest["bound"]])
-    laws = [{"title": one["title"], "text": one["text"]} for one in groups]
-    return [{"text": first["text"], "table": rows}, *laws]
+    return [{"text": first["text"], "table": rows}]
 
 
 def of_contact_cases(data: dict[str, Any]) -> list[dict[str, Any]]:
@@ -109,12 +109,12 @@ def of_validation(data: dict[str, Any]) -> list[dict[str, Any]]:
         what, error, bound, _ = figures[0]
         rows.append([title, f"{judged.count('within')} of {len(judged)}", what, error, bound])
     shown = [{"text": first["text"], "table": rows}]
-    for one in sections:
+    for one in sections[:-1]:  # the last lists what was not found
         source = [note for note in one["notes"] if note.startswith("**Source.")]
-        # What is out of bounds, and the first sentence of why; a list without a source is whole.
+        # What is out of bounds, and the first sentence of why.
         out = [note.split(". ")[:2] for note in one["notes"] if note.startswith("Out of bounds")]
         notes = [*source, *(f"{'. '.join(two).rstrip('.')}." for two in out)]
-        shown.append({**one, "notes": notes if source else one["notes"]})
+        shown.append({**one, "notes": notes})
     return shown
 
 
@@ -124,6 +124,13 @@ def of_peers(data: dict[str, Any]) -> list[dict[str, Any]]:
     head, *rows = ratios["table"]
     short = {**ratios, "table": [row[:7] for row in (head, *rows)]}
     return [first, short, *({**one, "table": ()} for one in scenes if "text" in one)]
+
+
+def of_gallery(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the cards; what a picture shows stands below it, and need not be said twice."""
+    (cards,) = data["sections"]
+    notes = [re.sub(r"!\[(.*?)\](\(.*?\)<br>\*\*\1\*\*)", r"![]\2", one) for one in cards["notes"]]
+    return [{**cards, "notes": notes}]
 
 
 def of_parts(data: dict[str, Any]) -> list[dict[str, Any]]:
@@ -139,5 +146,6 @@ SHORT: dict[str, Callable[[dict[str, Any]], list[dict[str, Any]]]] = {
     "validation": of_validation,
     "peers": of_peers,
     "mesh_parts": of_parts,
+    "gallery": of_gallery,
 }
 """What is too long for a page: its summary."""

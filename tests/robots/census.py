@@ -2,9 +2,10 @@
 
     python -m tests.robots.census FOLDER... --most 8 --pairs 40 --write docs/measured/census.json
 
-Each folder of a FOLDER is a repository. Of each, at most `--most` of its files of a whole robot (URDF,
-xacro, MJCF) are loaded and go through check-robot, in a process with a time limit, first without
-any option, then with the one that the refusal names. `--pairs` of them are asked for a scenario too.
+Each folder of a FOLDER is a repository. Of each, at most `--most` of its files of a whole robot
+(URDF, xacro, MJCF) are loaded and go through check-robot, in a process with a time limit, first
+without any option, then with the one that the refusal names. `--pairs` of them are asked for a
+scenario too.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ _ADVICE: dict[str, dict[str, object]] = {
 
 @dataclass
 class Row:
-    """One robot's file: why it was refused by each command, "" where it was not, None: not asked."""
+    """A robot's file: why each command refused it, "" where it did not, None: not asked."""
 
     repository: str
     file: str
@@ -78,7 +79,7 @@ class Row:
 
 
 def robot_files(folder: Path) -> Iterator[Path]:
-    """Yield the files in `folder` that describe a whole robot, not macros, poses or parts of one."""
+    """Yield the files in `folder` that describe a whole robot, not macros, poses or parts."""
     files = [
         one
         for one in sorted(folder.rglob("*"))
