@@ -2,9 +2,10 @@
 
     python -m tests.robots.census FOLDER... --most 8 --pairs 40 --write docs/measured/census.json
 
-Each folder of a FOLDER is a repository. Of each, at most `--most` of its files of a whole robot (URDF,
-xacro, MJCF) are loaded and go through check-robot, in a process with a time limit, first without
-any option, then with the one that the refusal names. `--pairs` of them are asked for a scenario too.
+Each folder of a FOLDER is a repository. Of each, at most `--most` of its files of a whole robot
+(URDF, xacro, MJCF) are loaded and go through check-robot, in a process with a time limit, first
+without any option, then with the one that the refusal names. `--pairs` of them are asked for a
+scenario too.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import tempfile
 import time
 import warnings
 import xml.etree.ElementTree as ET
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
@@ -26,8 +26,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.measured import Measured
 from sphshell_pin import robots
-from sphshell_pin.cases.measured import Measured, write
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.study.robot_check import QUICK, check_robot
@@ -36,8 +36,23 @@ PARTS = Path(__file__).parents[1] / "data" / "corpus"
 LIMIT = 60
 """Of the processor, for a file [s]."""
 
-_XACRO = "{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}", "{http://ros.org/wiki/xacro}"
-_BUILT_IN = {"include", "property", "arg", "macro", "if", "unless", "insert_block", "call", "element", "attribute"}
+_XACRO = (
+    "{http://www.ros.org/wiki/xacro}",
+    "{http://wiki.ros.org/xacro}",
+    "{http://ros.org/wiki/xacro}",
+)
+_BUILT_IN = {
+    "include",
+    "property",
+    "arg",
+    "macro",
+    "if",
+    "unless",
+    "insert_block",
+    "call",
+    "element",
+    "attribute",
+}
 _INCLUDED = re.compile(r"<xacro:include\s+filename=[\"'](?:[^\"']*/)?([^/\"']+)[\"']")
 # What a refusal says to do, and how.
 _ADVICE: dict[str, dict[str, object]] = {
@@ -50,7 +65,7 @@ _ADVICE: dict[str, dict[str, object]] = {
 
 @dataclass
 class Row:
-    """One robot's file: why it was refused by each command, "" where it was not, None: not asked."""
+    """A robot's file: why each command refused it, "" where it did not, None: not asked."""
 
     repository: str
     file: str
@@ -64,9 +79,18 @@ class Row:
 
 
 def robot_files(folder: Path) -> Iterator[Path]:
-    """Yield the files in `folder` that describe a whole robot, not macros, poses or parts of one."""
-    files = [one for one in sorted(folder.rglob("*")) if one.suffix in (".urdf", ".xacro", ".xml") and one.is_file()]
-    parts = {(one.parent, name) for one in files if one.suffix == ".xacro" for name in _INCLUDED.findall(one.read_text(errors="replace"))}
+    """Yield the files in `folder` that describe a whole robot, not macros, poses or parts."""
+    files = [
+        one
+        for one in sorted(folder.rglob("*"))
+        if one.suffix in (".urdf", ".xacro", ".xml") and one.is_file()
+    ]
+    parts = {
+        (one.parent, name)
+        for one in files
+        if one.suffix == ".xacro"
+        for name in _INCLUDED.findall(one.read_text(errors="replace"))
+    }
     for file in files:
         if (file.parent, file.name) in parts or re.search(r"\.(srdf|gazebo)\b", file.name):
             continue
@@ -77,7 +101,10 @@ def robot_files(folder: Path) -> Iterator[Path]:
                 yield file  # its reader has to say so
             continue
         if root.tag == "mujoco":
-            if root.find("worldbody//joint") is not None or root.find("worldbody//freejoint") is not None:
+            if (
+                root.find("worldbody//joint") is not None
+                or root.find("worldbody//freejoint") is not None
+            ):
                 yield file
         elif root.tag == "robot" and root.get("name") and any(_makes(one) for one in root):
             yield file
@@ -154,13 +181,17 @@ def main() -> int:
     parser.add_argument("--write", action="store_true", help="write docs/measured/census.json")
     asked = parser.parse_args()
     questions = []
-    for repository in sorted(one for folder in asked.folders for one in folder.iterdir() if one.is_dir()):
+    for repository in sorted(
+        one for folder in asked.folders for one in folder.iterdir() if one.is_dir()
+    ):
         if asked.only not in repository.name:
             continue
         files = list(robot_files(repository))
         chosen = np.unique(np.linspace(0, len(files) - 1, min(asked.most, len(files))).astype(int))
         questions += [(rank, repository, files[k]) for rank, k in enumerate(chosen)]
-    parts = sorted(one for one in PARTS.iterdir() if one.suffix.lower() in (".step", ".stl", ".obj", ".iges"))
+    parts = sorted(
+        one for one in PARTS.iterdir() if one.suffix.lower() in (".step", ".stl", ".obj", ".iges")
+    )
     drafted = set(np.linspace(0, len(questions) - 1, asked.pairs).astype(int))
     context = multiprocessing.get_context("fork")
     rows = []
@@ -178,8 +209,20 @@ def main() -> int:
         child.join()
         rows.append(row)
         if row:
-            said = [f"{step}: {getattr(row, step)}" for step in ("load", "check", "new") if getattr(row, step)]
-            print(row.repository, row.file, row.options or "", part or "", f"{row.seconds:.0f} s", "; ".join(said) or "right", flush=True)
+            said = [
+                f"{step}: {getattr(row, step)}"
+                for step in ("load", "check", "new")
+                if getattr(row, step)
+            ]
+            print(
+                row.repository,
+                row.file,
+                row.options or "",
+                part or "",
+                f"{row.seconds:.0f} s",
+                "; ".join(said) or "right",
+                flush=True,
+            )
     found = sections(rows)
     print(*found[0].text.split("\n"), sep="\n")
     print(*(" | ".join(map(str, one)) for section in found for one in section.table), sep="\n")
