@@ -20,7 +20,6 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.export.mcap import write_mcap
 from sphshell_pin.export.tables import write_tables
 from sphshell_pin.patches import TaxelGrid
-from sphshell_pin.patches.wear import save_wear, wear_maps
 from sphshell_pin.plot.compare import plot_compare
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.replay import Replay
@@ -140,12 +139,6 @@ def _replay(home: Path) -> None:
         kind.values(player.now)
 
 
-def _wear(home: Path) -> None:
-    replay = Replay(home / "run.npz")
-    maps = wear_maps(replay.result, 1e-9, replay.scene)
-    save_wear(maps, home)
-
-
 def _taxels(home: Path) -> None:
     replay = Replay(home / "run.npz")
     TaxelGrid("ball-plate", (8, 8)).images(replay.result, replay.scene).save(home / "taxels.npz")
@@ -189,7 +182,7 @@ def _plot(kind: str) -> Callable[[Path], None]:
 
 
 LOOKS = (
-    *(_replay, _mcap, _export("csv"), _export("parquet"), _compare, _recording, _taxels, _wear),
+    *(_replay, _mcap, _export("csv"), _export("parquet"), _compare, _recording, _taxels),
     *(_save, *map(_plot, ("overview", "force", "energy", "sensors", "path", "map"))),
 )
 """Everything that shows or exports the results in a folder."""

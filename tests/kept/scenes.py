@@ -74,7 +74,6 @@ duration = 0.05
 dt = 1e-4
 record_dt = 1e-3
 record = ["patch"]
-wear = 1e-9
 
 [figures]
 own = "routine.py:figure"

@@ -23,7 +23,6 @@ from sphshell_pin.contact import (
 )
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
-from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.scene.sources import Find, checked_source
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
@@ -66,10 +65,6 @@ class ContactPair(Summarized):
     other_sphere: Sphere | None = None
     group: str = ""
     plane: Plane | None = None
-
-    frame = renamed("frame", "frame_j")
-    sphere_placement = renamed("sphere_placement", "placement_i")
-    shell_placement = renamed("shell_placement", "placement_j")
 
     def __post_init__(self) -> None:
         """Check law, friction and method, and what needs a sphere or a shell where there is none.

@@ -12,7 +12,6 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.arrays import Array
-from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
@@ -88,7 +87,6 @@ class Replay:
         self._time, self._row, self._given = self.start, 0, 0
 
     parameters: tuple[LiveParameter, ...] = ()
-    knobs = renamed("knobs", "parameters")
     bodies: tuple[str, ...] = ()
 
     @property
