@@ -6,7 +6,7 @@ joint, which keeps its name. Pinocchio's own reader (4.1) of the file as it is d
 the world but the first, includes, ranges' `limited`, visual geoms' masses, orientations of geoms
 without `pos`, damping of ball joints and equalities, and makes one nameless joint of several.
 
-MuJoCo gets numbers and names, and meshes as bytes; it opens no file itself.
+MuJoCo gets numbers and names, of meshes their corners; it opens no file itself.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.arrays import Array
 from sphshell_pin.errors import import_extra
 from sphshell_pin.regular_file import read_bytes
-from sphshell_pin.robots.description import MOST_LINKS, Description
+from sphshell_pin.robots.description import MOST_LINKS, Description, check_memory
 from sphshell_pin.robots.mjcf_additions import Extras, Site
 from sphshell_pin.robots.mjcf_couplings import couplings
 from sphshell_pin.robots.mjcf_includes import include
@@ -40,7 +40,6 @@ _COMPILER = {"angle", "autolimits", "coordinate", "eulerseq", "boundmass", "boun
 _COMPILER |= {"settotalmass", "balanceinertia", "inertiafromgeom", "inertiagrouprange"}
 _MESH = {"name", "class", "scale", "refpos", "refquat", "inertia", "vertex", "face"}
 _DROPPED = ("camera", "light")
-_MESH_FORMATS = (".stl", ".obj", ".msh")
 _MOST_MESH = 1e9  # [B]
 _POINT = "0 0 0 1 0 0 0 1 0 0 0 1"  # a mesh that nothing weighs
 _KINDS = {2: ("sphere", 1), 3: ("capsule", 2), 4: ("ellipsoid", 3), 5: ("cylinder", 2)}
@@ -76,6 +75,11 @@ def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> 
                 f"<{tag}> is not supported: let MuJoCo write the bodies out "
                 "(mujoco.MjSpec.from_file(...), compile(), to_xml())"
             )
+    freedoms = {"free": 6, "ball": 3}
+    joints = (
+        freedoms.get(one.get("type", "hinge"), 1) for one in root.iterfind("worldbody//joint")
+    )
+    check_memory(sum(joints) + 6 * len(root.findall("worldbody//freejoint")))
     if root.find("worldbody/body") is None and root.find("worldbody//body") is None:
         raise ValueError("its <worldbody> has no <body>")
     return _Reader(mujoco, root, folders).read()
@@ -239,37 +243,32 @@ class _Reader:
         for mesh in spec.meshes:
             if mesh.name in self.files:
                 self.files[mesh.name] = self.files[mesh.name][0], _text(mesh.scale)
-        read = {name: self._read_mesh(spec.mesh(name), body) for name, body in needed.items()}
-        spec.assets = {spec.mesh(name).file: data for name, data in read.items()}
+        for name, body in needed.items():
+            self._read_mesh(spec.mesh(name), body)
         try:
             return spec.compile()
-        except (ValueError, self.mujoco.FatalError) as error:
-            raise ValueError(str(error)) from None
+        except (ValueError, MemoryError, self.mujoco.FatalError) as error:
+            raise ValueError(str(error) or "it needs too much memory") from None
 
-    def _read_mesh(self, mesh: Any, body: str) -> bytes:
-        """Let `mesh` be that of its file; return the bytes. One that is open weighs as its hull."""
+    def _read_mesh(self, mesh: Any, body: str) -> None:
+        """Let `mesh` have the corners of its file; one that is open weighs as its hull."""
         with interrupts_delayed():
             import trimesh
-        path, why = self.files[mesh.name][0], f"the mass of body '{body}' would be that of mesh "
+        path = self.files[mesh.name][0]
         try:
-            data = read_bytes(path, _MOST_MESH)
-            if path.suffix.lower() not in _MESH_FORMATS:
-                raise ValueError(f"not one of {', '.join(_MESH_FORMATS)}")
-            if path.suffix.lower() != ".msh":
-                found: Any = trimesh.load(
-                    io.BytesIO(data), file_type=path.suffix.lower()[1:], force="mesh"
-                )
-                found.merge_vertices()
-                if not found.is_watertight:
-                    mesh.inertia = self.mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-                    self.notes[_HULLS].append(mesh.name)
-        except Exception as error:  # of readers of several formats, and of packages not there
+            data, kind = io.BytesIO(read_bytes(path, _MOST_MESH)), path.suffix.lower()[1:]
+            found: Any = trimesh.load(data, file_type=kind, force="mesh")
+            found.merge_vertices()
+            mesh.uservert, mesh.userface = found.vertices.ravel(), found.faces.ravel()
+            if not found.is_watertight:
+                mesh.inertia = self.mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+                self.notes[_HULLS].append(mesh.name)
+        except Exception as error:  # of readers of many formats, and of packages not there
             reason = " ".join(str(error).split()) or type(error).__name__
             raise ValueError(
-                f"{why}'{mesh.name}', which cannot be read ({reason}): state <inertial>"
+                f"the mass of body '{body}' would be that of mesh '{mesh.name}', which cannot be "
+                f"read ({reason}): state <inertial>"
             ) from None
-        mesh.uservert, mesh.file = [], mesh.name + path.suffix.lower()
-        return data
 
     def _extras(self) -> dict[str, Extras]:
         """Return damping and dry friction of joints of several degrees of freedom."""
