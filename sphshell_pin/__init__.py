@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from sphshell_pin.shell import ShellHealth as ShellHealth
     from sphshell_pin.study.fit import *  # noqa: F403
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"  # what is released next; the only place
 
 _PARTS = (
     "contact",

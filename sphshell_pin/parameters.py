@@ -9,11 +9,12 @@ of the documentation.
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,13 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin.checks import check_finite, check_type
 from sphshell_pin.errors import InvalidParameter
 
-if TYPE_CHECKING:
-    Named = Any  # in whose place the name of a material may be given
-else:
-    Named = float
-
 _KEY = "parameter"
-_NUMBERS = ("float", "Named")
 # A field of the object in a unit, as in "N/m^{0.exponent:g}".
 _IN_UNIT = re.compile(r"\{0\.(\w+)[^}]*\}")
 
@@ -164,7 +159,7 @@ class Component:
             about, value = one.metadata.get(_KEY), getattr(self, one.name)
             if about is None or (value is None and one.default is None):
                 continue
-            if one.type in (*_NUMBERS, "float | None"):
+            if one.type in ("float", "float | None"):
                 object.__setattr__(self, one.name, about.check(one.name, value))
             elif one.type == "bool":
                 check_type(one.name, value, bool, "must be True or False")
@@ -184,7 +179,8 @@ class Component:
 
     def _numbers(self) -> list[float]:
         """Return the parameters in their order, as the compiled core takes them."""
-        return [float(getattr(self, name)) for name in parameters_of(self)]
+        values = (getattr(self, name) for name in parameters_of(self))
+        return [math.nan if value is None else float(value) for value in values]
 
     @property
     def files(self) -> tuple[str, ...]:

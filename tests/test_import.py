@@ -59,7 +59,6 @@ def test_heavy_module_is_not_loaded(loaded: set[str], module: str) -> None:
         "scenario.drafting.new",
         "scenario.running.run",
         "study.robot_check",
-        "study.validation.tosses",
     ],
 )
 def test_commands_load_without_extras(module: str) -> None:
@@ -206,14 +205,12 @@ LAYERS = (
     ("scenario", "scenarios"),
     ("plot", "view", "export"),
     ("testing",),
-    ("cases",),
-    ("benchmarks",),
     ("study",),
     ("cli",),
 )
 LEVEL = {folder: k for k, folders in enumerate(LAYERS) for folder in folders}
 # Installed below the package, and beside it in a checkout.
-BESIDE = ("robots", "scenarios", "benchmarks")
+BESIDE = ("robots", "scenarios")
 
 
 def imports_of(file: Path, modules: set[str]) -> set[str]:

@@ -193,6 +193,28 @@ def test_no_number_is_refused(wrong) -> None:
         python_law(lambda depth, rate, p: 10**5000, {}).normal_force(1.0)
 
 
+def test_a_law_that_cannot_carry_the_load_is_refused_at_once() -> None:
+    calls = []
+    law = python_law(lambda depth, rate, p: calls.append(depth) or 0.0, {})
+    with pytest.raises(errors.SphshellError, match="force of a law stays below 1 at any depth"):
+        law.depth_at(1.0)
+    with pytest.raises(errors.SphshellError, match="energy of a law stays below 2 at any depth"):
+        law.depth_of(2.0)
+    assert len(calls) < 3000
+
+
+def test_a_scene_that_a_law_changes_has_no_result() -> None:
+    def adds(depth, gap_rate, parameters):
+        if depth > 2e-4 and len(scene.pairs) == 1:
+            scene.add_contact(sp.Sphere(0.05, "ball"), plate, law=TWIN, name="later")
+        return 1e5 * depth
+
+    plate = models.plate()
+    scene = models.on_plate(models.slider(), python_law(adds, {}))
+    with pytest.raises(errors.SphshellError, match="contacts were changed during the run"):
+        sp.Simulation(scene).run([0.0499], None, 0.02)
+
+
 OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
 
 

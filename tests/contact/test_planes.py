@@ -8,9 +8,9 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.study.validation.rattleback import ellipsoid
 from tests.meshes import crumpled, cube, grid_plate, icosphere, soup
 from tests.models import add_body, empty, free_q, linear_law
+from tests.validation.rattleback import ellipsoid
 
 AXES = np.array([0.2, 0.03, 0.02])
 

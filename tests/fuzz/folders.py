@@ -19,7 +19,8 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
 from tests.fuzz import tables
 from tests.fuzz.meshes import SHAPES, WRITERS, Mesh, damaged_mesh
-from tests.fuzz.mutate import LARGEST, NUMBERS, alter, damage
+from tests.fuzz.mutate import LARGEST, NUMBERS, alter, damage, repeated
+from tests.fuzz.strangers import mesh_corpus as drawn_corpus
 from tests.kept import scenes
 
 DATA = Path(__file__).parents[1] / "data"
@@ -162,6 +163,19 @@ def results_corpus() -> tuple[bytes, ...]:
         return (tables.pack({"run.npz": run}),)
 
 
+def damaged_kept(rng: random.Random, data: bytes) -> bytes:
+    """Return results in which a mesh that shows a robot is a damaged one of its format."""
+    with np.load(io.BytesIO(unpacked(data)["run.npz"])) as file:
+        arrays = dict(file)
+    robots = json.loads(str(arrays["header"]))["origin"]["kept"]["robots"]
+    meshes = [item for one in robots if one for item in one["meshes"].items()]
+    for name, digest in rng.choices(sorted(meshes), k=rng.choice((1, 1, 2))):
+        suffix = PurePath(name).suffix
+        content = damaged(rng, STRUCTURES[suffix], rng.choice(drawn_corpus(suffix)))
+        arrays[f"kept.file.{digest}"] = np.frombuffer(content, np.uint8)
+    return tables.pack({"run.npz": tables.packed(arrays)})
+
+
 def damaged_csv(rng: random.Random, data: bytes) -> bytes:
     """Return a table of which cells, columns or rows were changed."""
     rows = [row.split(",") for row in data.decode(errors="replace").split("\n")]
@@ -211,7 +225,10 @@ def damaged(
 ) -> bytes:
     """Return `data` with its structure changed, or some of its bytes."""
     # Of an archive with other bytes, all is refused at once.
-    if structure is None or (structure is not damaged_folder and rng.random() < 0.4):
+    archives = (damaged_folder, damaged_kept)
+    if structure not in archives and rng.random() < 0.05:
+        return repeated(rng, data)
+    if structure is None or (structure not in archives and rng.random() < 0.4):
         return damage(rng, data, others)
     try:
         return structure(rng, data)

@@ -133,7 +133,7 @@ def reproducible(path: Path) -> bytes:
     header = json.loads(str(arrays["header"]).replace(str(path.parent), "/home"))
     header["stats"] |= {"wall_time": 0.0, "real_time_factor": 0.0}
     arrays["header"] = np.array(json.dumps(header))
-    return pack({f"{name}.npy": _npy(array) for name, array in arrays.items()})
+    return packed(arrays)
 
 
 def pack(members: dict[str, bytes]) -> bytes:
@@ -186,8 +186,13 @@ def damaged_npz(rng: random.Random, data: bytes) -> bytes:
             rng.choice(_ARRAY_WAYS)(rng, arrays, name)
     if rng.random() < 0.1:
         members["t.npy"] = _lying_npy(rng)
-    packed = {f"{k}.npy": _npy(a, pickled=a.dtype.hasobject) for k, a in arrays.items()}
-    return pack(packed | members)
+    return packed(arrays, members)
+
+
+def packed(arrays: dict[str, Any], members: dict[str, bytes] | None = None) -> bytes:
+    """Return a file of NumPy's with the arrays, and `members` in the place of some."""
+    files = {f"{k}.npy": _npy(a, pickled=a.dtype.hasobject) for k, a in arrays.items()}
+    return pack(files | (members or {}))
 
 
 def _lying_npy(rng: random.Random) -> bytes:

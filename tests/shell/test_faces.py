@@ -9,7 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.shell.faces import described
-from sphshell_pin.study.validation.rattleback import ellipsoid
+from tests.validation.rattleback import ellipsoid
 
 SEGMENTS = 48
 

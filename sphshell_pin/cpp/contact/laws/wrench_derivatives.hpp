@@ -1,7 +1,7 @@
 // How the wrench of one contact, and the rate of its bristle, change with the relative motion.
 #pragma once
 
-#include "contact/laws/friction.hpp"
+#include "sphshell_pin/laws/friction.hpp"
 #include "contact/laws/hertz.hpp"
 #include "contact/query/query.hpp"
 

@@ -211,8 +211,8 @@ void FoundationForces::add_bristle(const Pair& pair, std::size_t i, double relax
   const Mat3 point_by = center_slopes(i, pair.radius);
   at.point_by = &point_by;
   NormalLaw held, steep;  // the same force here, constant, and in proportion to the depth
-  held.law = ImpactLaw({size, 0, 0, 1});
-  steep.law = ImpactLaw({size / depth, 1, 0, 1});
+  held.law = ImpactLaw({size, 0});
+  steep.law = ImpactLaw({size / depth, 1});
   ContactSlopes all, without, more;
   contact_slopes(held, pair.friction, relaxation, at, all);
   contact_slopes(held, FrictionLaw(), relaxation, at, without);
