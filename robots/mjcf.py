@@ -16,6 +16,7 @@ import io
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,23 @@ _GIVEN = ("compiler", "default", "asset", "worldbody", "keyframe")
 _COMPILER = {"angle", "autolimits", "coordinate", "eulerseq", "boundmass", "boundinertia"}
 _COMPILER |= {"settotalmass", "balanceinertia", "inertiafromgeom", "inertiagrouprange"}
 _MESH = {"name", "class", "scale", "refpos", "refquat", "inertia", "vertex", "face"}
+_FINITE = [
+    "body_pos",
+    "body_ipos",
+    "body_mass",
+    "body_inertia",
+    "jnt_pos",
+    "jnt_axis",
+    "jnt_range",
+    "dof_damping",
+    "dof_frictionloss",
+    "dof_armature",
+    "geom_pos",
+    "geom_size",
+    "site_pos",
+    "qpos0",
+    "key_qpos",
+]
 _DROPPED = ("camera", "light")
 _MOST_MESH = 1e9  # [B]
 _POINT = "0 0 0 1 0 0 0 1 0 0 0 1"  # a mesh that nothing weighs
@@ -106,6 +124,19 @@ def _set_base(root: ET.Element, *, floats: bool) -> None:
             key.set("qpos", " ".join(place + qpos if floats else qpos[7:]))
 
 
+@contextmanager
+def _silent(mujoco: Any) -> Iterator[None]:
+    """Make MuJoCo's faults ValueErrors; it writes no file of its warnings meanwhile."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    except (MemoryError, mujoco.FatalError) as error:
+        raise ValueError(str(error) or "it needs too much memory") from None
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
 class _Reader:
     """What MuJoCo makes of one MJCF, and the plain form of it."""
 
@@ -114,8 +145,11 @@ class _Reader:
         # What is not modeled: the names that each sentence is about.
         self.notes: defaultdict[str, list[str]] = defaultdict(list)
         self.files: dict[str, tuple[Path, str]] = {}
-        self.model = self._compiled(self._spec())
-        m = self.model
+        with _silent(mujoco):
+            self.model = m = self._compiled(self._spec())
+        for name in _FINITE:
+            if not np.isfinite(getattr(m, name)).all():
+                raise ValueError(f"it has a number that is not finite ({name})")
         self.bodies = [m.body(i).name or "world" for i in range(m.nbody)]
         self.joints = [m.joint(j).name for j in range(m.njnt)]
         for what, names in (("body", self.bodies), ("joint", self.joints)):
@@ -200,10 +234,7 @@ class _Reader:
         count = iter(range(MOST_LINKS))
         for world in root.findall("worldbody"):
             _name_bodies(world, "world", count)
-        try:
-            return self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
-        except self.mujoco.FatalError as error:
-            raise ValueError(str(error)) from None
+        return self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
 
     def _mesh(self, one: ET.Element, compiler: Mapping[str, str]) -> None:
         """Put a mesh that weighs nothing in the place of one of a file."""
@@ -245,10 +276,7 @@ class _Reader:
                 self.files[mesh.name] = self.files[mesh.name][0], _text(mesh.scale)
         for name, body in needed.items():
             self._read_mesh(spec.mesh(name), body)
-        try:
-            return spec.compile()
-        except (ValueError, MemoryError, self.mujoco.FatalError) as error:
-            raise ValueError(str(error) or "it needs too much memory") from None
+        return spec.compile()
 
     def _read_mesh(self, mesh: Any, body: str) -> None:
         """Let `mesh` have the corners of its file; one that is open weighs as its hull."""
