@@ -40,23 +40,6 @@ _GIVEN = ("compiler", "default", "asset", "worldbody", "keyframe")
 _COMPILER = {"angle", "autolimits", "coordinate", "eulerseq", "boundmass", "boundinertia"}
 _COMPILER |= {"settotalmass", "balanceinertia", "inertiafromgeom", "inertiagrouprange"}
 _MESH = {"name", "class", "scale", "refpos", "refquat", "inertia", "vertex", "face"}
-_FINITE = [
-    "body_pos",
-    "body_ipos",
-    "body_mass",
-    "body_inertia",
-    "jnt_pos",
-    "jnt_axis",
-    "jnt_range",
-    "dof_damping",
-    "dof_frictionloss",
-    "dof_armature",
-    "geom_pos",
-    "geom_size",
-    "site_pos",
-    "qpos0",
-    "key_qpos",
-]
 _DROPPED = ("camera", "light")
 _MOST_MESH = 1e9  # [B]
 _POINT = "0 0 0 1 0 0 0 1 0 0 0 1"  # a mesh that nothing weighs
@@ -147,9 +130,6 @@ class _Reader:
         self.files: dict[str, tuple[Path, str]] = {}
         with _silent(mujoco):
             self.model = m = self._compiled(self._spec())
-        for name in _FINITE:
-            if not np.isfinite(getattr(m, name)).all():
-                raise ValueError(f"it has a number that is not finite ({name})")
         self.bodies = [m.body(i).name or "world" for i in range(m.nbody)]
         self.joints = [m.joint(j).name for j in range(m.njnt)]
         for what, names in (("body", self.bodies), ("joint", self.joints)):
@@ -361,17 +341,17 @@ class _Reader:
         dof, at = m.jnt_dofadr[j], m.jnt_qposadr[j]
         made = ET.Element("joint", name=self.joints[j], type=_JOINTS[kind])
         made.set("pos", "0 0 0" if kind == _FREE else _text(m.jnt_pos[j]))
-        made.set("armature", repr(float(m.dof_armature[dof])))
+        made.set("armature", _text(m.dof_armature[dof]))
         if kind == _FREE:
             return made
         made.set("axis", _text(m.jnt_axis[j]))
         if kind == _BALL:
             return made
-        made.set("damping", repr(float(np.ravel(m.dof_damping[dof])[0])))
-        made.set("frictionloss", repr(float(m.dof_frictionloss[dof])))
+        made.set("damping", _text(np.ravel(m.dof_damping[dof])[0]))
+        made.set("frictionloss", _text(m.dof_frictionloss[dof]))
         ref = float(m.qpos0[at])
         if ref:
-            made.set("ref", repr(ref))
+            made.set("ref", _text(ref))
         if m.jnt_limited[j]:
             # Pinocchio subtracts ref from the range, but counts positions as MuJoCo does.
             made.set("range", _text(m.jnt_range[j] + ref))
@@ -445,20 +425,24 @@ def _name_bodies(element: ET.Element, body: str, count: Iterator[int]) -> None:
 
 def _pose(position: Array, quaternion: Array) -> pin.SE3:
     w, x, y, z = quaternion
-    return pin.SE3(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix(), np.array(position))
+    turn = pin.Quaternion(w, x, y, z).normalized().toRotationMatrix()
+    return pin.SE3(turn, np.array(position))
 
 
 def _posed(pose: pin.SE3) -> dict[str, str]:
     x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
-    return {"pos": _text(pose.translation), "quat": _text(np.array([w, x, y, z]))}
+    return {"pos": _text(pose.translation), "quat": _text(w, x, y, z)}
 
 
 def _add_inertial(body: ET.Element, inertia: pin.Inertia) -> None:
     i = inertia.inertia
-    full = np.array([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]])
-    stated = {"mass": repr(float(inertia.mass)), "pos": _text(inertia.lever)}
-    ET.SubElement(body, "inertial", stated | {"fullinertia": _text(full)})
+    full = _text(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
+    stated = {"mass": _text(inertia.mass), "pos": _text(inertia.lever), "fullinertia": full}
+    ET.SubElement(body, "inertial", stated)
 
 
-def _text(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
+def _text(*values: Any) -> str:
+    numbers = np.ravel(values)
+    if not np.isfinite(numbers).all():
+        raise ValueError("it has numbers that are not finite")
+    return " ".join(map(repr, numbers.tolist()))
