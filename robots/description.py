@@ -70,15 +70,14 @@ class Description:
         return self.root.tag == "mujoco"
 
 
-def check_memory(model: pin.Model) -> pin.Model:
-    """Return `model`; ValueError if its pinocchio.Data would need too much memory."""
-    memory = 8 * 8.0 * model.nv**3
+def check_memory(nv: int) -> None:
+    """Raise ValueError if a pinocchio.Data of `nv` velocities would need too much memory."""
+    memory = 8 * 8.0 * nv**3
     if memory > MOST_MEMORY:
         raise ValueError(
-            f"its {model.nv} degrees of freedom need {memory * 1e-9:.3g} GB of memory, more than "
+            f"its {nv} degrees of freedom need {memory * 1e-9:.3g} GB of memory, more than "
             f"{MOST_MEMORY * 1e-9:g} GB; fix some joints, or build the pinocchio.Model yourself"
         )
-    return model
 
 
 def parsed(text: bytes) -> ET.Element:

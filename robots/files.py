@@ -156,14 +156,15 @@ def build_model(
         if not description.is_mjcf:
             root = [pin.JointModelFreeFlyer()] if free_flyer else []
             text = ET.tostring(description.root, encoding="unicode")
-            model = check_memory(pin.buildModelFromXML(text, *root))
+            model = pin.buildModelFromXML(text, *root)
         else:
             with _written(description.root) as path:
-                model = check_memory(pin.buildModelFromMJCF(path))
+                model = pin.buildModelFromMJCF(path)
             for name, extras in description.extras.items():
                 extras.give(model, model.joints[model.getJointId(name)])
             for site in description.sites:
                 site.give(model)
+        check_memory(model.nv)
     except (ValueError, RuntimeError, OSError) as error:
         what = "MJCF" if description.is_mjcf else "URDF"
         raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None

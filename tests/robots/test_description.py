@@ -50,7 +50,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("reason", REFUSED)
-@pytest.mark.parametrize("load", [robots.load_urdf, load_subject])
+@pytest.mark.parametrize("load", [robots.load_file, load_subject])
 def test_what_is_too_large_is_refused(tmp_path, reason, load):
     path = tmp_path / "r.urdf"
     path.write_text(REFUSED[reason])
@@ -61,4 +61,4 @@ def test_what_is_too_large_is_refused(tmp_path, reason, load):
 def test_a_chain_as_long_as_may_be_is_read(tmp_path):
     path = tmp_path / "r.urdf"
     path.write_text(robot("".join(joint(k, k - 1) for k in range(1, 1000))))
-    assert robots.load_urdf(path).model.nv == 0
+    assert robots.load_file(path).model.nv == 0
