@@ -46,9 +46,10 @@ _POINT = "0 0 0 1 0 0 0 1 0 0 0 1"  # a mesh that nothing weighs
 _KINDS = {2: ("sphere", 1), 3: ("capsule", 2), 4: ("ellipsoid", 3), 5: ("cylinder", 2)}
 _KINDS |= {6: ("box", 3), 7: ("mesh", 0)}
 _MESH_GEOM, _GRAY = 7, (0.5, 0.5, 0.5, 1.0)
-_OTHERS = {0: "plane", 1: "hfield", 8: "sdf"}
+_OTHERS = {0: "plane"}
 _FREE, _BALL, _SLIDE, _HINGE = range(4)
 _JOINTS = ("free", "ball", "slide", "hinge")
+_LEFT_OUT = "geoms of these kinds are left out"
 _HULLS = "masses of meshes that are not closed are those of their convex hulls"
 
 
@@ -166,6 +167,9 @@ class _Reader:
         compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
         for one in root.findall("compiler"):
             one.attrib = {k: v for k, v in one.attrib.items() if k in _COMPILER}
+            one[:] = []
+        for one in root.iterfind("keyframe/key"):  # of actuators and speeds nothing is read
+            one.attrib = {k: v for k, v in one.attrib.items() if k in ("name", "qpos")}
         for asset in root.findall("asset"):
             for one in list(asset):
                 if one.tag == "mesh":
@@ -182,8 +186,11 @@ class _Reader:
                     one.attrib.pop("texture", None)
                     one.attrib.pop("file", None)
         for element in root.iter():
-            for one in [one for one in element if one.tag in _DROPPED]:
-                element.remove(one)
+            for one in list(element):
+                if "hfield" in one.attrib:  # of a file
+                    self.notes[_LEFT_OUT].append("hfield")
+                if one.tag in _DROPPED or "hfield" in one.attrib:
+                    element.remove(one)
             if element.tag == "freejoint":
                 element.attrib.pop("align", None)
         count = iter(range(MOST_LINKS))
@@ -350,7 +357,7 @@ class _Reader:
         kind, count = _KINDS.get(int(m.geom_type[g]), (_OTHERS.get(int(m.geom_type[g]), "geom"), 0))
         mesh = m.mesh(m.geom_dataid[g]).name if kind == "mesh" else ""
         if int(m.geom_type[g]) not in _KINDS or (mesh and mesh not in self.files):
-            self.notes["geoms of these kinds are left out"].append(kind)
+            self.notes[_LEFT_OUT].append(kind)
             return
         made = ET.SubElement(into, "geom", type=kind)
         if mesh:

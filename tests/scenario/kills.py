@@ -1,10 +1,9 @@
-"""What commands leave behind when they are killed, and when the disk is full.
+"""What commands leave behind when they are killed at random times.
 
 `python -m tests.scenario.kills` runs each command of `COMMANDS` over its own earlier results and
-kills it: at every system call that touches the folder's files (with strace), and at random times.
-After each kill the folder must have all old files or all new ones, and those of others. Then it
-runs them on small file systems in memory (where it may mount them). Returns 1 if anything else was
-found.
+kills it. After each kill the folder must have all old files or all new ones, and those of others.
+Returns 1 if anything else was found. `test_results_kills` ends what writes at every file operation,
+and on full disks.
 """
 
 import argparse
@@ -12,14 +11,12 @@ import hashlib
 import json
 import os
 import random
-import re
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,10 +24,6 @@ from sphshell_pin.atomic import AtomicFolder
 from tests.scenario.operations import visible
 
 MAIN = [sys.executable, "-c", "from sphshell_pin.cli import main; main()"]
-CALLS = (
-    "openat,write,pwrite64,writev,rename,renameat,renameat2,unlink,unlinkat,link,linkat,symlink,"
-    "symlinkat,mkdir,mkdirat,rmdir,fsync,fdatasync,ftruncate,chmod,fchmod,fchmodat,chown,flock"
-)
 SCENE, STIFFNESS = "sphere_on_shell", "contact.ball-bowl.law.k"
 
 
@@ -58,8 +51,6 @@ class Command:
     """What it resumes from; it is removed once the command has done all."""
     beside: str = ""
     """The command whose results are in the same folder."""
-    browser: bool = False
-    """Whether a browser draws: strace and a full disk would meet that, too."""
     whole: Callable[[dict[str, bytes]], str] | None = None
     """Returns the value whose files these are. By default they have always the same bytes."""
 
@@ -79,7 +70,6 @@ COMMANDS = {
         "render ../run --to {value} --fps 400 --size 320x240 --out out",
         ("0.02", "0.03"),
         "frame_0001.png",
-        browser=True,
     ),
     "sweep": Command(
         f"sweep {SCENE} --duration 0.01 --vary {STIFFNESS}=1e4:{{value}}:4 --workers 0 "
@@ -116,10 +106,11 @@ class Trial:
         """Return the command with one of its values."""
         return [*MAIN, *self.command.words.format(value=value).split()]
 
-    def run(self, value: str, before: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
-        """Run to the end, below the command `before`."""
-        words = [*before, *self.words(value)]
-        return subprocess.run(words, cwd=self.place, capture_output=True, text=True, check=False)
+    def run(self, value: str) -> subprocess.CompletedProcess[str]:
+        """Run to the end."""
+        return subprocess.run(
+            self.words(value), cwd=self.place, capture_output=True, text=True, check=False
+        )
 
     def begin(self) -> None:
         """Put the results of others and those of the first value there."""
@@ -182,48 +173,6 @@ class Trial:
         }
 
 
-def calls_on(place: Path, log: Path) -> list[tuple[str, int]]:
-    """Return the system calls that touched files below `place`, each with its ordinal.
-
-    `log` is strace's, of one process: descriptors are shown with their paths.
-    """
-    counts: Counter[str] = Counter()
-    found = []
-    for line in log.read_text(errors="replace").splitlines():
-        call = re.match(r"(?:\d+ +)?(\w+)\(", line)
-        if call is None:
-            continue
-        counts[call[1]] += 1
-        if str(place) in line and not (call[1] == "openat" and "O_RDONLY" in line):
-            found.append((call[1], counts[call[1]]))
-    return found
-
-
-def kill_at_every_call(trial: Trial) -> list[str]:
-    """Kill the command at each of its system calls on files; return what was wrong."""
-    place, value = trial.place, trial.values[1]
-    log, keep = place.with_suffix(".strace"), place.with_suffix(".keep")
-    trial.begin()
-    shutil.copytree(place, keep)
-    traced = trial.run(value, ["strace", "-y", "-o", str(log), "-e", f"trace={CALLS}"])
-    assert traced.returncode == 0, traced.stderr
-    calls = calls_on(place, log)
-    print(f"{len(calls)} system calls: {dict(Counter(name for name, _ in calls))}", flush=True)
-    found: Counter[str] = Counter()
-    wrong = []
-    for name, ordinal in calls:
-        shutil.rmtree(place)
-        shutil.copytree(keep, place)
-        inject = f"inject={name}:signal=KILL:when={ordinal}"
-        done = trial.run(value, ["strace", "-o", "/dev/null", "-e", f"trace={name}", "-e", inject])
-        left = trial.state()
-        found[f"exit code {done.returncode}, results of {left}"] += 1
-        if left not in trial.values:
-            wrong.append(f"{name} {ordinal}: {left}")
-    print(dict(found), flush=True)
-    return wrong + trial.ends()
-
-
 def kill_at_random(trial: Trial, times: int) -> list[str]:
     """Kill a chain of commands, each over what the one before left; return what was wrong.
 
@@ -270,46 +219,10 @@ def kill_at_random(trial: Trial, times: int) -> list[str]:
     return wrong + trial.ends()
 
 
-def fill_disks(trial: Trial, sizes: int = 24) -> list[str]:
-    """Run on file systems that are full after a while; return what was wrong."""
-    place = trial.place
-    trial.begin()
-    keep = shutil.copytree(place, place.with_suffix(".keep"))
-    wrong = []
-    found: Counter[str] = Counter()
-    begin_size, told = 0, ""
-    for n in range(sizes):
-        options = ["-t", "tmpfs", "-o", "size=64m", "tmpfs", str(place)]
-        if subprocess.run(["mount", *options], capture_output=True, check=False).returncode:
-            print("full disks: left out, for file systems cannot be mounted here")
-            return wrong
-        try:
-            shutil.copytree(keep, place, dirs_exist_ok=True)
-            used = shutil.disk_usage(place).used
-            begin_size = begin_size or used
-            room = used + n * begin_size // (sizes - 4)
-            resize = f"remount,size={room}"
-            subprocess.run(["mount", "-o", resize, str(place)], check=True)
-            done = trial.run(trial.values[1])
-            left = trial.state()
-            expected = {0: trial.values[1], 2: trial.values[0]}.get(done.returncode, "?")
-            found[f"exit code {done.returncode}"] += 1
-            if left != expected or os.listdir(place) != ["out"]:
-                wrong.append(f"{room} bytes: {left}, {os.listdir(place)}: {done.stderr}")
-            elif done.returncode and done.stderr.count("\n") != 1:
-                wrong.append(f"{room} bytes: {done.stderr}")
-            told = done.stderr if done.returncode else told
-        finally:
-            subprocess.run(["umount", str(place)], check=True)
-    print(f"{sizes} small file systems: {dict(found)}; the last error was\n  {told}", flush=True)
-    return wrong
-
-
 def main() -> int:
-    """Kill and fill; return 1 if anything but whole results was found."""
+    """Kill; return 1 if anything but whole results was found."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--times", type=int, default=75, help="SIGKILLs at random times, of each")
-    parser.add_argument("--only", choices=["calls", "random", "full"])
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
     chosen = parser.parse_args()
     wrong = []
@@ -317,13 +230,7 @@ def main() -> int:
         prepare(Path(folder))
         for name in chosen.commands:
             print(f"{name}:", flush=True)
-            traced = shutil.which("strace") and not COMMANDS[name].browser
-            if chosen.only in (None, "calls") and traced:
-                wrong += kill_at_every_call(Trial(name, Path(folder) / f"{name}-calls"))
-            if chosen.only in (None, "random"):
-                wrong += kill_at_random(Trial(name, Path(folder) / f"{name}-random"), chosen.times)
-            if chosen.only in (None, "full") and not COMMANDS[name].browser:
-                wrong += fill_disks(Trial(name, Path(folder) / f"{name}-full"))
+            wrong += kill_at_random(Trial(name, Path(folder) / name), chosen.times)
     for one in wrong:
         print(f"wrong: {one}")
     print("failed" if wrong else "whole old or whole new each time")
