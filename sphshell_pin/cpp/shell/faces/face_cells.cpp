@@ -9,8 +9,6 @@
 namespace sphshell {
 namespace {
 
-// What is measured at a few places may be larger between them.
-constexpr double kMargin = 1.5;
 constexpr double kTurn = 6.283185307179586;
 // Facets of one face overlap by this share of their parameters: one of them has each point.
 constexpr double kOverlap = 1e-9;
@@ -22,13 +20,25 @@ double difference(double from, double to, bool angle) {
 
 }  // namespace
 
-// The most that a face is off a facet of it, by its middle and those of its sides.
-double sagitta_of(const Facet& facet, const Primitive& shape) {
-  const Vec3* p = facet.corner;
-  double most = std::abs(shape.distance((p[0] + p[1] + p[2]) / 3));
-  for (int k = 0; k < 3; ++k)
-    most = std::max(most, std::abs(shape.distance((p[k] + p[next_corner(k)]) / 2)));
-  return kMargin * most;
+std::array<Vec3, 4> middles_of(const Primitive& shape, const FaceCell& cell, const Facet& facet,
+                               double size) {
+  std::array<Vec3, 4> out;
+  for (int i = 0; i < 4; ++i) {
+    Vec3 chord = Vec3::Zero();
+    Eigen::Vector2d place(0, 0);
+    int turned = 0, count = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (i < 3 && k == previous_corner(i)) continue;
+      chord += facet.corner[k], ++count;
+      place[1] += cell.place[k][1];
+      // The tip of a cone has no angle.
+      if (!std::isnan(cell.place[k][0])) place[0] += cell.place[k][0], ++turned;
+    }
+    place[0] /= turned, place[1] /= count;
+    out[i] =
+        shape.has_parameters() && turned > 0 ? shape.at(place, size) : shape.onto(chord / count);
+  }
+  return out;
 }
 
 WithinLine within_line(const Primitive& shape, const FaceCell& cell, const Facet& facet, int k,
@@ -92,12 +102,8 @@ class CellMaker {
     if (cell.face < 0) return;
     const Facet& facet = shell_.facets()[f];
     const Primitive& shape = faces_.shapes[cell.face];
-    Vec3 n;
-    shape.distance((facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3, n);
-    cell.sign = n.dot(facet.normal) < 0 ? -1 : 1;
     double first[2] = {0, 0};
     for (int i = 0; i < 3; ++i) {
-      cell.upright[i] = static_cast<float>(cell.sign * n[i]);
       const double off = std::abs(shape.distance(facet.corner[i]));
       if (!(off <= gap_)) give_up(cell.face, cell.face, off);
       if (!shape.has_parameters()) continue;
@@ -109,6 +115,24 @@ class CellMaker {
         if (angle && !std::isnan(mine)) mine -= kTurn * std::round((mine - first[c]) / kTurn);
       }
     }
+    Vec3 n;
+    shape.distance(middles_of(shape, cell, facet, shell_.size())[3], n);
+    cell.sign = turn_of(shape, cell, facet, n) < 0 ? -1 : 1;
+    for (int i = 0; i < 3; ++i) cell.upright[i] = static_cast<float>(cell.sign * n[i]);
+  }
+
+  // Positive where a facet turns as the face's parameters do, or about the center of a sphere.
+  static double turn_of(const Primitive& shape, const FaceCell& cell, const Facet& facet,
+                        const Vec3& normal) {
+    if (shape.has_parameters()) {
+      const double (&at)[3][2] = cell.place;
+      const double u = at[1][0] - at[0][0], v = at[1][1] - at[0][1];
+      const double s = at[2][0] - at[0][0], t = at[2][1] - at[0][1], turn = u * t - s * v;
+      // But not of three corners on one of their lines, nor at a tip.
+      if (std::abs(turn) > kOverlap * (std::abs(u) + std::abs(v) + std::abs(s) + std::abs(t)))
+        return turn;
+    }
+    return normal.dot(facet.normal);
   }
 
   // Flat facets of planes far from anything round stay as they are.
