@@ -120,7 +120,7 @@ fuzz: $(VENV)/.test ## damaged files, folders of robots and results for every re
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 	$(BIN)/python -m tests.fuzz.cad --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 
-kills: $(VENV)/.test ## kill run, fit, render and sweep at random times
+kills: $(VENV)/.test ## kill run, fit, render, sweep, new and report at random times
 	$(BIN)/python -m tests.scenario.kills
 
 sanitize: $(VENV)/.test ## run tests with checks of memory, undefined behavior and data races

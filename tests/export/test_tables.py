@@ -134,16 +134,17 @@ def test_names_of_columns_and_text():
     text = csv_text({"x [m]": [0.1, np.nan], "n": [1, 2], "name": ["a,b", 'c"d']})
     assert text.splitlines() == ["x [m],n,name", '0.1,1,"a,b"', ',2,"c""d"']
     # No spreadsheet evaluates a name; numbers stay numbers.
-    text = csv_text({"=1+1": ["@a", "+b", "-c", "\td", "e=1"], "x": [-1.0] * 5})
+    text = csv_text({"=1+1": ["@a", "+b", "-c", "\td", "\uff1df", "e=1"], "x": [-1.0] * 6})
     assert [line.split(",")[0] for line in text.split("\r\n")][:-1] == [
         "'=1+1",
         "'@a",
         "'+b",
         "'-c",
         "'\td",
+        "'\uff1df",
         "e=1",
     ]
-    assert text.count(",-1.0") == 5
+    assert text.count(",-1.0") == 6
 
 
 def test_a_parquet_file_says_where_it_comes_from(finger, tmp_path):

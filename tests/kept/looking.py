@@ -103,7 +103,7 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     def live() -> None:
         """End the page after a second, as Ctrl-C does."""
         signal.signal(signal.SIGALRM, signal.default_int_handler)
-        signal.setitimer(signal.ITIMER_REAL, 25.0)
+        signal.setitimer(signal.ITIMER_REAL, 2.0)
         command("view", "run", "--no-open")()
 
     def load() -> Result:
@@ -136,6 +136,9 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
 def look(repository: Path, out: Path, scenario: str) -> None:
     """Look at the results in every way."""
     import matplotlib.font_manager  # noqa: F401  # asks the system for its fonts, once
+
+    with contextlib.suppress(ImportError):  # its glfw asks a process for its version, once
+        import mujoco  # noqa: F401
 
     package = importlib.util.find_spec("sphshell_pin")
     assert package is not None
