@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.robots.description import check_size
 from sphshell_pin.shell.readers.mesh import STL_RECORD, stl_corners
 from sphshell_pin.shell.readers.ply import parse_ply
@@ -34,7 +35,17 @@ _OF_NUMBERS = "float_array p vcount matrix translate rotate scale color float do
 _NUMBERS = frozenset(_OF_NUMBERS.split())
 _KNOWN = _NUMBERS.union(_PLAIN.split())
 _LINKS = ("url", "source", "target")
+_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([-+.\deE]+)")
 _CORNER = re.compile(r"(-?\d+)(?:/-?\d*)?(?:/(-?\d+))?")
+
+
+def collada_unit(path: Path) -> float:
+    """Return the length of the unit that a Collada file states [m]."""
+    found = _UNIT.search(read_bytes(path, MOST_TEXT))
+    try:
+        return float(found[1]) if found else 1.0
+    except ValueError:
+        return 1.0
 
 
 def plain_mesh(suffix: str, content: bytes) -> bytes | None:

@@ -10,6 +10,7 @@ any option, then with the one that the refusal names. `--pairs` of them are aske
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import re
 import resource
@@ -39,6 +40,9 @@ LIMIT = 60
 _XACRO = "{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}", "{http://ros.org/wiki/xacro}"
 _BUILT_IN = {"include", "property", "arg", "macro", "if", "unless", "insert_block", "call", "element", "attribute"}
 _INCLUDED = re.compile(r"<xacro:include\s+filename=[\"'](?:[^\"']*/)?([^/\"']+)[\"']")
+# Of arguments that a file does not run without, as its repository's own launch files have them.
+_VALUES = {"dof": "7", "ur_type": "ur5e", "robot_model": "ur5", "foot_collision": "default"}
+_ARGUMENT = re.compile(r"--xacro-arg (?!NAME)(\w+)=VALUE")
 # What a refusal says to do, and how.
 _ADVICE: dict[str, dict[str, object]] = {
     "--density 2700": {"density": 2700.0},
@@ -114,6 +118,11 @@ def _advised(row: Row, step: str, way) -> Row:
             reason = f"FOREIGN {type(error).__name__}: {error}"
         setattr(row, step, reason)
         more = {k: v for word, one in _ADVICE.items() if word in reason for k, v in one.items()}
+        if argument := _ARGUMENT.search(reason):
+            given = {argument[1]: "robot" if "name" in argument[1] else "false"}
+            more["xacro_args"] = row.options.get("xacro_args", {}) | given
+        elif given := {k: v for k, v in _VALUES.items() if f" {k}" in reason.partition("sets:")[2]}:
+            more["xacro_args"] = row.options.get("xacro_args", {}) | given
         if not more or row.options.items() >= more.items():
             return row
         row = replace(row, options=row.options | more)
@@ -150,12 +159,13 @@ def main() -> int:
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--most", type=int, default=8, help="files of a repository")
     parser.add_argument("--pairs", type=int, default=0, help="files that `new` is asked for")
-    parser.add_argument("--only", default="", help="repositories with this in their name")
+    parser.add_argument("--only", default="", help="a regular expression of repositories' names")
+    parser.add_argument("--kept", type=Path, help="a file of rows: those that are right stay")
     parser.add_argument("--write", action="store_true", help="write docs/measured/census.json")
     asked = parser.parse_args()
     questions = []
-    for repository in sorted(one for folder in asked.folders for one in folder.iterdir() if one.is_dir()):
-        if asked.only not in repository.name:
+    for repository in sorted(one for folder in asked.folders for one in folder.iterdir() if one.is_dir() and not one.is_symlink()):
+        if not re.search(asked.only, repository.name):
             continue
         files = list(robot_files(repository))
         chosen = np.unique(np.linspace(0, len(files) - 1, min(asked.most, len(files))).astype(int))
@@ -163,11 +173,16 @@ def main() -> int:
     parts = sorted(one for one in PARTS.iterdir() if one.suffix.lower() in (".step", ".stl", ".obj", ".iges"))
     drafted = set(np.linspace(0, len(questions) - 1, asked.pairs).astype(int))
     context = multiprocessing.get_context("fork")
+    kept = json.loads(asked.kept.read_text()) if asked.kept and asked.kept.exists() else []
+    right = {(one["repository"], one["file"]): one for one in kept if not (one["load"] or one["check"] or one["new"])}
     rows = []
     for k, (_, repository, file) in enumerate(sorted(questions)):
         row = Row(repository.name.replace("+", "/"), str(file.relative_to(repository)))
-        here, there = context.Pipe(duplex=False)
         part = parts[k % len(parts)] if k in drafted else None
+        if (old := right.get((row.repository, row.file))) and (part is None or old["new"] == ""):
+            rows.append(Row(**old))
+            continue
+        here, there = context.Pipe(duplex=False)
         child = context.Process(target=_child, args=(there, file, part, row))
         child.start()
         there.close()
@@ -180,6 +195,9 @@ def main() -> int:
         if row:
             said = [f"{step}: {getattr(row, step)}" for step in ("load", "check", "new") if getattr(row, step)]
             print(row.repository, row.file, row.options or "", part or "", f"{row.seconds:.0f} s", "; ".join(said) or "right", flush=True)
+        if asked.kept:
+            right[row.repository, row.file] = vars(row)
+            asked.kept.write_text(json.dumps(list(right.values()), indent=1))
     found = sections(rows)
     print(*found[0].text.split("\n"), sep="\n")
     print(*(" | ".join(map(str, one)) for section in found for one in section.table), sep="\n")
