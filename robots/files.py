@@ -91,23 +91,8 @@ def read(
         else:
             text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
-        reason = _line(error)
-        argument = re.search(r"Undefined substitution argument (\w+)", reason)
-        if argument is not None:
-            reason += f": give it, --xacro-arg {argument[1]}=VALUE (xacro_args in a scenario)"
-        elif (stated := _arguments(file)) and "there is no package" not in reason:
-            reason += f"; its arguments, which --xacro-arg NAME=VALUE sets: {stated}"
-        raise RobotError(f"{file}: not a URDF that can be read: {reason}") from None
+        raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
     return described(text, folders, free_flyer=free_flyer)
-
-
-def _arguments(file: Path) -> str:
-    """Return the arguments that a xacro file declares, with their defaults."""
-    if file.suffix.lower() != ".xacro" or not os.path.isfile(file):
-        return ""
-    text = read_bytes(file, MOST_TEXT).decode(errors="replace")
-    found = re.findall(r'<xacro:arg\s+name="(\w+)"(?:\s+default="([^"]*)")?', text)
-    return ", ".join(f"{name} ({usual})" if usual and "$" not in usual else name for name, usual in found[:12])
 
 
 def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) -> Description:
@@ -193,8 +178,8 @@ def build_geometry(
 ) -> tuple[pin.GeometryModel, list[str]]:
     """Return the geometry of a kind, and the visual meshes that are missing.
 
-    Visual Collada meshes are left in their files' own unit, which those who draw them apply; if
-    they are not `drawn`, they are in meters, as collision meshes are. Raises RobotError for a collision mesh that is missing, and for a mesh that cannot be read.
+    Collada meshes are in meters, but for visual ones that are `drawn`: who draws them applies their
+    unit. Raises RobotError for a collision mesh that is missing, and for one that cannot be read.
     """
     visual = kind == pin.GeometryType.VISUAL
     root, missing = _with_meshes(description, visual=visual, meters=not (visual and drawn))
@@ -273,9 +258,9 @@ def _is_visual(part: ET.Element) -> bool:
 def _with_meshes(
     description: Description, *, visual: bool, meters: bool
 ) -> tuple[ET.Element, list[str]]:
-    """Return a copy that names every mesh by its absolute path; missing visual ones are out.
+    """Return a copy that names meshes by absolute paths; missing visual ones are out.
 
-    With `meters` Collada meshes are scaled by the unit that they state, which Coal ignores.
+    With `meters` Collada meshes are scaled by their unit, which Coal ignores.
     """
     root = ET.fromstring(ET.tostring(description.root))
     missing: dict[str, None] = {}
