@@ -23,11 +23,7 @@ from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
-<<<<<<< HEAD
-from sphshell_pin.robots.plain_mesh import collada_unit
-=======
-from sphshell_pin.robots.plain_mesh import refused_reference
->>>>>>> main
+from sphshell_pin.robots.plain_mesh import collada_unit, refused_reference
 from sphshell_pin.shell.readers.ply import read_ply
 
 

@@ -16,11 +16,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from sphshell_pin.errors import SphshellError
-<<<<<<< HEAD
-from sphshell_pin.regular_file import MOST_TEXT, read_bytes
-=======
 from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
->>>>>>> main
 from sphshell_pin.robots.description import check_size
 from sphshell_pin.shell.readers.mesh import STL_RECORD, stl_corners
 from sphshell_pin.shell.readers.ply import parse_ply
@@ -41,12 +37,9 @@ _OF_NUMBERS = "float_array p vcount matrix translate rotate scale color float do
 _NUMBERS = frozenset(_OF_NUMBERS.split())
 _KNOWN = _NUMBERS.union(_PLAIN.split())
 _LINKS = ("url", "source", "target")
-<<<<<<< HEAD
 _UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([-+.\deE]+)")
-=======
 _ODD, _CONTINUED = re.compile(rb"[\0\f\v]|\\\r(?!\n)"), re.compile(rb"\\\r?\n")
 _MATERIALS = re.compile(rb"mtllib([^\r\n]*)")
->>>>>>> main
 _CORNER = re.compile(r"(-?\d+)(?:/-?\d*)?(?:/(-?\d+))?")
 
 

@@ -71,15 +71,11 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     try:
         install(xacro, substitution_args)
         document = xacro.process_file(str(file), mappings=dict(arguments))
-<<<<<<< HEAD
     except MemoryError:
         raise
-    except Exception as error:  # of the package xacro, which raises what happens to come up
-=======
     except RecursionError:
         raise ValueError("its files, macros or elements are nested too deeply") from None
-    except (xacro.XacroException, ExpatError, OSError) as error:
->>>>>>> main
+    except Exception as error:  # of the package xacro, which raises what happens to come up
         if isinstance(error.__cause__ or error.__context__, MemoryError):
             raise MemoryError from None
         reason = " ".join(str(error).split()) or type(error).__name__

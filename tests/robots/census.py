@@ -182,7 +182,7 @@ def main() -> int:
     parser.add_argument("--most", type=int, default=4, help="files of a repository")
     parser.add_argument("--pairs", type=int, default=0, help="files that `new` is asked for")
     parser.add_argument("--only", default="", help="a regular expression of repositories' names")
-    parser.add_argument("--kept", type=Path, help="a file of rows: those that are right stay")
+    parser.add_argument("--kept", type=Path, help="a file of rows, which are not asked again")
     parser.add_argument("--write", action="store_true", help="write docs/measured/census.json")
     asked = parser.parse_args()
     questions = []
@@ -199,8 +199,8 @@ def main() -> int:
     for k, (_, repository, file) in enumerate(sorted(questions)):
         row = Row(repository.name.replace("+", "/"), str(file.relative_to(repository)))
         part = parts[k % len(parts)] if k in drafted else None
-        found = kept.get((row.repository, row.file), Row("", "", load="not asked"))
-        if found.came_to != "right" or (part is not None and found.new is None):
+        found = kept.get((row.repository, row.file))
+        if found is None or (part is not None and found.new is None and not found.load):
             found = kept[row.repository, row.file] = _asked(file, part, row)
             print(found, flush=True)
         if "there is no such link" not in (found.load or ""):  # that is a tool for another robot
