@@ -86,9 +86,23 @@ def parsed(text: bytes) -> ET.Element:
     The parser knows namespaces, which `check_size` does not look at.
     """
     try:
-        return ET.fromstring(_declared(text))
+        root = ET.fromstring(_declared(text))
     except ET.ParseError as error:
         raise ValueError(f"it is not well-formed XML: {error}") from None
+    # Of a link one of whose numbers ends in a blank or is none, urdfdom drops the whole inertia.
+    for element in root.iter():
+        element.attrib.update({name: value.strip() for name, value in element.attrib.items()})
+    for link in root.iter("link"):
+        for part in (*link.findall("inertial/mass"), *link.findall("inertial/inertia")):
+            for name, value in part.attrib.items():
+                try:
+                    float(value)
+                except ValueError:
+                    raise ValueError(
+                        f"the {part.tag} of link '{link.get('name')}' has {name} = '{value}', "
+                        "which is no number"
+                    ) from None
+    return root
 
 
 def _declared(text: bytes) -> bytes:

@@ -23,7 +23,7 @@ from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
-from sphshell_pin.robots.plain_mesh import refused_reference
+from sphshell_pin.robots.plain_mesh import collada_unit, refused_reference
 from sphshell_pin.shell.readers.ply import read_ply
 
 
@@ -56,6 +56,8 @@ _REFUSED = {
 MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
 """Formats of the meshes that a robot may name."""
 
+# A license before the declaration of XML, which no reader of robots minds.
+_BEFORE_XML = re.compile(rb"\A(?:\s|<!--(?:(?!-->).)*-->)+(?=<\?xml\s)", re.DOTALL)
 _NO_LIMITS = {"effort": "1e30", "velocity": "1e30"}
 _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files"
 
@@ -89,11 +91,7 @@ def read(
         else:
             text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
-        reason = _line(error)
-        argument = re.search(r"Undefined substitution argument (\w+)", reason)
-        if argument is not None:
-            reason += f": give it, --xacro-arg {argument[1]}=VALUE (xacro_args in a scenario)"
-        raise RobotError(f"{file}: not a URDF that can be read: {reason}") from None
+        raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
     return described(text, folders, free_flyer=free_flyer)
 
 
@@ -101,6 +99,7 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
     """Return the description that `text`, of the file of `folders`, is; see `read`."""
     file, what = folders.file, "URDF"
     try:
+        text = _BEFORE_XML.sub(b"", text)
         tag = check_size(text)
         if tag == "sdf":
             raise RobotError(f"{file}: {_reason('.sdf')}")
@@ -148,8 +147,7 @@ def build_model(
     With `mimic` continuous joints are without limits, but not wound round, where joints that mimic
     one another need it. Raises RobotError.
     """
-    file = description.file
-    wound: list[str] = []
+    file, wound = description.file, list[str]()
     if mimic:
         description, wound = unwound(description)
     try:
@@ -177,14 +175,15 @@ def build_model(
 
 
 def build_geometry(
-    description: Description, model: pin.Model, kind: pin.GeometryType
+    description: Description, model: pin.Model, kind: pin.GeometryType, *, drawn: bool = True
 ) -> tuple[pin.GeometryModel, list[str]]:
     """Return the geometry of a kind, and the visual meshes that are missing.
 
-    Raises RobotError for a collision mesh that is missing, and for a mesh that cannot be read.
+    Collada meshes are in meters, but for visual ones that are `drawn`: who draws them applies their
+    unit. Raises RobotError for a collision mesh that is missing, and for one that cannot be read.
     """
     visual = kind == pin.GeometryType.VISUAL
-    root, missing = _with_meshes(description, visual=visual)
+    root, missing = _with_meshes(description, visual=visual, meters=not (visual and drawn))
     try:
         return _geometry(description, root, model, kind), missing
     except RobotError:
@@ -257,8 +256,13 @@ def _is_visual(part: ET.Element) -> bool:
     return part.tag == "visual" or touches_nothing
 
 
-def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element, list[str]]:
-    """Return a copy that names every mesh by its absolute path; missing visual ones are out."""
+def _with_meshes(
+    description: Description, *, visual: bool, meters: bool
+) -> tuple[ET.Element, list[str]]:
+    """Return a copy that names meshes by absolute paths; missing visual ones are out.
+
+    With `meters` Collada meshes are scaled by their unit, which Coal ignores.
+    """
     root = ET.fromstring(ET.tostring(description.root))
     missing: dict[str, None] = {}
     if description.is_mjcf:
@@ -290,6 +294,9 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
             reason = f"{uri} is not there" if found is None else _mesh_reason(found)
             if found is not None and not reason:
                 mesh.set("filename", str(found.absolute()))
+                if meters and found.suffix.lower() == ".dae":
+                    scale = [float(x) for x in mesh.get("scale", "1 1 1").split()]
+                    mesh.set("scale", " ".join(str(x * collada_unit(found)) for x in scale))
             elif visual:
                 missing[uri] = None
                 link.remove(part)

@@ -38,7 +38,8 @@ def with_density(description: Description, density: float) -> tuple[Description,
         bare = [one for one in root.findall("link") if not _mass(one)]
         part = copy.deepcopy(description)
         keep_geometry_of(part, {one.get("name", "") for one in bare}, kind)
-        geometry, _ = build_geometry(part, model, getattr(pin.GeometryType, kind.upper()))
+        of = getattr(pin.GeometryType, kind.upper())
+        geometry, _ = build_geometry(part, model, of, drawn=False)
         for link in bare:
             inertia = _inertia(model, geometry, frames.get(link.get("name", "")), density)
             if inertia.mass > 0.0:

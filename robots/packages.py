@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from urllib.parse import unquote
@@ -69,7 +70,17 @@ class Folders:
         else:
             roots = (self.file.parent, *self.given)
             places = (folder / uri for folder in roots)  # of an absolute path, itself
+        places = chain(places, self._moved(Path(unquote(rest or uri)).parts))
         return next((place for place in places if os.path.isfile(place)), None)
+
+    def _moved(self, parts: Sequence[str]) -> Iterator[Path]:
+        """Yield where a file of a renamed package, or of another machine's folders, may be."""
+        home = self.file.resolve().parent
+        if "share" in parts[:-2]:  # where ROS installs packages
+            k = parts.index("share") + 1
+            yield from (folder.joinpath(*parts[k + 1 :]) for folder in self.packages(parts[k]))
+        for k in range(1, len(parts)):
+            yield from (folder.joinpath(*parts[k:]) for folder in (home, *home.parents[:2]))
 
     def beside(self, name: str) -> Path:
         """Return the path that an MJCF calls `name`; nothing is there if it may not be read."""

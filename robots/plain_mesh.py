@@ -37,9 +37,19 @@ _OF_NUMBERS = "float_array p vcount matrix translate rotate scale color float do
 _NUMBERS = frozenset(_OF_NUMBERS.split())
 _KNOWN = _NUMBERS.union(_PLAIN.split())
 _LINKS = ("url", "source", "target")
+_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([-+.\deE]+)")
 _ODD, _CONTINUED = re.compile(rb"[\0\f\v]|\\\r(?!\n)"), re.compile(rb"\\\r?\n")
 _MATERIALS = re.compile(rb"mtllib([^\r\n]*)")
 _CORNER = re.compile(r"(-?\d+)(?:/-?\d*)?(?:/(-?\d+))?")
+
+
+def collada_unit(path: Path) -> float:
+    """Return the length of the unit that a Collada file states [m]."""
+    found = _UNIT.search(read_bytes(path, MOST_TEXT))
+    try:
+        return float(found[1]) if found else 1.0
+    except ValueError:
+        return 1.0
 
 
 def plain_mesh(suffix: str, content: bytes) -> bytes | None:

@@ -12,7 +12,6 @@ import resource
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from xml.parsers.expat import ExpatError
 
 from sphshell_pin.limits import limit_memory
 from sphshell_pin.robots.packages import Folders
@@ -72,12 +71,16 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     try:
         install(xacro, substitution_args)
         document = xacro.process_file(str(file), mappings=dict(arguments))
+    except MemoryError:
+        raise
     except RecursionError:
         raise ValueError("its files, macros or elements are nested too deeply") from None
-    except (xacro.XacroException, ExpatError, OSError) as error:
+    except Exception as error:  # of the package xacro, which raises what happens to come up
         if isinstance(error.__cause__ or error.__context__, MemoryError):
             raise MemoryError from None
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error).split()) or type(error).__name__
+        # xacro says so of all that a substitution may fail for.
+        reason = reason.replace("Undefined substitution argument there is", "there is")
         where = Path((xacro.filestack or [file])[-1]).name
         of = f" (in {where})" if where != file.name else ""
         raise ValueError(f"xacro cannot expand it{of}: {reason}") from None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.limits import child_command, last_line
+from sphshell_pin.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.robots.packages import Folders
 
 TIME_LIMIT = 5.0
@@ -26,6 +28,8 @@ WAIT = 60.0
 
 CHILD = "sphshell_pin.robots.xacro_child"
 """The module whose `serve` runs in the process."""
+
+_LISTED = 12  # arguments, in a sentence
 
 MEMORY_LIMIT = 1e9
 """What a file may take [bytes]."""
@@ -71,11 +75,27 @@ def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> byt
             "expressions and loops"
         )
     if fault == "file":
-        raise ValueError(str(answer.get("reason")))
+        raise ValueError(_advised(str(answer.get("reason")), file))
     if fault is not None or not isinstance(urdf, str):
         raise ValueError(f"xacro cannot expand it: its process {fault or 'gave no answer'}")
     sys.stderr.write(answer["said"])  # xacro's warnings
     return urdf.encode()
+
+
+def _advised(reason: str, file: Path) -> str:
+    """Return a reason with the arguments that may be to blame."""
+    argument = re.search(r"Undefined substitution argument (\w+)", reason)
+    if argument is not None:
+        return f"{reason}: give it, --xacro-arg {argument[1]}=VALUE (xacro_args in a scenario)"
+    if "there is no package" in reason or not file.is_file():
+        return reason
+    text = read_bytes(file, MOST_TEXT).decode(errors="replace")
+    stated = [
+        f"{name} ({usual})" if usual and "$" not in usual else name
+        for name, usual in re.findall(r'<xacro:arg\s+name="(\w+)"(?:\s+default="([^"]*)")?', text)
+    ]
+    sets = "; its arguments, which --xacro-arg NAME=VALUE sets: "
+    return reason + (sets + ", ".join(stated[:_LISTED]) if stated else "")
 
 
 def _text(value: object) -> str:

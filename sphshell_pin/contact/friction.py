@@ -45,6 +45,11 @@ class Friction(Component):
         raise NotImplementedError
 
     @property
+    def creep_speed(self) -> float:
+        """Slip speed [m/s] at which it holds half of what it can hold; 0 where it sticks."""
+        return 0.0
+
+    @property
     def needs_radius(self) -> bool:
         """Whether the forces depend on the radius of the sphere."""
         return self._binding.torsional
@@ -174,6 +179,11 @@ class CoulombFriction(Coefficients, kind="coulomb"):
     def sticking_speed(self) -> float:
         """Slip speed [m/s] below which a contact creeps."""
         return self.v_static
+
+    @property
+    def creep_speed(self) -> float:
+        """The root of (3 x - x^3) / 2 = 1/2, in `v_static`."""
+        return 2.0 * math.sin(math.asin(0.5) / 3.0) * self.v_static
 
     def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return 20 times the decay of a slip below `v_static` [s]."""

@@ -86,15 +86,17 @@ def elastic_energy(result: Result) -> Finding:
 def _energies(scene: Scene, result: Result) -> tuple[Array, Array]:
     model, data = scene.model, scene.model.createData()
     rows = list(zip(result.q, result.v, strict=True))
-    kinetic = [kinetic_energy(model, data, q, v) for q, v in rows]
+    kinetic = [kinetic_energy(model, q, v) for q, v in rows]
     potential = [_potential_energy(model, data, q) for q, _ in rows]
     return np.array(kinetic), np.array(potential)
 
 
-def kinetic_energy(model: pin.Model, data: pin.Data, q: Array, v: Array) -> float:
-    """Return the kinetic energy [J]; Pinocchio's function refuses mimic joints."""
-    if not len(model.mimicking_joints):
-        return float(pin.computeKineticEnergy(model, data, q, v))
+def kinetic_energy(model: pin.Model, q: Array, v: Array) -> float:
+    """Return the kinetic energy [J].
+
+    Pinocchio's function refuses mimic joints, and leaves out the armature of joints about a skew
+    axis.
+    """
     return 0.5 * float(v @ mass_matrix(model, q) @ v)
 
 

@@ -123,3 +123,20 @@ def test_millimetres_taken_for_metres_are_suspected() -> None:
         scene.add_contact(
             sphere=sp.Sphere(0.1, "tip"), shell=sp.Shell(vertices, elements), law=models.LAW
         )
+
+
+@pytest.mark.parametrize(
+    ("friction", "warned"),
+    [
+        (sp.CoulombFriction(0.8, 0.68), True),
+        (sp.CoulombFriction(0.8, 0.68, 0.005, 0.05), False),
+        (sp.BristleFriction(0.8, 0.68, 1e4, 10.0), False),
+    ],
+)
+def test_friction_that_creeps_visibly_is_warned_of(friction: sp.Friction, warned: bool) -> None:
+    scene = sp.Scene(ball_model())
+    plate = sp.Shell(*meshes.grid_plate())
+    scene.add_contact(sp.Sphere(0.01, "tip"), plate, law=models.LAW, friction=friction)
+    assert any("creeps at 0.035 m/s" in one for one in scene.explain().warnings) == warned
+    creep = friction.creep_speed
+    assert creep == 0.0 or friction.coefficient(creep) == pytest.approx(0.4, rel=1e-12)

@@ -399,3 +399,15 @@ key = "joint.hinge.friction"
     result = built.simulation.run(built.q0, built.v0, 1.0, built.controller)
     assert result.stats.joints["hinge"].stops >= 1
     assert residual(result) < 1e-4
+
+
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.6, 0.0, 0.8)])
+def test_the_energy_of_an_armature_counts_about_any_axis(axis: tuple[float, ...]) -> None:
+    model = pin.Model()
+    turn = pin.JointModelRevoluteUnaligned(*axis)
+    joint = model.addJoint(0, turn, pin.SE3.Identity(), "turn")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    model.armature, speed = np.array([0.05]), 3.0
+    run = sp.Simulation(sp.Scene(model), sp.Adaptive()).run(np.zeros(1), [speed], 0.01)
+    inertia = 0.4 * 1.0 * 0.1**2 + 0.05
+    assert run.energy.kinetic == pytest.approx(0.5 * inertia * speed**2, rel=1e-12)

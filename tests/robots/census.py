@@ -1,16 +1,16 @@
-"""What strangers' robot files come to: every robot in clones of repositories, loaded and checked.
+"""What strangers' robot files come to: those of clones of repositories, loaded and checked.
 
-    python -m tests.robots.census FOLDER... --most 8 --pairs 40 --write docs/measured/census.json
+    python -m tests.robots.census FOLDER --most 4 --pairs 40 --write
 
-Each folder of a FOLDER is a repository. Of each, at most `--most` of its files of a whole robot
-(URDF, xacro, MJCF) are loaded and go through check-robot, in a process with a time limit, first
-without any option, then with the one that the refusal names. `--pairs` of them are asked for a
-scenario too.
+Each folder in FOLDER is a repository. Up to `--most` of its files of a whole robot (URDF, xacro,
+MJCF) are loaded and go through check-robot, in a process with a time limit, first without options,
+then with those that the refusals name. `--pairs` of them are asked for a scenario, too.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import re
 import resource
@@ -19,15 +19,17 @@ import tempfile
 import time
 import warnings
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.measured import Measured
 from sphshell_pin import robots
+from sphshell_pin.cases.measured import Measured, write
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.study.robot_check import QUICK, check_robot
@@ -36,61 +38,51 @@ PARTS = Path(__file__).parents[1] / "data" / "corpus"
 LIMIT = 60
 """Of the processor, for a file [s]."""
 
-_XACRO = (
-    "{http://www.ros.org/wiki/xacro}",
-    "{http://wiki.ros.org/xacro}",
-    "{http://ros.org/wiki/xacro}",
-)
-_BUILT_IN = {
-    "include",
-    "property",
-    "arg",
-    "macro",
-    "if",
-    "unless",
-    "insert_block",
-    "call",
-    "element",
-    "attribute",
-}
+_ENDS = (".urdf", ".xacro", ".xml")
+_BUILT_IN = {"include", "property", "arg", "macro", "if", "unless", "insert_block", "element"}
 _INCLUDED = re.compile(r"<xacro:include\s+filename=[\"'](?:[^\"']*/)?([^/\"']+)[\"']")
-# What a refusal says to do, and how.
-_ADVICE: dict[str, dict[str, object]] = {
+_ADVICE: dict[str, dict[str, Any]] = {
     "--density 2700": {"density": 2700.0},
     "--no-mimic": {"mimic": False},
     "mimic = false": {"mimic": False},
     "--free-flyer": {"free_flyer": True},
 }
+"""What a refusal says to do, and how."""
+_ARGUMENT = re.compile(r"--xacro-arg (?!NAME)(\w+)=VALUE")
+_VALUES = {"dof": "7", "ur_type": "ur5e", "robot_model": "ur5", "foot_collision": "default"}
+"""Of arguments that a file does not run without, as its repository's launch files have them."""
+_KINDS = (
+    ("mesh cannot be loaded", "a collision mesh is not in the repository"),
+    ("there is no package", "a package is in none of the repositories"),
+    ("No such file", "it includes a file that is not there, or not for these arguments"),
+)
 
 
 @dataclass
 class Row:
-    """A robot's file: why each command refused it, "" where it did not, None: not asked."""
+    """One robot's file, and why each command refused it: "" where it did not, None: not asked."""
 
     repository: str
     file: str
-    options: dict[str, object] = field(default_factory=dict)
-    """What the refusals of the first attempts said to add."""
+    options: dict[str, Any] = field(default_factory=dict)
+    """What refusals said to add."""
     load: str | None = None
     check: str | None = None
     new: str | None = None
     seconds: float = 0.0
-    """Of `new`."""
+    """Of the processor, for `new`."""
+
+    @property
+    def came_to(self) -> str:
+        """What came of it."""
+        return "not loaded" if self.load else "fails a check" if self.check else "right"
 
 
 def robot_files(folder: Path) -> Iterator[Path]:
     """Yield the files in `folder` that describe a whole robot, not macros, poses or parts."""
-    files = [
-        one
-        for one in sorted(folder.rglob("*"))
-        if one.suffix in (".urdf", ".xacro", ".xml") and one.is_file()
-    ]
-    parts = {
-        (one.parent, name)
-        for one in files
-        if one.suffix == ".xacro"
-        for name in _INCLUDED.findall(one.read_text(errors="replace"))
-    }
+    files = [one for one in sorted(folder.rglob("*")) if one.suffix in _ENDS and one.is_file()]
+    texts = {one: one.read_text(errors="replace") for one in files if one.suffix == ".xacro"}
+    parts = {(one.parent, name) for one in texts for name in _INCLUDED.findall(texts[one])}
     for file in files:
         if (file.parent, file.name) in parts or re.search(r"\.(srdf|gazebo)\b", file.name):
             continue
@@ -100,38 +92,49 @@ def robot_files(folder: Path) -> Iterator[Path]:
             if file.suffix != ".xml":
                 yield file  # its reader has to say so
             continue
-        if root.tag == "mujoco":
-            if (
-                root.find("worldbody//joint") is not None
-                or root.find("worldbody//freejoint") is not None
-            ):
-                yield file
-        elif root.tag == "robot" and root.get("name") and any(_makes(one) for one in root):
+        moves = any(root.find(f"worldbody//{one}") is not None for one in ("joint", "freejoint"))
+        if moves or (root.tag == "robot" and root.get("name") and any(map(_makes_links, root))):
             yield file
 
 
-def _makes(element: ET.Element) -> bool:
-    """Whether an element of a <robot> makes links: a joint, or a call of a macro."""
+def _makes_links(element: ET.Element) -> bool:
+    """Whether an element of a <robot> is a joint, or a call of a macro."""
     space, _, name = element.tag.rpartition("}")
-    return name == "joint" if not space else space + "}" in _XACRO and name not in _BUILT_IN
+    return ("xacro" in space and name not in _BUILT_IN) if space else name == "joint"
 
 
 def ask(file: Path, part: Path | None, row: Row) -> Row:
     """Load, check and draft, each until a refusal names no option that was not tried."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        row = _advised(row, "load", lambda row: _load(file, row))
-        if row.load:
-            return row
-        row = _advised(row, "check", lambda row: _check(file, row))
-        if part is not None:
-            began = time.perf_counter()
-            row = _advised(row, "new", lambda row: _new(file, part, row))
-            row.seconds = time.perf_counter() - began
+
+    def load(row: Row) -> str:
+        robots.load_file(file, **{"mimic": True, **row.options})
+        return ""
+
+    def check(row: Row) -> str:
+        report = check_robot(file, sizes=QUICK, **row.options)
+        return "" if report.verdict == "pass" else "; ".join(report.remarks)
+
+    def new(row: Row) -> str:
+        options = dict(row.options)
+        base = "floating" if options.pop("free_flyer", False) else None
+        unit = None if part is None or part.suffix.lower() in (".step", ".iges") else "mm"
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "made.toml"
+            new_scenario(file, str(part), unit=unit, base=base, out=out, **options)
+        return ""
+
+    warnings.simplefilter("ignore")
+    row = _advised(row, "load", load)
+    if not row.load:
+        row = _advised(row, "check", check)
+        began = time.process_time()
+        row = row if part is None else _advised(row, "new", new)
+        row.seconds = time.process_time() - began
     return row
 
 
-def _advised(row: Row, step: str, way) -> Row:
+def _advised(row: Row, step: str, way: Callable[[Row], str]) -> Row:
+    """Return `row` with the reason of a step's refusal, after what refusals say to add."""
     while True:
         try:
             reason = way(row)
@@ -141,29 +144,15 @@ def _advised(row: Row, step: str, way) -> Row:
             reason = f"FOREIGN {type(error).__name__}: {error}"
         setattr(row, step, reason)
         more = {k: v for word, one in _ADVICE.items() if word in reason for k, v in one.items()}
+        listed = reason.partition("sets:")[2]
+        given = {name: value for name, value in _VALUES.items() if f" {name}" in listed}
+        if argument := _ARGUMENT.search(reason):
+            given = {argument[1]: "robot" if "name" in argument[1] else "false"}
+        if given:
+            more["xacro_args"] = row.options.get("xacro_args", {}) | given
         if not more or row.options.items() >= more.items():
             return row
         row = replace(row, options=row.options | more)
-
-
-def _load(file: Path, row: Row) -> str:
-    options = {"mimic": True} | row.options
-    robots.load_file(file, **options)
-    return ""
-
-
-def _check(file: Path, row: Row) -> str:
-    report = check_robot(file, sizes=QUICK, **row.options)
-    return "" if report.verdict == "pass" else "; ".join(report.remarks)
-
-
-def _new(file: Path, part: Path, row: Row) -> str:
-    with tempfile.TemporaryDirectory() as folder:
-        unit = None if part.suffix.lower() in (".step", ".iges") else "mm"
-        options = dict(row.options)
-        base = "floating" if options.pop("free_flyer", False) else None
-        new_scenario(file, part, unit=unit, base=base, out=Path(folder) / "made.toml", **options)
-    return ""
 
 
 def _child(pipe: Connection, file: Path, part: Path | None, row: Row) -> None:
@@ -171,74 +160,91 @@ def _child(pipe: Connection, file: Path, part: Path | None, row: Row) -> None:
     pipe.send(ask(file, part, row))
 
 
+def _asked(file: Path, part: Path | None, row: Row) -> Row:
+    """Ask in a process of its own."""
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe(duplex=False)
+    child = context.Process(target=_child, args=(there, file, part, row))
+    child.start()
+    there.close()
+    try:
+        return here.recv()
+    except EOFError:
+        return replace(row, load=f"FOREIGN: the process died, or took {LIMIT} s")
+    finally:
+        child.join()
+
+
 def main() -> int:
     """Ask for each file, print, and write the tables of the documentation."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folders", type=Path, nargs="+")
-    parser.add_argument("--most", type=int, default=8, help="files of a repository")
+    parser = argparse.ArgumentParser(prog="python -m tests.robots.census", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--most", type=int, default=4, help="files of a repository")
     parser.add_argument("--pairs", type=int, default=0, help="files that `new` is asked for")
-    parser.add_argument("--only", default="", help="repositories with this in their name")
+    parser.add_argument("--only", default="", help="a regular expression of repositories' names")
+    parser.add_argument("--kept", type=Path, help="a file of rows, which are not asked again")
     parser.add_argument("--write", action="store_true", help="write docs/measured/census.json")
     asked = parser.parse_args()
     questions = []
-    for repository in sorted(
-        one for folder in asked.folders for one in folder.iterdir() if one.is_dir()
-    ):
-        if asked.only not in repository.name:
-            continue
-        files = list(robot_files(repository))
-        chosen = np.unique(np.linspace(0, len(files) - 1, min(asked.most, len(files))).astype(int))
-        questions += [(rank, repository, files[k]) for rank, k in enumerate(chosen)]
-    parts = sorted(
-        one for one in PARTS.iterdir() if one.suffix.lower() in (".step", ".stl", ".obj", ".iges")
-    )
+    for repository in sorted(asked.folder.iterdir()):
+        if repository.is_dir() and re.search(asked.only, repository.name):
+            files = list(robot_files(repository))
+            chosen = np.linspace(0, len(files) - 1, min(asked.most, len(files))).astype(int)
+            questions += [(rank, repository, files[k]) for rank, k in enumerate(chosen)]
+    parts = [one for one in sorted(PARTS.iterdir()) if one.suffix.lower() in (".step", ".stl")]
     drafted = set(np.linspace(0, len(questions) - 1, asked.pairs).astype(int))
-    context = multiprocessing.get_context("fork")
+    old = json.loads(asked.kept.read_text()) if asked.kept and asked.kept.exists() else []
+    kept = {(one["repository"], one["file"]): Row(**one) for one in old}
     rows = []
     for k, (_, repository, file) in enumerate(sorted(questions)):
         row = Row(repository.name.replace("+", "/"), str(file.relative_to(repository)))
-        here, there = context.Pipe(duplex=False)
         part = parts[k % len(parts)] if k in drafted else None
-        child = context.Process(target=_child, args=(there, file, part, row))
-        child.start()
-        there.close()
-        try:
-            row = here.recv()
-        except EOFError:
-            row = replace(row, load=f"FOREIGN: the process died, or took {LIMIT} s")
-        child.join()
-        rows.append(row)
-        if row:
-            said = [
-                f"{step}: {getattr(row, step)}"
-                for step in ("load", "check", "new")
-                if getattr(row, step)
-            ]
-            print(
-                row.repository,
-                row.file,
-                row.options or "",
-                part or "",
-                f"{row.seconds:.0f} s",
-                "; ".join(said) or "right",
-                flush=True,
-            )
-    found = sections(rows)
-    print(*found[0].text.split("\n"), sep="\n")
-    print(*(" | ".join(map(str, one)) for section in found for one in section.table), sep="\n")
-    return 0
+        found = kept.get((row.repository, row.file))
+        if found is None or (part is not None and found.new is None and not found.load):
+            found = kept[row.repository, row.file] = _asked(file, part, row)
+            print(found, flush=True)
+        if "there is no such link" not in (found.load or ""):  # that is a tool for another robot
+            rows.append(found)
+        if asked.kept:
+            asked.kept.write_text(json.dumps([vars(one) for one in kept.values()], indent=1))
+    sections = tables(rows)
+    for section in sections:
+        print(section.text, *(" | ".join(one) for one in section.table), sep="\n")
+    if asked.write:
+        command = f"python -m tests.robots.census FOLDER --most {asked.most} --pairs {asked.pairs}"
+        print(f"wrote {write('census', command + ' --write', sections)}")
+    return 1 if any("FOREIGN" in f"{row.load}{row.check}{row.new}" for row in rows) else 0
 
 
-def sections(rows: Sequence[Row]) -> list[Measured]:
-    repositories = list(dict.fromkeys(row.repository for row in rows))
-    loaded = [row for row in rows if row.load == ""]
-    passed = [row for row in loaded if row.check == ""]
-    text = f"{len(rows)} files: {len(loaded)} load, {len(passed)} pass"
+def tables(rows: Sequence[Row]) -> list[Measured]:
+    """Return what the site shows: counts by repository, and the reasons of what fell."""
+    drafts = [row for row in rows if row.new is not None]
+    count = Counter(row.came_to for row in rows)
+    loaded, times = len(rows) - count["not loaded"], [row.seconds for row in drafts] or [0.0]
+    text = (
+        f"{len(rows)} files: {loaded} load ({loaded / len(rows):.0%}), {count['right']} pass "
+        f"check-robot ({count['right'] / len(rows):.0%}), {sum(bool(row.options) for row in rows)} "
+        f"with options that refusals named. Of {len(drafts)} scenarios that `new` was asked for it "
+        f"wrote {sum(not row.new for row in drafts)}; seconds of the processor: median "
+        f"{np.median(times):.1f}, most {max(times):.1f}."
+    )
     table = [["repository", "files", "load", "pass check-robot"]]
-    for name in repositories:
-        of = [row for row in rows if row.repository == name]
-        table.append([name, len(of), sum(r.load == "" for r in of), sum(r.check == "" for r in of)])
-    return [Measured(text=text, table=table)]
+    for name in dict.fromkeys(row.repository for row in rows):
+        of = Counter(row.came_to for row in rows if row.repository == name)
+        table.append([name, *map(str, (of.total(), of.total() - of["not loaded"], of["right"]))])
+    fell = Counter((row.came_to, _kind(row.load or row.check or "")) for row in rows)
+    fell.update(("no scenario", _kind(row.new)) for row in drafts if row.new)
+    reasons = [[*what, str(number)] for what, number in fell.most_common() if what[0] != "right"]
+    return [
+        Measured(text=text, table=table),
+        Measured("What fell", table=[["is", "because", "files"], *reasons]),
+    ]
+
+
+def _kind(reason: str) -> str:
+    """Return the kind of a reason, without what is of one file alone."""
+    kinds = (kind for word, kind in _KINDS if word in reason)
+    return next(kinds, re.sub(r"/\S*/", "", reason)[:160])
 
 
 if __name__ == "__main__":

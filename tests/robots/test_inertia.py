@@ -141,3 +141,47 @@ def test_a_continuous_joint_mimics_by_its_whole_angle(tmp_path: Path) -> None:
     turned = data.oMi[1].rotation.T @ data.oMi[2].rotation
     np.testing.assert_allclose(turned, pin.rpy.rpyToMatrix(0.0, 3.5, 0.0), atol=1e-12)
     assert robots.load_file(file, mimic=False).model.nv == 2
+
+
+@pytest.mark.parametrize(
+    ("ixz", "refused"), [("0.01\n", ""), (" 1e-2", ""), ("0,01", "has ixz = '0,01'")]
+)
+def test_an_inertia_is_never_dropped(tmp_path: Path, ixz: str, refused: str) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(
+        '<!-- a license -->\n<?xml version="1.0"?><robot name="arm"><link name="a"/>'
+        f'<link name="b"><inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
+        f'ixz="{ixz}" iyz="0"/></inertial></link><joint name="j" type="continuous"><parent '
+        'link="a"/><child link="b"/></joint></robot>'
+    )
+    if refused:
+        with pytest.raises(robots.RobotError, match=f"inertia of link 'b' {refused}"):
+            robots.load_file(file)
+    else:
+        assert robots.load_file(file).model.inertias[1].inertia[0, 2] == 0.01
+
+
+@pytest.mark.parametrize("kind", ["collision", "visual"])
+def test_a_collada_mesh_has_the_unit_that_it_states(tmp_path: Path, kind: str) -> None:
+    numbers = "0 0 0 50 0 0 0 50 0 0 0 50"  # of a tetrahedron of 50 mm
+    (tmp_path / "part.dae").write_text(
+        '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" '
+        'version="1.4.1"><asset><unit name="millimeter" meter="0.001"/></asset>'
+        '<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="12">'
+        f'{numbers}</float_array><technique_common><accessor source="#a" count="4" stride="3">'
+        '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" '
+        'type="float"/></accessor></technique_common></source><vertices id="v"><input '
+        'semantic="POSITION" source="#p"/></vertices><triangles count="4"><input '
+        'semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>'
+        '</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node>'
+        '<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes><scene>'
+        '<instance_visual_scene url="#s"/></scene></COLLADA>'
+    )
+    file = tmp_path / "arm.urdf"
+    file.write_text(
+        f'<robot name="arm"><link name="a"/><link name="b"><{kind}><geometry><mesh '
+        f'filename="part.dae" scale="1 1 2"/></geometry></{kind}></link><joint name="j" '
+        'type="continuous"><parent link="a"/><child link="b"/></joint></robot>'
+    )
+    mass = robots.load_file(file, density=2700.0).model.inertias[1].mass
+    assert mass == pytest.approx(2 * 2700.0 * 0.05**3 / 6, rel=1e-6)

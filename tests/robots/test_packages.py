@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -123,3 +124,45 @@ def test_names_of_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyP
         robots.load("broken_description")
     with pytest.raises(robots.RobotError, match="has no robot"):
         robots.load("other_description")
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "package://renamed/meshes/one.obj",
+        "package://no/folder/one.obj",
+        "file:///home/another/arm%20support/meshes/one.obj",
+        "/home/another/arm_support/meshes/one.obj",
+        "file:///opt/ros/share/arm_resources/folder/one.obj",
+    ],
+)
+def test_a_mesh_of_a_package_that_is_nowhere_is_found_beside_the_robot(
+    tmp_path: Path, uri: str
+) -> None:
+    file = workspace(tmp_path, "src/vendor/arm_resources")
+    mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
+    near = file.parents[1] / "meshes" if "meshes" in uri else file.parent
+    near = tmp_path / "src" / "vendor" / "arm_resources" / "folder" if "share" in uri else near
+    near.mkdir(exist_ok=True)
+    mesh.rename(near / "one.obj")
+    file.write_text(file.read_text().replace("package://arm_resources/meshes/one.obj", uri))
+    assert len(robots.load_file(file).collision_model.geometryObjects) == 1
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('<xacro:include filename="$(arg kind).xacro"/>', "sets: kind (none)"),
+        ('<link name="$(arg size)"/>', "give it, --xacro-arg size=VALUE"),
+        ('<xacro:arg name="size"/>', "xacro:arg: missing attribute 'default'"),
+        ('<xacro:include filename="$(find far)/a.xacro"/>', "expand it: there is no package 'far'"),
+    ],
+)
+def test_a_xacro_that_fails_says_which_arguments_it_has(
+    tmp_path: Path, line: str, said: str
+) -> None:
+    file = tmp_path / "arm.xacro"
+    head = '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><xacro:arg name="kind"'
+    file.write_text(f'{head} default="none"/>{line}</robot>')
+    with pytest.raises(robots.RobotError, match=re.escape(said)):
+        robots.load_file(file)

@@ -29,15 +29,32 @@ print(len(sp.Shell.from_file(sys.argv[1]).faces))
 """
 
 
-def test_a_step_file_is_read_without_them():
+@pytest.fixture
+def without_display() -> list[str]:
+    """Return the words before a command that hide the libraries from it."""
     unshare = shutil.which("unshare")
     hidden = [str(unshare), "--mount", "bash", "-c", HIDE, "-"]
     if unshare is None or subprocess.run([*hidden, "true"], check=False, stderr=-3).returncode:
         pytest.skip("hiding a library needs the rights to make a mount namespace")
+    return hidden
+
+
+def test_a_step_file_is_read_without_them(without_display: list[str]) -> None:
     read = subprocess.run(
-        [*hidden, sys.executable, "-c", READ, VALVE_BODY],
+        [*without_display, sys.executable, "-c", READ, VALVE_BODY],
         capture_output=True,
         text=True,
         check=False,
     )
     assert (read.returncode, read.stdout, read.stderr) == (0, "27\n", "")
+
+
+def test_the_demo_runs_without_them(without_display: list[str], tmp_path: Path) -> None:
+    """What `make demo` runs when it has built; the job demo of CI builds too."""
+    program = Path(sys.executable).with_name("sphshell-pin")
+    run = [program, "run", "fingertip_on_blade", "--out", tmp_path / "r"]
+    done = subprocess.run([*without_display, *run], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "as expected" in done.stdout
+    assert "missed" not in done.stdout
+    assert (tmp_path / "r" / "recording.html").exists()

@@ -341,6 +341,11 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
             f"{where}: shell '{shell.name}' is open and one-sided: a sphere that goes round its "
             "rim is thrown out on the other side and gains energy"
         )
+    if pair.friction is not None and (creep := pair.friction.creep_speed) > radius:
+        out.append(
+            f"{where}: under half of what friction can hold, the sphere creeps at {creep:.2g} m/s, "
+            "more than its radius per second: a smaller v_static, or BristleFriction, which sticks"
+        )
     if pair.method == "elements":
         out.append(f"{where}: method 'elements' counts a place of touch once per touched element")
     return out

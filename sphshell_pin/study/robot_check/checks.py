@@ -195,9 +195,9 @@ def _impact(setting: Setting, rng: np.random.Generator) -> list[Result]:
     speed = (gap + 3.0) * radius / step
     touch = fixed_touch(setting, rng, gap, speed, least=True)
     pair = touch.scene.pairs[0]
-    scene, data = Scene(touch.scene.model), touch.scene.model.createData()
+    scene = Scene(touch.scene.model)
     # Whatever the joints do, the law can take up all the energy they have.
-    heavy = 2.0 * kinetic_energy(scene.model, data, touch.q, touch.v) / speed**2
+    heavy = 2.0 * kinetic_energy(scene.model, touch.q, touch.v) / speed**2
     law = stopping_law(heavy, speed, 0.3 * radius)
     scene.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.placement, law)
     start = replace(touch, scene=scene)

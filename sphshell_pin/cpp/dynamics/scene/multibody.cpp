@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <pinocchio/algorithm/aba-derivatives.hpp>
 #include <pinocchio/algorithm/aba.hpp>
-#include <pinocchio/algorithm/energy.hpp>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
@@ -323,14 +322,19 @@ void Multibody::speeds(const VectorRef& v, VectorX& out) const {
 }
 
 double Multibody::kinetic_energy(const VectorX& q, const VectorX& v) {
-  if (!mimics_) return pinocchio::computeKineticEnergy(model_, data_, q, v);
-  compute_mass(q);
-  return 0.5 * v.dot(data_.M * v);
+  if (mimics_) {
+    compute_mass(q);
+    return 0.5 * v.dot(data_.M * v);
+  }
+  // Not by Pinocchio's function, which leaves out the armature of joints about a skew axis.
+  pinocchio::forwardKinematics(model_, data_, q, v);
+  double twice = model_.armature.dot(v.cwiseAbs2());
+  for (int j = 1; j < model_.njoints; ++j) twice += model_.inertias[j].vtiv(data_.v[j]);
+  return 0.5 * twice;
 }
 
-// Of models with mimic joints by hand: - sum of m g . (center of mass).
+// - sum of m g . (center of mass); Pinocchio's function refuses mimic joints.
 double Multibody::potential_energy(const VectorX& q) {
-  if (!mimics_) return pinocchio::computePotentialEnergy(model_, data_, q);
   pinocchio::forwardKinematics(model_, data_, q);
   double sum = 0;
   for (int j = 1; j < model_.njoints; ++j) {
