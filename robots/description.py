@@ -21,6 +21,9 @@ from sphshell_pin.robots.packages import Folders
 DEEPEST = 100
 """Elements of the file one within another; robots need seven."""
 
+MOST_ATTRIBUTES = 200
+"""Of an element: the time to read them grows with their square."""
+
 LONGEST_CHAIN = 1000
 """Links one behind another; the parser overflows the stack of 8 MB at about 3800."""
 
@@ -144,6 +147,8 @@ def check_size(text: bytes) -> str:
             root.append(tag)
         if len(opened) > DEEPEST:
             raise ValueError(f"its elements are nested more than {DEEPEST} deep")
+        if len(attributes) > MOST_ATTRIBUTES:
+            raise ValueError(f"its element '{tag}' has more than {MOST_ATTRIBUTES} attributes")
         links += opened[1:] == ["link"] or tag == "body"
         if opened[1:] == ["joint"]:
             joints.append({})

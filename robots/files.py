@@ -23,6 +23,7 @@ from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.plain_mesh import refused_reference
 from sphshell_pin.shell.readers.ply import read_ply
 
 
@@ -312,7 +313,7 @@ def _mesh_reason(path: Path) -> str:
             read_ply(path)
         except ShellFileError as error:
             return str(error)
-    return ""
+    return refused_reference(path)
 
 
 def _mesh_fault(description: Description, reason: str) -> RobotError:

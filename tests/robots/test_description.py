@@ -32,6 +32,9 @@ REFUSED = {
         "".join(joint(k, 0, "revolute") for k in range(1, 317))
     ),
     "nested more than 100 deep": robot("<a>" * 100_000 + "</a>" * 100_000),
+    "element 'a' has more than 200 attributes": robot(
+        f"<a {' '.join(f'a{k}={chr(39) * 2}' for k in range(201))}/>"
+    ),
     "declares an entity, 'e0'": f"<!DOCTYPE r [{ENTITIES}]>{robot('&e8;')}",
     "not well-formed XML": robot("")[:-1],
     # urdfdom reads the first of both: a chain that the last ones hide.
