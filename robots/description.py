@@ -6,7 +6,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
@@ -16,7 +16,6 @@ import pinocchio as pin
 
 from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import Mimic
-from sphshell_pin.robots.mjcf_additions import Extras, Site
 from sphshell_pin.robots.packages import Folders
 
 DEEPEST = 100
@@ -49,10 +48,8 @@ class Description:
     """What else the file states that is not modeled, one sentence each."""
     start: Mapping[str, Array] = field(default_factory=dict)
     """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
-    extras: Mapping[str, Extras] = field(default_factory=dict)
-    """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
-    sites: tuple[Site, ...] = ()
-    """Of MJCF."""
+    finish: Callable[[pin.Model], None] | None = None
+    """Puts into the model what pinocchio's reader leaves out of MJCF."""
     stated: ET.Element | None = None
     """An MJCF as it was before it was brought into the plain form, with what it includes."""
 

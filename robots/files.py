@@ -158,10 +158,8 @@ def build_model(
         else:
             with _written(description.root) as path:
                 model = pin.buildModelFromMJCF(path)
-            for name, extras in description.extras.items():
-                extras.give(model, model.joints[model.getJointId(name)])
-            for site in description.sites:
-                site.give(model)
+            if description.finish is not None:
+                description.finish(model)
         check_memory(model.nv)
     except (ValueError, RuntimeError, OSError) as error:
         what = "MJCF" if description.is_mjcf else "URDF"

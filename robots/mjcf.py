@@ -5,19 +5,13 @@ what it compiles the plain form is written, in which every body states its inert
 joint, which keeps its name. Pinocchio's own reader (4.1) of the file as it is drops all bodies of
 the world but the first, includes, ranges' `limited`, visual geoms' masses, orientations of geoms
 without `pos`, damping of ball joints and equalities, and makes one nameless joint of several.
-
-MuJoCo gets numbers and names, of meshes their corners; it opens no file itself.
 """
 
 from __future__ import annotations
 
-import copy
-import io
 import xml.etree.ElementTree as ET
-from collections import defaultdict
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,31 +20,20 @@ import pinocchio as pin
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.arrays import Array
 from sphshell_pin.errors import import_extra
-from sphshell_pin.regular_file import read_bytes
 from sphshell_pin.robots.description import MOST_LINKS, Description, check_memory
-from sphshell_pin.robots.mjcf_additions import Extras, Site
+from sphshell_pin.robots.mjcf_compile import LEFT_OUT, Compiled
 from sphshell_pin.robots.mjcf_couplings import couplings
 from sphshell_pin.robots.mjcf_includes import include
 from sphshell_pin.robots.packages import Folders
 
 # What makes bodies of its own, without end, or runs a plugin.
 _UNKNOWN = ("composite", "flexcomp", "replicate", "attach", "deformable", "flex", "plugin")
-# What MuJoCo is given: the tables, and the attributes of those that could name files.
-_GIVEN = ("compiler", "default", "asset", "worldbody", "keyframe")
-_COMPILER = {"angle", "autolimits", "coordinate", "eulerseq", "boundmass", "boundinertia"}
-_COMPILER |= {"settotalmass", "balanceinertia", "inertiafromgeom", "inertiagrouprange"}
-_MESH = {"name", "class", "scale", "refpos", "refquat", "inertia", "vertex", "face"}
-_DROPPED = ("camera", "light")
-_MOST_MESH = 1e9  # [B]
-_POINT = "0 0 0 1 0 0 0 1 0 0 0 1"  # a mesh that nothing weighs
 _KINDS = {2: ("sphere", 1), 3: ("capsule", 2), 4: ("ellipsoid", 3), 5: ("cylinder", 2)}
 _KINDS |= {6: ("box", 3), 7: ("mesh", 0)}
-_MESH_GEOM, _GRAY = 7, (0.5, 0.5, 0.5, 1.0)
+_GRAY = (0.5, 0.5, 0.5, 1.0)
 _OTHERS = {0: "plane"}
-_FREE, _BALL, _SLIDE, _HINGE = range(4)
+_FREE, _BALL = 0, 1
 _JOINTS = ("free", "ball", "slide", "hinge")
-_LEFT_OUT = "geoms of these kinds are left out"
-_HULLS = "masses of meshes that are not closed are those of their convex hulls"
 
 
 def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> Description:
@@ -107,29 +90,12 @@ def _set_base(root: ET.Element, *, floats: bool) -> None:
             key.set("qpos", " ".join(place + qpos if floats else qpos[7:]))
 
 
-@contextmanager
-def _silent(mujoco: Any) -> Iterator[None]:
-    """Make MuJoCo's faults ValueErrors; it writes no file of its warnings meanwhile."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    except (MemoryError, mujoco.FatalError) as error:
-        raise ValueError(str(error) or "it needs too much memory") from None
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
-class _Reader:
-    """What MuJoCo makes of one MJCF, and the plain form of it."""
+class _Reader(Compiled):
+    """The plain form of what MuJoCo makes of one MJCF."""
 
     def __init__(self, mujoco: Any, root: ET.Element, folders: Folders) -> None:
-        self.mujoco, self.given, self.folders = mujoco, root, folders
-        # What is not modeled: the names that each sentence is about.
-        self.notes: defaultdict[str, list[str]] = defaultdict(list)
-        self.files: dict[str, tuple[Path, str]] = {}
-        with _silent(mujoco):
-            self.model = m = self._compiled(self._spec())
+        super().__init__(mujoco, root, folders)
+        m = self.model
         self.bodies = [m.body(i).name or "world" for i in range(m.nbody)]
         self.joints = [m.joint(j).name for j in range(m.njnt)]
         for what, names in (("body", self.bodies), ("joint", self.joints)):
@@ -145,7 +111,7 @@ class _Reader:
         for j, name in enumerate(self.joints):
             joints_of[self.bodies[m.jnt_bodyid[j]]].append(name)
         parents = {self.bodies[i]: self.bodies[m.body_parentid[i]] for i in range(1, m.nbody)}
-        extras, start = self._extras(), self._start()
+        start = self._start()
         made = ET.Element("mujoco", model=self.given.get("model") or "robot")
         ET.SubElement(made, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
         asset = ET.SubElement(made, "asset")
@@ -158,136 +124,36 @@ class _Reader:
                 ET.SubElement(keys, "key", name=m.key(k).name, qpos=_text(m.key_qpos[k]))
         self._note()
         mimics, loops = couplings(self.given, start, parents, joints_of)
-        sites = tuple(
-            Site(
-                m.site(s).name,
-                self.bodies[m.site_bodyid[s]],
-                _pose(m.site_pos[s], m.site_quat[s]),
-            )
-            for s in range(m.nsite)
-            if m.site(s).name
-        )
         notes = tuple(
             f"{text}: {', '.join(map(repr, dict.fromkeys(names)))}"
             for text, names in self.notes.items()
         )
         file, folders = self.folders.file, self.folders
-        return Description(
-            file, folders, made, mimics, loops, notes, start, extras, sites, self.given
-        )
+        finish = partial(_finish, self._several(), self._sites())
+        return Description(file, folders, made, mimics, loops, notes, start, finish, self.given)
 
-    def _spec(self) -> Any:
-        """Return what MuJoCo reads: nothing that names a file, all bodies and joints with names."""
-        root = ET.Element("mujoco", model="robot")
-        for one in copy.deepcopy(self.given):
-            if one.tag in _GIVEN:
-                root.append(one)
-        compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
-        for one in root.findall("compiler"):
-            one.attrib = {k: v for k, v in one.attrib.items() if k in _COMPILER}
-            one[:] = []
-        for one in root.iterfind("keyframe/key"):  # of actuators and speeds nothing is read
-            one.attrib = {k: v for k, v in one.attrib.items() if k in ("name", "qpos")}
-        for asset in root.findall("asset"):
-            for one in list(asset):
-                if one.tag == "mesh":
-                    self._mesh(one, compiler)
-                elif one.tag == "material" and "name" in one.attrib:
-                    color = {k: v for k, v in one.attrib.items() if k in ("name", "class", "rgba")}
-                    one.attrib = color
-                    one[:] = []
-                else:
-                    asset.remove(one)
-        for default in root.iter("default"):
-            for one in default:
-                if one.tag in ("material", "mesh"):
-                    one.attrib.pop("texture", None)
-                    one.attrib.pop("file", None)
-        for element in root.iter():
-            for one in list(element):
-                if "hfield" in one.attrib:  # of a file
-                    self.notes[_LEFT_OUT].append("hfield")
-                if one.tag in _DROPPED or "hfield" in one.attrib:
-                    element.remove(one)
-            if element.tag == "freejoint":
-                element.attrib.pop("align", None)
-        count = iter(range(MOST_LINKS))
-        for world in root.findall("worldbody"):
-            _name_bodies(world, "world", count)
-        return self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
-
-    def _mesh(self, one: ET.Element, compiler: Mapping[str, str]) -> None:
-        """Put a mesh that weighs nothing in the place of one of a file."""
-        stated, file = one.attrib, one.get("file")
-        one.attrib = {k: v for k, v in stated.items() if k in _MESH}
-        if file is None:
-            return
-        strip = compiler.get("strippath") == "true"
-        path = Path(Path(file).name if strip else file)
-        name = one.attrib.setdefault("name", path.stem)
-        folder = Path(compiler.get("meshdir", compiler.get("assetdir", "")))
-        self.files[name] = self.folders.beside(str(folder / path)), "1 1 1"
-        one.set("vertex", _POINT)
-
-    def _compiled(self, spec: Any) -> Any:
-        """Return the compiled model; meshes are read where something weighs what they hold."""
-        moves = {"world": False}
-        total = spec.compiler.settotalmass > 0.0
-        always = int(spec.compiler.inertiafromgeom) == 1
-        needed: dict[str, str] = {}
-        for body in spec.bodies:
-            if body.name != "world":
-                moves[body.name] = bool(body.joints) or moves[body.parent.name]
-            weighs = always or not body.explicitinertial
-            if weighs and int(spec.compiler.inertiafromgeom) == 0 and body.joints:
-                raise ValueError(f"body '{body.name}' moves, and states no <inertial>")
-            weighs = weighs and (moves[body.name] or total)
-            low, high = spec.compiler.inertiagrouprange
-            for geom in body.geoms:
-                if geom.meshname not in self.files:
-                    continue
-                own = low <= geom.group <= high and geom.mass != 0.0 and geom.density != 0.0
-                if int(geom.type) != _MESH_GEOM or (weighs and own):
-                    needed[geom.meshname] = body.name
-                else:
-                    geom.mass = 0.0
-        for mesh in spec.meshes:
-            if mesh.name in self.files:
-                self.files[mesh.name] = self.files[mesh.name][0], _text(mesh.scale)
-        for name, body in needed.items():
-            self._read_mesh(spec.mesh(name), body)
-        return spec.compile()
-
-    def _read_mesh(self, mesh: Any, body: str) -> None:
-        """Let `mesh` have the corners of its file; one that is open weighs as its hull."""
-        with interrupts_delayed():
-            import trimesh
-        path = self.files[mesh.name][0]
-        try:
-            data, kind = io.BytesIO(read_bytes(path, _MOST_MESH)), path.suffix.lower()[1:]
-            found: Any = trimesh.load(data, file_type=kind, force="mesh")
-            found.merge_vertices()
-            mesh.uservert, mesh.userface = found.vertices.ravel(), found.faces.ravel()
-            if not found.is_watertight:
-                mesh.inertia = self.mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-                self.notes[_HULLS].append(mesh.name)
-        except Exception as error:  # of readers of many formats, and of packages not there
-            reason = " ".join(str(error).split()) or type(error).__name__
-            raise ValueError(
-                f"the mass of body '{body}' would be that of mesh '{mesh.name}', which cannot be "
-                f"read ({reason}): state <inertial>"
-            ) from None
-
-    def _extras(self) -> dict[str, Extras]:
+    def _several(self) -> dict[str, tuple[float, float]]:
         """Return damping and dry friction of joints of several degrees of freedom."""
         m = self.model
         several = (j for j in range(m.njnt) if m.jnt_type[j] in (_FREE, _BALL))
         return {
-            self.joints[j]: Extras(
+            self.joints[j]: (
                 float(np.ravel(m.dof_damping[m.jnt_dofadr[j]])[0]),
                 float(m.dof_frictionloss[m.jnt_dofadr[j]]),
             )
             for j in several
+        }
+
+    def _sites(self) -> dict[str, tuple[str, pin.SE3]]:
+        """Return the bodies of the sites, and the places there."""
+        m = self.model
+        return {
+            m.site(s).name: (
+                self.bodies[m.site_bodyid[s]],
+                _pose(m.site_pos[s], m.site_quat[s]),
+            )
+            for s in range(m.nsite)
+            if m.site(s).name
         }
 
     def _start(self) -> dict[str, Array]:
@@ -364,7 +230,7 @@ class _Reader:
         kind, count = _KINDS.get(int(m.geom_type[g]), (_OTHERS.get(int(m.geom_type[g]), "geom"), 0))
         mesh = m.mesh(m.geom_dataid[g]).name if kind == "mesh" else ""
         if int(m.geom_type[g]) not in _KINDS or (mesh and mesh not in self.files):
-            self.notes[_LEFT_OUT].append(kind)
+            self.notes[LEFT_OUT].append(kind)
             return
         made = ET.SubElement(into, "geom", type=kind)
         if mesh:
@@ -407,20 +273,29 @@ class _Reader:
             self.notes["tendons are not modeled"].append(one.get("name", one.tag))
 
 
-def _name_bodies(element: ET.Element, body: str, count: Iterator[int]) -> None:
-    """Give the bodies and joints below an element names, where they have none."""
-    joints = 0
-    for one in element:
-        if one.tag == "body":
-            number = next(count)
-            name = one.attrib.setdefault("name", f"{body}_body{number}")
-            _name_bodies(one, name, count)
-        elif one.tag == "frame":
-            _name_bodies(one, body, count)
-        elif one.tag in ("joint", "freejoint"):
-            free = one.tag == "freejoint" or one.get("type") == "free"
-            one.attrib.setdefault("name", f"{body}_{'free' if free else f'joint{joints or str()}'}")
-            joints += 1
+def _finish(
+    several: Mapping[str, tuple[float, float]],
+    sites: Mapping[str, tuple[str, pin.SE3]],
+    model: pin.Model,
+) -> None:
+    """Put into `model` what pinocchio's reader leaves out of MJCF."""
+    values = {
+        name: np.array(getattr(model, name))
+        for name in ("damping", "lowerDryFrictionLimit", "upperDryFrictionLimit")
+    }
+    for name, (damping, friction) in several.items():
+        joint = model.joints[model.getJointId(name)]
+        span = slice(joint.idx_v, joint.idx_v + joint.nv)
+        for array, value in zip(values.values(), (damping, -friction, friction), strict=True):
+            array[span] = value
+    for name, array in values.items():
+        setattr(model, name, array)
+    for name, (body, place) in sites.items():
+        # It reads sites on bodies with joints only.
+        frame = 0 if body == "world" else model.getFrameId(body, pin.FrameType.BODY)
+        inside, joint = model.frames[frame].placement * place, model.frames[frame].parentJoint
+        made = pin.Frame(name, joint, frame, inside, pin.FrameType.OP_FRAME)
+        model.addFrame(made, False)
 
 
 def _pose(position: Array, quaternion: Array) -> pin.SE3:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import queue
 import re
+import socket
 import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import CancelledError
 from itertools import islice
 from typing import Any, TypeAlias
 
@@ -69,7 +69,9 @@ def run_on_cluster(
 def _client(address: str) -> Client:
     distributed = need("distributed")
     try:
-        _greet(address)
+        # A client that cannot connect gives up after half a minute.
+        host, _, port = address.rpartition("//")[2].rpartition(":")
+        socket.create_connection((host, int(port)), _CONNECT_TIMEOUT).close()
         return distributed.Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     # Another server at that address may be misread in any way.
     except Exception as fault:
@@ -129,15 +131,3 @@ def _outcome(future: Future, address: str) -> Outcome | None:
             f"installed there? ({type(fault).__name__}: {' '.join(str(fault).split())})"
         ) from None
     return outcome
-
-
-def _greet(address: str) -> None:
-    """Connect to `address` and leave: a client that cannot connect gives up after half a minute."""
-    connect = need("distributed.comm").connect
-
-    async def come_and_go() -> None:
-        (await connect(address, timeout=_CONNECT_TIMEOUT)).abort()
-
-    # In a thread of its own: this one may have an event loop that runs, as notebooks do.
-    with ThreadPoolExecutor(1) as helper:
-        helper.submit(asyncio.run, come_and_go()).result()
