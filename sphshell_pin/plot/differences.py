@@ -13,8 +13,8 @@ from sphshell_pin.plot.on_shell import Picture, color_scale, shell_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sphshell_pin.view.contact_path import FloatArray
     from sphshell_pin.shell.shell import Shell
+    from sphshell_pin.view.contact_path import FloatArray
 
 EYE = np.array([0.6, -0.7, 0.5])
 
