@@ -10,7 +10,7 @@ import numpy as np
 
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.curved import points_on
-from sphshell_pin.shell.faces import described
+from sphshell_pin.shell.faces import described, distances_from, not_exact
 from sphshell_pin.shell.health import LARGE_OF_TURNS, CurvatureReport, Place
 from sphshell_pin.shell.raw import Bytes, Floats, Ints, Longs, Mask, area_vectors
 
@@ -77,7 +77,29 @@ def curvature_report(shell: ShellBase) -> CurvatureReport:
         set_aside_at=first,
         share_set_aside=len(aside) / shell.triangles.size,
         faces=described(shell.faces, shell.num_elements) if _has_faces(shell) else "",
+        not_exact=_not_exact(shell, 0.5 * longest * height) if _has_faces(shell) else (),
     )
+
+
+def _not_exact(shell: ShellBase, areas: Floats) -> tuple[str, ...]:
+    """Say which faces are not exact; `areas` (t,) [m^2]."""
+    faces = shell.faces
+    share, off = np.zeros(len(faces)), np.zeros(len(faces))
+    of_element = np.full(shell.num_elements, -1)
+    for k, face in enumerate(faces):
+        if not face.exact:
+            of_element[face.elements] = k
+    of = of_element[shell.triangle_element]
+    order = np.argsort(of, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(of[order])) + 1):
+        k = of[rows[0]]
+        if k < 0:
+            continue
+        share[k] = areas[rows].sum() / areas.sum()
+        for some in np.split(rows, range(AT_ONCE, len(rows), AT_ONCE)):
+            points = points_on(shell, some, COARSE).reshape(-1, 3)
+            off[k] = max(off[k], float(distances_from(faces[k], points).max()))
+    return not_exact(faces, share, off)
 
 
 def distances_at(shell: ShellBase, divisions: int) -> Floats:

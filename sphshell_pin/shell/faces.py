@@ -123,8 +123,6 @@ def described(faces: Sequence[Face], elements: int) -> str:
     share = f"; {left:.3g} % of the elements on none" if left > 0.0 else ""
     if curved := sum(not face.exact for face in faces):
         share += f"; {curved} of {len(faces)} as curved elements"
-        told = [f"{f.name or f.kind}: {f.reason}" for f in faces if f.reason][:MOST_GROUPS]
-        share += f" ({'; '.join(told)})" if told else ""
     if flats := [face for face in faces if face.inscribed]:
         at = "({:.4g}, {:.4g}, {:.4g}) m".format(*flats[0].point)
         share += (
@@ -132,6 +130,47 @@ def described(faces: Sequence[Face], elements: int) -> str:
             f"{len(flats)}, one at {at}"
         )
     return (", ".join(parts) or "none recognized") + share
+
+
+def not_exact(faces: Sequence[Face], shares: Floats, off: Floats) -> tuple[str, ...]:
+    """Return a sentence for each reason why faces are not exact, which names them and the cost.
+
+    shares : of the area of the shell (n,); off : of their elements from the faces (n,) [m]
+    """
+    groups: dict[str, list[int]] = {}
+    for k, face in enumerate(faces):
+        if not face.exact:
+            what = "border to another face" if " to " in face.reason.split(" is off")[0] else ""
+            what = what or ("vertex" if face.reason.startswith("a vertex") else "border")
+            groups.setdefault(what if face.reason else "reason unknown", []).append(k)
+    told = []
+    for what, rows in sorted(groups.items(), key=lambda group: -shares[group[1]].sum()):
+        by = [float(faces[k].reason.split()[-2]) for k in rows if faces[k].reason]
+        far = f" off by {min(by):.2g} to {max(by):.2g} nm" if by else ""
+        names = ", ".join(
+            f"{faces[k].name or f'{faces[k].kind} {k}'} ({off[k]:.1e} m)"
+            for k in sorted(rows, key=lambda k: -off[k])
+        )
+        told.append(
+            f"{what}{far}: {100 * shares[rows].sum():.2g} % of the area; elements stand off by up "
+            f"to {off[rows].max():.2g} m: {names}"
+        )
+    return tuple(told)
+
+
+def distances_from(face: Face, points: Floats) -> Floats:
+    """Distances (n,) [m] of points (n, 3) from a face."""
+    away = points - face.point
+    if face.axis is None:
+        return np.asarray(np.abs(np.linalg.norm(away, axis=1) - face.radius))
+    height = away @ face.axis
+    if face.radius is None:
+        return np.asarray(np.abs(height))
+    beside = np.linalg.norm(away - height[:, None] * face.axis, axis=1) - face.radius
+    if face.minor_radius is not None:
+        return np.asarray(np.abs(np.hypot(beside, height) - face.minor_radius))
+    angle = face.half_angle or 0.0
+    return np.asarray(np.abs(beside * np.cos(angle) - height * np.sin(angle)))
 
 
 def _named(face: Face) -> tuple[str, str]:

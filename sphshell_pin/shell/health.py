@@ -149,6 +149,8 @@ class CurvatureReport:
     normals_set_aside : corners whose given normal was not used, as the elements contradict it
     set_aside_at : one of them [m], or None; share_set_aside : how many of all given ones
     faces : the faces recognized in a mesh, in words
+    not_exact : by reason, those that do not give closest points, with their share of the area and
+        how far elements are off them [m]
     """
 
     elements: int
@@ -165,6 +167,7 @@ class CurvatureReport:
     large_at: Place | None = None
     share_set_aside: float = 0.0
     faces: str = ""
+    not_exact: tuple[str, ...] = ()
 
     @property
     def flat(self) -> int:
@@ -199,6 +202,7 @@ class CurvatureReport:
         rows += [("flat", _fill("{:element}: {}", count, why)) for why, count in self.flat_because]
         if self.faces:
             rows.append(("faces", self.faces))
+        rows += [("not exact", text) for text in self.not_exact]
         if self.normals_set_aside:
             rows.append(
                 (

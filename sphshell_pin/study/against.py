@@ -166,6 +166,18 @@ def compare_shells(
     return Against(radius, DEPTH * radius, size, tolerance, moved, tuple(faces), unreached)
 
 
+def differences_on(found: Against, of: int, shell: Shell) -> Floats:
+    """Return the largest difference of depth (m,) [m] on the face of each element, 0 where none is.
+
+    `of` : 0 of the first shell, 1 of the second
+    """
+    worst = {(face.kind, face.name): abs(face.worst) for face in found.off if face.of == of}
+    out = np.zeros(shell.num_elements)
+    for name, kind, elements in _faces_of(shell):
+        out[elements] = worst.get((kind, name), 0.0)
+    return out
+
+
 def _faces_of(shell: Shell) -> Iterator[tuple[str, str, Ints | Longs]]:
     """Name, kind and elements of each face: of CAD, or recognized, or else smooth patches."""
     if shell.element_face is not None:

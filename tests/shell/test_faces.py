@@ -2,6 +2,7 @@
 
 import pickle
 import time
+from dataclasses import replace
 
 import coal
 import numpy as np
@@ -9,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.shell.faces import described
+from sphshell_pin.shell.faces import described, distances_from, not_exact
 from tests.validation.rattleback import ellipsoid
 
 SEGMENTS = 48
@@ -148,6 +149,24 @@ def test_words():
     text = described(many, 8 * count)
     assert "14 planes" in text
     assert text.endswith(", and 3 more; 12.5 % of the elements on none")
+
+
+def test_faces_that_are_not_exact_are_all_named_with_what_they_cost():
+    count, base = 9, coal.Cylinder(0.006, 0.03)
+    some = [face for face in mesh(base).faces for _ in range(3)]
+    reasons = ["a vertex is off it by 77 nm", "its border is off it by 0.8 nm"]
+    faces = [
+        replace(face, exact=False, reason=reasons[k % 2], name=f"Face {k}")
+        for k, face in enumerate(some)
+    ]
+    told = not_exact(faces, np.full(count, 0.1), 1e-9 * np.arange(count))
+    assert len(told) == 2
+    assert told[0].startswith("vertex off by 77 to 77 nm: 50 % of the area; elements stand off by")
+    assert all(f"Face {k} (" in told[k % 2] for k in range(count))
+    points = np.random.default_rng(0).normal(size=(9, 3))
+    solids = (coal.Cylinder(0.1, 0.3), coal.Cone(0.1, 0.3), coal.Sphere(0.1))
+    for face in (*torus().faces, *(face for one in solids for face in mesh(one).faces)):
+        assert np.allclose(distances_from(face, points), np.abs(distances(face, points)))
 
 
 def test_the_caps_of_a_fine_sphere_do_not_cost_its_square():

@@ -121,15 +121,17 @@ def test_the_command_prints_the_faces_and_ends_with_1(tmp_path: Any) -> None:
     one, two = tmp_path / "one.obj", tmp_path / "two.stl"
     bracket().to_file(one, "mm")
     bracket(1e-3).to_file(two, "m")
-    out = tmp_path / "figures.json"
+    out, drawn = tmp_path / "figures.json", tmp_path / "map.png"
     units = ("--unit", "mm", "--against-unit", "m")
-    told = call("check", one, *units, "--against", two, "--json", out, "--radius", "2mm")
+    options = ("--json", out, "--radius", "2mm", "--map", drawn)
+    told = call("check", one, *units, "--against", two, *options)
     assert told.exit_code == 1, told.output
     assert "A one.obj, B two.stl; spheres of radius 0.002 m" in " ".join(told.output.split())
     assert "plane" in told.output
     figures = json.loads(out.read_text())
     assert figures["files"] == [str(one), str(two)]
     assert (figures["same"], figures["radius"]) == (False, 0.002)
+    assert drawn.read_bytes().startswith(b"\x89PNG")
     assert 5e-4 < abs(figures["faces"][0]["worst"]) <= 1.001e-3
     assert call("check", one, *units[:2], "--against", one, "--against-unit", "mm").exit_code == 0
     assert "--against-unit" in refused("check", one, *units[:2], "--against", two)
