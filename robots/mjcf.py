@@ -6,7 +6,7 @@ joint, which keeps its name. Pinocchio's own reader (4.1) of the file as it is d
 the world but the first, includes, ranges' `limited`, visual geoms' masses, orientations of geoms
 without `pos`, damping of ball joints and equalities, and makes one nameless joint of several.
 
-MuJoCo gets numbers and names, and meshes as bytes; it opens no file itself.
+MuJoCo gets numbers and names, of meshes their corners; it opens no file itself.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import io
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.arrays import Array
 from sphshell_pin.errors import import_extra
 from sphshell_pin.regular_file import read_bytes
-from sphshell_pin.robots.description import MOST_LINKS, Description
+from sphshell_pin.robots.description import MOST_LINKS, Description, check_memory
 from sphshell_pin.robots.mjcf_additions import Extras, Site
 from sphshell_pin.robots.mjcf_couplings import couplings
 from sphshell_pin.robots.mjcf_includes import include
@@ -40,7 +41,6 @@ _COMPILER = {"angle", "autolimits", "coordinate", "eulerseq", "boundmass", "boun
 _COMPILER |= {"settotalmass", "balanceinertia", "inertiafromgeom", "inertiagrouprange"}
 _MESH = {"name", "class", "scale", "refpos", "refquat", "inertia", "vertex", "face"}
 _DROPPED = ("camera", "light")
-_MESH_FORMATS = (".stl", ".obj", ".msh")
 _MOST_MESH = 1e9  # [B]
 _POINT = "0 0 0 1 0 0 0 1 0 0 0 1"  # a mesh that nothing weighs
 _KINDS = {2: ("sphere", 1), 3: ("capsule", 2), 4: ("ellipsoid", 3), 5: ("cylinder", 2)}
@@ -76,6 +76,11 @@ def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> 
                 f"<{tag}> is not supported: let MuJoCo write the bodies out "
                 "(mujoco.MjSpec.from_file(...), compile(), to_xml())"
             )
+    freedoms = {"free": 6, "ball": 3}
+    joints = (
+        freedoms.get(one.get("type", "hinge"), 1) for one in root.iterfind("worldbody//joint")
+    )
+    check_memory(sum(joints) + 6 * len(root.findall("worldbody//freejoint")))
     if root.find("worldbody/body") is None and root.find("worldbody//body") is None:
         raise ValueError("its <worldbody> has no <body>")
     return _Reader(mujoco, root, folders).read()
@@ -102,6 +107,19 @@ def _set_base(root: ET.Element, *, floats: bool) -> None:
             key.set("qpos", " ".join(place + qpos if floats else qpos[7:]))
 
 
+@contextmanager
+def _silent(mujoco: Any) -> Iterator[None]:
+    """Make MuJoCo's faults ValueErrors; it writes no file of its warnings meanwhile."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    except (MemoryError, mujoco.FatalError) as error:
+        raise ValueError(str(error) or "it needs too much memory") from None
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
 class _Reader:
     """What MuJoCo makes of one MJCF, and the plain form of it."""
 
@@ -110,8 +128,8 @@ class _Reader:
         # What is not modeled: the names that each sentence is about.
         self.notes: defaultdict[str, list[str]] = defaultdict(list)
         self.files: dict[str, tuple[Path, str]] = {}
-        self.model = self._compiled(self._spec())
-        m = self.model
+        with _silent(mujoco):
+            self.model = m = self._compiled(self._spec())
         self.bodies = [m.body(i).name or "world" for i in range(m.nbody)]
         self.joints = [m.joint(j).name for j in range(m.njnt)]
         for what, names in (("body", self.bodies), ("joint", self.joints)):
@@ -196,10 +214,7 @@ class _Reader:
         count = iter(range(MOST_LINKS))
         for world in root.findall("worldbody"):
             _name_bodies(world, "world", count)
-        try:
-            return self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
-        except self.mujoco.FatalError as error:
-            raise ValueError(str(error)) from None
+        return self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
 
     def _mesh(self, one: ET.Element, compiler: Mapping[str, str]) -> None:
         """Put a mesh that weighs nothing in the place of one of a file."""
@@ -239,37 +254,29 @@ class _Reader:
         for mesh in spec.meshes:
             if mesh.name in self.files:
                 self.files[mesh.name] = self.files[mesh.name][0], _text(mesh.scale)
-        read = {name: self._read_mesh(spec.mesh(name), body) for name, body in needed.items()}
-        spec.assets = {spec.mesh(name).file: data for name, data in read.items()}
-        try:
-            return spec.compile()
-        except (ValueError, self.mujoco.FatalError) as error:
-            raise ValueError(str(error)) from None
+        for name, body in needed.items():
+            self._read_mesh(spec.mesh(name), body)
+        return spec.compile()
 
-    def _read_mesh(self, mesh: Any, body: str) -> bytes:
-        """Let `mesh` be that of its file; return the bytes. One that is open weighs as its hull."""
+    def _read_mesh(self, mesh: Any, body: str) -> None:
+        """Let `mesh` have the corners of its file; one that is open weighs as its hull."""
         with interrupts_delayed():
             import trimesh
-        path, why = self.files[mesh.name][0], f"the mass of body '{body}' would be that of mesh "
+        path = self.files[mesh.name][0]
         try:
-            data = read_bytes(path, _MOST_MESH)
-            if path.suffix.lower() not in _MESH_FORMATS:
-                raise ValueError(f"not one of {', '.join(_MESH_FORMATS)}")
-            if path.suffix.lower() != ".msh":
-                found: Any = trimesh.load(
-                    io.BytesIO(data), file_type=path.suffix.lower()[1:], force="mesh"
-                )
-                found.merge_vertices()
-                if not found.is_watertight:
-                    mesh.inertia = self.mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-                    self.notes[_HULLS].append(mesh.name)
-        except Exception as error:  # of readers of several formats, and of packages not there
+            data, kind = io.BytesIO(read_bytes(path, _MOST_MESH)), path.suffix.lower()[1:]
+            found: Any = trimesh.load(data, file_type=kind, force="mesh")
+            found.merge_vertices()
+            mesh.uservert, mesh.userface = found.vertices.ravel(), found.faces.ravel()
+            if not found.is_watertight:
+                mesh.inertia = self.mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+                self.notes[_HULLS].append(mesh.name)
+        except Exception as error:  # of readers of many formats, and of packages not there
             reason = " ".join(str(error).split()) or type(error).__name__
             raise ValueError(
-                f"{why}'{mesh.name}', which cannot be read ({reason}): state <inertial>"
+                f"the mass of body '{body}' would be that of mesh '{mesh.name}', which cannot be "
+                f"read ({reason}): state <inertial>"
             ) from None
-        mesh.uservert, mesh.file = [], mesh.name + path.suffix.lower()
-        return data
 
     def _extras(self) -> dict[str, Extras]:
         """Return damping and dry friction of joints of several degrees of freedom."""
@@ -334,17 +341,17 @@ class _Reader:
         dof, at = m.jnt_dofadr[j], m.jnt_qposadr[j]
         made = ET.Element("joint", name=self.joints[j], type=_JOINTS[kind])
         made.set("pos", "0 0 0" if kind == _FREE else _text(m.jnt_pos[j]))
-        made.set("armature", repr(float(m.dof_armature[dof])))
+        made.set("armature", _text(m.dof_armature[dof]))
         if kind == _FREE:
             return made
         made.set("axis", _text(m.jnt_axis[j]))
         if kind == _BALL:
             return made
-        made.set("damping", repr(float(np.ravel(m.dof_damping[dof])[0])))
-        made.set("frictionloss", repr(float(m.dof_frictionloss[dof])))
+        made.set("damping", _text(np.ravel(m.dof_damping[dof])[0]))
+        made.set("frictionloss", _text(m.dof_frictionloss[dof]))
         ref = float(m.qpos0[at])
         if ref:
-            made.set("ref", repr(ref))
+            made.set("ref", _text(ref))
         if m.jnt_limited[j]:
             # Pinocchio subtracts ref from the range, but counts positions as MuJoCo does.
             made.set("range", _text(m.jnt_range[j] + ref))
@@ -418,20 +425,24 @@ def _name_bodies(element: ET.Element, body: str, count: Iterator[int]) -> None:
 
 def _pose(position: Array, quaternion: Array) -> pin.SE3:
     w, x, y, z = quaternion
-    return pin.SE3(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix(), np.array(position))
+    turn = pin.Quaternion(w, x, y, z).normalized().toRotationMatrix()
+    return pin.SE3(turn, np.array(position))
 
 
 def _posed(pose: pin.SE3) -> dict[str, str]:
     x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
-    return {"pos": _text(pose.translation), "quat": _text(np.array([w, x, y, z]))}
+    return {"pos": _text(pose.translation), "quat": _text(w, x, y, z)}
 
 
 def _add_inertial(body: ET.Element, inertia: pin.Inertia) -> None:
     i = inertia.inertia
-    full = np.array([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]])
-    stated = {"mass": repr(float(inertia.mass)), "pos": _text(inertia.lever)}
-    ET.SubElement(body, "inertial", stated | {"fullinertia": _text(full)})
+    full = _text(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
+    stated = {"mass": _text(inertia.mass), "pos": _text(inertia.lever), "fullinertia": full}
+    ET.SubElement(body, "inertial", stated)
 
 
-def _text(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
+def _text(*values: Any) -> str:
+    numbers = np.ravel(values)
+    if not np.isfinite(numbers).all():
+        raise ValueError("it has numbers that are not finite")
+    return " ".join(map(repr, numbers.tolist()))

@@ -21,7 +21,7 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
+from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
@@ -79,7 +79,9 @@ def write_mcap(
     `command` goes into its metadata; `progress` gets the share that is done.
     """
     mcap = import_extra("mcap_ros2.writer", "mcap", "Result.to_mcap", "mcap-ros2-support")
-    run = _Run(result, _own_scene(result, scene), start)
+    scene = scene_of(result, scene)
+    check_scene(result, scene, "the result")
+    run = _Run(result, scene, start)
     path = Path(path)
     try:
         with atomic_file(path) as stream, mcap.Writer(stream) as writer:
@@ -106,20 +108,6 @@ def write_mcap(
     except OSError as error:
         raise ResultError(path, f"cannot be written: {error.strerror or error}") from error
     return path
-
-
-def _own_scene(result: Result, scene: Scene | None) -> Scene:
-    """Return `scene_of`; ResultError where it has other coordinates or contacts than `result`."""
-    scene = scene_of(result, scene)
-    ran, now = (result.q.shape[1], result.v.shape[1]), (scene.model.nq, scene.model.nv)
-    pairs = tuple(pair.name for pair in scene.pairs)
-    if ran != now or pairs != tuple(result.pairs):
-        raise ResultError(
-            "the result",
-            f"is of another scene: it has nq, nv = {ran} and the contacts {result.pairs}, the "
-            f"scene nq, nv = {now} and {pairs}",
-        )
-    return scene
 
 
 class _Run:

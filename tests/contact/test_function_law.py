@@ -7,6 +7,7 @@ import ctypes
 import gc
 import math
 import pickle
+import random
 import weakref
 
 import numpy as np
@@ -203,16 +204,27 @@ def test_a_law_that_cannot_carry_the_load_is_refused_at_once() -> None:
     assert len(calls) < 3000
 
 
-def test_a_scene_that_a_law_changes_has_no_result() -> None:
-    def adds(depth, gap_rate, parameters):
-        if depth > 2e-4 and len(scene.pairs) == 1:
-            scene.add_contact(sp.Sphere(0.05, "ball"), plate, law=TWIN, name="later")
-        return 1e5 * depth
+def test_the_energy_of_noise_takes_no_longer_than_that_of_jumps() -> None:
+    rng, calls = random.Random(1), []
 
-    plate = models.plate()
-    scene = models.on_plate(models.slider(), python_law(adds, {}))
+    def noise(depth, rate, p):
+        calls.append(depth)
+        return rng.random()
+
+    assert python_law(noise, {}).energy(1e-3) == pytest.approx(0.5e-3, rel=0.2)
+    assert len(calls) < 100_000
+
+
+def test_a_scene_that_is_changed_during_its_run_has_no_result() -> None:
+    def controller(t, q, v, contacts):
+        if t > 0.005 and len(scene.pairs) == 1:
+            pair = scene.pairs[0]
+            scene.add_contact(pair.sphere, pair.shell, law=TWIN, name="later")
+        return [0.0]
+
+    scene = models.on_plate(models.slider(), TWIN)
     with pytest.raises(errors.SphshellError, match="contacts were changed during the run"):
-        sp.Simulation(scene).run([0.0499], None, 0.02)
+        sp.Simulation(scene).run([0.0499], None, 0.02, controller=controller)
 
 
 OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)

@@ -119,13 +119,16 @@ def mesh_corpus() -> tuple[bytes, ...]:
         "buffers": [{"uri": uri, "byteLength": 102}],
     }
     files |= {".dae": DAE.encode(), ".gltf": json.dumps(gltf).encode()}
-    made = []
+    files[".obj"] = b"mtllib mesh.mtl\n" + files[".obj"]
+    parts = {"mesh.mtl": b"newmtl a\nmap_Kd mesh.mtl\n", "mesh.bin": buffer}
+    beside = {"mesh.gltf": json.dumps(gltf).replace(uri, "mesh.bin").encode(), **parts}
+    made = [tables.pack({"robot.urdf": ROBOT.replace("MESH", "mesh.gltf").encode(), **beside})]
     for suffix, data in files.items():
         for name, text in (("robot.urdf", ROBOT), ("robot.xml", MJCF)):
             robot = text.replace("MESH", f"mesh{suffix}")
-            if suffix == ".dae":  # whose mass only a further package can tell
+            if suffix not in (".stl", ".obj"):  # whose mass MuJoCo cannot tell
                 robot = robot.replace("<geom ", f"{INERTIAL}<geom ")
-            made.append(tables.pack({name: robot.encode(), f"mesh{suffix}": data}))
+            made.append(tables.pack({name: robot.encode(), f"mesh{suffix}": data, **parts}))
     return tuple(made)
 
 

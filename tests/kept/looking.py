@@ -103,7 +103,7 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     def live() -> None:
         """End the page after a second, as Ctrl-C does."""
         signal.signal(signal.SIGALRM, signal.default_int_handler)
-        signal.setitimer(signal.ITIMER_REAL, 2.0)
+        signal.setitimer(signal.ITIMER_REAL, 25.0)
         command("view", "run", "--no-open")()
 
     def load() -> Result:

@@ -211,7 +211,7 @@ def pinched_rod() -> float:
     bound=1e-9,
 )
 def pressing_hard_on_a_wall() -> float:
-    finger = robots.load_urdf(robots.URDF_FOLDER / "three_link_finger.urdf")
+    finger = robots.load_file(robots.URDF_FOLDER / "three_link_finger.urdf")
     wall = sp.Shell(
         [[0.07, -0.1, 0], [0.07, 0.1, 0], [0.07, 0.1, 0.2], [0.07, -0.1, 0.2]], [range(4)]
     )

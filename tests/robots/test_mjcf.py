@@ -192,12 +192,15 @@ def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, word
         ("<geom size='1'/>", "", "has no <body>"),
         ("<body><joint/><geom size='a'/></body>", "", "."),
         ("<body name='b'><joint/></body>", "<compiler inertiafromgeom='false'/>", "'b' moves"),
+        ("<body pos='0 nan 0'><joint/><geom size='1'/></body>", "", "not finite"),
         (f"<body name='b'>{7 * '<joint/>'}</body>", "", "more than 6 dofs in body 'b'"),
     ],
 )
-def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, inside, head, words):
+def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, monkeypatch, inside, head, words):
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(robots.RobotError, match=rf"not a MJCF that can be read: .*{words}"):
         robots.load_file(written(tmp_path, inside, head))
+    assert {one.name for one in tmp_path.iterdir()} == {"r.xml"}  # no log of MuJoCo's
 
 
 @pytest.mark.parametrize(

@@ -203,6 +203,7 @@ def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
         ('<xacro:include filename="$(find nix)/a.xacro"/>', "no package 'nix' in .*--package-dir"),
         ('<xacro:include filename="b.xacro"/>', r"b\.xacro"),
         ("<link name='a'>", "xacro cannot expand it"),
+        ("<xacro:macro name='m'><xacro:m/></xacro:macro><xacro:m/>", "nested too deeply"),
     ):
         with pytest.raises(robots.RobotError, match=words):
             robots.load_file(xacro(tmp_path, inside))

@@ -11,12 +11,13 @@ import hashlib
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +25,27 @@ from sphshell_pin.atomic import AtomicFolder
 from tests.scenario.operations import visible
 
 MAIN = [sys.executable, "-c", "from sphshell_pin.cli import main; main()"]
+REPORT = """
+import sys
+from sphshell_pin.study.report.making import Part, make_report
+from sphshell_pin.cases.contents import Finding, Section
+value = float(sys.argv[1])
+found = Section("x", "X", findings=[Finding("a", "a", value)])
+make_report("out", parts=[Part("x", "X", lambda **_: found, (1.0, 1.0))])
+"""
 SCENE, STIFFNESS = "sphere_on_shell", "contact.ball-bowl.law.k"
+
+
+def report_of(files: dict[str, bytes]) -> str:
+    """Return the figure of the report whose files these are: its page has the time of day."""
+    data = json.loads(files["report.json"])
+    if {*files} != {"report.html", "report.json", *data["files"]}:
+        return f"not complete: {sorted(files)}"
+    (figure,) = data["sections"][0]["findings"]
+    known = f"{figure['value']:g}"
+    same = files["findings.csv"].decode().rstrip().splitlines()[-1].split(",")[3]
+    shown = f">{figure['row'][1]}" in files["report.html"].decode()
+    return known if float(same) == figure["value"] and shown else f"{known}, {same} and a page"
 
 
 def run_of(files: dict[str, bytes]) -> str:
@@ -51,6 +72,7 @@ class Command:
     """What it resumes from; it is removed once the command has done all."""
     beside: str = ""
     """The command whose results are in the same folder."""
+    program: Sequence[str] = tuple(MAIN)
     whole: Callable[[dict[str, bytes]], str] | None = None
     """Returns the value whose files these are. By default they have always the same bytes."""
 
@@ -79,6 +101,18 @@ COMMANDS = {
         journal="sweep.parquet.journal",
         beside="run",
     ),
+    "new": Command(
+        "new --robot three_link_finger --radius {value} --out out/new.toml --force",
+        ("0.01", "0.02"),
+        "new.toml",
+    ),
+    "report": Command(
+        "{value}",
+        ("1", "2"),
+        "report.json",
+        program=(sys.executable, "-c", REPORT),
+        whole=report_of,
+    ),
 }
 
 
@@ -104,7 +138,7 @@ class Trial:
 
     def words(self, value: str) -> list[str]:
         """Return the command with one of its values."""
-        return [*MAIN, *self.command.words.format(value=value).split()]
+        return [*self.command.program, *self.command.words.format(value=value).split()]
 
     def run(self, value: str) -> subprocess.CompletedProcess[str]:
         """Run to the end."""
@@ -176,7 +210,7 @@ class Trial:
 def kill_at_random(trial: Trial, times: int) -> list[str]:
     """Kill a chain of commands, each over what the one before left; return what was wrong.
 
-    Half of them at any time, half while the files are being written.
+    Half of them at any time, half while the files are being written; a third by Ctrl-C.
     """
     trial.begin()
     rng = random.Random(1)
@@ -208,21 +242,23 @@ def kill_at_random(trial: Trial, times: int) -> list[str]:
             try:
                 process.wait(wait)
             except subprocess.TimeoutExpired:
-                process.kill()
+                process.send_signal(signal.SIGINT if n % 3 == 2 else signal.SIGKILL)
         left = trial.state()
         found["old" if left == before else "new" if left == wanted else "wrong"] += 1
-        if process.returncode not in (0, -9) or left not in trial.values:
+        # Python itself ends with -2 or 1 while it starts.
+        ends = (0, 130, -2, 1) if n % 3 == 2 else (0, -9)
+        if process.returncode not in ends or left not in trial.values:
             wrong.append(f"{n}, exit code {process.returncode}: {left}")
         if left == wanted:
             trial.forget()
-    print(f"{times} SIGKILLs at random times leave {dict(found)}", flush=True)
+    print(f"{times} signals at random times leave {dict(found)}", flush=True)
     return wrong + trial.ends()
 
 
 def main() -> int:
     """Kill; return 1 if anything but whole results was found."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--times", type=int, default=75, help="SIGKILLs at random times, of each")
+    parser.add_argument("--times", type=int, default=75, help="signals at random times, of each")
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
     chosen = parser.parse_args()
     wrong = []

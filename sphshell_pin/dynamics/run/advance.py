@@ -268,9 +268,7 @@ def result_of(
     names = tuple(pair.name for pair in scene.pairs)
     summaries = core.summaries
     if len(summaries) != len(names) + len(scene.joints.stopped_joints(scene.model)):
-        raise SphshellError(
-            "the contacts of the scene were changed during the run: it has no result"
-        )
+        raise SphshellError("the scene's contacts were changed during the run: it has no result")
     counts, wall_time = core.counts, core.wall_time
     simulated = core.time - float(record["t"][0] if len(record["t"]) else core.time)
     figures = map(PairFigures.from_core, summaries[: len(names)])

@@ -96,9 +96,15 @@ class ContactPair(Summarized):
 
     @cached_property
     def plane_law(self) -> NormalLaw:
-        """The law, and of one that follows the curvature of the shell that of a plane shell."""
+        """The law, and of one that follows the curvature of the shell that of a plane shell.
+
+        Of a foundation beside a Plane it is that of a face as large as the shell's box: stiffest.
+        """
         if not self.law.needs_shape:
             return self.law
+        if self.plane and self.shell and isinstance(self.law, FoundationLaw):
+            sides = np.sort(np.ptp(self.shell.vertices, axis=0))
+            return self.law.on_face(float(sides[1] * sides[2]))
         return self.law.on_plane(1 / sum(1 / one.radius for one in self.spheres))
 
     @property
@@ -142,8 +148,9 @@ class ContactPair(Summarized):
     def _check_plane(self) -> None:
         """Refuse what follows from the radius of a sphere, and flat elements."""
         why = "beside a Plane: it follows from the radius of a Sphere"
-        if self.law.needs_shape:
-            raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}")
+        if self.law.needs_shape and not isinstance(self.law, FoundationLaw):
+            must = "take law.on_plane(radius), or a FoundationLaw, which needs no radius"
+            raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}; {must}")
         friction = self.friction
         if friction is not None and (
             isinstance(friction, MindlinFriction) or friction._binding.torsional
