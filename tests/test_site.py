@@ -92,7 +92,7 @@ def test_data_and_parameters_are_shown(built):
     site, _ = built
     texts = {one.name: one.read_text(encoding="utf-8") for one in site.glob("*.html")}
     for name, words in (
-        ("hard_cases", ("2 I depth / v", "Tip of 3 or 100 facets")),
+        ("hard_cases", ("symmetric top", "Bowl touched along a ring")),
         ("speed", ("coal::collide", "Ball bounces five times")),
         ("robots", ("three_link_finger", "valve_body_step")),
         ("laws", ("parameter of <code>MindlinFriction</code>", "full_damping_depth")),

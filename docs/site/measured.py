@@ -134,9 +134,8 @@ def of_gallery(data: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def of_parts(data: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the kinds of files, and the triangles of one of them; families are in the data."""
-    first, kinds, _, faces, *_ = data["sections"]
-    return [first, kinds, faces]
+    """Return the kinds of files, and the triangles of one of them."""
+    return data["sections"][:3]
 
 
 SHORT: dict[str, Callable[[dict[str, Any]], list[dict[str, Any]]]] = {

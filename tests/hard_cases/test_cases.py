@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.hard_cases.__main__ import collect, row
+from tests.hard_cases.running import collect, measure, row
 from tests.hard_cases.verdict import CASES, Case
 from tests.studies import mostly_studies
 
@@ -22,3 +22,9 @@ def test_case(hard: Case) -> None:
 
 def test_every_module_has_cases() -> None:
     assert {case.module for case in ALL} == set(CASES.modules)
+
+
+def test_a_case_runs_in_a_process_of_its_own() -> None:
+    found = measure(quick=True, only="impact of Hunt")
+    assert [verdict.ok for verdict in found] == [True] * 4
+    assert {verdict.group for verdict in found} == {"Impacts"}

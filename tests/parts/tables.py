@@ -46,17 +46,13 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 def by_file(verdicts: list[Verdict]) -> Rows:
     """One row for each kind of file."""
-    return [FILE_COLUMNS, *([name, *summary(own)] for name, own in groups(verdicts, "file"))]
+    return [FILE_COLUMNS, *([name, *summary(own)] for name, own in groups(verdicts))]
 
 
-def by_family(verdicts: list[Verdict]) -> Rows:
-    columns = ("family", *FILE_COLUMNS[1:])
-    return [columns, *([name, *summary(own)] for name, own in groups(verdicts, "family"))]
-
-
-def groups(verdicts: list[Verdict], key: str) -> list[tuple[str, list[Verdict]]]:
-    names = dict.fromkeys(getattr(verdict, key) for verdict in verdicts)
-    return [(name, [v for v in verdicts if getattr(v, key) == name]) for name in names]
+def groups(verdicts: list[Verdict]) -> list[tuple[str, list[Verdict]]]:
+    """Return the kinds of files, and the verdicts of each."""
+    names = dict.fromkeys(verdict.file for verdict in verdicts)
+    return [(name, [v for v in verdicts if v.file == name]) for name in names]
 
 
 def summary(verdicts: list[Verdict]) -> list[str]:
@@ -118,29 +114,6 @@ def _faces(found: Found, k: int) -> list[str]:
     parts = (found.same, found.recognized_off, found.recognized_exact)
     pieces = share(int(found.pieces[k]), int(found.faces[k]), 2)
     return [*cells, share(taken, count), *(share(int(part[k]), taken) for part in parts), pieces]
-
-
-def worst(verdicts: list[Verdict], count: int = 25) -> Rows:
-    """Show the worst file of the worst parts, and the numbers to repeat them."""
-    worse = sorted((v for v in verdicts if v.worse and not v.spoiled), key=largest_ratio)
-    rows = sorted({v.number: v for v in worse}.values(), key=largest_ratio, reverse=True)[:count]
-    columns = ("number", "family", "file", "triangles", "largest error", "flat", "force", "health")
-    return [
-        columns,
-        *(
-            [
-                str(v.number),
-                v.family,
-                v.file,
-                str(v.triangles),
-                f"{v.largest['smooth']:.1e}",
-                f"{v.largest['facets']:.1e}",
-                forces([v], "smooth") if v.touches else "-",
-                "ok" if v.ok else "not ok",
-            ]
-            for v in rows
-        ),
-    ]
 
 
 def line(verdict: Verdict) -> str:
