@@ -247,25 +247,9 @@ def articulated(robot: Robot) -> list[Block]:
 
 def _solve(matrix: Expression, right: Expression) -> Expression:
     """Return X of a symmetric, positive definite system, by L D L^T without pivots."""
-    ca, n, pivots = casadi(), int(matrix.shape[0]), list[Expression]()
-    if n == 1:
-        return right * (1 / matrix[0, 0])
-    lower = ca.SX.eye(n)
-    for k in range(n):
-        pivot = matrix[k, k] - sum(lower[k, i] ** 2 * pivots[i] for i in range(k))
-        for row in range(k + 1, n):
-            known = sum(lower[row, i] * lower[k, i] * pivots[i] for i in range(k))
-            lower[row, k] = (matrix[row, k] - known) / pivot
-        pivots.append(pivot)
-    rows = [right[k, :] for k in range(n)]
-    for k in range(n):
-        for i in range(k):
-            rows[k] = rows[k] - lower[k, i] * rows[i]
-    rows = [row / pivot for row, pivot in zip(rows, pivots, strict=True)]
-    for k in reversed(range(n)):
-        for i in range(k + 1, n):
-            rows[k] = rows[k] - lower[i, k] * rows[i]
-    return ca.vertcat(*rows)
+    ca = casadi()
+    diagonal, upper, order = ca.ldl(ca.densify(matrix), False)
+    return ca.ldl_solve(ca.densify(right), diagonal, upper, order)
 
 
 def composite(robot: Robot) -> list[Block]:
