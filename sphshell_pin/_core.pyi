@@ -175,6 +175,9 @@ class Pair:
         plane: bool,
     ) -> None: ...
 
+class CompiledRobot:
+    def __init__(self, path: str, model: pin.Model) -> None: ...
+
 class JointEffects:
     def __init__(
         self, damping: _Doubles, least_effort: _Doubles, most_effort: _Doubles, speed: _Doubles
@@ -183,6 +186,7 @@ class JointEffects:
     def add_friction(
         self, v: int, limit: float, stiffness: float, damping: float, relaxation: float
     ) -> None: ...
+    def use(self, compiled: CompiledRobot) -> None: ...
 
 class Parameter:
     def __init__(

@@ -17,6 +17,9 @@ FLAGS = [
     "--host-resolver-rules=MAP evil.example 127.0.0.1",  # a name that was made to lead here
 ]
 
+# Tests compute anew what a cache would keep; those of the caches have folders of their own.
+os.environ["SPHSHELL_PIN_CACHE"] = ""
+
 
 @pytest.fixture(scope="session")
 def browser():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import contextvars
 import functools
+import logging
 import os
 import re
 import sys
@@ -17,6 +18,7 @@ import typer
 
 from sphshell_pin import errors
 from sphshell_pin._interrupts import interrupts_heard
+from sphshell_pin.cache import CACHE
 from sphshell_pin.checks import stated_pairs
 from sphshell_pin.cli.printing import lossy_streams
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
@@ -58,6 +60,9 @@ SetOption = Annotated[
     option("Change a value; may be given several times.", "--set", metavar="KEY=VALUE"),
 ]
 DtOption = Annotated[float | None, option("Time step \\[s] in place of run.dt.")]
+CompiledOption = Annotated[
+    bool, option("Move the robot by code compiled for it, as robot.compiled = true.", "--compiled")
+]
 DurationOption = Annotated[float | None, option("Time to simulate \\[s] in place of run.duration.")]
 OfOption = Annotated[
     str | None,
@@ -132,16 +137,24 @@ def options(
             is_eager=True,
         ),
     ] = False,
+    no_cache: Annotated[
+        bool, option("Keep nothing of CAD files and robots for later commands.", "--no-cache")
+    ] = False,
 ) -> None:
     """Exact contact of spheres with CAD surfaces, for Pinocchio's robots.
 
     Example: sphshell-pin run fingertip_on_blade
     """
     _debug.set(debug)
+    if no_cache:
+        os.environ[CACHE] = ""
 
 
 def main() -> None:
     """Run the command line."""
+    log = logging.getLogger("sphshell_pin")
+    log.addHandler(logging.StreamHandler())
+    log.setLevel(logging.INFO)
     with lossy_streams():
         app()
 
@@ -215,14 +228,17 @@ def _comes_from_ctrl_c(error: BaseException | None) -> bool:
 
 
 def changes_of(
-    set_: list[str] | None, dt: float | None = None, duration: float | None = None
+    set_: list[str] | None,
+    dt: float | None = None,
+    duration: float | None = None,
+    compiled: bool = False,
 ) -> dict[str, str]:
-    """Return the values that --set, --dt and --duration change, by dotted key."""
+    """Return the values that --set, --dt, --duration and --compiled change, by dotted key."""
     must = "must be KEY=VALUE, for instance run.dt=1e-4"
     changes = dict(stated_pairs("--set", set_ or [], must))
     for key, value in (("run.dt", dt), ("run.duration", duration)):
         changes |= {} if value is None else {key: repr(value)}
-    return changes
+    return changes | ({"robot.compiled": "true"} if compiled else {})
 
 
 def xacro_args_of(stated: list[str] | None) -> dict[str, str]:

@@ -12,6 +12,7 @@ import typer
 from sphshell_pin.checks import stated_pairs
 from sphshell_pin.cli.app import (
     MISSED,
+    CompiledOption,
     PackageDirOption,
     ScenarioArgument,
     SetOption,
@@ -66,6 +67,7 @@ def fit(
     ] = None,
     out: Annotated[Path | None, option("Folder of the files; by default results/SCENARIO.")] = None,
     picture: Annotated[bool, option("Draw fit and residuals.", "--picture/--no-picture")] = True,
+    compiled: CompiledOption = False,
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
 ) -> None:
@@ -82,7 +84,7 @@ def fit(
     from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
     from sphshell_pin.study.fit.writing import scenario_text
 
-    changes = changes_of(set_)
+    changes = changes_of(set_, compiled=compiled)
     wanted = parse_wanted(param)
     given = [Experiment(path) for path in data or []]
     given += [_experiment(text) for text in experiment or []]

@@ -13,6 +13,7 @@ from sphshell_pin.cli.app import (
     INTERRUPTED,
     MISSED,
     PERCENT,
+    CompiledOption,
     DtOption,
     DurationOption,
     PackageDirOption,
@@ -54,6 +55,7 @@ def run(
             "Compare every contact with that on the exact faces of the CAD file.", "--audit-cad"
         ),
     ] = False,
+    compiled: CompiledOption = False,
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
 ) -> None:
@@ -63,7 +65,7 @@ def run(
     """
     from sphshell_pin.scenario import build, explain_built, run_built
 
-    changes = changes_of(set_, dt, duration)
+    changes = changes_of(set_, dt, duration, compiled)
     built = build(scenario, changes)
     for warning in explain_built(built).warnings:
         typer.echo(f"warning: {warning}", err=True)

@@ -12,6 +12,7 @@ import typer
 
 from sphshell_pin.cli.app import (
     ERROR,
+    CompiledOption,
     DtOption,
     DurationOption,
     PackageDirOption,
@@ -96,6 +97,7 @@ def sweep(
     ] = False,
     dt: DtOption = None,
     duration: DurationOption = None,
+    compiled: CompiledOption = False,
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
 ) -> None:
@@ -110,7 +112,7 @@ def sweep(
     from sphshell_pin.plot.sweep import plot_sweep
     from sphshell_pin.study.sweep import plan_sweep, run_plan
 
-    changes = changes_of(set_, dt, duration)
+    changes = changes_of(set_, dt, duration, compiled)
     plan = plan_sweep(
         scenario,
         vary,

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.raw import Floats, Ints, Mask, moved_shapes
+
+Array: TypeAlias = NDArray[Any]
+Arrays = Mapping[str, Array]
+Known: TypeAlias = dict[str, tuple[str, tuple[str | int, ...]]]
+"""Numbers and shape of arrays by name: letters stand for sizes that several of them share."""
 
 
 @dataclass(frozen=True)
@@ -52,3 +63,20 @@ class CleanedSurface:
             health=self.health.moved(scale, rotation, translation),
             rounding=self.rounding * scale,
         )
+
+
+def check_arrays(given: Arrays, known: Known, always: tuple[str, ...]) -> None:
+    """Raise InvalidShell unless arrays have numbers and shapes as `known`, those `always` there."""
+    sizes: dict[str | int, int] = {3: 3, 4: 4, 9: 9}
+    for name, (kind, wanted) in known.items():
+        if name not in given:
+            if name in always:
+                raise InvalidShell(f"it has no {name}")
+            continue
+        array = given[name]
+        fits = array.dtype == np.dtype(kind) and array.ndim == len(wanted)
+        if not fits or any(
+            sizes.setdefault(letter, size) != size
+            for letter, size in zip(wanted, array.shape, strict=True)
+        ):
+            raise InvalidShell(f"its {name} are {array.dtype} {array.shape}, not {kind} {wanted}")

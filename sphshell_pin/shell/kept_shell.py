@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidShell
+from sphshell_pin.shell.cleaned import Array, Arrays, Known, check_arrays
 from sphshell_pin.shell.raw import KINDS
 from sphshell_pin.shell.shell import Shell
 
-Array: TypeAlias = NDArray[Any]
-Arrays = Mapping[str, Array]
-
 # Numbers and shape of each, with n vertices, m elements, t triangles and f faces.
-_ARRAYS: dict[str, tuple[str, tuple[str | int, ...]]] = {
+_ARRAYS: Known = {
     "vertices": ("f8", ("n", 3)),
     "elements": ("i4", ("m", 4)),
     "triangles": ("i4", ("t", 3)),
@@ -55,7 +50,7 @@ def shell_of(
         An option is out of range.
     """
     given = {key: arrays[key] for key in _ARRAYS if key in arrays}
-    _check_shapes(given)
+    check_arrays(given, _ARRAYS, _ALWAYS)
     # It checks indices, areas and the options.
     base = Shell(given["vertices"], given["elements"], None, crease_angle, side, clean=False)
     surface = base.surface()
@@ -85,22 +80,6 @@ def shell_of(
         health=surface.health.labelled(cleaned=True),
     )
     return Shell.from_surface(surface, crease_angle, side, name, finds_faces=finds_faces)
-
-
-def _check_shapes(given: Arrays) -> None:
-    sizes: dict[str | int, int] = {3: 3, 4: 4, 9: 9}
-    for name, (kind, wanted) in _ARRAYS.items():
-        if name not in given:
-            if name in _ALWAYS:
-                raise InvalidShell(f"it has no {name}")
-            continue
-        array = given[name]
-        fits = array.dtype == np.dtype(kind) and array.ndim == len(wanted)
-        if not fits or any(
-            sizes.setdefault(letter, size) != size
-            for letter, size in zip(wanted, array.shape, strict=True)
-        ):
-            raise InvalidShell(f"its {name} are {array.dtype} {array.shape}, not {kind} {wanted}")
 
 
 def _are_corners(triangles: Array, owners: Array) -> bool:

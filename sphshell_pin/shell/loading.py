@@ -6,11 +6,11 @@ import math
 import os
 from pathlib import Path
 
-from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing
+from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing, UnitWarning
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.cad.framing import check_frame
-from sphshell_pin.shell.cad.process import run_in_child
-from sphshell_pin.shell.cleaned import CleanedSurface
+from sphshell_pin.shell.cad.kept_surface import KeptSurface, Read
+from sphshell_pin.shell.cad.process import run_in_child, warn_caller
 from sphshell_pin.shell.cleaning import box_diagonal, clean_surface
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
@@ -25,7 +25,7 @@ def load_surface(
     scale: Scale,
     cad: CadOptions,
     crease_angle: float,
-) -> tuple[CleanedSurface, str, float]:
+) -> Read:
     """Read and clean a surface file.
 
     With a crease angle above 0 the sides that curvature would take off the faces of a CAD file are
@@ -52,12 +52,20 @@ def load_surface(
 
 def _load_cad(
     file: Path, unit: str | None, number: float, cad: CadOptions, crease_angle: float
-) -> tuple[CleanedSurface, str, float]:
+) -> Read:
     check_frame(file)
     arguments = (file, unit, cad, number, crease_angle, _scaled(number))
     purpose = f"reading {file.suffix.lower()} files"
-    surface, taken, factor = run_in_child("read", arguments, file, purpose, cad)
-    return surface, taken, factor
+    kept = KeptSurface.of(file, cad, (unit, number, crease_angle))
+    known = kept.load()
+    if known is not None:
+        for text in known[1]:
+            warn_caller(UnitWarning(text))
+        return known[0]
+    heard: list[Warning] = []
+    read: Read = run_in_child("read", arguments, file, purpose, cad, heard=heard)
+    kept.save(read, heard)
+    return read
 
 
 def _load_raw(

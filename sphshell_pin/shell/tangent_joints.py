@@ -38,27 +38,36 @@ def settle_joints(
     # Sorted by face within each vertex: the first and the last tell whether there are several.
     joint = owner[starts] != owner[ends - 1]
     settled = normals.reshape(-1, 3).copy()
-    for start, end in zip(starts[joint].tolist(), ends[joint].tolist(), strict=True):
-        corners = order[start:end]
-        fixed = None if plane is None else plane[corners // 3]
-        settled[corners] = _settled(settled[corners], fixed)
+    flat = np.zeros(len(settled), np.bool_) if plane is None else np.repeat(plane, 3)
+    starts, count = starts[joint], (ends - starts)[joint]
+    # Vertices with as many corners are settled together.
+    for size in np.unique(count).tolist():
+        corners = order[starts[count == size][:, None] + np.arange(size)]
+        settled[corners] = _settled(settled[corners], flat[corners])
     return settled.reshape(normals.shape)
 
 
-def _settled(normals: Floats, fixed: Bools | None) -> Floats:
-    """Mean normals (k, 3) of those that are linked by small angles; of planes, if any is one."""
-    near = np.argwhere(normals @ normals.T >= np.cos(TANGENT_ANGLE))
-    group = _core.mend_components(len(normals), np.ascontiguousarray(near, np.int32))
-    out = np.empty_like(normals)
-    for one in np.unique(group):
-        its = np.flatnonzero(group == one)
-        flat = its[fixed[its]] if fixed is not None else its[:0]
-        if len(flat):
-            # The nearest plane's; each plane keeps its own.
-            out[its] = normals[flat[np.argmax(normals[its] @ normals[flat].T, axis=1)]]
-            out[flat] = normals[flat]
-            continue
-        # Each distinct normal counts once, however many triangles a face has here.
-        mean = np.unique(np.round(normals[its], 9), axis=0).sum(axis=0)
-        out[its] = mean / np.linalg.norm(mean)
-    return out
+def _settled(normals: Floats, flat: Bools) -> Floats:
+    """Mean normals (g, k, 3) of those that are linked by small angles; of planes, if any is one.
+
+    g vertices with k corners each, of which those that are `flat` (g, k) lie on planes.
+    """
+    vertices, size = flat.shape
+    cosine = normals @ normals.transpose(0, 2, 1)
+    pairs = np.argwhere(cosine >= np.cos(TANGENT_ANGLE))
+    near = pairs[:, 1:] + size * pairs[:, :1]
+    group = _core.mend_components(vertices * size, np.ascontiguousarray(near, np.int32))
+    # Each distinct normal counts once, however many triangles a face has here.
+    given = normals.reshape(-1, 3)
+    distinct = np.unique(np.column_stack([group, np.round(given, 9)]), axis=0)
+    total = np.zeros((vertices * size, 3))
+    np.add.at(total, distinct[:, 0].astype(np.int64), distinct[:, 1:])
+    mean = total[group]
+    mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+    # The nearest plane's of those that are linked; each plane keeps its own.
+    linked = group.reshape(vertices, size)
+    seen = (linked[:, :, None] == linked[:, None, :]) & flat[:, None, :]
+    nearest = np.where(seen, cosine, -np.inf).argmax(axis=2)
+    of_plane = np.take_along_axis(normals, nearest[:, :, None], axis=1)
+    out = np.where(seen.any(axis=2)[:, :, None], of_plane, mean.reshape(normals.shape))
+    return np.asarray(np.where(flat[:, :, None], normals, out))

@@ -9,6 +9,7 @@
 #include "bindings/callbacks.hpp"
 #include "bindings/evaluations.hpp"
 #include "bindings/records.hpp"
+#include "dynamics/compiled/compiled_robot.hpp"
 #include "dynamics/scene/model_fault.hpp"
 #include "dynamics/derivatives/linearization.hpp"
 #include "dynamics/run/simulation.hpp"
@@ -199,6 +200,13 @@ void bind_dynamics(nanobind::module_& m) {
   m.def("patch_row_type", [] { return row_type<PatchRow>(kPatchRowFields); });
 
   // Joint components: arrays (nv) of damping and limits, then stops and dry friction one by one.
+  nb::class_<CompiledRobot>(m, "CompiledRobot")
+      .def(
+          "__init__",
+          [](CompiledRobot* self, const std::string& path, nb::handle model) {
+            new (self) CompiledRobot(path, model_of(model));
+          },
+          "path"_a, "model"_a);
   nb::class_<JointEffects>(m, "JointEffects")
       .def(nb::init<VectorX, VectorX, VectorX, VectorX>(), "damping"_a, "least_effort"_a,
            "most_effort"_a, "speed"_a)
@@ -214,7 +222,13 @@ void bind_dynamics(nanobind::module_& m) {
              double relaxation) {
             self.friction.push_back({v, limit, stiffness, damping, relaxation});
           },
-          "v"_a, "limit"_a, "stiffness"_a, "damping"_a, "relaxation"_a);
+          "v"_a, "limit"_a, "stiffness"_a, "damping"_a, "relaxation"_a)
+      .def(
+          "use",
+          [](JointEffects& self, std::shared_ptr<CompiledRobot> compiled) {
+            self.compiled = std::move(compiled);
+          },
+          "compiled"_a);
 
   m.def(
       "model_fault",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 
+#include "dynamics/compiled/compiled_robot.hpp"
 #include "dynamics/scene/model_fault.hpp"
 #include "dynamics/scene/scene_state.hpp"
 #include "library/checks.hpp"
@@ -75,6 +76,7 @@ void check_state(const Model& model, const Eigen::VectorXd& q, const Eigen::Vect
 struct Scene::Impl {
   Model model;
   std::vector<core::Pair> pairs;
+  core::JointForces::Effects joints;  // nothing acts in them; with the compiled robot, or null
 
   // A sphere as a frame at its center, in its joint.
   // `joint` receives the number of the joint that carries the frame.
@@ -95,7 +97,7 @@ struct Scene::Impl {
 Scene::Scene(const Model& model) {
   if (const auto fault = core::model_fault(model))
     throw InvalidParameter(fault->name, fault->value, fault->must);
-  impl_.reset(new Impl{model, {}});
+  impl_.reset(new Impl{model, {}, {}});
 }
 Scene::Scene(const Scene& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
 Scene& Scene::operator=(const Scene& other) { return *this = Scene(other); }
@@ -141,6 +143,18 @@ void Scene::set_relaxation(int pair, double time) {
   impl_->pairs[pair].relaxation = check_positive("time", time, " [s]");
 }
 
+void Scene::use_compiled(const std::string& path) {
+  core::JointEffects effects;
+  try {
+    effects.compiled = std::make_shared<core::CompiledRobot>(path, impl_->model);
+  } catch (const std::runtime_error& error) {
+    throw InvalidParameter(
+        "path", path,
+        std::string("must be what compile_robot() made for this model: ") + error.what());
+  }
+  impl_->joints = std::make_shared<core::JointEffects>(std::move(effects));
+}
+
 const Model& Scene::model() const { return impl_->model; }
 int Scene::num_pairs() const { return static_cast<int>(impl_->pairs.size()); }
 
@@ -150,7 +164,7 @@ struct SceneState::Impl {
 
   // A state copies the scene's model and pairs: what is done to the scene later does not change it.
   explicit Impl(const Scene::Impl& scene)
-      : state(scene.model, scene.pairs, nullptr),
+      : state(scene.model, scene.pairs, scene.joints),
         none(static_cast<std::size_t>(scene.model.njoints), pinocchio::Force::Zero()) {}
 
   void evaluate(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
@@ -171,6 +185,14 @@ const std::vector<pinocchio::Force>& SceneState::external_forces(const Eigen::Ve
   impl_->evaluate(q, v);
   const core::SceneData& scene = impl_->state.scene();
   return scene.touching() ? scene.external() : impl_->none;
+}
+
+const Eigen::VectorXd& SceneState::acceleration(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                                const Eigen::VectorXd& tau) {
+  check_size("tau", tau, impl_->state.scene().body().model().nv,
+             impl_->state.scene().body().model());
+  impl_->evaluate(q, v);
+  return impl_->state.scene().acceleration(q, v, tau);
 }
 
 // Rows as runs record them, in the library's own types.

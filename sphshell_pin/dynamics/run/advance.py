@@ -103,7 +103,7 @@ def start_run(
         scene, integrator, duration, hold, record_dt=record_dt, record=record, t0=t0
     )
     pairs = core_pairs(scene, q, v, warn=warn, limited_dt=integrator.limited_dt)
-    joints = scene.joints._bind(scene.model)
+    joints = scene.bind_joints()
     core = _core.Simulation(
         scene.model, pairs, joints, core_controller, q, v, settings, sensors.core
     )

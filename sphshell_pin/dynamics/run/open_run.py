@@ -158,7 +158,7 @@ class OpenRun:
                 scene, simulation.integrator, controller, self._control_dt, start, self._sensors
             )
         pairs = core_pairs(scene, q, v, warn=False)
-        self._core.change(pairs, scene.joints._bind(scene.model), core_controller)
+        self._core.change(pairs, scene.bind_joints(), core_controller)
         if core_controller is not None:
             self._controller = controller
         self.simulation = simulation

@@ -285,7 +285,7 @@ class Simulation(Summarized):
             return Rollout(scene, integrator, core, plan, workers, wall_time, sensors)
 
         workers = max(min(workers, len(starts)), 1)
-        joints = scene.joints._bind(scene.model)
+        joints = scene.bind_joints()
         core = _core.Rollout(scene.model, workers)
         tasks = Tasks(core, workers, progress, len(starts), plan.failures)
         try:

@@ -23,6 +23,7 @@ from sphshell_pin.checks import (
     check_vector,
 )
 from sphshell_pin.contact import Friction, FunctionFriction, ImpactLaw, NormalLaw, Plane, Sphere
+from sphshell_pin.dynamics.compiled.robot import load_compiled
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
 from sphshell_pin.dynamics.scene.models import (
     check_model,
@@ -60,6 +61,7 @@ class SceneParts(Summarized):
         lock: Iterable[str] = (),
         q_lock: ArrayLike | None = None,
         joints: JointComponents | None = None,
+        compiled: bool = False,
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
@@ -84,6 +86,8 @@ class SceneParts(Summarized):
         self._shown: pin.Model | None = None
         self._pairs: tuple[ContactPair, ...] = ()
         self._core: _core.Scene | None = None
+        self.compiled = compiled
+        self._robot = load_compiled(self._model) if compiled else None
 
     def _facts(self) -> list[Fact]:
         model = self._model
@@ -103,7 +107,12 @@ class SceneParts(Summarized):
 
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""
-        return {**self.__dict__, "_core": None}
+        return {**self.__dict__, "_core": None, "_robot": None}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Load a compiled robot again, from the cache of this machine."""
+        self.__dict__.update(state)
+        self._robot = load_compiled(self._model) if self.compiled else None
 
     @property
     def model(self) -> pin.Model:
@@ -272,7 +281,16 @@ class SceneParts(Summarized):
         """Return what the core makes of the scene with `pairs`: itself or its state."""
         shown = self.model
         convert = partial(_converted, self._model, shown, self.lock)
-        return kind(self._model, shown, pairs, self._joints._bind(self._model), convert)
+        return kind(self._model, shown, pairs, self.bind_joints(), convert)
+
+    def bind_joints(self) -> _core.JointEffects | None:
+        """Return what the core makes of the joints, with the compiled robot; None for neither."""
+        effects = self._joints._bind(self._model)
+        if self._robot is not None:
+            none = np.zeros(0)
+            effects = effects or _core.JointEffects(none, none, none, none)
+            effects.use(self._robot)
+        return effects
 
     def shares_model(self, other: SceneParts) -> bool:
         """Whether both scenes have one model, as those that `with_pairs` makes."""

@@ -175,7 +175,13 @@ def build_scenario(
         if scenario.contact:
             check_masses(assembly, assembly.lock)
         joints = joint_components(scenario, assembly, path)
-        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
+        scene = sp.Scene(
+            assembly.model,
+            lock=assembly.lock,
+            q_lock=q_lock,
+            joints=joints,
+            compiled=any(robot.compiled for robot in scenario.robot),
+        )
     shells: dict[str, ShellPlace] = {}
     for i, section in enumerate(scenario.shell):
         shell = (

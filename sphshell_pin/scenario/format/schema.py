@@ -100,6 +100,7 @@ class RobotSection(Section):
     frame: str = "universe"
     placement: Placement = Placement()
     lock: list[str] = []
+    compiled: bool = False
     joints: list[Literal["limits", "damping", "friction", "armature", "effort", "speed"]] = []
     q: list[float] | None = None
     start: dict[str, StartValue] = {}

@@ -14,7 +14,7 @@ from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
 
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.cad.face_mesh import ALONG, FaceMesh
-from sphshell_pin.shell.cad.face_surface import stationary_parameter
+from sphshell_pin.shell.cad.face_surface import stationary_parameters
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.surface import CadSurface
 from sphshell_pin.shell.cleaned import CleanedSurface
@@ -102,13 +102,14 @@ class _Places:
         self.corners = surface.vertices[surface.triangles] / factor
         self._sides = _own_sides(surface.triangles, cad.found.face_of(polygon))
         self._of_face: list[tuple[FaceMesh, Longs, Floats]] = []
-        self._curves: list[tuple[Occ, Longs, Floats]] = []  # sides (n, 2), their parameters
+        self._curves = _Curves()
         corner_rows = np.repeat(polygon, 3)
         for face, mesh, rows, uv in cad.found.locate(corner_rows, self.corners.reshape(-1, 3)):
             own = rows[::3] // 3
             self._of_face.append((mesh, own, uv.reshape(-1, 3, 2)))
             nodes = mesh.triangles[polygon[own] - cad.found.starts[face]]
             self._find_curves(mesh, own, nodes, SAME_PLACE * cad.size)
+        self._curves.seal()
 
     def errors(self, shell: ShellBase) -> Errors:
         """Measure the curved elements of `shell`, whose triangles are those of the surface."""
@@ -139,7 +140,11 @@ class _Places:
             sides[own] = found[:, :-1].reshape(-1, 3, len(ALONG)).max(axis=2)
             middles[own] = found[:, -1]
         of_sides = points[:, : 3 * len(ALONG)].reshape(count, 3, len(ALONG), 3)
-        for curve, places, ends in self._curves:
+        for shape, places in self._curves.shapes:
+            wanted = on_sides[tuple(places.T)]
+            triangle, side = places[wanted].T
+            borders[triangle, side] = _from_shape(shape[wanted], of_sides[triangle, side])
+        for curve, places, ends in self._curves.others:
             wanted = on_sides[tuple(places.T)]
             triangle, side = places[wanted].T
             along, near = of_sides[triangle, side], SETTLED * self._tolerance
@@ -165,7 +170,7 @@ class _Places:
                 found[number].append(((int(own[row]), side), at))
         for border, sides in zip(mesh.borders, found, strict=True):
             if sides:
-                self._curves.append((border.curve, *map(np.array, zip(*sides, strict=True))))
+                self._curves.add(border.curve, *map(np.array, zip(*sides, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -235,38 +240,64 @@ def _note(found: Errors, stated: float, factor: float, count: int, bent: float) 
     return note
 
 
+class _Curves:
+    """Exact curves of sides: lines and circles as numbers, all together; others one by one.
+
+    shapes : rows (n, 7) of point, unit direction or axis, radius (0 of lines), and sides (n, 2)
+    others : curve, sides (n, 2), their parameters (n, 2)
+    """
+
+    def __init__(self) -> None:
+        self.shapes: list[tuple[Floats, Longs]] = []
+        self.others: list[tuple[Occ, Longs, Floats]] = []
+
+    def add(self, curve: Occ, places: Longs, ends: Floats) -> None:
+        kind = curve.GetType()
+        if kind == GeomAbs_Line:
+            line = curve.Line()
+            row = (*line.Location().Coord(), *line.Direction().Coord(), 0.0)
+        elif kind == GeomAbs_Circle:
+            circle = curve.Circle()
+            axis = circle.Axis().Direction().Coord()
+            row = (*circle.Location().Coord(), *axis, circle.Radius())
+        else:
+            self.others.append((curve, places, ends))
+            return
+        self.shapes.append((np.tile(row, (len(places), 1)), places))
+
+    def seal(self) -> None:
+        """Put all lines and circles together."""
+        if self.shapes:
+            rows, places = (np.concatenate(parts) for parts in zip(*self.shapes, strict=True))
+            self.shapes = [(rows, places)]
+
+
+def _from_shape(shape: Floats, points: Floats) -> Floats:
+    """Largest distances (n,) of points (n, k, 3) along sides from lines and circles (n, 7)."""
+    axis, radius = shape[:, None, 3:6], shape[:, 6:]
+    offset = points - shape[:, None, :3]
+    along = (offset * axis).sum(axis=2)
+    aside = np.linalg.norm(offset - along[..., None] * axis, axis=2)
+    away = np.where(radius > 0.0, np.hypot(aside - radius, along), aside)
+    return np.asarray(away.max(axis=1, initial=0.0))
+
+
 def _from_curve(curve: Occ, points: Floats, ends: Floats, settled: float) -> Floats:
     """Largest distances (n,) of points (n, k, 3) along sides from a curve, `ends` (n, 2) on it.
 
-    Newton's steps shorter than `settled` are the last, where there is no closed form.
+    Newton's steps shorter than `settled` are the last.
     """
-    if curve.GetType() == GeomAbs_Circle:
-        circle = curve.Circle()
-        axis = np.array(circle.Axis().Direction().Coord())
-        from_middle = points - circle.Location().Coord()
-        along = from_middle @ axis
-        outward = np.linalg.norm(from_middle - along[..., None] * axis, axis=2) - circle.Radius()
-        return np.asarray(np.hypot(outward, along).max(axis=1))
-    if curve.GetType() == GeomAbs_Line:
-        line = curve.Line()
-        aside = np.cross(points - line.Location().Coord(), line.Direction().Coord())
-        return np.asarray(np.linalg.norm(aside, axis=2).max(axis=1))
-    rows = zip(points, ends.tolist(), strict=True)
-    return np.array([_side_from_curve(curve, side, a, b, settled) for side, (a, b) in rows])
-
-
-def _side_from_curve(curve: Occ, points: Floats, start: float, end: float, settled: float) -> float:
-    """Largest distance of points (k, 3) along a side from the curve between two parameters."""
     # Its speed may be anything: the middle of the side need not be near that of the parameters.
-    seeds = np.linspace(start, end, CURVE_SEEDS)
-    along = np.array([curve.Value(at).Coord() for at in seeds.tolist()])
-    ends = curve.FirstParameter(), curve.LastParameter()
-    largest = 0.0
-    for point in points:
-        away = np.linalg.norm(along - point, axis=1)
-        seed, nearest = float(seeds[np.argmin(away)]), float(away.min())
-        at = stationary_parameter(curve, point, seed, ends, settled)
-        if at is not None:
-            nearest = min(nearest, float(np.linalg.norm(curve.Value(at).Coord() - point)))
-        largest = max(largest, nearest)
-    return largest
+    seeds = np.linspace(ends[:, 0], ends[:, 1], CURVE_SEEDS, axis=1)
+    values = [curve.Value(at).Coord() for at in seeds.ravel().tolist()]
+    along = np.array(values).reshape(*seeds.shape, 3)
+    away = np.linalg.norm(along[:, None] - points[:, :, None], axis=3)
+    nearest, seed = away.min(axis=2), np.take_along_axis(seeds, away.argmin(axis=2), axis=1)
+    limits = curve.FirstParameter(), curve.LastParameter()
+    flat = points.reshape(-1, 3)
+    at = stationary_parameters(curve, flat, seed.ravel(), limits, settled)
+    found = np.flatnonzero(np.isfinite(at))
+    exact = np.array([curve.Value(one).Coord() for one in at[found].tolist()]).reshape(-1, 3)
+    closest = nearest.ravel()
+    closest[found] = np.minimum(closest[found], np.linalg.norm(exact - flat[found], axis=1))
+    return np.asarray(closest.reshape(nearest.shape).max(axis=1))

@@ -16,7 +16,7 @@ from OCP.IntTools import IntTools_FClass2d
 from OCP.TopAbs import TopAbs_OUT
 
 from sphshell_pin.shell.cad.face_mesh import FaceMesh
-from sphshell_pin.shell.cad.face_surface import stationary_parameter
+from sphshell_pin.shell.cad.face_surface import stationary_parameters
 from sphshell_pin.shell.cad.surface import CadSurface
 from sphshell_pin.shell.raw import Floats, Ints, random_places
 from sphshell_pin.shell.shell import Shell
@@ -145,6 +145,7 @@ class TrimmedFaces:
             away = np.linalg.norm(mesh.points[border.nodes] - near, axis=1)
             seed, low, high = (float(border.at[k]) for k in (np.argmin(away), 0, -1))
             ends = min(low, high), max(low, high)
-            at = stationary_parameter(border.curve, center, seed, ends, SETTLED * self._cad.size)
-            for parameter in (*ends, *([] if at is None else [at])):
+            settled = SETTLED * self._cad.size
+            at = stationary_parameters(border.curve, center[None], np.array([seed]), ends, settled)
+            for parameter in (*ends, *at[np.isfinite(at)].tolist()):
                 yield StationaryPoint(np.array(border.curve.Value(parameter).Coord()), None)

@@ -6,6 +6,7 @@ triangle and along each side against the surface, and along the border against i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -42,10 +43,10 @@ class Border:
 
     def error(self, points: Floats) -> float:
         """Largest distance of the curve from the polyline through `points` of the nodes."""
-        corners = points[self.nodes]
         if self.curve.GetType() == GeomAbs_Line:
-            ends = np.array([self.curve.Value(t).Coord() for t in (self.at[0], self.at[-1])])
-            return float(np.linalg.norm(corners[[0, -1]] - ends, axis=1).max())
+            ends = ((points[self.nodes[k]], self.curve.Value(self.at[k])) for k in (0, -1))
+            return max(math.dist(node, exact.Coord()) for node, exact in ends)
+        corners = points[self.nodes]
         start, span = corners[:-1], np.diff(corners, axis=0)
         shares = np.array((0.0, *ALONG))[:, None]
         places = ((1.0 - shares) * self.at[:-1] + shares * self.at[1:]).ravel()

@@ -143,30 +143,37 @@ class FaceSurface:
         return None
 
 
-def stationary_parameter(
-    curve: Occ, point: Floats, seed: float, ends: tuple[float, float], settled: float
-) -> float | None:
-    """Parameter of a stationary point of the distance from `point` (3,) to a curve, or None.
+def stationary_parameters(
+    curve: Occ, points: Floats, seeds: Floats, ends: tuple[float, float], settled: float
+) -> Floats:
+    """Parameters (n,) of stationary points of the distances from points (n, 3) to a curve, or nan.
 
-    Between the parameters `ends`, next to `seed`; Newton's method ends with a step shorter than
-    `settled`.
+    Between the parameters `ends`, next to `seeds` (n,); Newton's method ends with a step shorter
+    than `settled`.
     """
     place, first, second = gp_Pnt(), gp_Vec(), gp_Vec()
-    at = seed
+    at, found, left = seeds.copy(), np.full(len(seeds), np.nan), np.arange(len(seeds))
     for _ in range(MOST_STATIONARY_STEPS):
-        curve.D2(at, place, first, second)
-        offset, tangent = np.array(place.Coord()) - point, np.array(first.Coord())
-        square = float(tangent @ tangent)
-        bend = square + float(offset @ np.array(second.Coord()))
+        rows = []
+        for one in at[left].tolist():
+            curve.D2(one, place, first, second)
+            rows.append(place.Coord() + first.Coord() + second.Coord())
+        table = np.array(rows).reshape(-1, 9)
+        offset, tangent = table[:, :3] - points[left], table[:, 3:6]
+        square = dot(tangent, tangent)
+        bend = square + dot(offset, table[:, 6:])
         # Near a center of curvature, or at a place where the derivative vanishes.
-        bend = bend if abs(bend) > 1e-3 * square else square
-        if bend == 0.0:
-            return None
-        moved = min(max(at - float(offset @ tangent) / bend, ends[0]), ends[1])
-        if abs(moved - at) * square**0.5 <= settled:
-            return moved if ends[0] < moved < ends[1] else None
-        at = moved
-    return None
+        bend = np.where(np.abs(bend) > 1e-3 * square, bend, square)
+        step = dot(offset, tangent) / np.where(bend == 0.0, 1.0, bend)
+        moved = np.clip(at[left] - step, *ends)
+        last = np.abs(moved - at[left]) * np.sqrt(square) <= settled
+        inner = last & (bend != 0.0) & (ends[0] < moved) & (moved < ends[1])
+        found[left[inner]] = moved[inner]
+        at[left] = moved
+        left = left[~last & (bend != 0.0)]
+        if left.size == 0:
+            break
+    return found
 
 
 def dot(a: Floats, b: Floats) -> Floats:

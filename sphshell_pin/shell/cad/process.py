@@ -64,11 +64,13 @@ def run_in_child(
     purpose: str,
     options: CadOptions,
     target: Path | None = None,
+    heard: list[Warning] | None = None,
 ) -> Any:  # what the job returns
     """Do a job of `jobs.JOBS` in a child, and return its result.
 
     path : of the file that is read, for messages; purpose : what needs OpenCASCADE
     target : the file that the job has written, if it has one written
+    heard : receives the warnings that are given
 
     Raises
     ------
@@ -103,7 +105,9 @@ def run_in_child(
             )
         kind, content, caught = answer
         for warning in caught:
-            _warn(warning)
+            warn_caller(warning)
+        if heard is not None:
+            heard += caught
         if kind == "error":
             fine = isinstance(content, (InvalidParameter, NameNotFound))
             raise content
@@ -247,7 +251,7 @@ def _short_of_memory(limit: float) -> str:
     )
 
 
-def _warn(warning: Warning) -> None:
+def warn_caller(warning: Warning) -> None:
     """Give a warning of the child to the line that called the package."""
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_globals["__name__"].startswith("sphshell_pin."):

@@ -38,12 +38,14 @@ struct DryFriction {
   double clamped(double x) const { return std::clamp(x, -limit, limit); }
 };
 
-// The constant description, shared by all states of a scene.
+// The constant description, shared by all states of a scene: what acts in the joints, and the
+// compiled code that moves them, or null for Pinocchio's.
 struct JointEffects {
   VectorX damping;                           // (nv) [N m s/rad or N s/m], or empty
   VectorX least_effort, most_effort, speed;  // (nv), infinite where there is no limit, or empty
   std::vector<JointStop> stops = {};
   std::vector<DryFriction> friction = {};
+  std::shared_ptr<const CompiledRobot> compiled = {};
 };
 
 // A pair, or a stop of a joint, at one state.

@@ -10,6 +10,8 @@
 #include <pinocchio/algorithm/rnea.hpp>
 #include <string>
 
+#include "dynamics/compiled/compiled_robot.hpp"
+
 namespace sphshell {
 namespace {
 
@@ -28,6 +30,11 @@ void find_curved(const pinocchio::JointModel& joint, std::vector<CurvedSegment>&
   if (kind == "JointModelSpherical") add(Group::Rotation);
   if (kind == "JointModelPlanar") add(Group::Planar);
 }
+
+// Compiled code writes placements, velocities and forces as numbers in a row.
+static_assert(sizeof(pinocchio::SE3) == 12 * sizeof(double));
+static_assert(sizeof(pinocchio::Motion) == 6 * sizeof(double));
+static_assert(sizeof(pinocchio::Force) == 6 * sizeof(double));
 
 // True where each subtree's joints have consecutive numbers, as Pinocchio's derivatives need them.
 bool depth_first(const pinocchio::Model& model) {
@@ -69,6 +76,9 @@ void Multibody::need(int joint) {
 }
 
 void Multibody::kinematics(const VectorX& q) {
+  if (compiled_)
+    return compiled_->kinematics(needed_.data(), static_cast<int>(needed_.size()), q.data(),
+                                 nullptr, data_.oMi[0].rotation().data(), nullptr);
   // The step of Pinocchio's own forward kinematics, for the joints on the way to contacts
   // alone.
   using Step =
@@ -79,6 +89,10 @@ void Multibody::kinematics(const VectorX& q) {
 }
 
 void Multibody::kinematics(const VectorX& q, const VectorX& v) {
+  if (compiled_)
+    return compiled_->kinematics(needed_.data(), static_cast<int>(needed_.size()), q.data(),
+                                 v.data(), data_.oMi[0].rotation().data(),
+                                 data_.v[0].toVector().data());
   using Step =
       pinocchio::impl::ForwardKinematicFirstStep<double, 0, pinocchio::JointCollectionDefaultTpl,
                                                  VectorX, VectorX>;
@@ -126,6 +140,16 @@ const VectorX& Multibody::solve(const VectorX& tau, const VectorX& bias) {
 
 const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                                        const Forces* external) {
+  if (!compiled_) return own_acceleration(q, v, tau, external);
+  solution_.resize(model_.nv);
+  compiled_->acceleration(q.data(), v.data(), tau.data(),
+                          external ? external->front().toVector().data() : nullptr,
+                          solution_.data());
+  return solution_;
+}
+
+const VectorX& Multibody::own_acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
+                                           const Forces* external) {
   if (mimics_) {
     compute_mass(q);
     return solve(tau, external ? pinocchio::rnea(model_, data_, q, v, zero_, *external)
@@ -145,7 +169,7 @@ void Multibody::acceleration_derivatives(const VectorX& q, const VectorX& v, con
       return;
     }
     // With G the ratios, tau = G^T id(q_all, G v, G a): differentiated at a held torque.
-    const VectorX a = acceleration(q, v, tau);
+    const VectorX a = own_acceleration(q, v, tau);
     place_unlocked(q);
     auto& [model, data, ratios, id_by_q, id_by_v, id_by_a, q_all] = *unlocked_;
     pinocchio::computeRNEADerivatives(model, data, q_all, VectorX(ratios * v), VectorX(ratios * a),
@@ -164,14 +188,14 @@ void Multibody::acceleration_derivatives(const VectorX& q, const VectorX& v, con
       step_.setZero();
       step_[m] = sign * kDifference;
       integrate(q, step_, moved_);
-      by_q.col(m) += sign / (2 * kDifference) * acceleration(moved_, v, tau);
+      by_q.col(m) += sign / (2 * kDifference) * own_acceleration(moved_, v, tau);
       // The acceleration is quadratic in v and linear in tau: any step is exact.
       step_ = v;
       step_[m] += sign;
-      by_v.col(m) += sign / 2 * acceleration(q, step_, tau);
+      by_v.col(m) += sign / 2 * own_acceleration(q, step_, tau);
       step_ = tau;
       step_[m] += sign;
-      by_tau.col(m) += sign / 2 * acceleration(q, v, step_);
+      by_tau.col(m) += sign / 2 * own_acceleration(q, v, step_);
     }
 }
 
@@ -291,6 +315,8 @@ void Multibody::integrate(const VectorX& q, const VectorX& step, VectorX& out) c
 void Multibody::difference(const VectorX& q0, const VectorX& q1, VectorX& out) const {
   pinocchio::difference(model_, q0, q1, out);
 }
+
+VectorX Multibody::neutral() const { return pinocchio::neutral(model_); }
 
 // Scales for errors of q: |q| of plain coordinates; for positions of free and planar joints the
 // distance from the origin, the same for all axes; 1 rad for rotations.

@@ -3,6 +3,7 @@
 
 #include <pinocchio/multibody.hpp>
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -27,6 +28,8 @@ struct TurningAxes {
   Matrix6X by_q;  // in the joint's frame: column k + nv m, of axis k with respect to coordinate m
 };
 
+class CompiledRobot;
+
 // A constant model with the scratch that its algorithms write: one per thread.
 class Multibody {
  public:
@@ -34,6 +37,9 @@ class Multibody {
   // Pinocchio's own take seconds to compile: here, and not in every file.
   Multibody(const Multibody& other);
   ~Multibody();
+
+  // Answers acceleration() and kinematics() from now on, in place of Pinocchio, unless null.
+  void use(std::shared_ptr<const CompiledRobot> compiled) { compiled_ = std::move(compiled); }
 
   // Placements and, with v, velocities of the joints that were asked for by `need`, no others.
   void kinematics(const VectorX& q);
@@ -80,6 +86,7 @@ class Multibody {
   // q exp(step), and the step that leads from q0 to q1, both in the tangent space of the first one.
   void integrate(const VectorX& q, const VectorX& step, VectorX& out) const;
   void difference(const VectorX& q0, const VectorX& q1, VectorX& out) const;
+  VectorX neutral() const;
   // By which errors of coordinates and velocities are measured, per velocity component: lengths of
   // positions from the origin, 1 for turns; lengths of the vectors that components belong to.
   void sizes(const VectorX& q, VectorX& out) const;
@@ -129,6 +136,9 @@ class Multibody {
   void unlock();
   void place_unlocked(const VectorX& q);
 
+  // Pinocchio's, whose factorization of the mass matrix the derivatives go on with.
+  const VectorX& own_acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
+                                  const Forces* external = nullptr);
   // Fills by_q of a joint at q.
   void turn_axes(const VectorX& q, TurningAxes& axes);
   // Writes the mass matrix (nv, nv) into data_.M, both triangles.
@@ -138,6 +148,7 @@ class Multibody {
 
   pinocchio::Model model_;
   pinocchio::Data data_;
+  std::shared_ptr<const CompiledRobot> compiled_;
   VectorX zero_;
   // Pinocchio's ABA has no mimic joints: of models with some, the mass matrix is factorized.
   bool mimics_;

@@ -19,6 +19,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
       excursions_(pairs_.size()),
       external_(static_cast<std::size_t>(model.njoints), pinocchio::Force::Zero()),
       bristles_(group_numbers(pairs_)) {
+  if (joints_.effects()) body_.use(joints_.effects()->compiled);
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();

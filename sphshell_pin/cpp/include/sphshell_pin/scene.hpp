@@ -69,6 +69,12 @@ class SPHSHELL_PIN_API Scene {
   /// @throws InvalidParameter unless the pair exists and the time is positive
   void set_relaxation(int pair, double time);
 
+  /// States made from now on move the robot by the shared object at `path`, in place of Pinocchio:
+  /// the one that Python's compile_robot(scene.model) made for this model.
+  /// @throws InvalidParameter where it cannot be opened, is of another model, or differs from
+  ///         Pinocchio by more than 1e-12
+  void use_compiled(const std::string& path);
+
   const pinocchio::Model& model() const;
   int num_pairs() const;
 
@@ -101,6 +107,12 @@ class SPHSHELL_PIN_API SceneState {
   ///         (cos, sin) pair that is not of unit length
   const std::vector<pinocchio::Force>& external_forces(const Eigen::VectorXd& q,
                                                        const Eigen::VectorXd& v);
+
+  /// Forward dynamics (nv) under the torques `tau` (nv) and these forces, by Pinocchio's ABA or by
+  /// what Scene::use_compiled() was given. Valid until the next call; errors as of
+  /// external_forces().
+  const Eigen::VectorXd& acceleration(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                      const Eigen::VectorXd& tau);
 
   /// All contacts with their forces; arguments and errors as of external_forces().
   std::vector<SceneContact> contacts(const Eigen::VectorXd& q, const Eigen::VectorXd& v);

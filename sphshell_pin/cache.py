@@ -1,0 +1,63 @@
+"""Files that can be made again, kept between processes: compiled robots, surfaces of CAD files."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+CACHE = "SPHSHELL_PIN_CACHE"
+"""Environment variable with another folder, empty for none; by default it is sphshell-pin in that
+of XDG for caches."""
+
+
+def cache_folder(kind: str) -> Path | None:
+    """Return the folder for files of one `kind`, made if need be; None where there can be none.
+
+    It belongs to the user, and nobody else may write to it.
+    """
+    given, xdg = os.environ.get(CACHE), os.environ.get("XDG_CACHE_HOME", "")
+    if given == "":
+        return None
+    try:
+        usual = Path(xdg) if os.path.isabs(xdg) else Path.home() / ".cache"
+        root = Path(given).absolute() if given else usual / "sphshell-pin"
+        folder = root / kind
+        for one in (root, folder):
+            one.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # no permission; no home
+        return None
+    return folder if is_own(root, stat.S_ISDIR) and is_own(folder, stat.S_ISDIR) else None
+
+
+def is_own(path: Path, kind: Callable[[int], bool] = stat.S_ISREG) -> bool:
+    """Whether `path` is a file (of this `kind`), no link, that only this user can have written."""
+    try:
+        found = os.lstat(path)
+    except OSError:
+        return False
+    return kind(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
+
+
+def keep_newest(folder: Path, most: int) -> None:
+    """Remove the files of `folder` that were used longest ago beyond `most` bytes."""
+    used = []
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(folder):
+            with contextlib.suppress(OSError):
+                about = entry.stat(follow_symlinks=False)
+                used.append((about.st_mtime_ns, about.st_size, entry.path))
+    room = most
+    for _, size, path in sorted(used, reverse=True):
+        room -= size
+        if room < 0:
+            with contextlib.suppress(OSError):
+                os.unlink(path)
+
+
+def mark_used(path: Path) -> None:
+    """Make `path` the newest of its folder."""
+    with contextlib.suppress(OSError):
+        os.utime(path)
