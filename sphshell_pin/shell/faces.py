@@ -54,6 +54,7 @@ class Face:
 
     @property
     def exact(self) -> bool:
+        """Whether contacts on all of it are closed forms: no element of it is curved."""
         return len(self.curved) == 0
 
 
