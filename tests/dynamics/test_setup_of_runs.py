@@ -13,6 +13,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.dynamics.scene.explain import explain_pairs
+from sphshell_pin.dynamics.scene.sphere_arguments import seam_warning
 from sphshell_pin.shell import Shell
 from tests import models
 
@@ -143,3 +144,24 @@ def test_more_than_a_million_rows_are_announced(integrator, record_dt, rows) -> 
         assert rows in told[0]
         assert "record_dt = 0.002 s" in told[0] or "record_dt = 0.001 s" in told[0]
         assert caught[0].filename == __file__
+
+
+def test_shells_that_go_on_into_each_other_are_named() -> None:
+    """Side by side in one plane, not where one leans by more than the crease angle."""
+    turn = pin.utils.rotate("y", 0.8)
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "tip")
+    model.addFrame(pin.Frame("tip", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.1, 0.01), pin.SE3.Identity())
+    plate = sp.Shell([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]], name="plate")
+    for rotation, smooth in ((np.eye(3), True), (turn, False)):
+        scene = sp.Scene(model)
+        for name, place in (
+            ("left", pin.SE3.Identity()),
+            ("right", pin.SE3(rotation, np.array([1.0, 0.0, 0.0]))),
+        ):
+            ball = sp.Sphere(0.01, "tip")
+            scene.add_contact(ball, plate, placement=place, law=LAW, friction=None, name=name)
+        said = seam_warning(*scene.pairs)
+        assert (said is not None) == smooth
+        assert smooth == ("push twice at their seam" in str(said))
