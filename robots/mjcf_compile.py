@@ -31,7 +31,7 @@ _HULLS = "masses of meshes that are not closed are those of their convex hulls"
 
 
 @contextmanager
-def _silent(mujoco: Any) -> Iterator[None]:
+def silent(mujoco: Any) -> Iterator[None]:
     """Make MuJoCo's faults ValueErrors; it writes no file of its warnings meanwhile."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
@@ -54,7 +54,7 @@ class Compiled:
         # What is not modeled: the names that each sentence is about.
         self.notes: defaultdict[str, list[str]] = defaultdict(list)
         self.files: dict[str, tuple[Path, str]] = {}
-        with _silent(mujoco):
+        with silent(mujoco):
             self.model = self._compiled(self._spec())
 
     def _spec(self) -> Any:

@@ -11,6 +11,7 @@ import pytest
 from sphshell_pin import robots
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import RobotWarning
+from sphshell_pin.robots.mjcf_compile import silent
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -22,7 +23,8 @@ FREE, BALL = 0, 1
 @cache
 def told_by_mujoco(name):
     """Return joints, a state, and mass matrix and bias forces in it."""
-    model = mujoco.MjModel.from_xml_path(str(FOLDER / name))
+    with silent(mujoco):
+        model = mujoco.MjModel.from_xml_path(str(FOLDER / name))
     data = mujoco.MjData(model)
     rng = np.random.default_rng(7)
     data.qpos[:] = model.qpos0 + 0.3 * rng.normal(size=model.nq)
