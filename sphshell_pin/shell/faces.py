@@ -54,6 +54,7 @@ class Face:
 
     @property
     def exact(self) -> bool:
+        """Whether all its elements are those of the closed form."""
         return len(self.curved) == 0
 
 
