@@ -67,7 +67,7 @@ def plate(half: float, spacing: float, thickness: float = 0.1) -> Surface:
 
 
 def bowl(side: float) -> Surface:
-    """Return the sphere of benchmarks.swing seen from inside; sides of `side` radii of the ball."""
+    """Return the sphere of the swing seen from inside; sides of `side` radii of the ball."""
     mesh = swing.bowl(side)
 
     def height(x: Array, y: Array) -> Array:

@@ -120,7 +120,7 @@ class Plate(BallScene):
 
 @dataclass(frozen=True)
 class Bowl(BallScene):
-    """The swing of benchmarks.swing: 40 degrees, no friction, four periods, eight azimuths.
+    """The swing of the report: 40 degrees, no friction, four periods, eight azimuths.
 
     Truth: the period, by a code of its own, and a constant energy.
     """

@@ -123,7 +123,8 @@ def of_peers(data: dict[str, Any]) -> list[dict[str, Any]]:
     first, ratios, *scenes = data["sections"]
     head, *rows = ratios["table"]
     short = {**ratios, "table": [row[:7] for row in (head, *rows)]}
-    return [first, short, *({**one, "table": ()} for one in scenes if "text" in one)]
+    shown = {one["text"]: {**one, "table": ()} for one in reversed(scenes) if "text" in one}
+    return [first, short, *reversed(shown.values())]
 
 
 def of_gallery(data: dict[str, Any]) -> list[dict[str, Any]]:

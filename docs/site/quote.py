@@ -60,7 +60,7 @@ def blocks_of(data: Data) -> dict[str, str]:
     for name in shown.keys() & tables.keys():
         tables[name] = markdown(shown[name](cells_of(tables[name])))
     return tables | {
-        "findings": findings(list(found.values())),
+        "findings": findings([row for row in found.values() if not row[0].startswith("the same")]),
         "summary": head + findings([found[key] for key in SUMMARY if key in found]),
         "machine": f"`{machine.get('command', 'sphshell-pin report')}` on {'; '.join(parts)}.\n",
     }
