@@ -21,8 +21,8 @@ namespace {
 constexpr double kSinglePrecision = 2e-7;
 // And vertices are moved by sqrt(3) times the rounding of their coordinates at most.
 constexpr double kOfRounding = 1.8;
-// Vertices are moved onto faces by so many times single precision: faces that are fitted to coarser
-// numbers are not that exact.
+// Vertices are moved onto faces that were recognized by so many tolerances, within which they are
+// found there.
 constexpr double kMostMoved = 3;
 // Systems write CAD files whose edges are off the faces by this share of the size.
 constexpr double kFileTolerance = 2e-5;
@@ -233,9 +233,9 @@ std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions o
     recognized = true;
   }
   // Vertices are off the faces by the rounding of their coordinates, or the tolerance of a file.
-  const double most = recognized ? kMostMoved * kSinglePrecision : kFileTolerance;
+  const double most = recognized ? kMostMoved * tolerance : kFileTolerance * shell->size();
   std::vector<Vec3> moved;
-  if (options.known) moved = snapped_vertices(*shell, *options.known, most * shell->size());
+  if (options.known) moved = snapped_vertices(*shell, *options.known, most);
   if (!moved.empty()) {
     options.regions = nullptr;
     out = std::make_shared<Shell>(std::move(moved), shell->triangles(), shell->element(),

@@ -1,10 +1,21 @@
 #include "shell/faces/coplanar.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 namespace sphshell {
+namespace {
+
+// Facets whose normals differ by more than this (cosine) are not in one plane, slivers included.
+constexpr double kSameSide = 0.9;
+// Triangles within so many tolerances of a plane may be in it once it is fitted, to so many
+// triangles at least, so many times.
+constexpr double kBeside = 30;
+constexpr std::size_t kFewToFit = 3, kMostRounds = 6;
+
+}  // namespace
 
 CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     : shell_(shell), of_(shell.triangles().size(), -1) {
@@ -25,32 +36,56 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
   for (const int first : order) {
     if (of_[first] >= 0) continue;
     const int region = size();
-    const Vec3& normal = topology.face_normal[first];
-    const Vec3& origin = p[triangles[first][0]];
-    // The normals of slivers are noise.
-    constexpr double kSameSide = 0.9;
-    const auto lies_in_plane = [&](int t) {
-      if (topology.face_normal[t].dot(normal) < kSameSide) return false;
-      for (const int v : triangles[t])
-        if (std::abs((p[v] - origin).dot(normal)) > tolerance) return false;
-      return true;
-    };
-    Region out{normal, 0, 0, 0};
+    Region out{topology.face_normal[first], 0, 0, 0};
+    Vec3 origin = p[triangles[first][0]];
     Eigen::AlignedBox3d box;
-    of_[first] = region;
-    found.assign(1, first);
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const int t = found[i];
-      out.area += area[t];
-      for (int k = 0; k < 3; ++k) {
-        box.extend(p[triangles[t][k]]);
-        const int h = topology.other_half_edge(3 * t + k);
-        if (h < 0) continue;
-        const int u = triangle_of(h);
-        if (of_[u] >= 0 || !lies_in_plane(u)) continue;
-        of_[u] = region;
-        found.push_back(u);
+    // The plane of the largest triangle is off far from it, by the rounding of its corners: where
+    // triangles stand off by little, the plane is fitted to what was found, which is looked for
+    // again.
+    for (std::size_t before = 0, round = 0;; ++round) {
+      bool any_beside = false;
+      const auto lies_in_plane = [&](int t) {
+        if (topology.face_normal[t].dot(out.normal) < kSameSide) return false;
+        double most = 0;
+        for (const int v : triangles[t])
+          most = std::max(most, std::abs((p[v] - origin).dot(out.normal)));
+        any_beside = any_beside || (most > tolerance && most < kBeside * tolerance);
+        return most <= tolerance;
+      };
+      box.setEmpty(), out.area = 0;
+      of_[first] = region;
+      found.assign(1, first);
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        const int t = found[i];
+        out.area += area[t];
+        for (int k = 0; k < 3; ++k) {
+          box.extend(p[triangles[t][k]]);
+          const int h = topology.other_half_edge(3 * t + k);
+          if (h < 0) continue;
+          const int u = triangle_of(h);
+          if (of_[u] >= 0 || !lies_in_plane(u)) continue;
+          of_[u] = region;
+          found.push_back(u);
+        }
       }
+      if (!any_beside || found.size() < kFewToFit || found.size() <= before || round == kMostRounds)
+        break;
+      before = found.size();
+      // Least squares over the areas, by their moments about the first triangle.
+      Vec3 middle = Vec3::Zero();
+      for (const int t : found)
+        for (const int v : triangles[t]) middle += area[t] / (3 * out.area) * (p[v] - origin);
+      Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+      for (const int t : found)
+        for (const int v : triangles[t]) {
+          const Vec3 off = p[v] - origin - middle;
+          second += area[t] / out.area * off * off.transpose();
+        }
+      const Vec3 normal =
+          Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(second).eigenvectors().col(0);
+      out.normal = normal.dot(out.normal) < 0 ? Vec3(-normal) : normal;
+      origin += middle;
+      for (const int t : found) of_[t] = -1;
     }
     out.count = static_cast<int>(found.size());
     out.extent = box.diagonal().norm();

@@ -10,17 +10,17 @@
 namespace sphshell {
 namespace {
 
-// A facet leans [rad] from the primitive's normals at its corners by no more than this; slivers
-// that are absorbed later by more, since their own normals are noise.
-constexpr double kMostLeanOnFace = 0.7, kMostLeanOfSlivers = 1.1;
-// A curved side comes within this share of the flat side's distance.
+// The normal of a facet that leans more than this [rad] from the primitive's at its corners says
+// nothing.
+constexpr double kMostLeanOnFace = 0.7;
+// A curved side comes within this share of the flat sides' distance.
 constexpr double kMostOfFlat = 0.3;
 // Nearer to the axis than this share of its middle, a corner is the tip of a cone.
 constexpr double kTip = 1e-3;
 constexpr double kMostMeanLean = 0.314;  // [rad], 18 degrees: the median over a face
 // More points do not make a fit better than rounding.
 constexpr std::size_t kMostFitted = 300;
-constexpr int kMostRefits = 8, kMostSweeps = 40;
+constexpr int kMostRefits = 8;
 // Coplanar triangles of so many vertices are a face of their own, unless they are a band.
 constexpr int kFewOfBand = 3;
 constexpr std::size_t kVerticesOfPlane = 5;
@@ -40,12 +40,47 @@ std::array<Vec3, 3> normals_at(const Primitive& shape, const std::array<Vec3, 3>
 
 }  // namespace
 
+int turned_on(const Primitive& shape, const std::array<Vec3, 3>& x, double tolerance) {
+  double doubled, longest2 = 0;
+  if (shape.kind == FaceKind::Plane) return 0;
+  if (shape.kind == FaceKind::Sphere) {
+    doubled = (x[0] - shape.point).dot((x[1] - shape.point).cross(x[2] - shape.point));
+    doubled /= shape.radius;
+    for (int k = 0; k < 3; ++k)
+      longest2 = std::max(longest2, (x[next_corner(k)] - x[k]).squaredNorm());
+  } else {
+    // Lengths around the axis and across, about the middle of the facet.
+    const Vec3 middle = (x[0] + x[1] + x[2]) / 3 - shape.point;
+    const double off = (middle - middle.dot(shape.axis) * shape.axis).norm();
+    const double across = shape.kind == FaceKind::Torus  ? shape.second
+                          : shape.kind == FaceKind::Cone ? 1 / std::cos(shape.second)
+                                                         : 1;
+    const Eigen::Vector2d first = shape.parameters(x[0], 1);
+    Eigen::Vector2d d[2];
+    for (int k = 0; k < 2; ++k) {
+      d[k] = shape.parameters(x[k + 1], 1) - first;
+      d[k][0] = off * std::remainder(d[k][0], 2 * M_PI);
+      if (shape.kind == FaceKind::Torus) d[k][1] = std::remainder(d[k][1], 2 * M_PI);
+      d[k][1] *= across;
+    }
+    doubled = d[0][0] * d[1][1] - d[0][1] * d[1][0];
+    longest2 = std::max({d[0].squaredNorm(), d[1].squaredNorm(), (d[1] - d[0]).squaredNorm()});
+  }
+  // Twice the area over the longest side is the height.
+  if (!(std::abs(doubled) > tolerance * std::sqrt(longest2))) return 0;
+  return doubled < 0 ? -1 : 1;
+}
+
 Vec3 Faces::normal(const Shell& shell, int t, int k) const {
   const Triangle& c = shell.triangles()[t];
   const std::vector<Vec3>& p = shell.vertices();
-  // On the side of the facet's own normal.
-  const Vec3 n = normals_at(shapes[of[t]], {p[c[0]], p[c[1]], p[c[2]]})[k];
-  return n.dot(shell.topology().face_normal[t]) < 0 ? Vec3(-n) : n;
+  const std::array<Vec3, 3> corners = {p[c[0]], p[c[1]], p[c[2]]};
+  const Primitive& shape = shapes[of[t]];
+  const Vec3 n = normals_at(shape, corners)[k];
+  // On the side of the facet's own normal, if that says anything.
+  const double along = n.dot(shell.topology().face_normal[t]);
+  const int turned = std::abs(along) > std::cos(kMostLeanOnFace) ? 0 : turned_on(shape, corners, 0);
+  return (turned == 0 ? along < 0 : turned < 0) ? Vec3(-n) : n;
 }
 
 // Triangles around the seed until they have so many vertices: ring by ring, what turns most first,
@@ -88,37 +123,50 @@ double Recognizer::lean(int t, const Primitive& shape) const {
   return std::acos(std::min(least, 1.0));
 }
 
-// Whether a triangle lies on the primitive: its vertices, its normal, and the cubic sides through
-// the primitive's normals. What is checked is what is used: a primitive that passes and is wrong
-// can do bounded harm only.
-Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double tolerance,
-                                          double most_lean) const {
-  Explained out{false, 0, 0};
+// Whether a triangle lies on the primitive: its vertices, its normal or else its place in the
+// parameters, and the cubic sides through the primitive's normals. What is checked is what is used:
+// a primitive that passes and is wrong can do bounded harm only.
+Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double tolerance) const {
+  Explained out{false, false, 0, 0};
   const Triangle& c = corners(t);
   for (int v : c)
     if (!(std::abs(shape.distance(point(v))) <= tolerance)) return out;
-  const std::array<Vec3, 3> normals = normals_at(shape, {point(c[0]), point(c[1]), point(c[2])});
-  double sum = 0;
-  for (const Vec3& n : normals) sum += n.dot(facet_normal(t));
-  out.sign = sum < 0 ? -1 : 1;
-  const double least = std::cos(most_lean);
-  for (const Vec3& n : normals)
-    if (!(out.sign * n.dot(facet_normal(t)) > least)) return out;
-  double curved = 0;
+  const std::array<Vec3, 3> at = {point(c[0]), point(c[1]), point(c[2])};
+  const std::array<Vec3, 3> normals = normals_at(shape, at);
+  double flat[3], curved[3], sum = 0;
   for (int k = 0; k < 3; ++k) {
     const int l = next_corner(k);
-    const Vec3 d = point(c[l]) - point(c[k]), middle = (point(c[k]) + point(c[l])) / 2;
+    const Vec3 d = at[l] - at[k], middle = (at[k] + at[l]) / 2;
     // What the cubic side through these normals would add to the middle of the chord: an eighth of
     // the difference of the slopes.
     const Vec3 rise = (d.dot(normals[l]) * normals[l] - d.dot(normals[k]) * normals[k]) / 8;
-    out.deviation = std::max(out.deviation, std::abs(shape.distance(middle)));
-    curved = std::max(curved, std::abs(shape.distance(middle + rise)));
+    flat[k] = std::abs(shape.distance(middle)), curved[k] = std::abs(shape.distance(middle + rise));
+    out.deviation = std::max(out.deviation, flat[k]);
+    sum += normals[k].dot(facet_normal(t));
   }
-  out.explained = curved <= kMostOfFlat * out.deviation + 1.5 * tolerance;
+  out.sign = sum < 0 ? -1 : 1;
+  const double least = std::cos(kMostLeanOnFace);
+  for (const Vec3& n : normals)
+    out.leans = out.leans || !(out.sign * n.dot(facet_normal(t)) > least);
+  const double most = kMostOfFlat * out.deviation;
+  bool closer = true, no_farther = true;
+  for (int k = 0; k < 3; ++k) {
+    closer = closer && curved[k] <= most + 1.5 * tolerance;
+    no_farther = no_farther && curved[k] <= std::max(most, flat[k]) + 1.5 * tolerance;
+  }
+  // A chord along the crest of a torus is as near to it as its cubic side. But so are the ears of a
+  // plane that is tangent there, whose corners are on one line of the parameters.
+  if (out.leans || !closer) {
+    const int turned = turned_on(shape, at, 2 * tolerance);
+    if (turned != (out.leans ? turned : out.sign)) return out;
+    out.sign = turned;
+  }
+  out.explained = out.sign != 0 && no_farther;
   return out;
 }
 
-// Flood fill over the neighbors that the shape explains, all on one side of it.
+// Flood fill over the neighbors that the shape explains, all on one side of it. Edges of facets
+// that lean are no creases.
 Growth Recognizer::grow(int seed, const Primitive& shape, double tolerance) {
   Growth out{shape, {}, 0, 0, tolerance};
   mark({seed});
@@ -129,14 +177,21 @@ Growth Recognizer::grow(int seed, const Primitive& shape, double tolerance) {
     open.pop_back();
     ++visits_;
     if (inscribed_[regions_.of(t)] == Inscribed::Belt && shape.kind >= FaceKind::Sphere) continue;
-    const Explained one = explain(t, shape, tolerance, kMostLeanOnFace);
+    const Explained one = explain(t, shape, tolerance);
     if (!one.explained || (out.sign != 0 && one.sign != out.sign)) continue;
     out.sign = one.sign;
     out.deviation = std::max(out.deviation, one.deviation);
     found.push_back(t);
     for (int k = 0; k < 3; ++k) {
-      const int u = beside_[3 * t + k];
-      if (u < 0 || is_marked(u)) continue;
+      int u = beside_[3 * t + k];
+      if (u < 0) {
+        const int h = shell_.topology().other_half_edge(3 * t + k);
+        if (h < 0 || is_marked(triangle_of(h)) ||
+            !(one.leans || explain(triangle_of(h), shape, tolerance).leans))
+          continue;
+        u = triangle_of(h);
+      }
+      if (is_marked(u)) continue;
       mark_[u] = round_;
       open.push_back(u);
     }
@@ -174,9 +229,12 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
   std::vector<int>& all = growth.triangles;
   if (all.empty()) return;
   std::vector<double> leans, off;
+  std::vector<char> needle;
   for (const int t : all) {
+    const Explained one = explain(t, growth.shape, growth.window);
     leans.push_back(lean(t, growth.shape));
-    off.push_back(explain(t, growth.shape, growth.window, kMostLeanOnFace).deviation);
+    off.push_back(one.deviation);
+    needle.push_back(one.leans);
   }
   if (quantile(leans, 0.5) > kMostMeanLean) {
     all.clear();
@@ -191,7 +249,7 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
   std::sort(by_region.begin(), by_region.end());
   std::vector<char> keep(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
-    keep[i] = leans[i] <= most_lean && off[i] <= most_off;
+    keep[i] = (needle[i] || leans[i] <= most_lean) && off[i] <= most_off;
     if (!keep[i]) growth.left_out.push_back(all[i]);
   }
   for (std::size_t i = 0, j; i < by_region.size(); i = j) {
@@ -237,30 +295,45 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
   all.resize(kept);
 }
 
-// Slivers lean and turn too far, but their vertices lie on the primitive, and their sides stand off
-// no more than the others'.
-void Recognizer::absorb_slivers(Growth& growth) {
-  mark(growth.triangles);
-  std::vector<int>& all = growth.triangles;
-  const Topology& topology = shell_.topology();
-  std::size_t from = 0;
-  for (int sweep = 0; sweep < kMostSweeps && from < all.size(); ++sweep) {
-    const std::size_t end = all.size();
-    for (; from < end; ++from)
-      for (int k = 0; k < 3; ++k) {
-        const int h = topology.other_half_edge(3 * all[from] + k);
-        if (h < 0) continue;
-        const int u = triangle_of(h);
-        if (is_marked(u) || of_[u] >= 0 || inscribed_[regions_.of(u)] != Inscribed::No ||
-            regions_.count(regions_.of(u)) >= kFewOfBand)
-          continue;
-        const Explained one = explain(u, growth.shape, growth.window, kMostLeanOfSlivers);
-        if (!one.explained || one.sign != growth.sign ||
-            one.deviation > growth.deviation + growth.window)
-          continue;
-        mark_[u] = round_;
-        all.push_back(u);
+// What was left out of a face, or was taken for a strip before the face was known, goes to it where
+// it lies on it and stands off no more than the rest.
+void Recognizer::absorb(int face) {
+  Growth& growth = faces_[face];
+  const auto fits = [&](int t) {
+    const Explained one = explain(t, growth.shape, growth.window);
+    return one.explained && one.sign == growth.sign &&
+           one.deviation <= growth.deviation + growth.window;
+  };
+  std::vector<int> open, gained;
+  for (const int t : growth.triangles)
+    if (of_[t] == face) open.push_back(t);
+  const std::size_t own = open.size();
+  std::vector<char> asked(faces_.size(), 0);
+  asked[face] = 1;
+  while (!open.empty()) {
+    const int t = open.back();
+    open.pop_back();
+    for (int k = 0; k < 3; ++k) {
+      const int h = shell_.topology().other_half_edge(3 * t + k);
+      if (h < 0) continue;
+      const int u = triangle_of(h), other = of_[u], region = regions_.of(u);
+      gained.clear();
+      if (other < 0) {
+        if (inscribed_[region] == Inscribed::No && regions_.count(region) < kFewOfBand && fits(u))
+          gained.push_back(u);
+      } else if (!asked[other]) {
+        asked[other] = 1;
+        for (const int one : faces_[other].triangles)
+          if (of_[one] == other) gained.push_back(one);
+        if (3 * gained.size() > own || !std::all_of(gained.begin(), gained.end(), fits))
+          gained.clear();
       }
+      for (const int one : gained) {
+        of_[one] = face;
+        open.push_back(one);
+        growth.triangles.push_back(one);
+      }
+    }
   }
 }
 

@@ -1,7 +1,9 @@
 #include "shell/faces/recognition.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -18,10 +20,12 @@ constexpr std::size_t kPatience = 60, kTrianglesPerSeed = 3000;
 constexpr std::size_t kFewVisits = 300'000, kMostVisits = 4;
 // Vertices to guess from: enough for the kinds of up to six parameters, and for a torus.
 constexpr std::size_t kFewVertices = 8, kManyVertices = 12;
-// Planes have so many triangles, if they join what was not recognized smoothly. And they reach so
-// many times farther from a smooth side than what goes on beyond it.
+// A plane is so many times wider across a smooth side than what goes on beyond it there, if that
+// was not recognized; one of fewer triangles more.
 constexpr int kFewOfPlane = 4;
 constexpr double kFarther = 3, kFarLarger = 6;
+// Or it turns there by so many times more than beside what is narrow.
+constexpr double kMuchSharper = 3;
 // A prism with sides that turn by this share of the crease angle may be meant as one.
 constexpr double kMostTurn = 0.95;
 // A turn [rad] that is none.
@@ -241,7 +245,6 @@ bool Recognizer::take(Growth growth) {
   if (all.size() < 3) return false;
   for (const int region : growth.wide)
     inscribed_[region] = growth.shape.kind == FaceKind::Sphere ? Inscribed::Belt : Inscribed::Plane;
-  if (!is_weak(growth)) absorb_slivers(growth);
   for (const int t : all) of_[t] = static_cast<int>(faces_.size());
   faces_.push_back(std::move(growth));
   return true;
@@ -299,13 +302,52 @@ void Recognizer::drop_zones_of_free_shapes() {
     for (const int t : faces_[f].triangles) of_[t] = -1;
 }
 
-// Coplanar triangles with a vertex more than a plane needs, that reach farther from each smooth
-// side than what turns away from them there: the long side of a turn does not bend.
+std::vector<Recognizer::Moments> Recognizer::moments_of_regions() const {
+  std::vector<Moments> out(static_cast<std::size_t>(regions_.size()));
+  std::vector<Vec3> origin(out.size());
+  for (std::size_t t = 0; t < of_.size(); ++t) {
+    const int r = regions_.of(int(t));
+    if (out[r].area == 0) origin[r] = point(corners(int(t))[0]);
+    out[r].area += area(int(t));
+    out[r].middle += area(int(t)) * (centroid(int(t)) - origin[r]);
+  }
+  for (std::size_t r = 0; r < out.size(); ++r)
+    out[r].middle = origin[r] + out[r].middle / std::max(out[r].area, 1e-300);
+  for (std::size_t t = 0; t < of_.size(); ++t) {
+    Moments& of = out[regions_.of(int(t))];
+    const double share = area(int(t)) / std::max(of.area, 1e-300);
+    // A triangle has the moments of its corners and its middle, weighted 1 : 1 : 1 : 9.
+    const auto add = [&](const Vec3& x, double weight) {
+      of.second += weight * share * (x - of.middle) * (x - of.middle).transpose();
+    };
+    add(centroid(int(t)), 0.75);
+    for (const int v : corners(int(t))) {
+      add(point(v), 1.0 / 12);
+      const Vec3& normal = regions_.normal(regions_.of(int(t)));
+      of.off = std::max(of.off, std::abs((point(v) - of.middle).dot(normal)));
+    }
+  }
+  return out;
+}
+
+// Coplanar triangles with a vertex more than a plane needs, that are wider across each smooth side
+// than what turns away from them there: the long side of a turn does not bend.
 void Recognizer::add_planes(Faces& faces) const {
   const Topology& topology = shell_.topology();
   const auto count = static_cast<std::size_t>(regions_.size());
   std::vector<char> plane(count, 1);
   std::vector<int> number(count, -1), some(count, -1);
+  // The largest turn at sides beyond which a region goes on narrowly, the smallest at others [rad].
+  std::vector<std::pair<double, double>> turns(count, {0, std::numeric_limits<double>::infinity()});
+  const std::vector<Moments> moments = moments_of_regions();
+  // Of a region across a side: that of a rectangle with the same second moment [m].
+  const auto width = [&](int h) {
+    const int t = triangle_of(h), k = side_of(h), r = regions_.of(t);
+    if (regions_.count(r) == 1) return regions_.height(h);
+    const Vec3 side = point(corners(t)[next_corner(k)]) - point(corners(t)[k]);
+    const Vec3 across = regions_.normal(r).cross(side).normalized();
+    return std::sqrt(12 * across.dot(moments[r].second * across));
+  };
   for (std::size_t t = 0; t < of_.size(); ++t) {
     // Each triangle may speak against its region.
     char& is_plane = plane[regions_.of(int(t))];
@@ -316,18 +358,34 @@ void Recognizer::add_planes(Faces& faces) const {
       const int h = 3 * static_cast<int>(t) + k, u = beside_[h];
       if (u < 0 || regions_.of(u) == regions_.of(int(t))) continue;
       if (of_[u] >= 0) continue;  // its normals are known
-      is_plane = regions_.count(regions_.of(int(t))) >= kFewOfPlane &&
-                 regions_.height(h) > kFarther * regions_.height(topology.other_half_edge(h));
+      const bool few = regions_.count(regions_.of(int(t))) < kFewOfPlane;
+      auto& [narrow, alike] = turns[regions_.of(int(t))];
+      if (width(h) > (few ? kFarLarger : kFarther) * width(topology.other_half_edge(h)))
+        narrow = std::max(narrow, turn(int(t), u));
+      else
+        alike = std::min(alike, turn(int(t), u));
     }
+  }
+  // Whoever divides what is round into narrow strips there makes no turns that are larger.
+  for (std::size_t r = 0; r < count; ++r) {
+    const auto& [narrow, alike] = turns[r];
+    plane[r] = plane[r] && (std::isinf(alike) || (narrow > 0 && alike > kMuchSharper * narrow));
   }
   for (std::size_t t = 0; t < of_.size(); ++t) {
     const int r = regions_.of(int(t));
     if (!plane[r] || of_[t] >= 0) continue;
     if (number[r] < 0) {
       number[r] = static_cast<int>(faces.shapes.size());
+      // Fitted where the vertices are off the plane of the largest triangle by their rounding.
+      std::pair<Vec3, Vec3> plane{point(corners(some[r])[0]), regions_.normal(r)};
+      if (moments[r].off > kMostGap * shell_.size()) {
+        const Eigen::SelfAdjointEigenSolver<Mat3> solver(moments[r].second);
+        const Vec3 normal = solver.eigenvectors().col(0);
+        plane = {moments[r].middle, normal.dot(regions_.normal(r)) < 0 ? Vec3(-normal) : normal};
+      }
       // A plane has no second number: it says whether the plane is inscribed in a round face.
-      faces.shapes.push_back({FaceKind::Plane, point(corners(some[r])[0]), regions_.normal(r), 0,
-                              double(is_own_plane(int(t)))});
+      faces.shapes.push_back(
+          {FaceKind::Plane, plane.first, plane.second, 0, double(is_own_plane(int(t)))});
     }
     faces.of[t] = number[r];
   }
@@ -355,6 +413,7 @@ Faces Recognizer::run() {
     fruitless += found ? 0 : visits_ - before;
   }
   drop_zones_of_free_shapes();
+  for (std::size_t f = 0; f < faces_.size(); ++f) absorb(int(f));
   Faces out;
   out.of.assign(of_.size(), -1);
   std::vector<int> number(faces_.size(), -1);

@@ -1,8 +1,9 @@
-// Inside of recognition.cpp, growth.cpp, evidence.cpp and steps.cpp: the search for faces in a
-// mesh.
+// Inside of recognition.cpp, growth.cpp, evidence.cpp, steps.cpp and snapping.cpp: the search for
+// faces in a mesh.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 #include "shell/faces/recognition.hpp"
@@ -22,6 +23,12 @@ inline double quantile(std::vector<double> values, double share) {
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
+
+// Which way a facet is turned in the parameters of a shape, seen along the shape's normals: 1 or
+// -1; 0 where its corners are on one line there within the tolerance, as those of a cap are. The
+// normal of a needle may lie in the surface; that its corners are counter-clockwise in the
+// parameters holds for each facet of a mesh.
+int turned_on(const Primitive& shape, const std::array<Vec3, 3>& corners, double tolerance);
 
 // A connected part of the mesh that a primitive explains.
 struct Growth {
@@ -47,7 +54,7 @@ class Recognizer {
  private:
   // What one triangle says of a primitive.
   struct Explained {
-    bool explained;
+    bool explained, leans;  // its normal says nothing
     int sign;
     double deviation;
   };
@@ -70,14 +77,14 @@ class Recognizer {
 
   // growth.cpp
   std::vector<int> patch(int seed, std::size_t vertices, bool along);
-  Explained explain(int t, const Primitive& shape, double tolerance, double most_lean) const;
+  Explained explain(int t, const Primitive& shape, double tolerance) const;
   double lean(int t, const Primitive& shape) const;
   // The connected triangles that a shape explains; the shape fitted to them; both in turn.
   Growth grow(int seed, const Primitive& shape, double tolerance);
   bool refit(Growth& growth) const;
   Growth grow_and_refit(int seed, const Primitive& shape);
   void leave_own_faces_out(Growth& growth);
-  void absorb_slivers(Growth& growth);
+  void absorb(int face);
 
   // steps.cpp
   double widest_step(const Growth& growth);
@@ -103,6 +110,14 @@ class Recognizer {
   bool take(Growth growth);
   void drop_zones_of_free_shapes();
   void add_planes(Faces& faces) const;
+  // Of coplanar regions, by their second moments.
+  struct Moments {
+    double area = 0;             // [m^2]
+    Vec3 middle = Vec3::Zero();  // [m]
+    Mat3 second = Mat3::Zero();  // about the middle, over the area [m^2]
+    double off = 0;              // of a vertex from the plane of the largest triangle [m]
+  };
+  std::vector<Moments> moments_of_regions() const;
 
   const Shell& shell_;
   const CoplanarRegions& regions_;

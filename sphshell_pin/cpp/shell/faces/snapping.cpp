@@ -4,6 +4,7 @@
 #include <array>
 
 #include "shell/faces/face_cells.hpp"
+#include "shell/faces/recognizer.hpp"
 
 namespace sphshell {
 namespace {
@@ -67,14 +68,21 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
   if (!any) return {};
   for (bool changed = true; changed;) {
     changed = false;
-    for (const Triangle& t : shell.triangles()) {
+    for (std::size_t i = 0; i < shell.triangles().size(); ++i) {
+      const Triangle& t = shell.triangles()[i];
+      const int face = faces.of_triangle(static_cast<int>(i));
       const auto normal = [&](const std::vector<Vec3>& p) {
         return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).normalized();
+      };
+      const auto turned = [&](const std::vector<Vec3>& p) {
+        return face < 0 ? 0 : turned_on(faces.shapes[face], {p[t[0]], p[t[1]], p[t[2]]}, 0);
       };
       const bool moved =
           out[t[0]] != before[t[0]] || out[t[1]] != before[t[1]] || out[t[2]] != before[t[2]];
       // Put back where a triangle would turn over; that may spoil a neighbor, so it is repeated.
+      // The normal of a needle turns by its rounding, but it stays where it is on its face.
       if (!moved || normal(out).dot(normal(before)) > kLeastAlike) continue;
+      if (const int side = turned(out); side != 0 && side == turned(before)) continue;
       for (const int v : t) out[v] = before[v];
       changed = true;
     }
@@ -91,13 +99,14 @@ void settle_on_faces(const Shell& shell, const Edge& edge, const Faces& faces, c
   };
   // Within a face the curve has the face's own normals at its ends, which it keeps, but at the tip
   // of a cone there are none; between planes it is straight.
-  bool border = false, round = false;
+  bool border = false, curved = false;
   for (int i = 0; i < edge.count; ++i) {
     border = border || face_at(i) != face_at(0);
-    round = round || (face_at(i) >= 0 && faces.shapes[face_at(i)].kind != FaceKind::Plane);
+    curved = curved || face_at(i) < 0 || faces.shapes[face_at(i)].kind != FaceKind::Plane;
   }
   const bool at_tip = face_at(0) >= 0 && faces.shapes[face_at(0)].kind == FaceKind::Cone;
-  if (!(border || at_tip) || !round) return;
+  if (!curved) offset = {Vec3::Zero(), Vec3::Zero()};
+  if (!(border || at_tip) || !curved) return;
   const std::array<Vec3, 2> before = offset;
   for (int repeat = 0; repeat < kMostSettlings; ++repeat)
     for (const bool flat : {false, true})

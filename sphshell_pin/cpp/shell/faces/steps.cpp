@@ -201,7 +201,7 @@ void Recognizer::leave_wide_bands_out(Growth& growth) {
     for (const int t : band.members) {
       if (!is_marked(t)) continue;
       all.push_back(t);
-      growth.deviation = std::max(growth.deviation, explain(t, s, growth.window, M_PI).deviation);
+      growth.deviation = std::max(growth.deviation, explain(t, s, growth.window).deviation);
     }
   }
 }
