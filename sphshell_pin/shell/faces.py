@@ -30,7 +30,6 @@ class Face:
     half_angle : of a cone, between its axis and its surface: negative where its radius decreases
         along the axis [rad], else None
     elements : (k,) indices of the elements on it
-    exact : whether contacts on all of it are those of the face in closed form
     curved : (j,) those of its elements that are not exact: a vertex, or a border with what is no
         such face, is farther from the face than 4e-9 of the size, and contacts there are those of
         curved elements with its normals

@@ -104,3 +104,45 @@ def test_a_face_says_why_it_is_not_exact(folder):
     assert reasons
     assert all(reason.endswith(" nm") and "off it by" in reason for reason in reasons)
     assert all(face.reason == "" for face in rough.faces if face.exact)
+
+
+def test_only_elements_beside_a_free_form_border_are_curved(folder):
+    """Of a boss whose fillet is no simple face: nothing is lost, and nothing jumps."""
+    solid = occ.fuse(
+        occ.box([-20, -20, 0], [20, 20, 8]), occ.cylinder(6.0, 40.0, [0, 0, 4], [0.4, 0, 1])
+    )
+    at_foot = occ.edges_where(
+        solid, lambda p: abs(p[0, 2] - 8) < 1e-6 > np.ptp(p[:, 2]) and np.abs(p).max() < 12
+    )
+    shell = sp.Shell.from_file(step_of(occ.filleted(solid, at_foot, 2.0), folder), chord_error=2e-4)
+    (boss,) = [face for face in shell.faces if face.kind == "cylinder"]
+    assert 0 < len(boss.curved) < len(boss.elements)
+    assert "off it by" in boss.reason
+    rng, count, ball, depth = np.random.default_rng(0), 300, 2e-3, 2e-4
+    p, q, r = shell.vertices[shell.triangles[np.isin(shell.triangle_element, boss.elements)]][
+        rng.integers(0, len(boss.elements), count)
+    ].transpose(1, 0, 2)
+    share = rng.dirichlet(np.ones(3), count).T[..., None]
+    place = share[0] * p + share[1] * q + share[2] * r - boss.point
+    along = place @ boss.axis
+    out = place - along[:, None] * boss.axis
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    centers = boss.point + along[:, None] * boss.axis
+    centers += (boss.radius + ball - depth) * out
+    deepest = []
+    for center in centers:
+        found = shell.contacts(center, ball)
+        assert len(found) >= 1
+        on = np.isin(found.element, np.setdiff1d(boss.elements, boss.curved))
+        if on.any():
+            assert np.abs(found.depth[on] - depth).min() <= 1e-10 * ball
+        deepest.append(found.depth.max())
+    # On the strip as well, as far as it is the cylinder; a fillet beside it may be deeper.
+    assert np.min(deepest) >= depth - 1e-4 * ball
+    # Along the boss: no faster than the center moves.
+    step = 1e-9
+    for center, u in zip(centers[:40], along[:40], strict=True):
+        ways = center + np.linspace(-1, 1, 41)[:, None] * abs(u) * boss.axis
+        pairs = np.concatenate([ways, ways + step * boss.axis])
+        depths, _ = shell.contacts_batch(pairs, np.full(len(pairs), ball))
+        assert np.abs(np.diff(depths.reshape(2, -1), axis=0)).max() <= step + 1.6e-8 * shell.size

@@ -1,5 +1,7 @@
 """Walk over the joints of parts with spheres, and count what is wrong with their contacts.
 
+Of each part: how many of its faces are exact, and the share of their area that is.
+
 python -m tests.joints [--count 1000000] [--seed 1] [--only disc shaft tray] [--stl] [--show 3]
 python -m tests.joints --files part.step ... [--count 4000]
 """

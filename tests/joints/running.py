@@ -11,7 +11,7 @@ from tests.joints.boxes import BOXES
 from tests.joints.solid_walk import judge_solid, read_step, spheres_of
 from tests.joints.solids import FAMILIES, Part, write_step, write_stl
 from tests.joints.trimmed import TrimmedSolid
-from tests.joints.verdict import Verdict
+from tests.joints.verdict import Verdict, exact_share
 from tests.joints.walk import chord_error, judge, spheres
 from tests.parts.occ import Rng, checked
 
@@ -78,5 +78,5 @@ def walk_file(path: Path, name: str, count: int, rng: Rng, stl: bool = False) ->
 
 def _named(verdict: Verdict, shell: sp.Shell) -> Verdict:
     exact = sum(face.exact for face in shell.faces)
-    verdict.part += f" (exact {exact} of {len(shell.faces)})"
+    verdict.part += f" (exact {exact} of {len(shell.faces)}, {100 * exact_share(shell):.1f} %)"
     return verdict

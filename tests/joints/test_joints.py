@@ -46,7 +46,9 @@ def test_no_sphere_is_lost_or_counted_twice(part, tmp_path):
     assert_right(part, tmp_path, stl=False)
 
 
-@pytest.mark.parametrize("part", [cones(30.0, 0.3)], ids=lambda part: part.name)
+@pytest.mark.parametrize(
+    "part", [cones(30.0, 0.3), shaft(5.2, 2.4, 1e-4)], ids=lambda part: part.name
+)
 def test_none_is_on_meshes_of_single_precision(part, tmp_path):
     assert_right(part, tmp_path, stl=True)
 

@@ -75,6 +75,16 @@ class Verdict:
         return counts
 
 
+def exact_share(shell: sp.Shell) -> float:
+    """The share of the area of a shell's faces on which contacts are exact."""
+    p, q, r = shell.vertices[shell.triangles].transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(q - p, r - p), axis=1)
+    of_element = np.bincount(shell.triangle_element, area, len(shell.elements))
+    on_face = [face.elements for face in shell.faces]
+    total = of_element[np.concatenate(on_face)].sum() if on_face else 0.0
+    return float(of_element[exact_elements(shell)].sum() / total) if total else 1.0
+
+
 def exact_elements(shell: sp.Shell, whole: bool = False) -> NDArray[np.bool_]:
     """Whether each element is exact, or if `whole` all of its face."""
     out = np.zeros(len(shell.elements), bool)

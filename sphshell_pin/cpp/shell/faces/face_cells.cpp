@@ -10,6 +10,9 @@ namespace sphshell {
 namespace {
 
 constexpr double kTurn = 6.283185307179586;
+// A cubic may bound a face that it is off by this share of the size: the potential may jump by as
+// much there. Of vertices and joints it is kMostGap.
+constexpr double kMostCut = 4 * kMostGap;
 // Facets of one face overlap by this share of their parameters: one of them has each point.
 constexpr double kOverlap = 1e-9;
 
@@ -64,7 +67,11 @@ namespace {
 class CellMaker {
  public:
   CellMaker(const Shell& shell, Faces& faces, const LargeArray<CurvedFacet>& facets)
-      : shell_(shell), faces_(faces), facets_(facets), gap_(kMostGap * shell.size()) {}
+      : shell_(shell),
+        faces_(faces),
+        facets_(facets),
+        gap_(kMostGap * shell.size()),
+        cut_(kMostCut * shell.size()) {}
 
   FaceCells make() {
     if (faces_.of.empty()) return {};
@@ -170,7 +177,7 @@ class CellMaker {
     cell.bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
     const int joint = other >= 0 && h > 3 * f + k ? joint_of(f, k, cell.face, other) : -1;
     if (joint >= 0 && agree(joint, 3 * f + k, h)) return;
-    if (const double off = off_face(f, k); off > gap_) give_up(f, other, off);
+    if (const double off = off_face(f, k); off > cut_) give_up(f, other, off);
   }
 
   double bulge_of(int f, int k) const {
@@ -284,7 +291,7 @@ class CellMaker {
         if (h < 0 || out_.of[f].face < 0 || open_[f]) continue;
         out_.of[f].side[k] = FaceCell::Side::Cubic;
         out_.of[f].bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
-        if (const double off = off_face(f, k); off > gap_) give_up(f, out_.of[g].face, off);
+        if (const double off = off_face(f, k); off > cut_) give_up(f, out_.of[g].face, off);
       }
     }
     for (std::size_t f = 0; f < out_.of.size(); ++f) {
@@ -364,7 +371,7 @@ class CellMaker {
   const Shell& shell_;
   Faces& faces_;
   const LargeArray<CurvedFacet>& facets_;
-  const double gap_;
+  const double gap_, cut_;
   FaceCells out_;
   std::vector<char> open_;   // facets that are left to their cubics
   std::vector<int> opened_;  // those whose neighbors do not know of it yet
