@@ -10,7 +10,7 @@ OUT ?= results
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick studies lint format bench report robots hard-cases work-precision rollouts \
+.PHONY: help demo test quick studies lint format bench report robots validation hard-cases rollouts \
   joints real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
 
 help:
@@ -47,8 +47,9 @@ $(VENV)/.demo: $(VENV)/.build CMakeLists.txt $(CPP)
 $(VENV)/.test: $(VENV)/.build CMakeLists.txt $(CPP)
 	$(call install,test)
 
-$(VENV)/.bench: $(VENV)/.test
-	$(call install,bench)
+$(VENV)/.bench: $(VENV)/.test benchmarks/pyproject.toml
+	$(PIP) -e benchmarks
+	@touch $@
 
 demo: $(VENV)/.demo ## build into .venv and run fingertip_on_blade
 	$(BIN)/sphshell-pin run fingertip_on_blade --out $(OUT)/fingertip_on_blade
@@ -85,20 +86,20 @@ format: $(VENV)/.test ## correct the style
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(ALL_CPP)
 
-bench: $(VENV)/.bench ## print what contact costs, as ratios
-	$(BIN)/python -m benchmarks
+bench: $(VENV)/.bench ## time and memory of queries beside other codes, up to 5 M triangles
+	$(BIN)/python -m benchmarks.growth
 
-report: $(VENV)/.bench ## measure speed against error: a page in results/report
+report: $(VENV)/.test ## measure speed against error: a page in results/report
 	$(BIN)/sphshell-pin report --out $(OUT)/report
 
 robots: $(VENV)/.test ## check every robot, for docs/robots.md
 	$(BIN)/sphshell-pin check-robot --all --json docs/measured/robots.json
 
+validation: $(VENV)/.test ## compare with published experiments, for docs/validation.md
+	$(BIN)/python -m tests.validation
+
 hard-cases: $(VENV)/.test ## run every hard case, for docs/hard_cases.md
 	$(BIN)/python -m tests.hard_cases --write
-
-work-precision: $(VENV)/.test ## error against computing time of the integrators, with a figure
-	$(BIN)/python -m benchmarks.work_precision --write
 
 rollouts: $(VENV)/.test ## print the speed-up of 10 000 runs over threads
 	$(BIN)/python -m benchmarks.rollout
@@ -110,7 +111,7 @@ real-surfaces: $(VENV)/.test ## answers to 1500 spheres on each surface of FOLDE
 	SPHSHELL_FOLDER=$(abspath $(FOLDER)) $(PYTEST) tests/contact/smooth/test_real_surfaces.py -m ""
 
 new-study: $(VENV)/.test ## what `new` writes for 22 robots and the parts of FOLDER=...
-	$(BIN)/python -m benchmarks.new_study $(or $(FOLDER),tests/data/corpus)
+	$(BIN)/python -m tests.new_study $(or $(FOLDER),tests/data/corpus)
 
 parts: $(VENV)/.test ## what STL files of 300 generated parts cost against their CAD faces (COUNT=300 SEED=1)
 	$(BIN)/python -m tests.parts --count $(or $(COUNT),300) --seed $(or $(SEED),1)
@@ -119,7 +120,7 @@ fuzz: $(VENV)/.test ## damaged files, folders of robots and results for every re
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 	$(BIN)/python -m tests.fuzz.cad --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 
-kills: $(VENV)/.test ## kill run, fit, render and sweep at any moment, fill disks
+kills: $(VENV)/.test ## kill run, fit, render and sweep at random times
 	$(BIN)/python -m tests.scenario.kills
 
 sanitize: $(VENV)/.test ## run tests with checks of memory, undefined behavior and data races

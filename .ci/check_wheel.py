@@ -38,9 +38,11 @@ NEEDED = (
     "scenario/drafting/*.template",
     "scenarios/*.toml",
     "scenarios/surfaces/*.LICENSE.txt",
-    "benchmarks/*.py",
 )
-UNWANTED = ("*.cpp", "*.hpp", "*.o", "*.a", "*.pyc", "*.so.*", "*/tests/*", "*/docs/*")
+UNWANTED = (
+    *("*.cpp", "*.hpp", "*.o", "*.a", "*.pyc", "*.so.*"),
+    *("*/tests/*", "*/docs/*", "*/benchmarks/*"),
+)
 # Where the compiled core looks for the libraries of Pinocchio's and Coal's own wheels.
 RPATHS = (b"$ORIGIN/../cmeel.prefix/lib", b"@loader_path/../cmeel.prefix/lib")
 # The newest versions of symbols that a system of this tag has, as auditwheel's policy states them.

@@ -23,8 +23,8 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.timing import one_core
-from sphshell_pin.cases.machine import machine
+from sphshell_pin.study.report.machine import machine
+from sphshell_pin.study.report.timing import one_core
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "docs" / "examples" / "05_circle_with_5_newtons.py"

@@ -5,13 +5,13 @@ python -m benchmarks.creases [FILE ...]    # files in millimetres
 
 from __future__ import annotations
 
-import argparse
+import sys
 
 import numpy as np
 
 from sphshell_pin import Shell
-from sphshell_pin.benchmarks.convergence import EXPONENT
-from sphshell_pin.benchmarks.surfaces import BALL, DEPTH, RADIUS, ball_places, icosphere
+from sphshell_pin.study.report.convergence import EXPONENT
+from sphshell_pin.study.report.surfaces import BALL, DEPTH, RADIUS, ball_places, icosphere
 
 LEVEL = 4  # of the icosphere: its sides are 0.3 of the sphere's radius
 SHARES = (0.0, 0.002, 0.005, 0.01, 0.02, 0.05)  # of a side
@@ -63,12 +63,9 @@ def file_table(paths: list[str]) -> None:
 
 def main() -> None:
     """Print both tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("files", nargs="*", help="surfaces to look at")
-    files = parser.parse_args().files
     noise_table()
-    if files:
-        file_table(files)
+    if len(sys.argv) > 1:
+        file_table(sys.argv[1:])
 
 
 if __name__ == "__main__":

@@ -15,11 +15,11 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.step import panda, start_of, with_sheet
-from sphshell_pin.benchmarks.surfaces import wavy_sheet
-from sphshell_pin.benchmarks.timing import one_core, take_turns
-from sphshell_pin.cases.contents import times_table
-from sphshell_pin.cases.machine import machine
+from sphshell_pin.study.report.contents import times_table
+from sphshell_pin.study.report.machine import machine
+from sphshell_pin.study.report.steps import panda, start_of, with_sheet
+from sphshell_pin.study.report.surfaces import wavy_sheet
+from sphshell_pin.study.report.timing import one_core, take_turns
 from sphshell_pin.testing.numbers import names_of
 
 CALLS, ROUNDS = 2000, 50

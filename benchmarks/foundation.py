@@ -12,11 +12,11 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.models import model_of
-from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
-from sphshell_pin.benchmarks.timing import one_core, take_turns
-from sphshell_pin.cases.contents import times_table
-from sphshell_pin.cases.machine import machine
+from sphshell_pin.study.report.contents import times_table
+from sphshell_pin.study.report.machine import machine
+from sphshell_pin.study.report.models import model_of
+from sphshell_pin.study.report.surfaces import touching_centers, wavy_sheet
+from sphshell_pin.study.report.timing import one_core, take_turns
 
 DT, STEPS, CELLS, RADIUS = 1e-8, 2000, 316, 0.012
 POINT = sp.ImpactLaw(1e6, 1.5)

@@ -94,7 +94,7 @@ def drake_side(hint: float) -> list[Any]:
 def our_side() -> list[Any]:
     """Return the same of FoundationLaw; the time is that of one query and force in C++."""
     import sphshell_pin as sp
-    from sphshell_pin.benchmarks import foundation as benchmark
+    from benchmarks import foundation as benchmark
 
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * SIDE / 2
     quads = np.array(

@@ -1,4 +1,4 @@
-"""Contacts in MuJoCo's steps beside the scene's own: forces, time and energy. For docs/mujoco.md.
+"""Contacts in MuJoCo's steps beside the scene's own: forces and time. For docs/mujoco.md.
 
 Run it with `python -m benchmarks.in_mujoco`.
 """
@@ -15,10 +15,9 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from benchmarks.peers.merged import text
 from sphshell_pin.adapters.mujoco import attach
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.peers.merged import text
-from sphshell_pin.benchmarks.surfaces import Mesh, icosphere, torus
 from sphshell_pin.scenario import build
 
 STATES, ROUNDS, CALLS = 1000, 15, 2000
@@ -62,11 +61,6 @@ def ball(radius: float, mass: float, options: str = "", more: str = "") -> str:
     return f"""<mujoco><option {options}/><worldbody>
       <body name="ball"><freejoint/><inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia}"/>
       <geom name="ball" type="sphere" size="{radius}"/></body>{more}</worldbody></mujoco>"""
-
-
-def shell_of(mesh: Mesh) -> sp.Shell:
-    """Return a surface with its exact normals."""
-    return sp.Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
 
 
 def panda(rng: np.random.Generator) -> None:
@@ -126,83 +120,6 @@ def median(call: Callable[[], None]) -> float:
     return float(np.median(times))
 
 
-def ball_in_torus(rng: np.random.Generator) -> None:
-    """Print the largest difference of forces on two free bodies that touch."""
-    inertia = text(0.1, 0.12, 0.2, 0.0, 0.01, 0.0)
-    other = f"""<body name="torus"><freejoint/>
-      <inertial pos="0 0 0" mass="2" fullinertia="{inertia}"/></body>"""
-    radius, shell = 0.095, shell_of(torus(0.3, 0.1, 0.02))
-    model = mujoco.MjModel.from_xml_string(ball(radius, 0.3, more=other))
-    data = mujoco.MjData(model)
-    free = pin.Model()
-    for name in ("ball", "torus"):
-        joint = free.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
-        free.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
-        free.addBodyFrame(name, joint, pin.SE3.Identity(), 0)
-    scene = sp.Scene(free)
-    settings = {"law": sp.HuntCrossleyLaw(1e4, 1.5, 0.3), "friction": sp.CoulombFriction(0.4, 0.3)}
-    scene.add_contact(sp.Sphere(radius, "ball"), shell, "torus", **settings)  # type: ignore[arg-type]
-    worst, touched = 0.0, 0
-    with attach(model, shell, ["ball"], body="torus", **settings):  # type: ignore[arg-type]
-        while touched < STATES:
-            q, v = pin.neutral(free), rng.standard_normal(12)
-            q[7:10] = 0.1 * rng.standard_normal(3)
-            turn = pin.Quaternion(pin.exp3(rng.standard_normal(3)))
-            angle = rng.uniform(0, 2 * np.pi)
-            middle = 0.3 * np.array([np.cos(angle), np.sin(angle), 0.0])
-            q[10:] = turn.coeffs()
-            q[:3] = q[7:10] + turn.matrix() @ (middle + rng.uniform(-6e-3, 6e-3, 3))
-            wanted = scene.external_forces(q, v)
-            if not np.any(wanted[1].vector):
-                continue
-            touched += 1
-            for first in (0, 7):
-                data.qpos[first : first + 7] = q[first + np.array([0, 1, 2, 6, 3, 4, 5])]
-            # A free joint of MuJoCo has its velocity and force in the world, its turns in the body.
-            rotations = np.eye(3), turn.matrix()
-            for k, rotation in enumerate(rotations):
-                data.qvel[6 * k : 6 * k + 3] = rotation @ v[6 * k : 6 * k + 3]
-                data.qvel[6 * k + 3 : 6 * k + 6] = v[6 * k + 3 : 6 * k + 6]
-            mujoco.mj_forward(model, data)
-            for k, rotation in enumerate(rotations):
-                force = wanted[k + 1]
-                own = np.hstack((rotation @ force.linear, force.angular))
-                apart = np.abs(data.qfrc_passive[6 * k : 6 * k + 6] - own).max()
-                worst = max(worst, apart / np.abs(own).max())
-    print(f"ball in a torus, {STATES} states: {worst:.1e} of the force")
-
-
-def bowl(seconds: float = 60.0, dt: float = 1e-4) -> None:
-    """Print by how much the energy of a ball that swings in a bowl changes."""
-    radius, mass, law = 0.05, 0.2, sp.HuntCrossleyLaw(1e5, 1.5)
-    shell = shell_of(icosphere(5, 2.0))
-    options = f'timestep="{dt}" integrator="RK4"'
-    model = mujoco.MjModel.from_xml_string(ball(radius, mass, options))
-    data = mujoco.MjData(model)
-    depth = law.depth_at(mass * 9.81)
-    along = np.array([np.sin(0.15), 0.0, -np.cos(0.15)])
-    data.qpos[:3] = (2.0 - radius + depth * np.cos(0.15)) * along
-
-    energies, sides = [], []
-    with attach(model, shell, ["ball"], law=law) as contacts:
-        for step in range(round(seconds / dt)):
-            if step % 1000 == 0:
-                mujoco.mj_forward(model, data)
-                v = data.qvel[:3]
-                energy = 0.5 * mass * v @ v + mass * 9.81 * data.qpos[2]
-                depths = contacts.contacts(data).depth
-                assert len(depths) == 1
-                energies.append(energy + law.energy(depths[0]))
-                sides.append(data.qpos[0])
-            mujoco.mj_step(model, data)
-    assert min(sides) < -0.9 * max(sides) < 0.0
-    swing = mass * 9.81 * (2.0 - radius) * (1 - np.cos(0.15))
-    change = np.ptp(energies) / swing
-    print(f"energy of {seconds:.0f} s in a bowl, RK4 at {dt:.0e} s: {change:.1e} of the swing's")
-
-
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
     panda(np.random.default_rng(1))
-    ball_in_torus(np.random.default_rng(2))
-    bowl()

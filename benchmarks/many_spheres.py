@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.models import model_of
-from sphshell_pin.benchmarks.surfaces import wavy_sheet
-from sphshell_pin.benchmarks.timing import one_core
-from sphshell_pin.cases.machine import machine
 from sphshell_pin.contact.normal_law import bisect
 from sphshell_pin.dynamics.run.integrators import Integrator
+from sphshell_pin.study.report.machine import machine
+from sphshell_pin.study.report.models import model_of
+from sphshell_pin.study.report.surfaces import wavy_sheet
+from sphshell_pin.study.report.timing import one_core
 
 COUNT, RADIUS, APART = 8, 0.006, 0.012
 LAW = sp.ImpactLaw(1e5, 1.5, 10.0, 1e-4)

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.cases.machine import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
+from sphshell_pin.study.report.machine import machine
 from sphshell_pin.view.live import Live
 from sphshell_pin.view.live.server import Server
 

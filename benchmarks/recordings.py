@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import re
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -44,9 +44,7 @@ def mesh_files(visual_model: pin.GeometryModel) -> int:
 
 def main() -> None:
     """Print a row for each recording."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.recordings", description=__doc__)
-    parser.add_argument("names", nargs="*", help="scenarios and robots (default: the shipped ones)")
-    names = parser.parse_args().names or [*shipped_scenarios(), *ROBOTS]
+    names = sys.argv[1:] or [*shipped_scenarios(), *ROBOTS]
     print(
         f"{'':24s}{'mesh files':>12s}{'page':>10s}{'viewer':>10s}{'scene':>10s}{'written in':>12s}"
     )

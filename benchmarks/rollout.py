@@ -13,8 +13,8 @@ import os
 import numpy as np
 
 import sphshell_pin as sp
+from benchmarks.processes import resident
 from sphshell_pin import robots, scenarios
-from sphshell_pin.benchmarks.processes import resident
 from sphshell_pin.dynamics import Rollout
 
 RADIUS = 0.012

@@ -55,7 +55,6 @@ __all__ = [
     "library_source",
     "load",
     "load_file",
-    "load_urdf",
     "mass_fault",
     "mimics_of_library",
     "names",
@@ -258,18 +257,6 @@ def load_file(
             stacklevel=2,
         )
     return _posed(exactly(robot, description, mimic=mimic), pose, str(path))
-
-
-def load_urdf(
-    path: str | PathLike[str],
-    package_dirs: Iterable[str | PathLike[str]] = (),
-    *,
-    free_flyer: bool = False,
-    name: str | None = None,
-    mimic: bool = False,
-) -> LoadedRobot:
-    """Return the robot of one's own URDF file: `load_file` with the options that a URDF has."""
-    return load_file(path, package_dirs, free_flyer=free_flyer, name=name, mimic=mimic)
 
 
 def exactly(

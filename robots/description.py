@@ -22,6 +22,9 @@ from sphshell_pin.robots.packages import Folders
 DEEPEST = 100
 """Elements of the file one within another; robots need seven."""
 
+MOST_ATTRIBUTES = 200
+"""Of an element: the time to read them grows with their square."""
+
 LONGEST_CHAIN = 1000
 """Links one behind another; the parser overflows the stack of 8 MB at about 3800."""
 
@@ -67,15 +70,14 @@ class Description:
         return self.root.tag == "mujoco"
 
 
-def check_memory(model: pin.Model) -> pin.Model:
-    """Return `model`; ValueError if its pinocchio.Data would need too much memory."""
-    memory = 8 * 8.0 * model.nv**3
+def check_memory(nv: int) -> None:
+    """Raise ValueError if a pinocchio.Data of `nv` velocities would need too much memory."""
+    memory = 8 * 8.0 * nv**3
     if memory > MOST_MEMORY:
         raise ValueError(
-            f"its {model.nv} degrees of freedom need {memory * 1e-9:.3g} GB of memory, more than "
+            f"its {nv} degrees of freedom need {memory * 1e-9:.3g} GB of memory, more than "
             f"{MOST_MEMORY * 1e-9:g} GB; fix some joints, or build the pinocchio.Model yourself"
         )
-    return model
 
 
 def parsed(text: bytes) -> ET.Element:
@@ -148,6 +150,8 @@ def check_size(text: bytes) -> str:
             root.append(tag)
         if len(opened) > DEEPEST:
             raise ValueError(f"its elements are nested more than {DEEPEST} deep")
+        if len(attributes) > MOST_ATTRIBUTES:
+            raise ValueError(f"its element '{tag}' has more than {MOST_ATTRIBUTES} attributes")
         links += opened[1:] == ["link"] or tag == "body"
         if opened[1:] == ["joint"]:
             joints.append({})

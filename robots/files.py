@@ -23,6 +23,7 @@ from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.plain_mesh import refused_reference
 from sphshell_pin.shell.readers.ply import read_ply
 
 
@@ -155,14 +156,15 @@ def build_model(
         if not description.is_mjcf:
             root = [pin.JointModelFreeFlyer()] if free_flyer else []
             text = ET.tostring(description.root, encoding="unicode")
-            model = check_memory(pin.buildModelFromXML(text, *root))
+            model = pin.buildModelFromXML(text, *root)
         else:
             with _written(description.root) as path:
-                model = check_memory(pin.buildModelFromMJCF(path))
+                model = pin.buildModelFromMJCF(path)
             for name, extras in description.extras.items():
                 extras.give(model, model.joints[model.getJointId(name)])
             for site in description.sites:
                 site.give(model)
+        check_memory(model.nv)
     except (ValueError, RuntimeError, OSError) as error:
         what = "MJCF" if description.is_mjcf else "URDF"
         raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None
@@ -313,7 +315,7 @@ def _mesh_reason(path: Path) -> str:
             read_ply(path)
         except ShellFileError as error:
             return str(error)
-    return ""
+    return refused_reference(path)
 
 
 def _mesh_fault(description: Description, reason: str) -> RobotError:

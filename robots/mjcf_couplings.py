@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
-from sphshell_pin.robots.mjcf_values import numbers
 
 JointsOf = Mapping[str, Sequence[str]]
 
@@ -32,7 +31,7 @@ def couplings(
         first, second = one.get(f"{one.tag}1"), one.get(f"{one.tag}2")
         if one.tag == "joint" and first is not None:
             terms = np.zeros(5)
-            stated = numbers(one.get("polycoef", "0 1 0 0 0"))[:5]
+            stated = np.array(one.get("polycoef", "0 1 0 0 0").split(), dtype=float)[:5]
             terms[: len(stated)] = stated
             if second is not None and not terms[2:].any():
                 # It is of the distances from ref.

@@ -72,6 +72,8 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     try:
         install(xacro, substitution_args)
         document = xacro.process_file(str(file), mappings=dict(arguments))
+    except RecursionError:
+        raise ValueError("its files, macros or elements are nested too deeply") from None
     except (xacro.XacroException, ExpatError, OSError) as error:
         if isinstance(error.__cause__ or error.__context__, MemoryError):
             raise MemoryError from None

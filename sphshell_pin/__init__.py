@@ -8,15 +8,11 @@ from __future__ import annotations
 from sphshell_pin._interrupts import interrupts_delayed
 
 # isort: split
-import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 with interrupts_delayed():
     from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
-    from sphshell_pin.deprecation import FormerModules
-
-sys.meta_path.append(FormerModules())
 
 if TYPE_CHECKING:
     from sphshell_pin.contact import *  # noqa: F403
@@ -35,7 +31,7 @@ if TYPE_CHECKING:
     from sphshell_pin.shell import ShellHealth as ShellHealth
     from sphshell_pin.study.fit import *  # noqa: F403
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"  # what is released next; the only place
 
 _PARTS = (
     "contact",
@@ -64,7 +60,7 @@ _NAMES = {
     "SemiImplicitEuler",
     "dynamics.sensing.sensors": "ContactSwitch ForceTorqueSensor JointTorqueSensor",
     "errors": "InvalidParameter SphshellError",
-    "patches": "ShellTaxels TaxelGrid TaxelImages WearMap wear_maps",
+    "patches": "ShellTaxels TaxelGrid TaxelImages",
     "shell": "CleanedSurface ClosestPoints Face Shell ShellHealth",
     "study.fit": "Experiment Fit Fitted Series fit",
 }
@@ -81,11 +77,6 @@ if not TYPE_CHECKING:
             value = getattr(import_module(f"sphshell_pin.{_HOME[name]}"), name)
             globals()[name] = value
             return value
-        if name == "JointIngredients":
-            from sphshell_pin.deprecation import warn_former
-
-            warn_former(f"sphshell_pin.{name}", "it is called JointComponents")
-            return __getattr__("JointComponents")
         if name in _PARTS:
             return import_module(f"sphshell_pin.{name}")
         raise AttributeError(f"module 'sphshell_pin' has no attribute '{name}'")

@@ -92,10 +92,6 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
     return f"did you mean '{near[0]}'?" if near else ""
 
 
-class FormerName(FutureWarning):
-    """A number is stated by a name that it had; the text says what it is called now."""
-
-
 class UnitWarning(UserWarning):
     """A shell is so much larger than its sphere or robot that its unit is probably wrong."""
 

@@ -2,18 +2,16 @@
 
 A name is the path of fields that leads to a number: "tip.law.young" is the field `young` of the law
 of the contact "tip". In files it stands behind the name of its table, "contact.tip.law.young"; a
-scene takes that spelling, too. A field that was renamed says so (`parameter(former=...)`): its
-former name still works everywhere, with a warning.
+scene takes that spelling, too.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from sphshell_pin.errors import FormerName, InvalidParameter, NameNotFound
+from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.parameters import Component, parameters_of
 
 AXES = ("x", "y", "z")
@@ -34,8 +32,6 @@ class NamedNumber:
     """Of one value; None where a value is an object (a law), or an integer or None (a seed)."""
     ends: tuple[str, ...] | None = ("",)
     """What its columns in derivatives are called behind the name; None if it has none."""
-    former: str = ""
-    """Former name of the last field."""
 
 
 # What the names of a scene lead to.
@@ -71,9 +67,9 @@ def _of_pair(at: int, pair: Any) -> Iterator[NamedNumber]:
     for part in ("law", "friction"):
         yield NamedNumber(at, (part,), None, None)
         whole = getattr(pair, part)
-        for name, about in parameters_of(whole).items():
+        for name in parameters_of(whole):
             if isinstance(getattr(whole, name), float):
-                yield NamedNumber(at, (part, name), former=about.former)
+                yield NamedNumber(at, (part, name))
     for end in ("sphere", "other_sphere"):
         if getattr(pair, end) is not None:
             yield NamedNumber(at, (end, "radius"))
@@ -83,18 +79,13 @@ def _of_pair(at: int, pair: Any) -> Iterator[NamedNumber]:
 
 
 def find_name(name: str, known: Names, kind: str = "parameter") -> str:
-    """Return which of the `known` names is meant: itself, its spelling in files or a former one.
+    """Return which of the `known` names is meant: itself, or its spelling in files.
 
     Raises NameNotFound for another one, which says that there is no such `kind`.
     """
     for one in _spellings(name):
         if one in known:
             return one
-        head, _, last = one.rpartition(".")
-        for whole, number in known.items():
-            if last and number.former == last and whole == f"{head}.{number.path[-1]}":
-                _warn_former_name(one, whole)
-                return whole
     raise NameNotFound(kind, name, "the scene", known)
 
 
@@ -150,16 +141,3 @@ def with_value(whole: Any, path: tuple[str, ...], value: object) -> Any:
     inner = with_value(getattr(whole, first), tuple(rest), value) if rest else value
     new = {first: inner}
     return whole.changed(**new) if isinstance(whole, Component) else replace(whole, **new)
-
-
-def present_name(owner: object, name: str) -> str:
-    """Return the name of a field of `owner`, a class or an object, that was once called `name`."""
-    for now, about in parameters_of(owner).items():
-        if name and name == about.former:
-            _warn_former_name(name, now)
-            return now
-    return name
-
-
-def _warn_former_name(former: str, now: str) -> None:
-    warnings.warn(f"'{former}' is deprecated: it is called '{now}'", FormerName, stacklevel=3)

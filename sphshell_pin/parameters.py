@@ -9,26 +9,20 @@ of the documentation.
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import check_finite, check_type
-from sphshell_pin.deprecation import former_names
 from sphshell_pin.errors import InvalidParameter
 
-if TYPE_CHECKING:
-    Named = Any  # in whose place the name of a material may be given
-else:
-    Named = float
-
 _KEY = "parameter"
-_NUMBERS = ("float", "Named")
 # A field of the object in a unit, as in "N/m^{0.exponent:g}".
 _IN_UNIT = re.compile(r"\{0\.(\w+)[^}]*\}")
 
@@ -48,8 +42,6 @@ class Parameter:
     at_most: float | None = None
     log: bool | None = None
     """Whether a slider multiplies (else it adds); None: it follows from the range."""
-    former: str = ""
-    """A name that it had, and that still works with a warning."""
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -96,7 +88,6 @@ def parameter(
     at_least: float | None = None,
     at_most: float | None = None,
     log: bool | None = None,
-    former: str = "",
     **more: object,
 ) -> Any:
     """Return the field of a dataclass that is a parameter.
@@ -104,7 +95,7 @@ def parameter(
     The bounds hold for numbers; `more` is what pydantic takes for the field in a file
     (`min_length`). A field that is not made by this function cannot be stated in a file.
     """
-    about = Parameter(unit, label, help, above, at_least, at_most, log, former)
+    about = Parameter(unit, label, help, above, at_least, at_most, log)
     # Pydantic reads the bounds and the description in a field's metadata.
     metadata = {_KEY: about, "description": help, **about.bounds, **more}
     return field(default=default, metadata=metadata)
@@ -168,7 +159,7 @@ class Component:
             about, value = one.metadata.get(_KEY), getattr(self, one.name)
             if about is None or (value is None and one.default is None):
                 continue
-            if one.type in (*_NUMBERS, "float | None"):
+            if one.type in ("float", "float | None"):
                 object.__setattr__(self, one.name, about.check(one.name, value))
             elif one.type == "bool":
                 check_type(one.name, value, bool, "must be True or False")
@@ -188,7 +179,8 @@ class Component:
 
     def _numbers(self) -> list[float]:
         """Return the parameters in their order, as the compiled core takes them."""
-        return [float(getattr(self, name)) for name in parameters_of(self)]
+        values = (getattr(self, name) for name in parameters_of(self))
+        return [math.nan if value is None else float(value) for value in values]
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -202,7 +194,3 @@ class Component:
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""
         return {k: v for k, v in self.__dict__.items() if k != "_binding"}
-
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__, {"Ingredient": "Component"})

@@ -45,7 +45,10 @@ def open_regular(path: str | PathLike[str], most: float = MOST) -> io.BufferedRe
 def read_bytes(path: str | PathLike[str], most: float = MOST) -> bytes:
     """Return the content of a file, see `open_regular`."""
     with open_regular(path, most) as file:
-        return file.read(max(os.fstat(file.fileno()).st_size, SMALL))  # no more: it may grow
+        content = file.read(max(os.fstat(file.fileno()).st_size, SMALL))  # no more: it may grow
+    if content is None:  # of some of the system's files, for which a reader would wait
+        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN), str(path))
+    return content
 
 
 def read_text(path: str | PathLike[str], most: float = MOST) -> str:

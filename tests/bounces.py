@@ -44,7 +44,7 @@ def bounce(
 
         elastic = 380e9, 0.23, 70e9, 0.25
         law = sp.ImpactLaw.hertz(2.5e-3, *elastic, restitution=0.98, speed=3.9)
-        friction = sp.BristleFriction.mindlin(0.092, None, *elastic)
+        friction = sp.MindlinFriction(0.092, 0.092, *elastic)
         bounce(np.radians(20), 3.9, 2.5e-3, 4000.0, law, friction).tangential
     """
     mass = density * 4 / 3 * np.pi * radius**3

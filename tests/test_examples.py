@@ -30,6 +30,7 @@ FILES = {
     ],
     "07_peg_in_mujoco": ["peg.png"],
     "08_gripper_with_loops": ["gripper.png"],
+    "09_wear_of_a_polished_part": ["wear.png"],
 }  # fmt: skip
 # Objects that the last line of a cell shows as a table.
 TABLES = {
@@ -38,7 +39,12 @@ TABLES = {
     "04_taxels_on_a_crease": ["Result"],
     "06_fit_measured_rebounds": ["Fit of "],
 }
-LONG = ("03_parameter_study", "05_circle_with_5_newtons", "06_fit_measured_rebounds")
+LONG = (
+    "03_parameter_study",
+    "05_circle_with_5_newtons",
+    "06_fit_measured_rebounds",
+    "09_wear_of_a_polished_part",
+)
 NEEDS = {"05_circle_with_5_newtons": "crocoddyl", "07_peg_in_mujoco": "mujoco"}
 
 
@@ -179,3 +185,9 @@ def check_gripper_with_loops(names):
     assert names["forces"][-1] == pytest.approx(names["expected"], rel=1e-3)
     # The part is held: it does not creep.
     assert np.ptp(names["heights"][3900:]) < 1e-7
+
+
+def check_wear_of_a_polished_part(names):
+    assert names["mean"] == pytest.approx(1e-12 * 8.0 / 2.0246e-3, rel=0.04)
+    depth = names["depth"][names["raster"]]
+    assert (depth > 0.5 * names["mean"]).all()

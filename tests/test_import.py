@@ -16,8 +16,6 @@ from pathlib import Path
 
 import pytest
 
-from sphshell_pin.deprecation import MOVED
-
 PACKAGE = Path(__file__).parent.parent / "sphshell_pin"
 
 HEAVY = (
@@ -61,7 +59,6 @@ def test_heavy_module_is_not_loaded(loaded: set[str], module: str) -> None:
         "scenario.drafting.new",
         "scenario.running.run",
         "study.robot_check",
-        "study.validation.tosses",
     ],
 )
 def test_commands_load_without_extras(module: str) -> None:
@@ -208,14 +205,12 @@ LAYERS = (
     ("scenario", "scenarios"),
     ("plot", "view", "export"),
     ("testing",),
-    ("cases",),
-    ("benchmarks",),
     ("study",),
     ("cli",),
 )
 LEVEL = {folder: k for k, folders in enumerate(LAYERS) for folder in folders}
 # Installed below the package, and beside it in a checkout.
-BESIDE = ("robots", "scenarios", "benchmarks")
+BESIDE = ("robots", "scenarios")
 
 
 def imports_of(file: Path, modules: set[str]) -> set[str]:
@@ -311,14 +306,3 @@ def test_values_have_types() -> None:
     text = "\n".join(file.read_text(encoding="utf-8") for file in PACKAGE.rglob("*.py"))
     lines = [line for line in text.splitlines() if re.search(r"\bAny\b", line)]
     assert len([line for line in lines if " import " not in line]) <= 60
-
-
-@pytest.mark.parametrize("former", MOVED)
-def test_a_module_that_has_moved_is_found_where_it_was(former: str) -> None:
-    with pytest.warns(DeprecationWarning, match=MOVED[former].replace(".", r"\.")):
-        found = import_module(f"sphshell_pin.{former}")
-    now = import_module(f"sphshell_pin.{MOVED[former]}")
-    public = [name for name in vars(now) if not name.startswith("_")]
-    assert public
-    assert all(getattr(found, name) is getattr(now, name) for name in public)
-    del sys.modules[f"sphshell_pin.{former}"]

@@ -10,7 +10,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.sensing.sensors import Sensor
-from sphshell_pin.errors import FormerName, InvalidParameter, NameNotFound, ScenarioError
+from sphshell_pin.errors import NameNotFound, ScenarioError
 from sphshell_pin.parameters import parameters_of
 from sphshell_pin.scenario import build, live_parameters, rebuild
 from sphshell_pin.study.fit.parameters import free_parameters
@@ -127,8 +127,7 @@ def test_the_numbers_of_all_kinds_are_tried(family, part):
         numbers = {
             one.name
             for one in dataclasses.fields(stating)
-            if one.name in parameters_of(stating)
-            and "float" in one.type + "float" * (one.type == "Named")
+            if one.name in parameters_of(stating) and "float" in one.type
         }
         tried = {name for table in STATED[part] if table["type"] == kind for name in table}
         if tried:
@@ -147,49 +146,6 @@ def test_a_single_number_has_no_places() -> None:
         assert found.parameters == (f"ball-plate.{number}",)
         with pytest.raises(NameNotFound, match=rf"{number}\.0"):
             scene.dynamics_derivatives(*state, parameters=[f"ball-plate.{number}.0"])
-
-
-def test_former_names_work_and_warn(tmp_path):
-    now = drop("law", {"type": "hertz", **HERTZ})
-    path = write(tmp_path, now.replace("young =", "young_1 =").replace("poisson =", "poisson_1 ="))
-    key, former = "contact.ball-plate.law.young", "contact.ball-plate.law.young_1"
-    warns = pytest.warns(FormerName, match="'young_1' is deprecated: it is called 'young'")
-    with warns:
-        built = build(path)
-    assert built.scene.pairs[0].law == sp.HertzLaw(**HERTZ)
-    with warns:
-        assert rebuild(built, {former: "3e9"}).scene.pairs[0].law.young == 3e9
-    with warns:
-        assert free_parameters([former], built.scenario, path)[0].key == key
-    with warns, pytest.raises(InvalidParameter, match="given twice"):
-        plan_sweep(path, {key: [1e9], former: [1e9]})
-    names = pytest.warns(FormerName, match=r"law\.young_1' is deprecated.*'ball-plate\.law\.young'")
-    with names:
-        found = built.scene.dynamics_derivatives(built.q0, parameters=["ball-plate.law.young_1"])
-    assert found.parameters == ("ball-plate.law.young",)
-    with names:
-        rollout = built.simulation.rollout(built.q0, None, 0.0, vary={former: [3e9]})
-    assert rollout.varied == {"ball-plate.law.young": [3e9]}
-    with names, pytest.raises(InvalidParameter, match=r"must not vary .* twice"):
-        built.simulation.rollout(built.q0, vary={former: [1.0], "ball-plate.law.young": [1.0]})
-
-
-def test_a_file_may_not_state_a_number_twice(tmp_path):
-    stated = drop("law", {"type": "hertz", **HERTZ, "young_1": 1e9})
-    with (
-        pytest.raises(ScenarioError, match=r"law: 'young_1' is a former name of 'young', which is"),
-        pytest.warns(FormerName),
-    ):
-        build(write(tmp_path, stated))
-
-
-def test_the_place_of_a_wrong_value_is_told_by_its_present_name(tmp_path):
-    stated = drop("law", {"type": "hertz", "young_1": -1.0, "poisson": 0.3})
-    with (
-        pytest.raises(ScenarioError, match=r"contact\.ball-plate\.law\.young: "),
-        pytest.warns(FormerName),
-    ):
-        build(write(tmp_path, stated))
 
 
 @pytest.mark.parametrize(

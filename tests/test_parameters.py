@@ -105,6 +105,36 @@ def test_every_parameter_is_described(kind):
             assert about.bounds, f"{one.name} has no bounds"
 
 
+CORES = [
+    pytest.param(kind, core, id=kind.__name__)
+    for family, core in ((NormalLaw, _core.NormalLaw), (Friction, _core.FrictionLaw))
+    for kind in concrete(family)
+    if kind.kind != "function" and "kind" in vars(kind)
+]
+
+
+@pytest.mark.parametrize(("kind", "core"), CORES)
+def test_cpp_states_the_same_bounds_units_and_defaults(kind, core):
+    """What C++ programs fill in, `sphshell_pin/laws/*.hpp`, is what Python's class says."""
+    stated = {f.name: (parameters_of(kind)[f.name], f) for f in fields(kind) if f.metadata}
+    for name, unit, above, at_least, at_most, default in core.parameters(kind.kind):
+        if name not in stated:  # what follows from others in Python
+            assert (kind, name) in {
+                (sp.HertzLaw, "dissipation"),
+                (sp.HertzLaw, "relaxation_time"),
+                (sp.FoundationLaw, "radius"),
+            }
+            continue
+        about, field = stated.pop(name)
+        assert unit == about.general_unit
+        bounds = {"gt": above, "ge": at_least, "le": at_most}
+        if name != "radius":  # 0 stands for none
+            assert {k: v for k, v in bounds.items() if abs(v) < float("inf")} == about.bounds
+        if field.default is not MISSING and default is not None:
+            assert default == (field.default or 0.0)
+    assert not stated.keys() - {"restitution", "speed", "loss_tangent", "frequency"}
+
+
 # Valid values of what has no default.
 VALUES = {
     "stiffness": 1e5,

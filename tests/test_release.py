@@ -9,6 +9,7 @@ from datetime import date
 from xml.etree import ElementTree
 
 import pytest
+from packaging.version import Version
 
 import sphshell_pin
 from tests.test_packaging import NAME, ROOT, load, script
@@ -20,16 +21,23 @@ CONDA = {"pin": "pinocchio", "meshcat": "meshcat-python", "matplotlib": "matplot
 FORMS = ROOT / ".github" / "ISSUE_TEMPLATE"
 
 
+def released():
+    """Return the last version of the changelog."""
+    return next(iter(changes()))
+
+
 def changes():
     """Return the date of each released version of the changelog, the latest first."""
     text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     return dict(re.findall(r"^## \[([0-9.]+)\] - (\d{4}-\d\d-\d\d)$", text, re.MULTILINE))
 
 
-def test_one_version_is_stated_everywhere():
-    version = PROJECT["version"]
-    assert sphshell_pin.__version__ == version
-    assert next(iter(changes())) == version
+def test_the_version_is_stated_once_and_that_of_the_release_everywhere():
+    assert PROJECT["dynamic"] == ["version"]
+    version = released()
+    current = Version(sphshell_pin.__version__)
+    assert current.is_devrelease or str(current) == version
+    assert current >= Version(version)
     assert ElementTree.parse(ROOT / "package.xml").findtext("version") == version
     assert load(ROOT / "CITATION.cff")["version"] == version
     assert load(RECIPE)["context"]["version"] == version
@@ -48,7 +56,7 @@ def test_the_changelog_has_its_form():
 def test_the_citation_is_of_this_release():
     citation = load(ROOT / "CITATION.cff")
     assert {"cff-version", "message", "title", "authors", "license"} <= set(citation)
-    assert citation["date-released"] == date.fromisoformat(changes()[PROJECT["version"]])
+    assert citation["date-released"] == date.fromisoformat(changes()[released()])
     assert citation["license"] == PROJECT["license"]
     assert [one["name"] for one in citation["authors"]] == [a["name"] for a in PROJECT["authors"]]
     assert citation["title"].startswith("sphshell_pin")
@@ -141,4 +149,4 @@ def test_the_command_of_the_bug_form_works(capsys):
     (versions,) = (one for one in form["body"] if one["id"] == "versions")
     (program,) = re.findall(r'python -c "(.*)"', versions["attributes"]["description"])
     exec(compile(program, "bug.yml", "exec"), {})
-    assert f"('sphshell_pin', '{PROJECT['version']}')" in capsys.readouterr().out
+    assert f"('sphshell_pin', '{sphshell_pin.__version__}')" in capsys.readouterr().out

@@ -6,14 +6,18 @@ python -m benchmarks.peers [--engine E]... [--scene S]... [--quick] [--write]
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
-from sphshell_pin.benchmarks.peers.measuring import measure
-from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.benchmarks.peers.section import assemble, site_sections
-from sphshell_pin.benchmarks.peers.workers import ENGINES
-from sphshell_pin.benchmarks.timing import one_core
-from sphshell_pin.cases.machine import machine
-from sphshell_pin.cases.measured import write
+from benchmarks.measured import write
+from benchmarks.peers.measuring import measure
+from benchmarks.peers.scenes import SCENES
+from benchmarks.peers.section import assemble, site_sections
+from benchmarks.peers.workers import ENGINES
+from sphshell_pin.study.report.machine import describe, machine
+from sphshell_pin.study.report.making import Report, report_json
+from sphshell_pin.study.report.timing import one_core
+
+REPORT = Path("results", "peers", "report.json")
 
 
 def main() -> None:
@@ -34,11 +38,15 @@ def main() -> None:
         arguments.quick,
         say=lambda text: print(text, flush=True),
     )
-    for table in assemble(rows, ratios).tables:
+    found = assemble(rows, ratios)
+    for table in found.tables:
         print(f"{table.caption}\n\n{table.markdown()}")
     if arguments.write:
         command = f"python -m benchmarks.peers{' --quick' * arguments.quick} --write"
         print(f"wrote {write('peers', command, site_sections(rows, ratios))}")
+        REPORT.parent.mkdir(parents=True, exist_ok=True)
+        REPORT.write_text(report_json(Report([found], describe(command)), []), encoding="utf-8")
+        print(f"wrote {REPORT}, for docs/site/quote.py")
 
 
 if __name__ == "__main__":

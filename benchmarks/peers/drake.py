@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.peers.drake_plant import (
+from benchmarks.peers.drake_plant import (
     advance,
     empty,
     motion_of,
@@ -20,13 +19,14 @@ from sphshell_pin.benchmarks.peers.drake_plant import (
     sum_of_forces,
     wall_forces,
 )
-from sphshell_pin.benchmarks.peers.engine import Params, Trajectory
-from sphshell_pin.benchmarks.peers.merged import MeshFiles, merged_urdf
-from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import Scene
-from sphshell_pin.benchmarks.peers.shapes import Surface
-from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact
-from sphshell_pin.benchmarks.swing import BOWL
+from benchmarks.peers.engine import Params, Trajectory
+from benchmarks.peers.merged import MeshFiles, merged_urdf
+from benchmarks.peers.press import FRAME, PressScene
+from benchmarks.peers.scenes import Scene
+from benchmarks.peers.shapes import Surface
+from benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact
+from sphshell_pin.arrays import Array
+from sphshell_pin.study.report.swing import BOWL
 
 GUIDE = "Drake, Hydroelastic Contact User Guide"
 # The table is light and its motor holds its rate: with a heavy one, the solvers of contact stop too

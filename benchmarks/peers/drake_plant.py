@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.peers.engine import CannotDo, Params
+from benchmarks.peers.scenes import Scene
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.peers.engine import CannotDo, Params
-from sphshell_pin.benchmarks.peers.scenes import Scene
 
 
 def empty(params: Params, gravity: Any) -> tuple[Any, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from sphshell_pin.arrays import Array
 
 if TYPE_CHECKING:
-    from sphshell_pin.benchmarks.peers.scenes import Scene
+    from benchmarks.peers.scenes import Scene
 
 Params = dict[str, Any]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.benchmarks.peers.engine import CannotDo, CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.press import PressScene
-from sphshell_pin.benchmarks.peers.scenes import Scene
+from benchmarks.peers.engine import CannotDo, CpuClock, Params, Trajectory
+from benchmarks.peers.press import PressScene
+from benchmarks.peers.scenes import Scene
 
 HEAVY = 1e4  # moment of inertia of what does not turn, or keeps its rate [kg m^2]
 MOST_CELLS = 40  # of the search tree along a side

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sphshell_pin.benchmarks.peers.engine import Params
-from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.benchmarks.peers.workers import ENGINES, NoAnswer, Ran, Worker
+from benchmarks.peers.engine import Params
+from benchmarks.peers.scenes import SCENES
+from benchmarks.peers.workers import ENGINES, NoAnswer, Ran, Worker
 
 OURS = "ours"
 SWINGS = ("bowl", "bowl fine")

@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.shapes import Surface
+from benchmarks.peers.press import FRAME, PressScene
+from benchmarks.peers.shapes import Surface
 
 AXES = {"JointModelRX": "1 0 0", "JointModelRY": "0 1 0", "JointModelRZ": "0 0 1"}
 

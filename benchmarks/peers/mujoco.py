@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.merged import text
-from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
-from sphshell_pin.benchmarks.peers.scenes import Scene
-from sphshell_pin.benchmarks.peers.shapes import Surface
-from sphshell_pin.benchmarks.peers.truths import (
+from benchmarks.peers.engine import CpuClock, Params, Trajectory
+from benchmarks.peers.merged import text
+from benchmarks.peers.press import FRAME, PressScene, at_the_end
+from benchmarks.peers.scenes import Scene
+from benchmarks.peers.shapes import Surface
+from benchmarks.peers.truths import (
     BallScene,
     Bowl,
     Cylinder,
@@ -22,6 +21,7 @@ from sphshell_pin.benchmarks.peers.truths import (
     Plate,
     Turntable,
 )
+from sphshell_pin.arrays import Array
 
 # A contact of impedance d answers the share d of a load by itself and leaves 1 - d to the spring:
 # at the least impedance that MuJoCo has it is the spring of the scene. Friction needs more of it.

@@ -10,16 +10,15 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from benchmarks.peers.engine import CpuClock, Params, Trajectory
+from benchmarks.peers.press import FRAME, PressScene, at_the_end
+from benchmarks.peers.scenes import Scene
+from benchmarks.peers.shapes import Surface
+from benchmarks.peers.truths import BallScene, Bowl, Impact
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.models import model_of
-from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
-from sphshell_pin.benchmarks.peers.scenes import Scene
-from sphshell_pin.benchmarks.peers.shapes import Surface
-from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Impact
-from sphshell_pin.benchmarks.rolling import turned, velocities
 from sphshell_pin.dynamics.run.advance import advance, start_run
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
+from sphshell_pin.study.report.models import model_of
 
 # Bristles are so much stiffer than the contact: what rolls should not slip.
 STIFFER = 100.0
@@ -147,7 +146,10 @@ def read(scene: BallScene, result: sp.Result, cpu: float) -> Trajectory:
     position, velocity = result.q[:, :3], result.v[:, :3]
     spin = np.zeros_like(position)
     if scene.rolls:
-        velocity, spin = velocities(result), turned(result.q[:, 3:7], result.v[:, 3:6])
+        turns = np.array([pin.XYZQUATToSE3(q[:7]).rotation for q in result.q])
+        velocity, spin = (
+            np.einsum("nij,nj->ni", turns, part) for part in (result.v[:, :3], result.v[:, 3:6])
+        )
     log = result.contacts
     force = np.zeros_like(position)
     np.add.at(force, log.row, log.force_world)

@@ -11,12 +11,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+from benchmarks.peers import shapes
+from benchmarks.peers.engine import Trajectory
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks import step
-from sphshell_pin.benchmarks.peers import shapes
-from sphshell_pin.benchmarks.peers.engine import Trajectory
-from sphshell_pin.benchmarks.surfaces import height as wavy_height
 from sphshell_pin.errors import MissingExtra
+from sphshell_pin.study.report import steps as panda
+from sphshell_pin.study.report.surfaces import height as wavy_height
 
 FRAME = "panda_hand_tcp"
 CELLS, SIZE = 316, 1.0  # 2 * 316^2 = 199712 triangles; [m]
@@ -46,7 +46,7 @@ class PressScene:
     q_ref: tuple[float, ...]
     dt: float = 1e-4
     steps: int = 5000
-    radius: float = step.RADIUS
+    radius: float = panda.RADIUS
     rise: float = 5e-4
     kp: float = 100.0
     kd: float = 10.0
@@ -144,7 +144,7 @@ def panda_urdf(radius: float) -> str:
             )
             ElementTree.SubElement(geometry, "sphere", radius=str(radius))
     for joint in robot.iter("joint"):
-        if joint.get("name") in step.FINGERS:
+        if joint.get("name") in panda.FINGERS:
             joint.set("type", "fixed")
         for name in ("dynamics", "mimic", "safety_controller"):
             for part in joint.findall(name):
@@ -155,21 +155,21 @@ def panda_urdf(radius: float) -> str:
 @cache
 def press() -> PressScene:
     """Return the scene; raise MissingExtra."""
-    urdf = panda_urdf(step.RADIUS)
+    urdf = panda_urdf(panda.RADIUS)
     model = pin.buildModelFromXML(urdf)
     data = model.createData()
     frame, axes = model.getFrameId(FRAME), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    jacobian = pin.computeFrameJacobian(model, data, step.START, frame, axes)
-    pin.framesForwardKinematics(model, data, step.START)
+    jacobian = pin.computeFrameJacobian(model, data, panda.START, frame, axes)
+    pin.framesForwardKinematics(model, data, panda.START)
     tip = data.oMf[frame].translation
     lower = np.linalg.pinv(jacobian[:3]) @ [0.0, 0.0, -PUSH]
-    place = tip + [0.0, 0.0, PressScene.rise - step.RADIUS]
+    place = tip + [0.0, 0.0, PressScene.rise - panda.RADIUS]
     return PressScene(
         name="press",
         title="Panda presses a fingertip on 199712 triangles, joint PD + gravity compensation",
         urdf=urdf,
         surface=shapes.wavy(CELLS, SIZE, place),
         place=tuple(place.tolist()),
-        q0=tuple(step.START.tolist()),
-        q_ref=tuple((step.START + lower).tolist()),
+        q0=tuple(panda.START.tolist()),
+        q_ref=tuple((panda.START + lower).tolist()),
     )

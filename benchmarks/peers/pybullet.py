@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.peers.engine import CpuClock, Params, Trajectory
+from benchmarks.peers.merged import MeshFiles, merged_urdf
+from benchmarks.peers.press import PressScene, at_the_end
+from benchmarks.peers.scenes import Scene
+from benchmarks.peers.shapes import Surface
+from benchmarks.peers.truths import BallScene, Bowl, Impact
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.merged import MeshFiles, merged_urdf
-from sphshell_pin.benchmarks.peers.press import PressScene, at_the_end
-from sphshell_pin.benchmarks.peers.scenes import Scene
-from sphshell_pin.benchmarks.peers.shapes import Surface
-from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl, Impact
 
 SCALE = 10.0  # of lengths; masses and times stay, forces grow as lengths do, torques as squares
 GUIDE = "PyBullet Quickstart Guide"

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.peers.engine import CpuClock, Params, Trajectory
+from benchmarks.peers.press import FRAME, PressScene, at_the_end
+from benchmarks.peers.scenes import Scene
+from benchmarks.peers.shapes import Surface
+from benchmarks.peers.truths import BallScene, Bowl
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
-from sphshell_pin.benchmarks.peers.press import FRAME, PressScene, at_the_end
-from sphshell_pin.benchmarks.peers.scenes import Scene
-from sphshell_pin.benchmarks.peers.shapes import Surface
-from sphshell_pin.benchmarks.peers.truths import BallScene, Bowl
-from sphshell_pin.benchmarks.query import coal_tree
-from sphshell_pin.benchmarks.step import bare
+from sphshell_pin.study.report.queries import coal_tree
+from sphshell_pin.study.report.steps import bare
 
 MOST = 1000  # contacts asked for
 APART = np.cos(np.deg2rad(30))  # contacts whose normals are closer than this are one

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 
-from sphshell_pin.benchmarks import swing
-from sphshell_pin.benchmarks.peers import shapes
-from sphshell_pin.benchmarks.peers.press import PressScene, press
-from sphshell_pin.benchmarks.peers.truths import (
+from benchmarks.peers import shapes
+from benchmarks.peers.press import PressScene, press
+from benchmarks.peers.truths import (
     GRAVITY,
     MASS,
     ORBIT,
@@ -25,6 +24,7 @@ from sphshell_pin.benchmarks.peers.truths import (
     Slope,
     Turntable,
 )
+from sphshell_pin.study.report import swing
 
 
 @cache

@@ -1,4 +1,4 @@
-"""The same scenes in other engines: findings, pictures and tables.
+"""The same scenes in other engines: findings and tables.
 
 The same scenes, each with a truth that no engine computes, in other engines. Every engine runs in a
 process of its own on one core, with the settings that its documentation recommends; the errors are
@@ -11,82 +11,49 @@ from __future__ import annotations
 
 import math
 
-from sphshell_pin.benchmarks.peers import measuring
-from sphshell_pin.benchmarks.peers.engine import Params
-from sphshell_pin.benchmarks.peers.measuring import Ratio, Row
-from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.cases import drawing
-from sphshell_pin.cases.contents import (
+from benchmarks.measured import Measured
+from benchmarks.peers.engine import Params
+from benchmarks.peers.measuring import Ratio, Row
+from benchmarks.peers.scenes import SCENES
+from sphshell_pin.study.report.contents import (
     TIMES,
     Finding,
-    Picture,
-    Progress,
     Section,
     Table,
     about,
     columns,
     number,
 )
-from sphshell_pin.cases.machine import machine
-from sphshell_pin.cases.measured import Measured
+from sphshell_pin.study.report.machine import machine
 
 KEY, TITLE = "peers", "Other engines"
-# Name on the page, color, marker; of an engine that is not here, its own name in gray.
-LOOKS = {
-    "ours": ("sphshell_pin", drawing.BLUE, "o"),
-    "mujoco": ("MuJoCo", drawing.RED, "v"),
-    "drake": ("Drake", drawing.GREEN, "s"),
-    "pybullet": ("PyBullet", drawing.ORANGE, "^"),
-    "exudyn": ("EXUDYN", drawing.INK, "P"),
-    "loop": ("Python loop", drawing.VIOLET, "D"),
+NAMES = {
+    "ours": "sphshell_pin",
+    "mujoco": "MuJoCo",
+    "drake": "Drake",
+    "pybullet": "PyBullet",
+    "exudyn": "EXUDYN",
+    "loop": "Python loop",
 }
+"""Names on the page; an engine that is not here has its own."""
 SWING = "bowl"
 TITLES = {name: make().title for name, make in SCENES.items()}
-ABOUT = 100  # rows of a whole measurement, for the progress
 TEXT = about(__doc__)
 AIMED = (
     "Panda press with control on 200 k triangles, time of a step: fastest peer",
     "bowl swing, CPU time at equal errors of period and energy: peer of the best error",
 )
-MISSING = "Engines that are not installed have no figures here: pip install 'sphshell-pin[peers]'."
-
-
-def left_out() -> Section:
-    """Return the section of a report without peers."""
-    return Section(
-        KEY,
-        TITLE,
-        notes=[
-            "Left out of this run: sphshell-pin report --peers measures the same scenes in MuJoCo, "
-            "Drake, PyBullet, EXUDYN and a Python loop (pip install 'sphshell-pin[peers]')."
-        ],
-        unmeasured=[f"{what} / ours (sphshell-pin report --peers)" for what in AIMED],
-    )
-
-
-def section(*, quick: bool, progress: Progress) -> Section:
-    """Measure and return the section."""
-    lines = 0
-
-    def count(_: str) -> None:
-        nonlocal lines
-        lines += 1
-        progress(lines / (lines + ABOUT / 2))
-
-    rows, ratios = measuring.measure(quick=quick, say=count)
-    return assemble(rows, ratios)
+MISSING = "Engines that are not installed have no figures here: pip install -e benchmarks."
 
 
 def assemble(rows: list[Row], ratios: list[Ratio]) -> Section:
     """Return the section of what was measured."""
     names = list(dict.fromkeys(row.scene for row in rows))
-    drawn = [row for row in rows if row.scene == SWING and not row.note]
     return Section(
         KEY,
         TITLE,
         TEXT,
         findings=findings_of(ratios),
-        pictures=[picture(drawn)] if drawn else [],
         tables=[
             ratios_table(ratios),
             *(scene_table(rows, scene, TITLES.get(scene, scene)) for scene in names),
@@ -98,7 +65,7 @@ def assemble(rows: list[Row], ratios: list[Ratio]) -> Section:
 
 def name_of(engine: str) -> str:
     """Return the name of an engine on the page."""
-    return LOOKS.get(engine, (engine, drawing.GREY, "P"))[0]
+    return NAMES.get(engine, engine)
 
 
 def notes_of(rows: list[Row]) -> list[str]:
@@ -205,38 +172,6 @@ def settings_table(rows: list[Row]) -> Table:
         columns("engine", "scene", "setting", "text: value and source"),
         list(settings),
         folded=True,
-    )
-
-
-def picture(rows: list[Row]) -> Picture:
-    """Draw the cost of the swing against its errors, a dot per setting."""
-    with drawing.canvas(7.8, 3.7) as figure:
-        panels = figure.subplots(1, 2, sharey=True)
-        engines = list(dict.fromkeys(row.engine for row in rows))
-        for axis, what in zip(panels, ("period", "energy"), strict=True):
-            drawing.logarithmic(axis, every=(2, 1))
-            axis.set_title(f"error of the {what}")
-            axis.invert_xaxis()
-            for engine in engines:
-                _, color, marker = LOOKS.get(engine, (engine, drawing.GREY, "P"))
-                found = [row for row in rows if row.engine == engine and row.errors[what] > 0]
-                axis.plot(
-                    [row.errors[what] for row in found], [row.cost for row in found], marker,
-                    color=color, label=name_of(engine), markersize=5, alpha=0.85,
-                )  # fmt: skip
-        panels[0].set_ylabel("CPU seconds per simulated second")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(
-            handles, labels, loc="outside upper center", ncols=len(labels), frameon=False,
-            fontsize=drawing.SMALL,
-        )  # fmt: skip
-        png = drawing.png_of(figure)
-    return Picture(
-        "peers",
-        png,
-        f"CPU time against errors of the bowl swing for {', '.join(map(name_of, engines))}.",
-        "The swing in the bowl, triangles of 0.3 r: a dot is a setting of an engine; more precise "
-        "to the right, dearer upwards.",
     )
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks import swing
-from sphshell_pin.benchmarks.surfaces import height as wavy_height
-from sphshell_pin.benchmarks.surfaces import random_grid, wavy_sheet
+from sphshell_pin.study.report import swing
+from sphshell_pin.study.report.surfaces import height as wavy_height
+from sphshell_pin.study.report.surfaces import random_grid, wavy_sheet
 
 Height = Callable[[Array, Array], Array]
 

@@ -17,10 +17,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.peers import shapes
+from benchmarks.peers.engine import Trajectory
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks import swing
-from sphshell_pin.benchmarks.peers import shapes
-from sphshell_pin.benchmarks.peers.engine import Trajectory
+from sphshell_pin.study.report import swing
 
 Vector = tuple[float, float, float]
 GRAVITY = 9.81

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from functools import cache
 from typing import TypedDict
 
-from sphshell_pin.benchmarks.peers.engine import CannotDo, Engine, Params
-from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.benchmarks.processes import OwnProcess, ProcessLost
-from sphshell_pin.benchmarks.timing import one_core
+from benchmarks.peers.engine import CannotDo, Engine, Params
+from benchmarks.peers.scenes import SCENES
+from benchmarks.processes import OwnProcess, ProcessLost
+from sphshell_pin.study.report.timing import one_core
 
 # Names on the command line, and module:class beside this file.
 ENGINES = {

@@ -12,7 +12,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots, scenarios
 
 bowl = sp.Shell.from_file(scenarios.__path__[0] + "/surfaces/bowl.shl", unit="mm")
-ball = robots.load("ball")  # radius 12 mm, flies freely; or robots.load_urdf("my.urdf")
+ball = robots.load("ball")  # radius 12 mm, flies freely; or robots.load_file("my.urdf")
 scene = sp.Scene(ball.model)
 law = sp.ImpactLaw.hertz(0.012, 5e6, 0.49, 70e9, 0.33, restitution=0.7, speed=1.0)  # rubber
 friction = sp.CoulombFriction(mu_static=0.2, mu_dynamic=0.15, v_static=1e-3, v_dynamic=1e-2)

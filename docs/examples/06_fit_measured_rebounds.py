@@ -12,7 +12,7 @@ from math import cos, pi, radians, sin
 from pathlib import Path
 
 import sphshell_pin as sp
-from sphshell_pin.study.validation.cases import read
+from tests.validation.cases import read
 
 RADIUS, DENSITY, SPEED = 2.5e-3, 4000.0, 3.9  # [m, kg/m^3, m/s]
 mass = 4 / 3 * pi * RADIUS**3 * DENSITY

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-import re
+from collections.abc import Iterator
 from typing import Any
 
 import typer
@@ -25,22 +25,21 @@ def _section(name: str, command: Any) -> str:
     lines = [f"## {name}", "", "\n\n".join(texts), ""]
     for one in examples:
         lines += ["```sh", one.removeprefix("Example: "), "```", ""]
-    rows = [_row(one) for one in command.params]
-    if rows:
-        lines += ["| | meaning | default |", "|---|---|---|", *rows, ""]
-    return "\n".join(lines)
+    arguments = [_names(one) for one in command.params if not one.opts[0].startswith("-")]
+    options = [_names(one) for one in command.params if one.opts[0].startswith("-")]
+    texts = [f"{what}: {', '.join(some)}." for what, some in _kinds(arguments, options) if some]
+    return "\n".join([*lines, *texts, ""])
 
 
-def _row(parameter: Any) -> str:
+def _kinds(arguments: list[str], options: list[str]) -> Iterator[tuple[str, list[str]]]:
+    yield ("Arguments" if len(arguments) > 1 else "Argument"), arguments
+    yield "Options", options
+
+
+def _names(parameter: Any) -> str:
+    """Return the names of an argument or option; a required option is bold."""
     names = [*parameter.opts, *parameter.secondary_opts]
     if not names[0].startswith("-"):
-        names = [names[0].upper()]
-    elif parameter.metavar:
-        names = [f"{one} {parameter.metavar}" for one in names]
-    default = parameter.default
-    shown = "" if default is None or isinstance(default, bool) else f"`{default}`"
-    if parameter.required:
-        shown = "required"
-    meaning = re.sub(r"\\(?=\[)", "", parameter.help or "")
-    meaning = meaning if meaning.endswith("...") else meaning.removesuffix(".")
-    return f"| {', '.join(f'`{one}`' for one in names)} | {meaning} | {shown} |"
+        return f"`{names[0].upper()}`"
+    text = "`" + "`/`".join(names) + "`"
+    return f"**{text}**" if parameter.required else text

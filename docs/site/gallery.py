@@ -18,11 +18,13 @@ from typing import Any
 from PIL import Image, ImageOps
 
 from sphshell_pin.atomic import write_whole
-from sphshell_pin.cases.measured import FOLDER, Measured, write
 from sphshell_pin.scenario import run_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.schema import Expected
 from sphshell_pin.scenario.running.run import RunReport
 from sphshell_pin.view.film import Camera, render_film
+
+sys.path.insert(0, str(Path(__file__).parents[2]))  # run as a script, and as a hook of MkDocs
+from benchmarks.measured import FOLDER, Measured, write
 
 PICTURES = Path(__file__).parents[1] / "pictures" / "gallery"
 SIZE = WIDTH, HEIGHT = 960, 600  # [pixels]

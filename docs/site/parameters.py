@@ -10,7 +10,7 @@ from sphshell_pin.parameters import parameters_of
 from sphshell_pin.scenario.format import shape_tables as primitives
 
 # Annotations of parameters that are numbers; see sphshell_pin.parameters.
-NUMBERS = ("float", "Named")
+NUMBERS = ("float",)
 
 
 def kinds(name: str) -> str:

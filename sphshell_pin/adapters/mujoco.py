@@ -1,6 +1,6 @@
 """Contacts of spheres with shells in MuJoCo's own steps.
 
-    contacts = attach(model, shell, ["fingertip"], law=HertzLaw("steel", "rubber"))
+    contacts = attach(model, shell, ["fingertip"], law=HertzLaw.of("steel", "rubber"))
     mujoco.mj_step(model, data)
 
 Chosen sphere geoms or sites touch a shell on any body. MuJoCo calls the compiled core in each

@@ -15,7 +15,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -23,12 +23,8 @@ from typing import Self
 
 from sphshell_pin.atomic.exchange import exchange
 from sphshell_pin.atomic.file import sync_file, sync_folder
-from sphshell_pin.atomic.lock import holder, lock_file, lock_folder, sign
+from sphshell_pin.atomic.lock import holder, lock_file, sign
 from sphshell_pin.regular_file import read_text
-
-# End the names of a sweep's database, and of what SQLite keeps beside it while it is changed. As it
-# finds no moved file again, a sweep locks its folder.
-_JOURNAL, _CHANGES = ".journal", ".journal-journal"
 
 # Another process can remove the parent that long between two steps of this one.
 _MOST_TRIES = 100
@@ -70,7 +66,6 @@ class AtomicFolder:
         self._lock: tuple[Path, int] | None = None
         # Without a lock it is unknown whether another process has ended: its files are left alone.
         self._suffix = ""
-        self._fixed: str | tuple[str, ...] = ()
 
     def __enter__(self) -> Self:
         try:
@@ -121,10 +116,9 @@ class AtomicFolder:
 
         A reader sees all old files or all new ones at any time, and every other file, unless the
         folder cannot be exchanged: a mount point, the working directory, a folder whose parent
-        cannot be written, one with subfolders, one in which a sweep writes or was killed while it
-        wrote a row, or one on a file system without the exchange of names or without hard links.
-        There the files are replaced one by one, and `last` is missing meanwhile; if the process is
-        killed then, the next `AtomicFolder` completes the change.
+        cannot be written, one with subfolders, or one on a file system without the exchange of
+        names or without hard links. There the files are replaced one by one, and `last` is missing
+        meanwhile; if the process is killed then, the next `AtomicFolder` completes the change.
 
         Raises
         ------
@@ -144,11 +138,9 @@ class AtomicFolder:
         if staging.parent == beside:
             _write_list(beside, new, old)
             try:
-                with _no_sweeps(self._folder) as locked, _no_sweeps(staging):
-                    self._fixed = _CHANGES if locked else (_JOURNAL, _CHANGES)
-                    self._link_others(self._folder, staging, ours)
-                    sync_folder(staging)
-                    exchange(staging, self._folder)
+                self._link_others(self._folder, staging, ours)
+                sync_folder(staging)
+                exchange(staging, self._folder)
             except OSError:
                 inside.mkdir()
                 shutil.move(staging, inside / _FILES)
@@ -275,8 +267,6 @@ class AtomicFolder:
             if entry.name in ours:
                 continue
             copy = target / entry.name
-            if entry.name.endswith(self._fixed):
-                raise OSError(f"{entry.path} may be written by a sweep")
             if not entry.is_dir(follow_symlinks=False):
                 os.link(entry, copy, follow_symlinks=False)
             elif source == self._folder and entry.name in self._inner:
@@ -285,19 +275,6 @@ class AtomicFolder:
                 sync_folder(copy)
             else:
                 raise OSError(f"{entry.path} is a folder of others")
-
-
-@contextlib.contextmanager
-def _no_sweeps(folder: Path) -> Iterator[bool]:
-    """Let no sweep begin in the folder; yield whether it is known that none writes there.
-
-    Raises BlockingIOError if one does.
-    """
-    descriptor, locked = lock_folder(folder, alone=True)
-    try:
-        yield locked
-    finally:
-        os.close(descriptor)
 
 
 def _is_left(place: Path) -> bool:

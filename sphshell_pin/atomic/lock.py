@@ -29,20 +29,7 @@ def lock_file(path: Path, *, wait: bool = True) -> tuple[int, bool]:
     """
     # No link of somebody else's in a shared folder may lead to the file.
     flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
-    return _lock(path, flags, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-
-
-def lock_folder(path: Path, *, alone: bool) -> tuple[int, bool]:
-    """Open the folder at `path` and lock it, like `lock_file`, alone or together with others.
-
-    A folder that is locked together cannot be locked alone: BlockingIOError. The other way round
-    it waits.
-    """
-    flags = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
-    return _lock(path, flags, fcntl.LOCK_EX | fcntl.LOCK_NB if alone else fcntl.LOCK_SH)
-
-
-def _lock(path: Path, flags: int, operation: int) -> tuple[int, bool]:
+    operation = fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB)
     while True:
         descriptor = os.open(path, flags, 0o666)
         try:

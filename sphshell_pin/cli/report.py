@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +17,6 @@ from sphshell_pin.cli.app import (
     progress_bar,
     say,
 )
-from sphshell_pin.errors import SphshellError
 
 if TYPE_CHECKING:
     from sphshell_pin.study.report import Report
@@ -26,36 +24,23 @@ if TYPE_CHECKING:
 
 @command()
 def report(
-    quick: Annotated[bool, option("Some four minutes: fewer rounds and sizes.", "--quick")] = False,
-    peers: Annotated[bool, option("The same scenes in other engines, too.", "--peers")] = False,
-    validation: Annotated[
-        bool,
-        option(
-            "Against published experiments instead; --quick leaves out the slow cases.",
-            "--validation",
-        ),
-    ] = False,
+    quick: Annotated[bool, option("Some two minutes: fewer rounds and sizes.", "--quick")] = False,
     out: Annotated[Path, option("Folder of the page and its tables.")] = Path("results/report"),
 ) -> None:
     """Measure speed against error on this machine and write a page of it.
 
-    Contact forces, queries, integrators, steps and hard cases, each against its aim. The machine
-    should have nothing else to do. Exit code 1: a section could not
-    be measured; a missed aim is listed, and is no error.
+    Contact forces, queries, integrators and steps, each against its aim. The machine should have
+    nothing else to do. Exit code 1: a section could not be measured; a missed aim is listed, and is
+    no error.
 
     Example: sphshell-pin report --quick
     """
-    if validation and peers:
-        raise SphshellError("--validation runs no other engines: leave out --peers")
     from sphshell_pin.study.report import PAGE, make_report
-    from sphshell_pin.study.validation import make_validation
 
     # Without --out: the folder is no part of what was measured.
-    flags = {"--quick": quick, "--peers": peers, "--validation": validation}
-    command = " ".join(["sphshell-pin report", *(name for name, on in flags.items() if on)])
-    make = make_validation if validation else functools.partial(make_report, with_peers=peers)
+    command = f"sphshell-pin report{' --quick' * quick}"
     with progress_bar("report", PERCENT, "TimeElapsedColumn", total=1.0) as update:
-        made = make(
+        made = make_report(
             out,
             quick=quick,
             command=command,

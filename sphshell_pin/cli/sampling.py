@@ -38,7 +38,7 @@ def report_sample(
     inputs = []
     for axis, one in zip(plan.axes, design.dists.values(), strict=True):
         ends = (f"{end:.6g}" for end in one.quantile(np.array([0.05, 0.5, 0.95])))
-        inputs.append((axis.key, str(one), *ends, axis.unit))
+        inputs.append((axis.key, str(one), *ends, plan.units.get(axis.key, "")))
     print_table(("input", "distribution", "5 %", "median", "95 %", "unit"), inputs)
     if not all_:
         figures = [name for name in figures if table[name].notna().any()][:1]

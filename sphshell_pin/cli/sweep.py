@@ -210,7 +210,10 @@ def _print_ranges(plan: Plan, report: SweepReport) -> None:
 def _print_failures(plan: Plan, report: SweepReport) -> None:
     failed = report.table[report.table["status"] == "failed"]
     for _, row in failed.head(_MOST_FAILURES).iterrows():
-        values = [f"{axis.key} = {row[axis.key]} {axis.unit}".rstrip() for axis in plan.axes]
+        values = [
+            f"{axis.key} = {row[axis.key]} {plan.units.get(axis.key, '')}".rstrip()
+            for axis in plan.axes
+        ]
         typer.echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
     if len(failed) > _MOST_FAILURES:
         typer.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, Self
 
 from sphshell_pin.checks import check_not_negative, check_type
 from sphshell_pin.contact.friction import Coefficients
-from sphshell_pin.contact.materials import TwoMaterials
+from sphshell_pin.contact.materials import TwoMaterials, elastic_numbers
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import parameter, same_parameter
@@ -79,46 +80,6 @@ class BristleFriction(Coefficients, kind="bristle"):
         """Return half a period of the spring, or 20 times its decay if that is shorter [s]."""
         return _spring_time(mass, self.stiffness, self.damping)
 
-    @staticmethod
-    def mindlin(
-        mu_static: float | str,
-        mu_dynamic: float | str | None,
-        young: float | str | None = None,
-        poisson: float | str | None = None,
-        young_2: float | None = None,
-        poisson_2: float | None = None,
-        *,
-        v_stribeck: float = 0.01,
-        damping_time: float = 0.0,
-        torsional: bool = False,
-        rolling: float = 0.0,
-        rolling_speed: float = 1e-3,
-        rings: int = 1,
-    ) -> MindlinFriction:
-        """Build the bristle whose stiffness follows from the bodies' materials and the contact.
-
-        `young` [Pa] and `poisson` are the sphere's, `young_2` and `poisson_2` the shell's (without
-        them the same). Without `mu_dynamic` it is `mu_static`. Of two names of MATERIALS, sphere's
-        and shell's, they all follow: mindlin("rubber", "steel"). See MindlinFriction.
-        """
-        mu_dynamic = mu_static if mu_dynamic is None else mu_dynamic
-        if isinstance(mu_static, str) and young is poisson is None:
-            young, poisson = mu_static, mu_dynamic
-        return MindlinFriction(
-            mu_static,
-            mu_dynamic,
-            young,
-            poisson,
-            young_2,
-            poisson_2,
-            v_stribeck,
-            damping_time,
-            torsional,
-            rolling,
-            rolling_speed,
-            rings,
-        )
-
 
 @dataclass(frozen=True)
 class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
@@ -170,6 +131,11 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
         help="1 to 8: of the disc, each with a state; for micro-slip",
     )
 
+    @classmethod
+    def of(cls, sphere: str, shell: str, **more: Any) -> Self:
+        """Build from two names of MATERIALS, with `more` parameters."""
+        return super().of(sphere, shell, **elastic_numbers(sphere, shell) | more)
+
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value outside its bounds."""
         super().__post_init__()
@@ -180,11 +146,11 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
 
     def tangential_stiffness(self, disc: float) -> float:
         """Return 8 G* a [N/m] on a disc of contact of the radius a = `disc` [m]."""
-        return self._shear_moduli[0] * check_not_negative("disc", disc, "m")
+        return self._moduli[1] * check_not_negative("disc", disc, "m")
 
     def torsional_stiffness(self, disc: float) -> float:
         """Return 16/3 G a^3 [N m/rad] on a disc of contact of the radius a = `disc` [m]."""
-        return self._shear_moduli[1] * check_not_negative("disc", disc, "m") ** 3
+        return self._moduli[2] * check_not_negative("disc", disc, "m") ** 3
 
     @property
     def state_size(self) -> int:
@@ -195,12 +161,6 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
     def needs_radius(self) -> bool:
         """True: the disc of contact depends on it."""
         return True
-
-    def _numbers(self) -> list[float]:
-        """Return the parameters as the compiled core takes them, moduli for the materials."""
-        names = ["v_stribeck", "damping_time", "torsional", "rolling", "rolling_speed", "rings"]
-        more = [float(getattr(self, name)) for name in names]
-        return [self.mu_static, self.mu_dynamic, *self._shear_moduli, *more]
 
     @property
     def text(self) -> str:
@@ -213,7 +173,7 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
             )
         return (
             f"Mindlin, coefficient {self.mu_static:g} at rest, {self.mu_dynamic:g} beyond "
-            f"{self.v_stribeck:g} m/s; sticks with {self._shear_moduli[0]:.4g} N/m per m of the "
+            f"{self.v_stribeck:g} m/s; sticks with {self._moduli[1]:.4g} N/m per m of the "
             f"disc's radius, damping time {self.damping_time:g} s{spin}{rolling}; the force is a "
             "state of the contact"
         )
@@ -225,7 +185,7 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
 
     def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return half a period of the spring, or 20 times its decay if that is shorter [s]."""
-        stiffness = self._shear_moduli[0] * disc
+        stiffness = self._moduli[1] * disc
         times = [_spring_time(mass, stiffness, self.damping_time * stiffness)]
         if self.rolling and load > 0:
             decay = mass * self.rolling_speed / (1.5 * self.rolling * load)

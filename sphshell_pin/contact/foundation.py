@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_positive, check_type, check_vector, read_only
+from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import parameter
@@ -33,6 +34,10 @@ class FoundationLaw(NormalLaw, kind="foundation"):
     thickness. `dissipation` b [s/m]: the pressure is p (1 - b gap_rate), not below 0, with the gap
     rate of each point. The shell is rigid, the layer of this `modulus` [Pa] and `thickness` [m] is
     on the sphere: Johnson, Contact Mechanics (1985), 4.3.
+
+    Beside a Plane the layer is on the plane, and the pressure is modulus / thickness times the
+    depth below it: the force is modulus / thickness times the volume below the plane, at its
+    centroid.
     """
 
     modulus: float = parameter(
@@ -55,6 +60,11 @@ class FoundationLaw(NormalLaw, kind="foundation"):
         numbers = self.modulus, self.thickness, self.dissipation
         return _OnPlane(*numbers, check_positive("radius", radius, "m"))
 
+    def on_face(self, area: float) -> NormalLaw:
+        """Return the law of a flat face of `area` [m^2] that lies on a plane, by its depth."""
+        stiffness = self.modulus / self.thickness * check_positive("area", area, "m^2")
+        return HuntCrossleyLaw(stiffness, 1.0, self.dissipation)
+
     def _numbers(self) -> list[float]:
         """Return the parameters and no radius, as the compiled core takes them."""
         return [self.modulus, self.thickness, self.dissipation, 0.0]
@@ -62,7 +72,7 @@ class FoundationLaw(NormalLaw, kind="foundation"):
     @property
     def _shapeless_binding(self) -> _core.NormalLaw:
         """Raise InvalidParameter: without a radius and a shell there is no overlap."""
-        must = "needs a sphere and a shell: take law.on_plane(radius)"
+        must = "needs a shell beside a sphere or a plane: take law.on_plane(radius)"
         raise InvalidParameter("law", self, must)
 
     @property

@@ -6,13 +6,14 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any, Self
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative, check_positive, check_type
 from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, Named, parameter
+from sphshell_pin.parameters import Component, parameter
 
 
 class Friction(Component):
@@ -72,16 +73,12 @@ class Friction(Component):
 
 @dataclass(frozen=True)
 class Coefficients(Friction):
-    """What the laws share that have two coefficients.
+    """What the laws share that have two coefficients."""
 
-    `mu_static` and `mu_dynamic` may be names of MATERIALS, of the sphere and of the shell: the
-    coefficients are theirs.
-    """
-
-    mu_static: Named = parameter(
+    mu_static: float = parameter(
         at_least=0, label="static friction", help="coefficient at rest or nearly so"
     )
-    mu_dynamic: Named = parameter(
+    mu_dynamic: float = parameter(
         at_least=0,
         label="dynamic friction",
         help="coefficient of fast sliding; not above `mu_static`",
@@ -92,14 +89,14 @@ class Coefficients(Friction):
         """The static coefficient."""
         return float(self.mu_static)
 
+    @classmethod
+    def of(cls, sphere: str, shell: str, **more: Any) -> Self:
+        """Build from two names of MATERIALS: their coefficients, and `more` parameters."""
+        pair = friction_between(find_material(sphere), find_material(shell))
+        return cls(**dict(zip(("mu_static", "mu_dynamic"), pair, strict=True)) | more)
+
     def __post_init__(self) -> None:
-        """Put numbers in place of names; raise InvalidParameter for a value outside its bounds."""
-        if isinstance(self.mu_static, str) and isinstance(self.mu_dynamic, str):
-            pair = find_material(self.mu_static), find_material(self.mu_dynamic)
-            for name, value in zip(
-                ("mu_static", "mu_dynamic"), friction_between(*pair), strict=True
-            ):
-                object.__setattr__(self, name, value)
+        """Raise InvalidParameter for a value outside its bounds."""
         super().__post_init__()
         if self.mu_dynamic > self.mu_static:
             raise InvalidParameter(
@@ -125,10 +122,10 @@ class CoulombFriction(Coefficients, kind="coulomb"):
     Source: ADAMS/View help, contact friction force.
     """
 
-    mu_static: Named = parameter(
+    mu_static: float = parameter(
         0.3, at_least=0, label="static friction", help="coefficient at the slip speed `v_static`"
     )
-    mu_dynamic: Named = parameter(
+    mu_dynamic: float = parameter(
         0.1,
         at_least=0,
         label="dynamic friction",

@@ -9,7 +9,12 @@ from pathlib import Path
 
 from sphshell_pin import _core
 from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw, dissipation_for
-from sphshell_pin.contact.materials import Material, TwoMaterials, restitution_between
+from sphshell_pin.contact.materials import (
+    TwoMaterials,
+    elastic_numbers,
+    find_material,
+    restitution_between,
+)
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import parameter
@@ -21,8 +26,7 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
 
     force = E* scale depth^1.5 with 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2; `young` [Pa] and
     `poisson` of the sphere, `young_2` and `poisson_2` of the shell (by default of the same
-    material); or two names of MATERIALS, HertzLaw("rubber", "steel"), which also state a
-    restitution at 1 m/s where no damping is given. `scale` [m^0.5] depends on the radius of the
+    material); of two names of MATERIALS see `of`. `scale` [m^0.5] depends on the radius of the
     sphere and the two principal curvatures of the shell at the contact, by the elliptic integrals
     of Johnson, Contact Mechanics (1985), 4.26; on a plane it is 4/3 sqrt(radius). Where it changes
     along the shell there is a force along the shell as well, as the elastic energy
@@ -64,7 +68,6 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
         """Raise InvalidParameter for a value outside its bounds, and for one of a pair."""
         super().__post_init__()
         for one, other in (
-            ("young_2", "poisson_2"),
             ("restitution", "speed"),
             ("loss_tangent", "frequency"),
         ):
@@ -76,11 +79,17 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
             must = "must not be given with a restitution: either states the damping"
             raise InvalidParameter("loss_tangent", self.loss_tangent, must)
 
-    def _of(self, one: Material, other: Material) -> dict[str, float]:
-        stated = super()._of(one, other)
-        if self.restitution is self.speed is self.loss_tangent is self.frequency is None:
-            stated |= {"restitution": restitution_between(one, other), "speed": 1.0}
-        return stated
+    @classmethod
+    def of(cls, sphere: str, shell: str, **more: float) -> HertzLaw:
+        """Build from two names of MATERIALS, with `more` parameters.
+
+        Where these state no damping, the restitution is that of the materials at 1 m/s.
+        """
+        stated = elastic_numbers(sphere, shell)
+        if not more.keys() & {"restitution", "speed", "loss_tangent", "frequency"}:
+            pair = find_material(sphere), find_material(shell)
+            stated |= {"restitution": restitution_between(*pair), "speed": 1.0}
+        return cls(**stated | more)
 
     @cached_property
     def dissipation(self) -> float:
@@ -115,9 +124,9 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
         return HuntCrossleyLaw.with_restitution(stiffness, 1.5, self.restitution, self.speed)
 
     def _numbers(self) -> list[float]:
-        """Return E*, b, tau and the fixed scale, or 0, as the compiled core takes them."""
-        scale = 0.0 if self.radius is None else 4 / 3 * math.sqrt(self.radius)
-        return [self.modulus, self.dissipation, self.relaxation_time, scale]
+        """Return the materials, b, tau and the radius, or 0, as the compiled core takes them."""
+        damping = self.dissipation, self.relaxation_time
+        return [*super()._numbers()[:4], *damping, self.radius or 0.0]
 
     @property
     def _shapeless_binding(self) -> _core.NormalLaw:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from sphshell_pin.errors import InvalidParameter, NameNotFound
-from sphshell_pin.parameters import Named, parameter
+from sphshell_pin import _core
+from sphshell_pin.errors import NameNotFound
+from sphshell_pin.parameters import parameter
 
 
 @dataclass(frozen=True)
@@ -78,24 +80,13 @@ def friction_between(one: Material, other: Material) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class TwoMaterials:
-    """Young's modulus and Poisson's ratio of sphere and shell, and the moduli of the contact.
+    """Young's modulus and Poisson's ratio of sphere and shell, and the moduli of the contact."""
 
-    `young` and `poisson` may be names of MATERIALS: those of the sphere and of the shell.
-    """
-
-    young: Named = parameter(
-        above=0,
-        unit="Pa",
-        label="Young's modulus",
-        help="Young's modulus of the sphere",
-        former="young_1",
+    young: float = parameter(
+        above=0, unit="Pa", label="Young's modulus", help="Young's modulus of the sphere"
     )
-    poisson: Named = parameter(
-        above=-1,
-        at_most=0.5,
-        label="Poisson's ratio",
-        help="Poisson's ratio of the sphere",
-        former="poisson_1",
+    poisson: float = parameter(
+        above=-1, at_most=0.5, label="Poisson's ratio", help="Poisson's ratio of the sphere"
     )
     young_2: float | None = parameter(
         None,
@@ -112,43 +103,24 @@ class TwoMaterials:
         help="Poisson's ratio of the shell; without it that of the sphere",
     )
 
-    def __post_init__(self) -> None:
-        """Put numbers in place of names; raise InvalidParameter for a value outside its bounds."""
-        if isinstance(self.young, str) and isinstance(self.poisson, str):
-            for name in ("young_2", "poisson_2"):
-                if getattr(self, name) is not None:
-                    must = "must be left out where materials are named: HertzLaw('rubber', 'steel')"
-                    raise InvalidParameter(name, getattr(self, name), must)
-            one, other = find_material(self.young), find_material(self.poisson)
-            for name, value in self._of(one, other).items():
-                object.__setattr__(self, name, value)
-        super().__post_init__()  # type: ignore[misc]  # of Component
-
-    def _of(self, one: Material, other: Material) -> dict[str, float]:
-        """Return the parameters that follow from the materials."""
-        return {
-            "young": one.young,
-            "poisson": one.poisson,
-            "young_2": other.young,
-            "poisson_2": other.poisson,
-        }
+    @cached_property
+    def _moduli(self) -> tuple[float, float, float]:
+        """E*, 8 G* and 16/3 G [Pa] of sphere and shell, by the compiled core."""
+        numbers = self.young, self.poisson, self.young_2, self.poisson_2
+        return _core.contact_moduli([math.nan if x is None else x for x in numbers])
 
     @property
-    def _both(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Young's modulus [Pa] and Poisson's ratio of the sphere, and those of the shell."""
-        return (self.young, self.poisson), (
-            self.young if self.young_2 is None else self.young_2,
-            self.poisson if self.poisson_2 is None else self.poisson_2,
-        )
-
-    @cached_property
     def modulus(self) -> float:
         """The effective modulus E* [Pa]: 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2."""
-        return 1 / sum((1 - nu**2) / young for young, nu in self._both)
+        return self._moduli[0]
 
-    @cached_property
-    def _shear_moduli(self) -> tuple[float, float]:
-        """8 G* and 16/3 G [Pa]: 1/G* = sum of (2 - nu)/G_k, 1/G = sum of 1/G_k, over both."""
-        softness = [2 * (1 + nu) / young for young, nu in self._both]
-        tangential = sum((2 - nu) * s for s, (_, nu) in zip(softness, self._both, strict=True))
-        return 8 / tangential, 16 / 3 / sum(softness)
+
+def elastic_numbers(sphere: str, shell: str) -> dict[str, float]:
+    """Return the parameters of TwoMaterials that follow from two names of MATERIALS."""
+    one, other = find_material(sphere), find_material(shell)
+    return {
+        "young": one.young,
+        "poisson": one.poisson,
+        "young_2": other.young,
+        "poisson_2": other.poisson,
+    }

@@ -10,7 +10,7 @@ import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_finite, check_type
-from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.errors import InvalidParameter, SphshellError
 from sphshell_pin.parameters import Component
 
 # Decay times that need as many steps as one period of an oscillation.
@@ -132,6 +132,10 @@ def inverse(function: Callable[[float], float], value: float) -> float:
     high = 1e-6
     while function(high) < value:
         high *= 2
+        if high > 1e6:
+            what = function.__name__.replace("_", " ")
+            said = f"the {what} of a law stays below {value:.4g} at any depth up to 1000 km"
+            raise SphshellError(f"{said}: it must grow with the depth")
     return bisect(lambda x: function(x) - value, 0.0, high)
 
 

@@ -1,8 +1,5 @@
 """Scenes of contact pairs on a Pinocchio model, and their motion."""
 
-from typing import TYPE_CHECKING
-
-from sphshell_pin.deprecation import former_names
 from sphshell_pin.dynamics.control.controllers import GravityCompensation, JointPD
 from sphshell_pin.dynamics.control.impedance import CartesianImpedance
 from sphshell_pin.dynamics.result.result import Result
@@ -71,6 +68,3 @@ __all__ = [
     "Simulation",
     "StepDerivatives",
 ]
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__, {"JointIngredients": "JointComponents"})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,9 @@ from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.dynamics.scene.scene import Scene
+
+Message = Mapping[str, object]
+"""Fields of a ROS 2 message by their names; those that are left out are zero or empty."""
 
 WORLD = "universe"
 """The root of all frames, as Pinocchio calls it."""
@@ -102,9 +105,14 @@ class Frames:
         return cls(tuple(moving.values()), tuple(fixed), spheres, others, contacts, shells)
 
 
-def quaternion(rotation: Array) -> Array:
-    """Return x, y, z, w of a rotation matrix."""
-    return np.asarray(pin.Quaternion(rotation).coeffs())
+def xyz(vector: Array) -> Message:
+    """Return a point or vector (3,) as a message."""
+    return dict(zip("xyz", np.asarray(vector, dtype=float).tolist(), strict=True))
+
+
+def quaternion(rotation: Array) -> Message:
+    """Return a rotation matrix as a message."""
+    return dict(zip("xyzw", pin.Quaternion(rotation).coeffs().tolist(), strict=True))
 
 
 def _hung(name: str, joint: int, place: pin.SE3, moving: dict[int, Moving]) -> Fixed:

@@ -7,8 +7,7 @@ import numpy as np
 from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
-from sphshell_pin.export.cdr import Message
-from sphshell_pin.export.frames import WORLD, Frames
+from sphshell_pin.export.frames import WORLD, Frames, Message, xyz
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR, POINT_COLOR, ArrowScale, pushing
 from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.robot import LINK_COLOR
@@ -19,6 +18,7 @@ Stamp = tuple[int, int]
 # Of visualization_msgs/Marker.
 ARROW, SPHERE, LINE_LIST, SPHERE_LIST, TRIANGLE_LIST = 0, 2, 5, 7, 11
 DELETEALL = 3
+_COLORS = (("r", 16), ("g", 8), ("b", 0))
 
 ROD = 0.25  # width of the skeleton's rods and size of the points, in radii of the smallest sphere
 
@@ -39,11 +39,11 @@ def _marker(
         "ns": name,
         "id": number,
         "type": kind,
-        "pose": {"orientation": (0.0, 0.0, 0.0, 1.0)},
-        "scale": scale,
-        "color": (*((color >> k & 255) / 255 for k in (16, 8, 0)), opacity),
+        "pose": {"orientation": {"w": 1.0}},
+        "scale": xyz(np.array(scale)),
+        "color": {"a": opacity} | {c: (color >> k & 255) / 255 for c, k in _COLORS},
         "frame_locked": True,
-        "points": () if points is None else points,
+        "points": [] if points is None else [xyz(point) for point in points],
     }
 
 

@@ -21,13 +21,12 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
+from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
 from sphshell_pin.errors import ResultError, import_extra
-from sphshell_pin.export.cdr import Message, encode
-from sphshell_pin.export.frames import WORLD, Frames, free_name, quaternion
+from sphshell_pin.export.frames import WORLD, Frames, Message, free_name, quaternion, xyz
 from sphshell_pin.export.markers import (
     ROD,
     body_markers,
@@ -79,50 +78,36 @@ def write_mcap(
 
     `command` goes into its metadata; `progress` gets the share that is done.
     """
-    mcap = import_extra("mcap.writer", "mcap", "Result.to_mcap")
-    run = _Run(result, _own_scene(result, scene), start)
+    mcap = import_extra("mcap_ros2.writer", "mcap", "Result.to_mcap", "mcap-ros2-support")
+    scene = scene_of(result, scene)
+    check_scene(result, scene, "the result")
+    run = _Run(result, scene, start)
     path = Path(path)
     try:
-        with atomic_file(path) as stream:
-            writer = mcap.Writer(stream)
-            writer.start(profile="ros2", library=f"sphshell_pin {_version('sphshell-pin')}")
+        with atomic_file(path) as stream, mcap.Writer(stream) as writer:
             writer.add_metadata("sphshell_pin", run.about(command))
             if result.origin is not None:
                 data = json.dumps(result.origin.settings, indent=1).encode()
                 writer.add_attachment(run.first, run.first, "settings.json", "text/json", data)
-            channels: dict[str, int] = {}
-            schemas: dict[str, int] = {}
+            schemas = {}
             counts: dict[str, int] = {}
             for logged, published, topic, kind, message, latched in run.messages():
-                if topic not in channels:
-                    if kind not in schemas:
-                        text = schema_of(kind).encode()
-                        schemas[kind] = writer.register_schema(full_name(kind), "ros2msg", text)
-                    metadata = {"offered_qos_profiles": _LATCHED} if latched else {}
-                    channels[topic] = writer.register_channel(topic, "cdr", schemas[kind], metadata)
+                if kind not in schemas:
+                    schemas[kind] = writer.register_msgdef(full_name(kind), schema_of(kind))
+                if latched:  # a channel has metadata only if it is registered by MCAP's own writer
+                    about = {"offered_qos_profiles": _LATCHED}
+                    writer._channel_ids[topic] = writer._writer.register_channel(
+                        topic, "cdr", schemas[kind].id, about
+                    )
                 counts[topic] = counts.get(topic, -1) + 1
-                data = encode(kind, message)
-                writer.add_message(channels[topic], logged, data, published, counts[topic])
+                writer.write_message(
+                    topic, schemas[kind], message, logged, published, counts[topic]
+                )
                 if progress is not None and topic == "/tf":
                     progress(counts[topic] / run.count)
-            writer.finish()
     except OSError as error:
         raise ResultError(path, f"cannot be written: {error.strerror or error}") from error
     return path
-
-
-def _own_scene(result: Result, scene: Scene | None) -> Scene:
-    """Return `scene_of`; ResultError where it has other coordinates or contacts than `result`."""
-    scene = scene_of(result, scene)
-    ran, now = (result.q.shape[1], result.v.shape[1]), (scene.model.nq, scene.model.nv)
-    pairs = tuple(pair.name for pair in scene.pairs)
-    if ran != now or pairs != tuple(result.pairs):
-        raise ResultError(
-            "the result",
-            f"is of another scene: it has nq, nv = {ran} and the contacts {result.pairs}, the "
-            f"scene nq, nv = {now} and {pairs}",
-        )
-    return scene
 
 
 class _Run:
@@ -216,7 +201,7 @@ class _Run:
             for j in several:
                 name, place = self.frames.on(j)
                 twist = place.actInv(data.v[j])
-                moving = {"linear": twist.linear, "angular": twist.angular}
+                moving = {"linear": xyz(twist.linear), "angular": xyz(twist.angular)}
                 stamped = {"header": _header(stamp, name), "twist": moving}
                 parts.append((self.twists[name], "geometry_msgs/TwistStamped", stamped))
             if len(contacts) or drawn:
@@ -246,7 +231,7 @@ class _Run:
         moved.append(_transform(stamp, WORLD, frame, pin.SE3(np.eye(3), center)))
         topic = self.topics[pair.name]
         slip = np.linalg.norm(contacts.slip_velocity_world[own], axis=1)
-        wrench = {"force": pair.force_world[row], "torque": torque}
+        wrench = _wrench(np.concatenate([pair.force_world[row], torque]))
         message = {"header": _header(stamp, frame), "wrench": wrench}
         yield f"{topic}/wrench", "geometry_msgs/WrenchStamped", message
         yield f"{topic}/normal_force", _FLOAT, {"data": pair.normal[row]}
@@ -274,7 +259,7 @@ class _Run:
         for t, sampled, values in zip(arrived, taken, log.values, strict=True):
             if columns == wrench:
                 header = _header(_split(sampled), self.stated.get(name, name))
-                read = {"header": header, "wrench": {"force": values[:3], "torque": values[3:]}}
+                read = {"header": header, "wrench": _wrench(values)}
                 yield _Sent(t, sampled, topic, "geometry_msgs/WrenchStamped", read)
             elif columns == ["closed"]:
                 yield _Sent(t, sampled, topic, "std_msgs/Bool", {"data": values[0] > 0})
@@ -309,8 +294,12 @@ def _header(stamp: tuple[int, int], frame: str) -> Message:
     return {"stamp": stamp_of(stamp), "frame_id": frame}
 
 
+def _wrench(values: Array) -> Message:
+    return {"force": xyz(values[:3]), "torque": xyz(values[3:])}
+
+
 def _transform(stamp: tuple[int, int], parent: str, name: str, place: pin.SE3) -> Message:
-    transform = {"translation": place.translation, "rotation": quaternion(place.rotation)}
+    transform = {"translation": xyz(place.translation), "rotation": quaternion(place.rotation)}
     return {"header": _header(stamp, parent), "child_frame_id": name, "transform": transform}
 
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from sphshell_pin.arrays import Array
 
-_POINT = 1e-5  # of a half axis: shorter strokes are points, with an error of its square
-
 
 def pressure(u: Array) -> Array:
     """Pressure over the peak (...) at the places u (..., 2)."""
@@ -52,35 +50,3 @@ def _lacking(t: Array, d: Array, half: Array) -> Array:
     return np.asarray(
         np.arctan2(t, d * root) - d * angle - 0.5 * d * (t * root + half * half * angle)
     )
-
-
-def stroke(start: Array, step: Array, first: float = 1.0, last: float = 1.0) -> Array:
-    """Pressure over the peak (n,), averaged while the ellipse moves by `step` (2,).
-
-    `start` (n, 2) are places seen from the ellipse's center before it moves. The peak changes
-    linearly from `first` to `last` on the way. Exact for a straight stroke: along it the pressure
-    is that of a half circle.
-    """
-    width = float(np.hypot(*step))
-    if width < _POINT:
-        return np.asarray(0.5 * (first + last) * pressure(start - 0.5 * step))
-    along = step / width
-    c = start @ along
-    # The chord of the disc on which the place moves, and what of it is passed.
-    half2 = np.maximum(0.0, 1.0 - (start * start).sum(axis=-1) + c * c)
-    half = np.sqrt(half2)
-    begin, end = np.clip(c, -half, half), np.clip(c - width, -half, half)
-    whole = (_half_disc(begin, half2, half) - _half_disc(end, half2, half)) / width
-    if first == last:
-        return np.asarray(first * whole)
-    left = np.maximum(0.0, half2 - np.stack((begin, end)) ** 2) ** 1.5
-    cube = left[0] - left[1]
-    # Of the share s = (c - x) / width of the stroke, times the pressure.
-    late = (c * whole + cube / (3.0 * width)) / width
-    return np.asarray(first * whole + (last - first) * late)
-
-
-def _half_disc(x: Array, half2: Array, half: Array) -> Array:
-    """Integral from 0 to x of sqrt(half^2 - x^2)."""
-    angle = np.arcsin(np.clip(x / np.where(half > 0.0, half, 1.0), -1.0, 1.0))
-    return np.asarray(0.5 * (x * np.sqrt(np.maximum(0.0, half2 - x * x)) + half2 * angle))

@@ -52,7 +52,8 @@ def patches_on(
     Contacts whose geometry is unknown are left out. Raises ResultError without patches.
     """
     log, patches = result.contacts, result.patches
-    chosen = np.flatnonzero(np.isin(log.pair, pairs) & (patches["half_axes"][:, 1] > 0.0))
+    known = (patches["half_axes"][:, 1] > 0.0) & np.isfinite(log.point_world).all(axis=1)
+    chosen = np.flatnonzero(np.isin(log.pair, pairs) & known)
     row = np.asarray(log.row[chosen], dtype=np.int64)
     rotations, origins = poses_along(result, scene, row, joint, placement)
 

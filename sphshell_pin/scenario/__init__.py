@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from sphshell_pin.deprecation import former_names
 from sphshell_pin.scenario.format.build import Built, build, explain_built, rebuild
 from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.schema import Scenario
@@ -29,6 +26,3 @@ __all__ = [
     "run_scenario",
     "shipped_scenarios",
 ]
-
-if not TYPE_CHECKING:
-    __getattr__ = former_names(__name__, {"Knob": "LiveParameter", "knobs_of": "live_parameters"})

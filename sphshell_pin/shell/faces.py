@@ -30,9 +30,10 @@ class Face:
     half_angle : of a cone, between its axis and its surface: negative where its radius decreases
         along the axis [rad], else None
     elements : (k,) indices of the elements on it
-    exact : whether contacts on it are those of the face in closed form; else its vertices, or its
-        borders with what is no such face, are farther from it than 4e-9 of the size, and contacts
-        are those of curved elements with its normals
+    exact : whether contacts on all of it are those of the face in closed form
+    curved : (j,) those of its elements that are not exact: a vertex, or a border with what is no
+        such face, is farther from the face than 4e-9 of the size, and contacts there are those of
+        curved elements with its normals
     name : of the CAD face; None of one that was recognized
     reason : why it is not exact, with the distance in the file's own geometry; "" if it is
     inscribed : whether it is a plane with all corners on a round face beside it: it is wider than
@@ -46,10 +47,14 @@ class Face:
     minor_radius: float | None
     half_angle: float | None
     elements: Ints = field(repr=False)
-    exact: bool
+    curved: Ints = field(repr=False)
     name: str | None = None
     reason: str = ""
     inscribed: bool = False
+
+    @property
+    def exact(self) -> bool:
+        return len(self.curved) == 0
 
 
 def faces_of(core: _core.Shell, names: Sequence[str] = ()) -> tuple[Face, ...]:
@@ -59,7 +64,9 @@ def faces_of(core: _core.Shell, names: Sequence[str] = ()) -> tuple[Face, ...]:
     kinds, numbers = core.faces
     order = np.argsort(of_element, kind="stable").astype(np.int32)
     rows, starts = np.unique(of_element[order], return_index=True)
-    exact = core.exact_faces
+    # An element of four corners is exact if both of its triangles are.
+    exact = np.ones(core.num_elements, bool)
+    np.logical_and.at(exact, core.triangle_element, core.exact_triangles.astype(bool))
     reasons = _reasons(core.inexact_faces, names)
     parts = zip(rows.tolist(), np.split(order, starts[1:]), strict=True)
     return tuple(
@@ -67,9 +74,9 @@ def faces_of(core: _core.Shell, names: Sequence[str] = ()) -> tuple[Face, ...]:
             KINDS[kinds[k]],
             numbers[k],
             some,
-            bool(exact[k]),
+            some[~exact[some]],
             names[k] if names else None,
-            "" if exact[k] else reasons.get(k, ""),
+            "" if exact[some].all() else reasons.get(k, ""),
         )
         for k, some in parts
         if k >= 0
@@ -87,7 +94,7 @@ def _reasons(inexact: Floats, names: Sequence[str]) -> dict[int, str]:
 
 
 def _face(
-    kind: str, numbers: Floats, elements: Ints, exact: bool, name: str | None, reason: str
+    kind: str, numbers: Floats, elements: Ints, curved: Ints, name: str | None, reason: str
 ) -> Face:
     point, axis = read_only(numbers[:3].copy()), read_only(numbers[3:6].copy())
     radius, second = numbers[6:].tolist()
@@ -99,7 +106,7 @@ def _face(
         second if kind == "torus" else None,
         second if kind == "cone" else None,
         read_only(elements.copy()),
-        exact,
+        read_only(curved.copy()),
         name,
         reason,
         kind == "plane" and second > 0.0,

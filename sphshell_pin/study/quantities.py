@@ -36,8 +36,6 @@ class Quantity:
     unit: str
     at: Callable[[Result, Array], Array]
     """Its values (n,) in a result at the times (n,) [s]; nan before the first one."""
-    derivatives: Callable[[Result, Array], Array] | None = None
-    """Its derivatives (n, p) by what the result has sensitivities of; None: by differences only."""
 
 
 def quantities_of(built: Built, sensors: str = "") -> dict[str, Quantity]:
@@ -87,28 +85,15 @@ def _at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
 
 
 def _of_joints(built: Built) -> list[Quantity]:
-    model, out = built.scene.model, []
-    # A coordinate whose rate is its speed has the derivatives of the tangent space.
-    tangent = {
-        joint.idx_q + i: joint.idx_v + i
-        for joint in model.joints
-        if joint.nq == joint.nv
-        for i in range(joint.nq)
-    }
-    for kind, titles in zip("qv", coordinates(model), strict=True):
-        for k, title in enumerate(titles):
-            in_v = k if kind == "v" else tangent.get(k)
-            moved = None if in_v is None else _at_rows(_state_derivatives(kind, in_v))
-            out.append(Quantity(*quantity_of(title), _at_rows(_state(kind, k)), moved))
-    return out
+    return [
+        Quantity(*quantity_of(title), _at_rows(_state(kind, k)))
+        for kind, titles in zip("qv", coordinates(built.scene.model), strict=True)
+        for k, title in enumerate(titles)
+    ]
 
 
 def _state(kind: str, column: int) -> Callable[[Result], Array]:
     return lambda result: np.asarray(getattr(result, kind)[:, column])
-
-
-def _state_derivatives(kind: str, column: int) -> Callable[[Result], Array]:
-    return lambda result: np.asarray(getattr(result.sensitivities, kind)[:, column])
 
 
 def _of_pairs(built: Built) -> list[Quantity]:
@@ -119,7 +104,6 @@ def _of_pairs(built: Built) -> list[Quantity]:
             f"pairs.{pair.name}.{name}",
             unit,
             _at_rows(_of_pair(k, name)),
-            None if name == "friction_force" else _at_rows(_pair_derivatives(k, name)),
         )
         for k, pair in enumerate(built.scene.pairs)
         for name, unit in units.items()
@@ -137,34 +121,6 @@ def _of_pair(pair: int, name: str) -> Callable[[Result], Array]:
         forces = contacts.force_world if part == "force" else contacts.friction_force_world
         whole = np.zeros(len(result.t))
         np.add.at(whole, contacts.row, forces[:, axis])
-        return whole
-
-    return of
-
-
-def _pair_derivatives(pair: int, name: str) -> Callable[[Result], Array]:
-    """Return the derivatives of `_of_pair`'s rows."""
-
-    def of(result: Result) -> Array:
-        seen, log = result.sensitivities, result.contacts
-        assert seen is not None
-        keep = np.flatnonzero(log.pair == pair)
-        rows = log.row[keep]
-        whole = np.zeros((len(result.t), len(seen.parameters)))
-        if name == "depth":
-            # The deepest contact of a row comes last.
-            order = np.lexsort((log.depth[keep], rows))
-            whole[rows[order]] = seen.depth[keep[order]]
-            return whole
-        normal = seen.normal_force[keep]
-        if name == "normal_force":
-            values = normal
-        else:
-            part, axis = name[:-2], "xyz".index(name[-1])
-            values = seen.force_world[keep, axis]
-            if part == "friction_force":
-                values = values - normal * log.normal_world[keep, axis, None]
-        np.add.at(whole, rows, values)
         return whole
 
     return of

@@ -9,8 +9,8 @@ import sphshell_pin as sp
 
 mujoco = pytest.importorskip("mujoco")
 
+from benchmarks.in_mujoco import ball  # noqa: E402
 from sphshell_pin.adapters.mujoco import attach, reserve  # noqa: E402
-from sphshell_pin.benchmarks.in_mujoco import ball  # noqa: E402
 
 LAW = sp.HuntCrossleyLaw(1e5, 1.5, 0.2)
 STIFF, STICKS = sp.HuntCrossleyLaw(1e6, 1.5, 5.0), sp.BristleFriction(0.6, 0.5, 1e4, 60.0)

@@ -16,8 +16,8 @@ from tests.shell.test_faces import torus
 
 mujoco = pytest.importorskip("mujoco")
 
+from benchmarks.in_mujoco import ball, generalized, mjcf_of  # noqa: E402
 from sphshell_pin.adapters.mujoco import attach  # noqa: E402
-from sphshell_pin.benchmarks.in_mujoco import ball, generalized, mjcf_of  # noqa: E402
 from tests.adapters.mujoco_models import LAW, SOFT, model_of, plate  # noqa: E402
 
 RNG = np.random.default_rng(0)

@@ -14,8 +14,8 @@ from sphshell_pin.errors import InvalidParameter, SphshellError
 
 mujoco = pytest.importorskip("mujoco")
 
+from benchmarks.in_mujoco import ball, text  # noqa: E402
 from sphshell_pin.adapters.mujoco import attach, reserve  # noqa: E402
-from sphshell_pin.benchmarks.in_mujoco import ball, text  # noqa: E402
 from tests.adapters.mujoco_models import (  # noqa: E402
     LAW,
     STICKS,

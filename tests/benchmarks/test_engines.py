@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin.benchmarks.peers import mujoco as peer
-from sphshell_pin.benchmarks.peers import scenes
-from sphshell_pin.benchmarks.peers.ours import Ours
-from sphshell_pin.benchmarks.peers.press import press
-from sphshell_pin.benchmarks.peers.python_loop import PYTHON, Finder, PythonLoop
+from benchmarks.peers import mujoco as peer
+from benchmarks.peers import scenes
+from benchmarks.peers.ours import Ours
+from benchmarks.peers.press import press
+from benchmarks.peers.python_loop import PYTHON, Finder, PythonLoop
 from sphshell_pin.errors import MissingExtra
 
 

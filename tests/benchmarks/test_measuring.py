@@ -7,9 +7,9 @@ import os
 
 import pytest
 
-from sphshell_pin.benchmarks import processes
-from sphshell_pin.benchmarks.peers import measuring, section, workers
-from sphshell_pin.benchmarks.peers.measuring import Ratio, Row, as_good_as, best_of, compared
+from benchmarks import processes
+from benchmarks.peers import measuring, section, workers
+from benchmarks.peers.measuring import Ratio, Row, as_good_as, best_of, compared
 
 
 def row(engine, period, energy, cost, **more):

@@ -9,11 +9,11 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
-from sphshell_pin.benchmarks import swing
-from sphshell_pin.benchmarks.peers import drake, scenes
-from sphshell_pin.benchmarks.peers.engine import CannotDo
-from sphshell_pin.benchmarks.peers.merged import merged_urdf
-from sphshell_pin.benchmarks.peers.workers import engine_called
+from benchmarks.peers import drake, scenes
+from benchmarks.peers.engine import CannotDo
+from benchmarks.peers.merged import merged_urdf
+from benchmarks.peers.workers import engine_called
+from sphshell_pin.study.report import swing
 
 SAP = {"contact": "kSap", "dt": 1e-3, "edge": 1e-3}
 EXPLICIT = {"integrator": "runge_kutta3", "max_step": 0.01, "accuracy": 1e-4, "edge": 1e-3}

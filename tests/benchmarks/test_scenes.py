@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sphshell_pin.benchmarks import swing
-from sphshell_pin.benchmarks.peers import press as press_module
-from sphshell_pin.benchmarks.peers import scenes
-from sphshell_pin.benchmarks.peers.engine import Trajectory
+from benchmarks.peers import press as press_module
+from benchmarks.peers import scenes
+from benchmarks.peers.engine import Trajectory
 from sphshell_pin.errors import MissingExtra
+from sphshell_pin.study.report import swing
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -7,6 +7,7 @@ import ctypes
 import gc
 import math
 import pickle
+import random
 import weakref
 
 import numpy as np
@@ -191,6 +192,39 @@ def test_no_number_is_refused(wrong) -> None:
         python_law(lambda depth, rate, p: "a", {}).normal_force(1.0)
     with pytest.raises(errors.InvalidParameter, match="returns a larger one, must return a number"):
         python_law(lambda depth, rate, p: 10**5000, {}).normal_force(1.0)
+
+
+def test_a_law_that_cannot_carry_the_load_is_refused_at_once() -> None:
+    calls = []
+    law = python_law(lambda depth, rate, p: calls.append(depth) or 0.0, {})
+    with pytest.raises(errors.SphshellError, match="force of a law stays below 1 at any depth"):
+        law.depth_at(1.0)
+    with pytest.raises(errors.SphshellError, match="energy of a law stays below 2 at any depth"):
+        law.depth_of(2.0)
+    assert len(calls) < 3000
+
+
+def test_the_energy_of_noise_takes_no_longer_than_that_of_jumps() -> None:
+    rng, calls = random.Random(1), []
+
+    def noise(depth, rate, p):
+        calls.append(depth)
+        return rng.random()
+
+    assert python_law(noise, {}).energy(1e-3) == pytest.approx(0.5e-3, rel=0.2)
+    assert len(calls) < 100_000
+
+
+def test_a_scene_that_is_changed_during_its_run_has_no_result() -> None:
+    def controller(t, q, v, contacts):
+        if t > 0.005 and len(scene.pairs) == 1:
+            pair = scene.pairs[0]
+            scene.add_contact(pair.sphere, pair.shell, law=TWIN, name="later")
+        return [0.0]
+
+    scene = models.on_plate(models.slider(), TWIN)
+    with pytest.raises(errors.SphshellError, match="contacts were changed during the run"):
+        sp.Simulation(scene).run([0.0499], None, 0.02, controller=controller)
 
 
 OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from sphshell_pin import HuntCrossleyLaw, ImpactLaw
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.study.validation.restitution import hunt_crossley_restitution
 from tests.oracle import laws as oracle
+from tests.validation.restitution import hunt_crossley_restitution
 
 MM = 1e-3
 DEFAULTS = ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s")

@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from sphshell_pin import ImpactLaw, Shell
-from sphshell_pin.benchmarks.surfaces import wavy_sheet
 from sphshell_pin.cli import app
+from sphshell_pin.study.report.surfaces import wavy_sheet
 from tests import meshes
 from tests.contact.helpers import energy
 from tests.contact.walks import jumps, paths

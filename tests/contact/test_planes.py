@@ -8,9 +8,9 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.study.validation.rattleback import ellipsoid
 from tests.meshes import crumpled, cube, grid_plate, icosphere, soup
 from tests.models import add_body, empty, free_q, linear_law
+from tests.validation.rattleback import ellipsoid
 
 AXES = np.array([0.2, 0.03, 0.02])
 
@@ -73,7 +73,7 @@ def test_flat_elements_touch_at_every_lowest_vertex(mesh) -> None:
         several += len(expected) > 1
         assert np.sort(depth) == pytest.approx(np.sort(-world[expected, 2]), abs=1e-14)
         order = np.argsort(depth), np.argsort(-world[expected, 2])
-        points = world[expected][order[1]]
+        points = world[expected][order[1]] * [1, 1, 0]  # in the plane, over the lowest points
         assert found.point_world[minima][order[0]] == pytest.approx(points, abs=1e-13)
         assert found.normal_world == pytest.approx(np.tile([0, 0, -1.0], (len(found.depth), 1)))
     assert (several > 20) == (len(shell.elements) not in (6, 320))  # two of them are convex
@@ -115,7 +115,7 @@ def test_spheres_and_tori_are_exact() -> None:
     for rotation in rotations(30, 2):
         found = scene.contacts(pose(rotation, 0.039))
         assert found.depth == pytest.approx([0.001], abs=1e-14)
-        assert found.point_world[0] == pytest.approx([0.3, -0.2, -0.001], abs=1e-9)
+        assert found.point_world[0] == pytest.approx([0.3, -0.2, 0.0], abs=1e-9)
 
 
 def test_limit_of_large_spheres() -> None:
@@ -131,7 +131,8 @@ def test_limit_of_large_spheres() -> None:
         ours, theirs = scene.contacts(q), large.contacts(q)
         assert ours.depth == pytest.approx(theirs.depth, abs=1e-7)
         assert ours.normal_world == pytest.approx(theirs.normal_world, abs=1e-3)
-        assert ours.point_world == pytest.approx(theirs.point_world, abs=1e-3)
+        lowest = ours.point_world + ours.depth * ours.normal_world
+        assert lowest == pytest.approx(theirs.point_world, abs=1e-3)
         assert ours.normal_force == pytest.approx(theirs.normal_force, rel=1e-3)
 
 
@@ -183,9 +184,6 @@ def test_what_a_plane_cannot_do_is_refused() -> None:
             scene_of(shell, method=method)
     with pytest.raises(InvalidParameter, match="must be a Shell"):
         scene_of(sp.Sphere(0.1, "body"))  # type: ignore[arg-type]
-    for law in (sp.FoundationLaw(1e6, 0.01), sp.HertzLaw(1e9, 0.3)):
-        with pytest.raises(InvalidParameter, match="follows from the radius"):
-            scene_of(shell, law)
     with pytest.raises(InvalidParameter, match="follows from the radius"):
         scene_of(shell, friction=sp.BristleFriction(0.4, 0.3, 1e4, 5.0, torsional=True))
     with pytest.raises(InvalidParameter, match="must not be zero"):

@@ -155,7 +155,7 @@ def test_no_work_is_done_around_many_loops(name: str, kind: str, law: str, shell
     assert worst < 1e-3
 
 
-@pytest.mark.parametrize("law", ["impact", "hunt-crossley", "table", "function"])
+@pytest.mark.parametrize("law", ["impact", "hunt-crossley", "table", "function", "foundation"])
 @pytest.mark.parametrize("name", ["seat.obj", "bottle.obj"])
 def test_no_work_is_done_by_a_plane(name: str, law: str, shells) -> None:
     """A shell that turns and sinks beside a plane, around a loop of poses."""

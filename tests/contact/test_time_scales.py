@@ -135,17 +135,17 @@ def test_bristles_ring_or_decay() -> None:
 
 def test_bristles_of_mindlin_follow_the_disc() -> None:
     disc, load = 5e-3, 50.0
-    plain = sp.BristleFriction.mindlin(0.4, None, *RUBBER)
+    plain = sp.MindlinFriction(0.4, 0.4, *RUBBER)
     stiffness = plain.tangential_stiffness(disc)
     half = math.pi * math.sqrt(MASS / stiffness)
     assert plain.slip_time(MASS, load, disc) == pytest.approx(half, rel=1e-14)
     assert plain.slip_time(MASS, load, math.nan) == plain.slip_time(MASS, load, 0.0) == math.inf
     for time in (1e-4, 1.0):
-        damped = sp.BristleFriction.mindlin(0.4, None, *RUBBER, damping_time=time)
+        damped = sp.MindlinFriction(0.4, 0.4, *RUBBER, damping_time=time)
         expected = min(half, 20 * MASS / (time * stiffness))
         assert damped.slip_time(MASS, load, disc) == pytest.approx(expected, rel=1e-14)
     for speed in (1e-5, 10.0):
-        rolls = sp.BristleFriction.mindlin(0.4, None, *RUBBER, rolling=0.02, rolling_speed=speed)
+        rolls = sp.MindlinFriction(0.4, 0.4, *RUBBER, rolling=0.02, rolling_speed=speed)
         expected = min(half, 20 * MASS * speed / (1.5 * 0.02 * load))
         assert rolls.slip_time(MASS, load, disc) == pytest.approx(expected, rel=1e-14)
         light = min(half, 20 * MASS * speed / (1.5 * 0.02 * 0.5))

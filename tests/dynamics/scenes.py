@@ -37,13 +37,9 @@ FRICTIONS = {
     "coulomb": sp.CoulombFriction(0.3, 0.1, 0.1, 1.0),
     "bristle": sp.BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05),
     "soft finger": sp.BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05, torsional=True),
-    "mindlin": sp.BristleFriction.mindlin(0.5, 0.3, 5e3, 0.3, 2e4, 0.45, torsional=True, **MINDLIN),
-    "rings": sp.BristleFriction.mindlin(
-        0.5, 0.3, 5e3, 0.3, v_stribeck=0.05, torsional=True, rings=3
-    ),
-    "many rings": sp.BristleFriction.mindlin(
-        0.5, 0.3, 5e3, 0.3, damping_time=1e-3, rolling=0.1, rings=7
-    ),
+    "mindlin": sp.MindlinFriction(0.5, 0.3, 5e3, 0.3, 2e4, 0.45, torsional=True, **MINDLIN),
+    "rings": sp.MindlinFriction(0.5, 0.3, 5e3, 0.3, v_stribeck=0.05, torsional=True, rings=3),
+    "many rings": sp.MindlinFriction(0.5, 0.3, 5e3, 0.3, damping_time=1e-3, rolling=0.1, rings=7),
 }
 COULOMB, BRISTLE = FRICTIONS["coulomb"], FRICTIONS["bristle"]
 BRISTLES = [name for name in FRICTIONS if name not in ("none", "coulomb")]

@@ -287,3 +287,11 @@ def test_geometry_stays_on_its_joint_whatever_the_frames_are_called() -> None:
     geometry.addCollisionPair(pair)
     (made,) = Scene.from_geometry(model, geometry, LAW).pairs
     assert made.placement_i.isApprox(place)
+
+
+def test_a_law_that_nobody_states_is_warned_of() -> None:
+    scene = Scene(ball())
+    with pytest.warns(FutureWarning, match=r"law=ImpactLaw\.from_adams") as caught:
+        pair = scene.add_contact(BALL, plate())
+    assert caught[0].filename == __file__
+    assert pair.law == sp.ImpactLaw.from_adams()

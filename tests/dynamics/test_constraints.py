@@ -17,7 +17,7 @@ RADIUS, MASS, DT = 0.02, 0.26, 1e-3
 def ball_on_a_slope(angle: float, mu: float | None):
     """A steel ball that rests on a slope, turned in its joint, and its configuration."""
     model = ball(9.81, MASS, RADIUS)
-    law, turn = sp.HertzLaw("steel", "steel"), pin.exp3(np.array([0.0, angle, 0.0]))
+    law, turn = sp.HertzLaw.of("steel", "steel"), pin.exp3(np.array([0.0, angle, 0.0]))
     plate = sp.Shell(*meshes.grid_plate(size=2.0, quads=True))
     friction = None if mu is None else sp.CoulombFriction(mu, mu)
     scene = sp.Scene(model)

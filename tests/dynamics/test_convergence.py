@@ -9,8 +9,8 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.study.validation.restitution import hunt_crossley_restitution
 from tests import models
+from tests.validation.restitution import hunt_crossley_restitution
 
 MM, RADIUS = 1e-3, 0.05
 SMOOTH_FRICTION = sp.CoulombFriction(0.3, 0.1, 20.0, 40.0)

@@ -19,7 +19,7 @@ R = 0.02
 RUBBER, STEEL = (4e6, 0.48), (2.1e11, 0.3)
 UP, ALONG = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 LAW = sp.ImpactLaw.hertz(R, *RUBBER, *STEEL)
-STICKS = sp.BristleFriction.mindlin(1e3, None, *RUBBER, *STEEL, torsional=True)
+STICKS = sp.MindlinFriction(1e3, 1e3, *RUBBER, *STEEL, torsional=True)
 
 
 def shear(young: float, poisson: float) -> float:
@@ -37,8 +37,8 @@ def disc(depth: float) -> float:
 
 def test_stiffness_of_equal_bodies() -> None:
     """Of one material 8 G* a is 4 G a / (2 - nu), and 16/3 G a^3 of two is 8/3 of one's."""
-    one = sp.BristleFriction.mindlin(0.5, 0.4, *RUBBER)
-    both = sp.BristleFriction.mindlin(0.5, 0.4, *RUBBER, *RUBBER)
+    one = sp.MindlinFriction(0.5, 0.4, *RUBBER)
+    both = sp.MindlinFriction(0.5, 0.4, *RUBBER, *RUBBER)
     for law in (one, both):
         assert law.tangential_stiffness(0.01) == pytest.approx(
             4 * shear(*RUBBER) * 0.01 / (2 - RUBBER[1]), rel=1e-14
@@ -106,7 +106,7 @@ def test_damping_scales_with_the_stiffness() -> None:
     """With damping_time = 2 zeta / omega a motion at omega is damped by zeta."""
     depth, zeta = 1e-3, 0.2
     omega = math.sqrt(STICKS.tangential_stiffness(disc(depth)))
-    friction = sp.BristleFriction.mindlin(1e3, None, *RUBBER, *STEEL, damping_time=2 * zeta / omega)
+    friction = sp.MindlinFriction(1e3, 1e3, *RUBBER, *STEEL, damping_time=2 * zeta / omega)
     scene = held_ball(pin.JointModelPX(), depth, friction, pin.Inertia.FromSphere(1.0, R))
     run = sp.Simulation(scene, sp.Adaptive(1e-9)).run([0.0], [1e-3], 3 / omega)
     fast = omega * math.sqrt(1 - zeta**2)
@@ -126,7 +126,7 @@ def test_loading_curve_of_mindlin(rings: int, bound: float) -> None:
     A mass comes in at a speed and stops where the curve has taken its energy, at 0.8 s_0.
     """
     depth = 1e-3
-    friction = sp.BristleFriction.mindlin(0.5, None, *RUBBER, *STEEL, rings=rings)
+    friction = sp.MindlinFriction(0.5, 0.5, *RUBBER, *STEEL, rings=rings)
     limit = 0.5 * LAW.normal_force(depth)
     s_0 = 1.5 * limit / friction.tangential_stiffness(disc(depth))
     taken = limit * s_0 * (0.8 + 0.4 * (0.2**2.5 - 1))
@@ -145,7 +145,7 @@ def test_spheres_that_were_stated_together_have_rings_of_their_own() -> None:
     ends = []
     for together in (True, False):
         scene = sp.Scene(models.ball())
-        friction = sp.BristleFriction.mindlin(0.3, None, *SOFT, rings=4, torsional=True)
+        friction = sp.MindlinFriction(0.3, 0.3, *SOFT, rings=4, torsional=True)
         spheres = [sp.Sphere(0.02, "ball", offset=(x, 0.0, -0.03)) for x in (-0.02, 0.02)]
         if together:
             scene.add_contacts(spheres, models.plate(), law=DEEP_LAW, friction=friction)
@@ -187,10 +187,8 @@ def test_a_run_goes_on_with_as_many_rings() -> None:
 @pytest.mark.parametrize("rings", [1, 3])
 def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -> None:  # type: ignore[no-untyped-def]
     """The ball sticks, spins and rolls while the depth grows, or falls, all the time."""
-    friction = sp.BristleFriction.mindlin(
-        5.0, None, *SOFT, torsional=True, damping_time=1e-3, rolling=0.01, rolling_speed=10.0,
-        rings=rings,
-    )  # fmt: skip
+    more = {"damping_time": 1e-3, "rolling": 0.01, "rolling_speed": 10.0, "rings": rings}
+    friction = sp.MindlinFriction(5.0, 5.0, *SOFT, torsional=True, **more)
     scene = models.on_plate(models.ball(gravity=0.0), DEEP_LAW, friction)
     depth = 0.008 if parts else 0.003
     v = np.array([0.02, -0.03, 0.05 if parts else -0.5, 0.3, 0.2, 1.0])
@@ -219,7 +217,7 @@ def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyp
     model.gravity.linear = 9.81 * np.array([math.sin(angle), 0.0, -math.cos(angle)])
     models.add_body(model, "ball", pin.JointModelTranslation())
     law = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT, restitution=0.1, speed=0.1)
-    friction = sp.BristleFriction.mindlin(0.5, 0.4, *SOFT, damping_time=0.01)
+    friction = sp.MindlinFriction(0.5, 0.4, *SOFT, damping_time=0.01)
     scene = models.on_plate(model, law, friction)
     start = [0.0, 0.0, 0.05 - law.depth_at(9.81 * math.cos(angle))]
     run = sp.Simulation(scene, integrator).run(start, duration=4.0, record_dt=1.0)
@@ -235,7 +233,7 @@ def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyp
 def test_a_spin_dies_out_at_the_moment_limit(rings: int) -> None:
     """M = 3 pi / 16 mu N a."""
     depth = 1e-3
-    friction = sp.BristleFriction.mindlin(0.4, None, *RUBBER, *STEEL, torsional=True, rings=rings)
+    friction = sp.MindlinFriction(0.4, 0.4, *RUBBER, *STEEL, torsional=True, rings=rings)
     inertia = pin.Inertia.FromSphere(1.0, R)
     scene = held_ball(pin.JointModelRZ(), depth, friction, inertia)
     moment = 3 * math.pi / 16 * 0.4 * LAW.normal_force(depth) * disc(depth)
@@ -255,8 +253,8 @@ class TestRolling:
         model = models.ball()
         model.gravity.linear = 9.81 * np.array([math.sin(slope), 0.0, -math.cos(slope)])
         law = sp.ImpactLaw.hertz(0.05, 1e9, 0.3, 1e9, 0.3, restitution=0.1, speed=0.1)
-        friction = sp.BristleFriction.mindlin(
-            0.5, None, 1e9, 0.3, rolling=self.COEFFICIENT, rolling_speed=rolling_speed
+        friction = sp.MindlinFriction(
+            0.5, 0.5, 1e9, 0.3, rolling=self.COEFFICIENT, rolling_speed=rolling_speed
         )
         scene = models.on_plate(model, law, friction)
         q = models.free_q([-0.3, 0, 0.05 - law.depth_at(9.81 * math.cos(slope))])
@@ -287,7 +285,7 @@ def test_friction_is_continuous_over_a_groove(rings: int) -> None:
     shell = sp.Shell(*meshes.v_groove(math.radians(5), size=2.0, cells=6))
     scene = sp.Scene(models.ball(radius=0.1))
     law = sp.HuntCrossleyLaw(3e5, 1.5, 0.5)
-    friction = sp.BristleFriction.mindlin(
+    friction = sp.MindlinFriction(
         0.4, 0.3, 1e6, 0.4, torsional=True, damping_time=1e-4, rings=rings
     )
     scene.add_contact(sp.Sphere(0.1, "ball"), shell, law=law, friction=friction)
@@ -320,6 +318,6 @@ def test_a_wrench_needs_the_radius() -> None:
         sp.contact_wrench(
             np.zeros(3), UP, 1e-4, still, still, LAW, replace(STICKS, rings=2), sp.BristleState(R)
         )
-    plain = sp.BristleFriction.mindlin(0.5, 0.4, *RUBBER)
+    plain = sp.MindlinFriction(0.5, 0.4, *RUBBER)
     with pytest.raises(InvalidParameter, match="must be the sphere's, of Mindlin's friction"):
         sp.contact_wrench(np.zeros(3), UP, 1e-4, still, still, LAW, plain, sp.BristleState())

@@ -18,7 +18,7 @@ R = 0.02
 RUBBER, STEEL = (4e6, 0.48), (2.1e11, 0.3)
 UP = np.array([0.0, 0.0, 1.0])
 LAW = sp.ImpactLaw.hertz(R, *RUBBER, *STEEL)
-STICKS = sp.BristleFriction.mindlin(1e3, None, *RUBBER, *STEEL, torsional=True)
+STICKS = sp.MindlinFriction(1e3, 1e3, *RUBBER, *STEEL, torsional=True)
 
 
 def disc(depth: float) -> float:
@@ -83,7 +83,7 @@ def test_cycle_of_elata_and_berryman() -> None:
 def test_no_closed_path_gains_energy(seed: int, mu: float) -> None:
     """Random loops in depth, slip and twist, again and again: friction only takes work."""
     rng = np.random.default_rng(seed)
-    friction = sp.BristleFriction.mindlin(mu, None, *RUBBER, *STEEL, torsional=True)
+    friction = sp.MindlinFriction(mu, mu, *RUBBER, *STEEL, torsional=True)
     phase = rng.uniform(0, 2 * math.pi, (4, 3))
     size = rng.normal(size=(4, 3)) * np.array([[0.3], [0.05], [0.05], [0.5]])
     number = np.arange(1, 4)
@@ -119,7 +119,7 @@ def bristle(seed: int) -> tuple[float, sp.NormalLaw, sp.BristleFriction, float]:
 
 def mindlin(seed: int) -> tuple[float, sp.NormalLaw, sp.MindlinFriction, float]:
     rolling, rings = 0.01 * (seed // 2), 1 + seed
-    friction = sp.BristleFriction.mindlin(
+    friction = sp.MindlinFriction(
         0.3, 0.25, 1e6, 0.4, torsional=bool(seed % 2), rolling=rolling, rings=rings
     )
     return 0.1, sp.HuntCrossleyLaw(3e5, 1.5, 0.3), friction, 0.0

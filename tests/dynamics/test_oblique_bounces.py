@@ -15,7 +15,7 @@ from tests.oracle import oblique
 ALUMINA_GLASS = (380e9, 0.23, 70e9, 0.25)
 BALL, DENSITY, MU, SPEED = 2.5e-3, 4000.0, 0.092, 3.9
 ELASTIC = sp.ImpactLaw.hertz(BALL, *ALUMINA_GLASS)
-KHARAZ = sp.BristleFriction.mindlin(MU, None, *ALUMINA_GLASS)
+KHARAZ = sp.MindlinFriction(MU, MU, *ALUMINA_GLASS)
 KAPPA = oblique.kappa(*ALUMINA_GLASS)
 
 

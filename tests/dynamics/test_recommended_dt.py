@@ -63,7 +63,7 @@ FRICTIONS = {
     "coulomb": sp.CoulombFriction(0.5, 0.3, 1e-4, 0.1),
     "bristle": sp.BristleFriction(0.5, 0.5, 1e8),
     "damped bristle": sp.BristleFriction(0.5, 0.5, 1e6, 1e6),
-    "mindlin": sp.BristleFriction.mindlin(0.4, None, 1e9, 0.4),
+    "mindlin": sp.MindlinFriction(0.4, 0.4, 1e9, 0.4),
 }
 
 
@@ -358,7 +358,7 @@ def test_what_cannot_move_along_the_normal_has_no_time_scales() -> None:
     scene.replace_pair("ball-plate", friction=sp.BristleFriction(0.5, 0.5, 1e6))
     found = scene.explain().pairs[0].shortest_time
     assert found == pytest.approx(math.pi * math.sqrt(MASS / 1e6), rel=1e-9)
-    friction = sp.BristleFriction.mindlin(0.5, None, 1e9, 0.3)
+    friction = sp.MindlinFriction(0.5, 0.5, 1e9, 0.3)
     below = models.pin.SE3(np.eye(3), np.array([0.0, 0.0, -2 * RADIUS]))
     apart = models.on_plate(model, ELASTIC["linear"], friction, placement=below)
     assert apart.explain().pairs[0].shortest_time == math.inf
@@ -368,7 +368,7 @@ def test_what_cannot_move_along_the_normal_has_no_time_scales() -> None:
 def test_the_disc_of_mindlin_is_that_of_both_spheres(speed: float) -> None:
     """At the larger of the depths of the start and of the impact."""
     scene, law = two_bodies(models.pin.JointModelTranslation), sp.ImpactLaw(1e6, 1.0)
-    friction = sp.BristleFriction.mindlin(0.4, None, 1e9, 0.4)
+    friction = sp.MindlinFriction(0.4, 0.4, 1e9, 0.4)
     scene.add_contact(sp.Sphere(0.2, "one"), sp.Sphere(0.1, "two"), law=law, friction=friction)
     for pressed in (-1e-3, 1e-3):
         q, v = [0.0, 0.0, -pressed, 0.0, 0.0, 0.0], [0.0, 0.0, -speed, 0.0, 0.0, 0.0]

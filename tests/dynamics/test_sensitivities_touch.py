@@ -23,7 +23,7 @@ LAWS = {
 FRICTIONS = {
     "coulomb": COULOMB,
     "bristle": BRISTLE,
-    "mindlin": sp.BristleFriction.mindlin(0.4, 0.3, 2e7, 0.3, damping_time=1e-5),
+    "mindlin": sp.MindlinFriction(0.4, 0.3, 2e7, 0.3, damping_time=1e-5),
 }
 # Half axes of an ellipsoid [m].
 AXES = np.array([0.25, 0.2, 0.15])

@@ -8,8 +8,8 @@ from functools import cache
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.work_precision import cost_at, measure
-from sphshell_pin.benchmarks.work_precision_cases import Judge, bowl, press, stick_slip
+from sphshell_pin.study.report.integrators import cost_at, measure
+from sphshell_pin.study.report.motions import Judge, bowl, press, stick_slip
 
 CASES = {
     "bowl": lambda: replace(bowl(), duration=0.2),

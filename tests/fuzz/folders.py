@@ -19,7 +19,8 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
 from tests.fuzz import tables
 from tests.fuzz.meshes import SHAPES, WRITERS, Mesh, damaged_mesh
-from tests.fuzz.mutate import LARGEST, NUMBERS, alter, damage
+from tests.fuzz.mutate import LARGEST, NUMBERS, alter, damage, repeated
+from tests.fuzz.strangers import mesh_corpus as drawn_corpus
 from tests.kept import scenes
 
 DATA = Path(__file__).parents[1] / "data"
@@ -118,13 +119,16 @@ def mesh_corpus() -> tuple[bytes, ...]:
         "buffers": [{"uri": uri, "byteLength": 102}],
     }
     files |= {".dae": DAE.encode(), ".gltf": json.dumps(gltf).encode()}
-    made = []
+    files[".obj"] = b"mtllib mesh.mtl\n" + files[".obj"]
+    parts = {"mesh.mtl": b"newmtl a\nmap_Kd mesh.mtl\n", "mesh.bin": buffer}
+    beside = {"mesh.gltf": json.dumps(gltf).replace(uri, "mesh.bin").encode(), **parts}
+    made = [tables.pack({"robot.urdf": ROBOT.replace("MESH", "mesh.gltf").encode(), **beside})]
     for suffix, data in files.items():
         for name, text in (("robot.urdf", ROBOT), ("robot.xml", MJCF)):
             robot = text.replace("MESH", f"mesh{suffix}")
-            if suffix == ".dae":  # whose mass only a further package can tell
+            if suffix not in (".stl", ".obj"):  # whose mass MuJoCo cannot tell
                 robot = robot.replace("<geom ", f"{INERTIAL}<geom ")
-            made.append(tables.pack({name: robot.encode(), f"mesh{suffix}": data}))
+            made.append(tables.pack({name: robot.encode(), f"mesh{suffix}": data, **parts}))
     return tuple(made)
 
 
@@ -160,6 +164,19 @@ def results_corpus() -> tuple[bytes, ...]:
         result, _ = simulate(build(scenario, changes))
         run = tables.reproducible(result.save(home / "run.npz"))
         return (tables.pack({"run.npz": run}),)
+
+
+def damaged_kept(rng: random.Random, data: bytes) -> bytes:
+    """Return results in which a mesh that shows a robot is a damaged one of its format."""
+    with np.load(io.BytesIO(unpacked(data)["run.npz"])) as file:
+        arrays = dict(file)
+    robots = json.loads(str(arrays["header"]))["origin"]["kept"]["robots"]
+    meshes = [item for one in robots if one for item in one["meshes"].items()]
+    for name, digest in rng.choices(sorted(meshes), k=rng.choice((1, 1, 2))):
+        suffix = PurePath(name).suffix
+        content = damaged(rng, STRUCTURES[suffix], rng.choice(drawn_corpus(suffix)))
+        arrays[f"kept.file.{digest}"] = np.frombuffer(content, np.uint8)
+    return tables.pack({"run.npz": tables.packed(arrays)})
 
 
 def damaged_csv(rng: random.Random, data: bytes) -> bytes:
@@ -211,7 +228,10 @@ def damaged(
 ) -> bytes:
     """Return `data` with its structure changed, or some of its bytes."""
     # Of an archive with other bytes, all is refused at once.
-    if structure is None or (structure is not damaged_folder and rng.random() < 0.4):
+    archives = (damaged_folder, damaged_kept)
+    if structure not in archives and rng.random() < 0.05:
+        return repeated(rng, data)
+    if structure is None or (structure not in archives and rng.random() < 0.4):
         return damage(rng, data, others)
     try:
         return structure(rng, data)

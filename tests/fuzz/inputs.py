@@ -14,6 +14,7 @@ from sphshell_pin.robots.plain_mesh import FORMATS
 from tests.fuzz import folders, readers, strangers, tables
 from tests.fuzz.folders import STRUCTURES, Structure, damaged
 from tests.fuzz.meshes import SHAPES, WRITERS
+from tests.fuzz.special import read_special
 
 CORPUS = Path(__file__).parents[1] / "data" / "corpus"
 Corpus = Callable[[], tuple[bytes, ...]]
@@ -81,6 +82,13 @@ KINDS: dict[str, Kind] = {
     "packages": _folder("packages", folders.package_corpus, readers.read_robot_in),
     "meshes": _folder("meshes", folders.mesh_corpus, readers.read_robot_in),
     "results": _folder("results", folders.results_corpus, readers.read_run),
+    "kept": Kind(
+        ".kept.zip",
+        folders.results_corpus,
+        folders.damaged_kept,
+        readers.look_in,
+    ),
+    "special": Kind(".special", lambda: (b"",), lambda rng, _: rng.randbytes(8), read_special),
     "expression": Kind(
         ".expression", strangers.expression_corpus, strangers.expression, strangers.read_expression
     ),

@@ -142,8 +142,8 @@ def _lines(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
     return b"".join(lines)
 
 
-def _many(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
-    """Insert a word of the file 100 000 times: what takes the square of its length shows."""
+def repeated(rng: random.Random, data: bytes, _: Sequence[bytes] = ()) -> bytes:
+    """Return `data` with a word of it 100 000 times: what takes the square of its length shows."""
     words = data.split(None, 200)[:200]
     word = rng.choice(words)[:12] if words else b"a"
     at = rng.randrange(len(data) + 1)
@@ -158,7 +158,7 @@ def _nest(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
 
 _WAYS = (
     *(_flip, _flip, _overwrite, _integer, _real, _insert, _delete, _repeat, _truncate, _splice),
-    *(_number, _number, _number, _digit, _lines, _lines, _nest, _many),
+    *(_number, _number, _number, _digit, _lines, _lines, _nest, repeated),
 )
 
 

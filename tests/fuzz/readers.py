@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import tempfile
 import zipfile
 import zlib
@@ -19,7 +20,6 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.export.mcap import write_mcap
 from sphshell_pin.export.tables import write_tables
 from sphshell_pin.patches import TaxelGrid
-from sphshell_pin.patches.wear import save_wear, wear_maps
 from sphshell_pin.plot.compare import plot_compare
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.replay import Replay
@@ -83,16 +83,16 @@ def _use(robot: robots.LoadedRobot) -> None:
 
 def in_folder(read: Callable[[Path], None]) -> Callable[[Path], None]:
     """Return what unpacks an archive, and reads the folder with `read`."""
+    return functools.partial(_unpack_and_read, read)
 
-    def unpack_and_read(path: Path) -> None:
-        # Always another folder: what one package.xml states is kept by its path.
-        with tempfile.TemporaryDirectory(dir=path.parent) as place:
-            with zipfile.ZipFile(path) as archive:
-                archive.extractall(place)
-            prepare(Path(place))
-            read(Path(place))
 
-    return unpack_and_read
+def _unpack_and_read(read: Callable[[Path], None], path: Path) -> None:
+    # Always another folder: what one package.xml states is kept by its path.
+    with tempfile.TemporaryDirectory(dir=path.parent) as place:
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(place)
+        prepare(Path(place))
+        read(Path(place))
 
 
 def read_robot_in(home: Path) -> None:
@@ -116,7 +116,8 @@ def read_measured(path: Path) -> None:
 def read_run(home: Path) -> None:
     """Look at the results in a folder in one of the ways that there are, or two."""
     run = home / "run.npz"
-    number = zlib.crc32(run.read_bytes()) if run.exists() else 0
+    whole = run.is_file() and run.stat().st_size < 1e7
+    number = zlib.crc32(run.read_bytes()) if whole else 0
     fault = None
     for way in (LOOKS[0], LOOKS[number % len(LOOKS)]):
         try:
@@ -127,18 +128,15 @@ def read_run(home: Path) -> None:
         raise fault
 
 
+look_in = in_folder(read_run)
+
+
 def _replay(home: Path) -> None:
     player = player_of(home)
     player.advance(1e-2)
     player.seek(0.02)
     for kind in player.series:
         kind.values(player.now)
-
-
-def _wear(home: Path) -> None:
-    replay = Replay(home / "run.npz")
-    maps = wear_maps(replay.result, 1e-9, replay.scene)
-    save_wear(maps, home)
 
 
 def _taxels(home: Path) -> None:
@@ -184,7 +182,7 @@ def _plot(kind: str) -> Callable[[Path], None]:
 
 
 LOOKS = (
-    *(_replay, _mcap, _export("csv"), _export("parquet"), _compare, _recording, _taxels, _wear),
+    *(_replay, _mcap, _export("csv"), _export("parquet"), _compare, _recording, _taxels),
     *(_save, *map(_plot, ("overview", "force", "energy", "sensors", "path", "map"))),
 )
 """Everything that shows or exports the results in a folder."""

@@ -7,7 +7,6 @@ import io
 import json
 import math
 import random
-import sqlite3
 import tempfile
 import tomllib
 import xml.etree.ElementTree as ET
@@ -134,7 +133,7 @@ def reproducible(path: Path) -> bytes:
     header = json.loads(str(arrays["header"]).replace(str(path.parent), "/home"))
     header["stats"] |= {"wall_time": 0.0, "real_time_factor": 0.0}
     arrays["header"] = np.array(json.dumps(header))
-    return pack({f"{name}.npy": _npy(array) for name, array in arrays.items()})
+    return packed(arrays)
 
 
 def pack(members: dict[str, bytes]) -> bytes:
@@ -187,8 +186,13 @@ def damaged_npz(rng: random.Random, data: bytes) -> bytes:
             rng.choice(_ARRAY_WAYS)(rng, arrays, name)
     if rng.random() < 0.1:
         members["t.npy"] = _lying_npy(rng)
-    packed = {f"{k}.npy": _npy(a, pickled=a.dtype.hasobject) for k, a in arrays.items()}
-    return pack(packed | members)
+    return packed(arrays, members)
+
+
+def packed(arrays: dict[str, Any], members: dict[str, bytes] | None = None) -> bytes:
+    """Return a file of NumPy's with the arrays, and `members` in the place of some."""
+    files = {f"{k}.npy": _npy(a, pickled=a.dtype.hasobject) for k, a in arrays.items()}
+    return pack(files | (members or {}))
 
 
 def _lying_npy(rng: random.Random) -> bytes:
@@ -319,20 +323,14 @@ def journal_corpus() -> tuple[bytes, ...]:
 
 def damaged_journal(rng: random.Random, data: bytes) -> bytes:
     """Return a journal some of whose values were changed, but not their checksums."""
-    with tempfile.TemporaryDirectory() as home:
-        path = Path(home) / "journal"
-        path.write_bytes(data)
-        journal = sqlite3.connect(path)
-        table = rng.choice(("runs", "runs", "sweep"))
-        names = [row[1] for row in journal.execute(f"PRAGMA table_info({table})")]
-        for _ in range(rng.choice((1, 1, 2))):
-            name, row = rng.choice(names), rng.randrange(1, 5)
-            (old,) = journal.execute(f"SELECT {name} FROM {table}").fetchall()[0]
-            new = rng.choice((None, 1, 0.5, "", "[]", b"\xff", old, f"{old}0", "[" * 100_000))
-            journal.execute(f"UPDATE OR IGNORE {table} SET {name} = ? WHERE rowid = ?", (new, row))
-        journal.commit()
-        journal.close()
-        return path.read_bytes()
+    lines = data.split(b"\n")
+    for _ in range(rng.choice((1, 1, 2))):
+        k = rng.randrange(len(lines) - 1)
+        values = json.loads(lines[k])
+        name = rng.choice([*values])
+        values[name] = rng.choice((None, 1, 0.5, "", "[]", {}, [values[name]], "[" * 100_000))
+        lines[k] = json.dumps(values).encode()
+    return b"\n".join(lines)
 
 
 def urdf_corpus() -> tuple[bytes, ...]:

@@ -8,31 +8,58 @@ from __future__ import annotations
 import argparse
 import importlib
 import itertools
+import multiprocessing
+import os
 import sys
-from pathlib import Path
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import cache
 
-from sphshell_pin.benchmarks.hard_cases import measure
-from sphshell_pin.cases.contents import Verdict, verdicts_table
-from sphshell_pin.cases.measured import Measured, write
-from tests.hard_cases.verdict import CASES
+from benchmarks.measured import Measured, write
+from tests.hard_cases.verdict import CASES, Case, Verdict, verdicts_table
 
 NAME = "hard_cases"
-collect = CASES.collect
+MOST_PROCESSES = 4
+collect = cache(CASES.collect)
 
 
 def row(verdict: Verdict) -> list[str]:
-    return verdicts_table([verdict], grouped=False).cells[0]
+    return verdicts_table([verdict]).cells[0]
+
+
+def about(module: str) -> tuple[str, str]:
+    """Return the heading of a module's cases and the text above their table."""
+    heading, _, text = (importlib.import_module(module).__doc__ or module).strip().partition(".")
+    return heading, text.strip()
+
+
+def verdicts(number: int, quick: bool, only: str | None) -> list[Verdict]:
+    """Return the verdicts of a case; the group is the heading of its module."""
+    case: Case = collect(quick=quick, only=only)[number]
+    return [replace(verdict, group=about(case.module)[0]) for verdict in case.verdicts()]
+
+
+def measure(quick: bool = False, only: str | None = None) -> list[Verdict]:
+    """Run the cases in fresh interpreters, on all cores: a case may change its process."""
+    count = len(collect(quick=quick, only=only))
+    workers = min(MOST_PROCESSES, os.cpu_count() or 1)
+    context = multiprocessing.get_context("spawn")
+    found: list[Verdict] = []
+    with ProcessPoolExecutor(workers, context) as pool:
+        runs = [pool.submit(verdicts, k, quick, only) for k in range(count)]
+        for k, run in enumerate(runs, 1):
+            found += run.result()
+            print(f"\r{k / count:.0%}", end="", file=sys.stderr, flush=True)
+    return found
 
 
 def sections(found: list[Verdict]) -> list[Measured]:
-    """Return what the site shows: a section for each module."""
+    """Return the data of the page: a section for each module."""
     wrong = sum(not verdict.ok for verdict in found)
     parts = [Measured(text=f"{len(found)} verdicts, {wrong} of them out of bounds.")]
-    docs = [(importlib.import_module(name).__doc__ or "").strip() for name in CASES.modules]
-    texts = {heading: text.strip() for heading, _, text in (doc.partition(".") for doc in docs)}
+    texts = dict(map(about, CASES.modules))
     for heading, some in itertools.groupby(found, key=lambda verdict: verdict.group):
-        table = verdicts_table(list(some), grouped=False)
-        parts.append(Measured.of(table, heading, texts[heading]))
+        parts.append(Measured.of(verdicts_table(list(some)), heading, texts[heading]))
     return parts
 
 
@@ -47,12 +74,7 @@ def main() -> int:
     options = parser.parse_args()
     if options.write and (options.quick or options.only):
         parser.error("--write needs all cases: leave out --quick and --only")
-
-    def progress(share: float) -> None:
-        print(f"\r{share:.0%}", end="", file=sys.stderr, flush=True)
-
-    root = Path(__file__).parents[2]
-    found = measure(root, quick=options.quick, only=options.only, progress=progress).rows
+    found = measure(options.quick, options.only)
     for verdict in found:
         name, tried, _, expected, measured, error, bound, word = row(verdict)
         figures = f"{expected:>13.30s} {measured:>13.40s} {error:>8s} <= {bound:>5s} {word}"

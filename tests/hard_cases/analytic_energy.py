@@ -14,8 +14,8 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks import swing
-from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
+from sphshell_pin.study.report import swing
+from sphshell_pin.study.report.surfaces import Mesh, icosphere
 from tests import models
 from tests.hard_cases import surfaces
 from tests.hard_cases.analytic_impact import (

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.analytic_cases import FALL, bounce
-from sphshell_pin.study.validation.restitution import hunt_crossley_restitution
+from sphshell_pin.study.report.closed_forms import FALL, bounce
 from tests import models
 from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (
@@ -30,6 +29,7 @@ from tests.hard_cases.balls import (
     velocities,
 )
 from tests.hard_cases.verdict import Verdict, Verdicts, case, compare
+from tests.validation.restitution import hunt_crossley_restitution
 
 PRECISE = sp.Adaptive(1e-9)
 GAP = 1e-4

@@ -14,10 +14,9 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks import rolling
-from sphshell_pin.benchmarks.swing import ball_model
 from sphshell_pin.dynamics import Result
-from tests import models
+from sphshell_pin.study.report.swing import ball_model
+from tests import models, rolling
 from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (
     BALL,

@@ -14,9 +14,9 @@ import numpy as np
 
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks import rolling
-from sphshell_pin.benchmarks.swing import ball_model, downward_crossings, mean_period
 from sphshell_pin.dynamics import Result
+from sphshell_pin.study.report.swing import ball_model, downward_crossings, mean_period
+from tests import rolling
 from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (
     BALL,

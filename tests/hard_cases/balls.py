@@ -12,9 +12,9 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.rolling import PRECISE, RATIO, Ball, state, turned, velocities
-from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
 from sphshell_pin.dynamics import Result
+from sphshell_pin.study.report.swing import GRAVITY, MASS, RADIUS
+from tests.rolling import PRECISE, RATIO, Ball, state, turned, velocities
 
 __all__ = [
     "BALL", "GRAVITY", "INERTIA", "MASS", "PRECISE", "RADIUS", "RATIO", "STIFF", "beta", "bristle",

@@ -13,8 +13,8 @@ import numpy as np
 
 from sphshell_pin import Shell
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
-from sphshell_pin.benchmarks.swing import any_turn
+from sphshell_pin.study.report.surfaces import Mesh, icosphere
+from sphshell_pin.study.report.swing import any_turn
 from tests import meshes
 from tests.contact.smooth import surfaces as unit
 from tests.hard_cases.balls import RADIUS

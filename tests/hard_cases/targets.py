@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.arrays import Array
-from sphshell_pin.benchmarks import surfaces
+from sphshell_pin.study.report import surfaces
 from tests import meshes
 from tests.shell.surfaces import tetrahedron
 

@@ -75,9 +75,10 @@ class Verdict:
         return counts
 
 
-def exact_elements(shell: sp.Shell) -> NDArray[np.bool_]:
-    """Whether each element belongs to an exact face."""
+def exact_elements(shell: sp.Shell, whole: bool = False) -> NDArray[np.bool_]:
+    """Whether each element is exact, or if `whole` all of its face."""
     out = np.zeros(len(shell.elements), bool)
     for face in shell.faces:
-        out[face.elements] = face.exact
+        out[face.elements] = True
+        out[face.elements if whole and not face.exact else face.curved] = False
     return out

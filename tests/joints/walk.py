@@ -102,7 +102,7 @@ def exact_pieces(shell: sp.Shell, part: Part) -> Array:
     """Whether the face of each piece (k,) and those beside it are exact in the shell."""
     middles = [piece.at(np.array([piece.length / 2]))[0][0] for piece in part.profile.pieces]
     near = shell.closest_points(part.in_space(np.array(middles), 0.3, 0.5) * MM, method="facets")
-    exact = exact_elements(shell)[near.elements]
+    exact = exact_elements(shell, whole=True)[near.elements]
     # Beside a face that is not exact the chord error is allowed.
     return np.asarray(exact & np.roll(exact, 1) & np.roll(exact, -1))
 

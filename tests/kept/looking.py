@@ -86,7 +86,6 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     from sphshell_pin import Result
     from sphshell_pin.cli import main
     from sphshell_pin.patches import TaxelGrid
-    from sphshell_pin.patches.wear import wear_maps
     from sphshell_pin.plot import KINDS
     from sphshell_pin.scenario.running.replay import Replay
 
@@ -104,15 +103,11 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     def live() -> None:
         """End the page after a second, as Ctrl-C does."""
         signal.signal(signal.SIGALRM, signal.default_int_handler)
-        signal.setitimer(signal.ITIMER_REAL, 2.0)
+        signal.setitimer(signal.ITIMER_REAL, 25.0)
         command("view", "run", "--no-open")()
 
     def load() -> Result:
         return Result.load("run/run.npz")
-
-    def wear() -> None:
-        replay = Replay("run/run.npz")
-        wear_maps(replay.result, 1e-9, replay.scene)
 
     def taxels() -> None:
         replay = Replay("run/run.npz")
@@ -132,7 +127,6 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
         "Result.view": lambda: load().view().save("page.html"),
         "Result.to_mcap": lambda: load().to_mcap("again.mcap"),
         "Result.save": lambda: load().save("again.npz"),
-        "wear": wear,
         "TaxelGrid": taxels,
         "trusted": lambda: Replay("run/run.npz", trust_code=True),
         "another scenario": lambda: Replay("run/run.npz", scenario, trust_code=True),

@@ -74,7 +74,6 @@ duration = 0.05
 dt = 1e-4
 record_dt = 1e-3
 record = ["patch"]
-wear = 1e-9
 
 [figures]
 own = "routine.py:figure"
@@ -156,7 +155,7 @@ def write(home: Path) -> Path:
             mesh_corpus(suffix)[0].replace(b"/dev/zero", b"named")
         )
     with (home / "arm" / "drawn.obj").open("ab") as file:
-        file.write(b"\rmtllib named\n\x0cmtllib named\nusemtl a\n")
+        file.write(b"\rmtllib named\nmtllib named\nusemtl a\n")
     (home / "arm" / "named").write_text("newmtl a\nmap_Kd named\n")
     shutil.copy(DATA / "mjcf" / "meshes.xml", home)
     shutil.copytree(DATA / "mjcf" / "assets", home / "assets")

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 
-from sphshell_pin.cases.measured import Measured, write
+from benchmarks.measured import Measured, write
 from tests.parts import tables
 from tests.parts.cad_mesh import KINDS
 from tests.parts.files import KINDS_OF_FILE

@@ -50,12 +50,3 @@ def total_force(result):
     """The sum of the normal forces at each row (rows,) [N]."""
     log = result.contacts
     return np.bincount(log.row, log.normal_force, len(result.t))
-
-
-def preston(result, coefficient):
-    """Return the volume that Preston's law removes in all, coefficient in 1/Pa [m^3]."""
-    half = 0.5 * np.diff(result.t)
-    share = np.append(half, 0.0) + np.append(0.0, half)
-    log = result.contacts
-    slip = np.linalg.norm(log.slip_velocity_world, axis=1)
-    return coefficient * (log.normal_force * slip * share[log.row]).sum()

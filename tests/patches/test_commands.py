@@ -1,29 +1,22 @@
-"""Patches, wear and taxels from scenario files and results folders."""
+"""Patches and taxels from scenario files and results folders."""
 
 import numpy as np
-import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import ScenarioError
-from sphshell_pin.scenario import build
 from tests.command import call
 from tests.scenario.files import DROP, write
 
 
-def test_a_scenario_writes_patches_wear_and_taxels(tmp_path):
+def test_a_scenario_writes_patches_and_taxels(tmp_path):
     text = DROP.replace(
         "[run]",
-        'friction = { type = "coulomb", mu_static = 0.3 }\n[run]\nrecord = ["patch"]\nwear = 1e-12',
+        'friction = { type = "coulomb", mu_static = 0.3 }\n[run]\nrecord = ["patch"]',
     ).replace("[robot]", "[robot]\nspeed = { root_joint = [0.2, 0, 0, 0, 0, 0] }")
     out = tmp_path / "out"
     told = call("run", write(tmp_path, text), "--out", out)
     assert told.exit_code == 0, told.output
     result = sp.Result.load(out / "run.npz")
     assert len(result.patches) == len(result.contacts) > 0
-    with np.load(out / "wear.npz") as file:
-        assert file["depth"].max() > 0.0
-        assert len(file["depth"]) == len(file["corners"]) == len(file["areas"])
-    assert (out / "wear.png").is_file()
     assert "pressure of patches" in (out / "recording.html").read_text(encoding="utf-8")
 
     told = call("taxels", out, "--contact", "ball-plate", "--axis", 0, 0, -1, "--shape", 4, 6)
@@ -39,16 +32,9 @@ def test_a_scenario_writes_patches_wear_and_taxels(tmp_path):
     assert (out / "taxels.gif").is_file()
 
 
-def test_wear_needs_patches(tmp_path):
-    path = write(tmp_path, DROP.replace("[run]", "[run]\nwear = 1e-12"))
-    with pytest.raises(ScenarioError, match=r"set record = \['patch'\]"):
-        build(path)
-
-
 def test_a_run_without_patches_has_no_taxels(tmp_path, no_pictures):
     out = tmp_path / "out"
     assert call("run", write(tmp_path), "--out", out, "--no-recording").exit_code == 0
-    assert not (out / "wear.png").exists()
     told = call("taxels", out, "--contact", "ball-plate")
     assert told.exit_code == 2
     assert "has no patches" in told.stderr

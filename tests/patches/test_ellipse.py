@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sphshell_pin.patches.ellipse import load_in_polygons, pressure, stroke
+from sphshell_pin.patches.ellipse import load_in_polygons, pressure
 
 
 def summed(polygon, n=1500):
@@ -43,13 +43,3 @@ def test_cells_of_any_grid_add_up():
     loads = load_in_polygons(cells)
     assert loads.min() > -1e-15
     assert loads.sum() == pytest.approx(1.0, abs=1e-14)
-
-
-@pytest.mark.parametrize("step", [(0.7, -0.4), (1e-7, 0.0), (3.0, 1.0), (0.0, 0.0)])
-def test_strokes(step):
-    places = np.random.default_rng(2).normal(size=(8, 2)) * 0.6
-    s = (np.arange(100_000) + 0.5)[:, None] / 100_000
-    expected = [
-        np.mean((1.3 - 1.1 * s[:, 0]) * pressure(place - s * np.array(step))) for place in places
-    ]
-    np.testing.assert_allclose(stroke(places, np.array(step), 1.3, 0.2), expected, atol=2e-7)

@@ -1,11 +1,11 @@
-"""Patches, taxels and wear of an elastic foundation: by its pressure, not by an ellipse."""
+"""Patches and taxels of an elastic foundation: by its pressure, not by an ellipse."""
 
 import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.patches import ShellTaxels, TaxelGrid, wear_maps
-from tests.patches.scenes import RADIUS, plate, preston, slider, total_force
+from sphshell_pin.patches import ShellTaxels, TaxelGrid
+from tests.patches.scenes import RADIUS, plate, slider, total_force
 
 KAPPA = 2e9  # modulus over thickness [Pa/m]
 LAW = sp.FoundationLaw(1e7, 5e-3)
@@ -59,20 +59,6 @@ def test_taxels_add_up(slid):
     )
 
 
-def test_a_long_pass_leaves_the_groove_of_the_pressure():
-    result = run(duration=0.08, q0=(-0.008, 0.0, RADIUS - DEPTH))
-    (worn,) = wear_maps(result, 1e-12)
-    chosen = np.abs(worn.points[:, 0]) < 5e-4
-    y, depth = worn.points[chosen, 1], worn.depth[chosen]
-    height = RADIUS - result.contacts.depth.mean()
-    x = np.linspace(-0.004, 0.004, 4001)
-    rho = np.sqrt(x[None, :] ** 2 + y[:, None] ** 2 + height**2)
-    pressure = KAPPA * np.maximum(0.0, RADIUS**2 - rho**2) / (2 * rho)
-    expected = 1e-12 * pressure.sum(axis=1) * (x[1] - x[0])
-    assert np.abs(depth - expected).max() < 0.01 * expected.max()
-    assert worn.volume == pytest.approx(preston(result, 1e-12), rel=1e-9)
-
-
 def test_at_a_crease_each_wall_takes_its_own():
     valley = plate(0.03, 2, height=lambda x, y: 0.5 * abs(x))
     slope = np.arctan(0.5)
@@ -84,5 +70,3 @@ def test_at_a_crease_each_wall_takes_its_own():
     np.testing.assert_allclose(elements.forces.sum(axis=1), force, rtol=1e-12)
     left, right = elements.forces[0].reshape(2, 2).sum(axis=0)
     assert left == pytest.approx(right, rel=1e-6)
-    (worn,) = wear_maps(result, 1e-12)
-    assert worn.volume == pytest.approx(preston(result, 1e-12), rel=1e-9)

@@ -1,4 +1,4 @@
-"""Pictures of patches, wear and taxels: what they show is where it was, and as large."""
+"""Pictures of patches and taxels: what they show is where it was, and as large."""
 
 from dataclasses import replace
 
@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.patches import ShellTaxels, TaxelGrid, wear_maps
+from sphshell_pin.patches import ShellTaxels, TaxelGrid
 from sphshell_pin.plot import plot_contact_map
 from sphshell_pin.plot.taxels import plot_taxels
-from sphshell_pin.plot.wear import plot_wear
 from tests.patches.scenes import plate, slide
 from tests.test_plot import texts
 
@@ -34,24 +33,6 @@ def test_the_contact_map_shows_patches_true_to_size(slid):
 def test_the_contact_map_of_a_run_without_patches_has_none(slid):
     figure = plot_contact_map(replace(slid, patch_rows=None))
     assert not any("patches" in text for text in texts(figure))
-
-
-def test_wear_is_drawn_where_it_is(slid):
-    (worn,) = wear_maps(slid, 1e-12, resolution=4e-4)
-    figure = plot_wear([worn])
-    said = texts(figure)
-    assert f"plate: {worn.volume * 1e9:.3g} mm³ removed" in said
-    assert "removed depth [nm]" in said
-    pieces = figure.axes[0].collections[-1]
-    middles = np.array(pieces._faces)[:, :4].mean(axis=1)
-    a = slid.patches["half_axes"][0, 0] * 1e3
-    assert np.abs(middles[:, 1]).max() < a + 0.4
-    assert middles[:, 0].min() > -10.0 - a - 0.4
-
-
-def test_nothing_worn_is_said():
-    result = slide(speed=0.0, duration=1e-3)
-    assert "Nothing was worn off." in texts(plot_wear(wear_maps(result, 1e-12)))
 
 
 def test_images_of_taxels_have_latitude_upwards(slid):

@@ -11,7 +11,7 @@ import sys
 import warnings
 from pathlib import Path
 
-from tests.public_cases import CASES, motion, surfaces  # noqa: F401  (registered by importing)
+from tests.public_cases import CASES, machines, motion, surfaces  # noqa: F401  (registered by importing)
 
 PAGE = Path(__file__).parents[2] / "docs" / "cases.md"
 BEGIN, END = "<!-- table: python -m tests.public_cases --write -->\n", "<!-- end of table -->"

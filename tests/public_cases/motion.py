@@ -211,7 +211,7 @@ def pinched_rod() -> float:
     bound=1e-9,
 )
 def pressing_hard_on_a_wall() -> float:
-    finger = robots.load_urdf(robots.URDF_FOLDER / "three_link_finger.urdf")
+    finger = robots.load_file(robots.URDF_FOLDER / "three_link_finger.urdf")
     wall = sp.Shell(
         [[0.07, -0.1, 0], [0.07, 0.1, 0], [0.07, 0.1, 0.2], [0.07, -0.1, 0.2]], [range(4)]
     )
@@ -231,3 +231,103 @@ def pressing_hard_on_a_wall() -> float:
     log = result.contacts
     force = log.normal_force[result.t[log.row] > 1.0]
     return float(np.ptp(force) / force.mean())
+
+
+def plate_scene(model: pin.Model, friction: object, law: object = None) -> sp.Scene:
+    """Return a scene of a ball of 0.1 m over a level square of 2 x 16 x 16 triangles."""
+    shell = sp.Shell(*terrain(17, 4.0, lambda x, _: 0.0 * x))
+    scene = sp.Scene(model)
+    law = sp.HuntCrossleyLaw(1e6, 1.5, 0.5) if law is None else law
+    sphere = sp.Sphere(0.1, frame="ball")
+    scene.add_contact(sphere, shell, law=law, friction=friction, name="ball-plate")
+    return scene
+
+
+@case(
+    "google-deepmind/mujoco#1823",
+    "newton-physics/newton#2107",
+    wanted="the contact forces on a ball at rest on a mesh are its weight",
+    figure="normal force over weight, on a vertex of six triangles",
+    truth=1.0,
+    bound=1e-9,
+)
+def weight_of_a_ball_at_rest() -> float:
+    depth = (GRAVITY / 1e6) ** (2 / 3)
+    sim = sp.Simulation(plate_scene(ball(1.0, 0.1), None), sp.SemiImplicitEuler(1e-4))
+    log = sim.run(at(0, 0, 0.1 - depth), duration=0.5, record_dt=1e-2).contacts
+    return float(log.normal_force[log.row == log.row[-1]].sum() / GRAVITY)
+
+
+@case(
+    "ekiefl/pooltool#39",
+    wanted="a ball that slides at first rolls on at 5/7 of its speed",
+    figure="speed over the first one; the lever of friction is radius - depth",
+    truth=5 / 7,
+    bound=2e-4,
+)
+def sliding_then_rolling() -> float:
+    depth = (GRAVITY / 1e6) ** (2 / 3)
+    scene = plate_scene(ball(1.0, 0.1), sp.CoulombFriction(0.2, 0.2, 1e-3, 2e-3))
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
+        at(-1.5, 0.2, 0.1 - depth), v0=[2.0, 0, 0, 0, 0, 0], duration=0.6, record_dt=0.01
+    )
+    rotation = pin.Quaternion(result.q[-1, 3:]).toRotationMatrix()
+    speed = (rotation @ result.v[-1, :3])[0] / 2.0
+    lever = 1.0 - depth / 0.1
+    return float(speed * (1 + 0.4 / lever**2) / 1.4)
+
+
+@case(
+    "Xiexe/VRCBilliards#8",
+    wanted="a ball keeps its spin about the vertical when it begins to roll",
+    figure="spin over the first one",
+    truth=1.0,
+    bound=1e-9,
+)
+def spin_while_rolling() -> float:
+    depth = (GRAVITY / 1e6) ** (2 / 3)
+    scene = plate_scene(ball(1.0, 0.1), sp.CoulombFriction(0.2, 0.2, 1e-3, 2e-3))
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
+        at(-1.5, 0.2, 0.1 - depth), v0=[2.0, 0, 0, 0, 0, 5.0], duration=0.6, record_dt=0.01
+    )
+    rotation = pin.Quaternion(result.q[-1, 3:]).toRotationMatrix()
+    return float((rotation @ result.v[-1, 3:])[2] / 5.0)
+
+
+@case(
+    "schteppe/cannon.js#328",
+    wanted="a ball that hits the seam of two triangles is reflected as by a plane",
+    figure="tangent of the angle it leaves at, having come at 45 degrees",
+    truth=1.0,
+    bound=1e-6,
+)
+def reflected_at_a_seam() -> float:
+    model = ball(1.0, 0.1)
+    model.gravity.linear = np.zeros(3)
+    scene = plate_scene(model, None, sp.HuntCrossleyLaw(1e7, 1.5, 0.0))
+    result = sp.Simulation(scene, sp.Adaptive(1e-9)).run(
+        at(-0.2, 0.01, 0.3), v0=[3.0, 0, -3.0, 0, 0, 0], duration=0.2, record_dt=0.01
+    )
+    return float(result.v[-1, 2] / np.hypot(*result.v[-1, :2]))
+
+
+@case(
+    "liabru/matter-js#752",
+    "newton-physics/newton#3943",
+    wanted="what friction can hold on a slope of 20 degrees stays where it is",
+    figure="speed downhill, after 3 s [m/s]",
+    truth=0.0,
+    bound=1e-12,
+)
+def held_on_a_slope() -> float:
+    model, slope = pin.Model(), np.radians(20)
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "slides")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model.gravity.linear = GRAVITY * np.array([np.sin(slope), 0.0, -np.cos(slope)])
+    scene = plate_scene(model, sp.BristleFriction(0.5, 0.4, 1e5, 20.0))
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
+        np.array([0.0, 0.0, 0.1]), duration=4.0, record_dt=0.01
+    )
+    late = result.t > 3.0
+    return float(abs(np.polyfit(result.t[late], result.q[late, 0], 1)[0]))

@@ -6,7 +6,7 @@ import warnings
 
 import pytest
 
-from tests.public_cases import CASES, motion, surfaces  # noqa: F401  (registered by importing)
+from tests.public_cases import CASES, machines, motion, surfaces  # noqa: F401  (registered by importing)
 from tests.public_cases.__main__ import PAGE, listed
 
 

@@ -1,9 +1,7 @@
-"""Robots' files: xacro, package paths, poses, mimic joints, and what is refused."""
+"""Robots' files: package paths, poses, mimic joints, and what is refused."""
 
 import shutil
-import sys
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import numpy as np
 import pinocchio as pin
@@ -11,8 +9,7 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.dynamics.scene.mimic import mimics
-from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning
-from sphshell_pin.robots import xacro_file
+from sphshell_pin.errors import NameNotFound, RobotWarning
 from tests.studies import mostly_studies
 
 FOLDER = Path(__file__).parents[1] / "data" / "xacro"
@@ -21,205 +18,6 @@ INERTIAL = (
     "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
 )
 MESH = "<geometry><mesh filename='{0}'/></geometry>"
-
-
-@pytest.mark.parametrize(
-    ("name", "nq", "spheres"),
-    [
-        ("one_finger", 1, 1),
-        ("hand", 4, 3),
-        ("from_yaml", 3, 0),
-        ("gripper", 2, 2),
-        ("legged", 6, 2),
-    ],
-)
-def test_xacro_files_are_read(name, nq, spheres):
-    robot = robots.load_file(FOLDER / f"{name}.urdf.xacro", mimic=True)
-    assert robot.model.name == name
-    assert robot.model.nq == nq
-    assert len(robots.end_spheres(robot)) == spheres
-    assert all(inertia.mass > 0 for inertia in list(robot.model.inertias)[1:])
-
-
-def test_xacro_has_arguments_and_finds_packages():
-    file = FOLDER / "hand.urdf.xacro"
-    robot = robots.load_file(file, xacro_args={"fingers": 2, "with_wrist": False})
-    assert list(robot.model.names)[1:] == ["f1_base", "f1_end", "f2_base", "f2_end"]
-    # The meshes of its visual geometry, by package://.
-    assert robot.visual_model.ngeoms == 4
-    model = robot.model
-    assert np.all(model.damping == 0.02)
-    assert np.all(model.upperDryFrictionLimit == 0.01)
-    assert np.all(model.upperEffortLimit == 2)
-    assert np.all(model.velocityLimit == 3)
-    assert np.all(model.lowerPositionLimit == -0.3)
-    length, radius = 0.05, 0.01
-    mass = 2700 * np.pi * radius**2 * length
-    assert model.inertias[1].mass == pytest.approx(mass)
-
-
-OS = "[c for c in ().__class__.__base__.__subclasses__() if c.__name__ == '_wrap_close'][0]"
-HOSTILE = {
-    "lambda": "${(lambda: " + OS + ".__init__.__globals__['system']('touch FILE'))()}",
-    "comprehension": "${[" + OS + ".__init__.__globals__['system']('touch FILE') for i in [1]]}",
-    "frame": "${[g.gi_frame.f_back.f_builtins for g in [(1 for i in [1])]]}",
-    "underscore": "${len.__self__}",
-    "eval": "$(eval eval('_'*2 + 'import' + '_'*2 + '(\"os\").system(\"touch FILE\")'))",
-    "open": "$(eval open('FILE', 'w'))",
-    "argument": "$(eval (lambda: open('FILE', 'w'))())",
-    "walrus": "${[y := 1, y]}",
-    "nested": "${" + "-" * 3000 + "(lambda: 1)()}",
-    "vars": "${python.vars(python.type)['mro'](int)}",
-    "type": "${python.type('a', (), dict())}",
-    "class": "${''.__class__}",
-    "method": "${[].append}",
-    "format": "${f1.format(1)}",
-    "format of a key": "${f2.format([1])}",
-    "width": "${f3.format(1)}",
-    "width of %": "${'%099999999999d' % 1}",
-    "attribute of a number": "${(1).real}",
-    "attribute of a function": "${len.real}",
-    "loader": "$(eval __loader__)",
-    "private name of math": "$(eval [v for v in [__spec__]])",
-    "bytes": "${b'a'}",
-    "f-string": "$(eval f'{1}')",
-    "function of functions": "${map(python.vars, [1])}",
-}
-
-
-def xacro(tmp_path, inside):
-    """Return the file of a xacro robot."""
-    path = tmp_path / "r.xacro"
-    path.write_text(f"<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>{inside}</robot>")
-    return path
-
-
-@pytest.mark.parametrize("how", HOSTILE)
-def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
-    made = tmp_path / "made"
-    expression = escape(HOSTILE[how].replace("FILE", str(made)), {"'": "&apos;", '"': "&quot;"})
-    links = "<link name='a'/><link name='${p}'/>"
-    values = {"p": expression, "f1": "{0.real}", "f2": "{0[0]}", "f3": "{:99999999999}"}
-    given = "".join(f"<xacro:property name='{k}' value='{v}'/>" for k, v in values.items())
-    path = xacro(tmp_path, given + links)
-    # What is in $(eval ...) ends at the first parenthesis, and is no expression then.
-    why = (
-        "refused in the expression|too deeply|is not defined"
-        if "${" in HOSTILE[how]
-        else "xacro cannot expand"
-    )
-    with pytest.raises(robots.RobotError, match=why):
-        robots.load_file(path)
-    assert not made.exists()
-
-
-@pytest.mark.parametrize(
-    ("expression", "words"),
-    [
-        ("9**9**9", "has more than 1000000 items"),
-        ("10**10**10", "has more than 1000000 items"),
-        ("1 &lt;&lt; 10**10", "has more than 1000000 items"),
-        ("'a'*10**9", "has more than 1000000 items"),
-        ("[0]*10**9", "has more than 1000000 items"),
-        ("'a'.zfill(10**9)", "has more than 1000000 items"),
-        ("python.zip(python.range(10**12))", "has more than 1000000 items"),
-        ("[1 for a in range(10**5) for b in range(10**5)]", "take more than 300000 steps"),
-        ("[0 for a in range(10**9) if 0]", "take more than 300000 steps"),
-        ("python.sum(python.range(10**11))", "takes more than 1 s to expand"),
-        ("math.factorial(10**8)", "takes more than 1 s to expand"),
-        ("len(list(range(10**9)))", "takes more than 1 GB of memory"),
-    ],
-)
-def test_what_a_xacro_file_takes_is_limited(tmp_path, monkeypatch, expression, words):
-    monkeypatch.setattr(xacro_file, "TIME_LIMIT", 1.0)
-    with pytest.raises(robots.RobotError, match=words):
-        robots.load_file(xacro(tmp_path, f'<link name="${{{expression}}}"/>'))
-
-
-UNCHECKED = """
-import os, socket
-from sphshell_pin.robots import xacro_child
-def attempt(function, *arguments):
-    try:
-        function(*arguments)
-    except Exception as error:
-        return type(error).__name__
-    return "done"
-def unchecked(xacro, substitution_args):
-    xacro.safe_eval = lambda text, *_: eval(text, globals())
-xacro_child.install = unchecked
-serve = xacro_child.serve
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="the kernel has no such means")
-def test_an_expression_that_escapes_is_in_a_process_that_does_nothing(tmp_path, monkeypatch):
-    (tmp_path / "unchecked_xacro.py").write_text(UNCHECKED)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(xacro_file, "CHILD", "unchecked_xacro")
-    kept = tmp_path / "kept"
-    kept.write_text("precious")
-    calls = (
-        f"os.unlink, '{kept}'",
-        f"os.mkdir, '{tmp_path / 'made'}'",
-        f"open, '{kept}', 'w'",
-        "socket.socket",
-        "os.execv, '/bin/true', ['true']",
-        "os.fork",
-    )
-    links = "".join(f'<link name="a{k}_${{attempt({call})}}"/>' for k, call in enumerate(calls))
-    description = robots.read(xacro(tmp_path, links))
-    names = [link.get("name") for link in description.root.iter("link")]
-    assert names == [f"a{k}_PermissionError" for k in range(len(calls))]
-    assert kept.read_text() == "precious"
-
-
-def test_xacro_expressions_compute(tmp_path):
-    names = ["${'a'.upper() + str(max([round(x) for x in (1.2, 3.7)]))}", "$(eval 'b2')"]
-    values = {
-        "_tmp_ + 1": 4,
-        "dict(a=1, **dict(b=2))['b']": 2,
-        "', '.join(sorted(['b', 'a'])[::-1])": "b, a",
-        "python.isinstance(_tmp_, python.int) and not _tmp_ in [1, 2]": True,
-        "[a * b for a, b in python.zip([1, 2], [3, 4]) if a > 1]": [8],
-        "f.format(1, name=2)": "1  2.00",
-        "'%d %s' % (1, 'a')": "1 a",
-        "xacro.tokenize('a, b;c')": ["a", "b", "c"],
-        "2**3 // 5 % 2 << 2": 4,
-        "list(map(str, python.range(2)))": ["0", "1"],
-        "1 if 1 < 2 < 2 else python.sum(x for x in [1, 2])": 3,
-        "max(['aa', 'b'], key=len).count('a')": 2,
-    }
-    start = "<xacro:property name='_tmp_' value='3'/>"
-    start += "<xacro:property name='f' value='{} {name:5.2f}'/>"
-    texts = "".join(f'<a b="${{{escape(text)}}}"/>' for text in values)
-    expanded = robots.read(xacro(tmp_path, start + texts)).root
-    assert [one.get("b") for one in expanded.iter("a")] == [*map(str, values.values())]
-    links = "".join(f'<link name="{name}"/>' for name in names)
-    joint = (
-        '<joint name="j" type="revolute"><parent link="A4"/><child link="b2"/>'
-        '<limit lower="${-pi/2}" upper="${radians(90) if 1 &lt; 2 else 0}" effort="1" '
-        'velocity="1"/></joint>'
-    )
-    model = robots.load_file(xacro(tmp_path, links + joint)).model
-    assert model.existFrame("A4")
-    assert model.upperPositionLimit[0] == -model.lowerPositionLimit[0] == pytest.approx(np.pi / 2)
-
-
-def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
-    for inside, words in (
-        ("${nix}", "xacro cannot expand it: .*nix"),
-        ('<xacro:include filename="$(find nix)/a.xacro"/>', "no package 'nix' in .*--package-dir"),
-        ('<xacro:include filename="b.xacro"/>', r"b\.xacro"),
-        ("<link name='a'>", "xacro cannot expand it"),
-    ):
-        with pytest.raises(robots.RobotError, match=words):
-            robots.load_file(xacro(tmp_path, inside))
-    with pytest.raises(robots.RobotError, match=r"arguments are for files that end in \.xacro"):
-        robots.load_file(robots.URDF_FOLDER / "ball.urdf", xacro_args={"a": 1})
-    monkeypatch.setitem(__import__("sys").modules, "xacro", None)
-    with pytest.raises(MissingExtra, match=r"needs xacro: .*sphshell-pin\[robots\]"):
-        robots.load_file(FOLDER / "hand.urdf.xacro")
 
 
 def arm(tmp_path, *, collision="", visual="", name="arm.urdf"):

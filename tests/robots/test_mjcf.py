@@ -187,17 +187,20 @@ def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, word
         ("<replicate count='2'/>", "", "<replicate> is not supported"),
         (ARM, "<compiler coordinate='global'/>", "coordinate"),
         (ARM, "<include file='nix.xml'/>", "includes nix.xml, which is not there"),
-        ("<body><joint class='x'/></body>", "", "class 'x', which has no <default>"),
-        ("<body><joint type='screw'/></body>", "", "unknown type, 'screw'"),
+        ("<body><joint class='x'/></body>", "", "unknown default class name 'x'"),
+        ("<body><joint type='screw'/></body>", "", "invalid keyword: 'screw'"),
         ("<geom size='1'/>", "", "has no <body>"),
         ("<body><joint/><geom size='a'/></body>", "", "."),
         ("<body name='b'><joint/></body>", "<compiler inertiafromgeom='false'/>", "'b' moves"),
-        (f"<body name='b'>{7 * '<joint/>'}</body>", "", "body 'b' has 7 joints"),
+        ("<body pos='0 nan 0'><joint/><geom size='1'/></body>", "", "not finite"),
+        (f"<body name='b'>{7 * '<joint/>'}</body>", "", "more than 6 dofs in body 'b'"),
     ],
 )
-def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, inside, head, words):
+def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, monkeypatch, inside, head, words):
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(robots.RobotError, match=rf"not a MJCF that can be read: .*{words}"):
         robots.load_file(written(tmp_path, inside, head))
+    assert {one.name for one in tmp_path.iterdir()} == {"r.xml"}  # no log of MuJoCo's
 
 
 @pytest.mark.parametrize(
@@ -287,35 +290,30 @@ def test_meshes_of_mjcf(tmp_path):
         assert robots.load_file(path).model.nv == 2
 
 
-WAYS = """<mujoco><compiler angle="degree"/><default><geom quat="0.5 0.5 0.5 0.5"/>
-<site quat="1 1 0 0"/><default class="turned"><geom quat="0.9 0.1 -0.3 0.2"/></default></default>
-<worldbody><body name="b"><joint name="j" type="hinge" axis="0 1 0"/>
-<geom type="box" size="0.02 0.03 0.1" euler="30 20 0" mass="1"/>
-<geom type="box" size="0.02" fromto="0 0 0 .1 .05 .2" mass="1"/>
-<geom class="turned" type="box" size="0.02 0.05 0.03" pos="0.2 0.1 0" {way} mass="0.5"/>
-<site name="way" {way}/><site name="site" type="capsule" size="0.01" fromto="0 0 0 .1 .05 .2"/>
-</body></worldbody></mujoco>"""
+SHOWN = """<mujoco model="arm"><compiler angle="radian" meshdir="a" texturedir="/dev"><lengthrange/>
+</compiler><option timestep="0.002"/><size nconmax="1000000000" memory="99999M"/>
+<visual><global offwidth="640"/></visual><statistic meansize="0.1"/>
+<default><default class="link"><geom material="gray"/><joint damping="2"/></default></default>
+<asset><texture name="t" type="2d" file="zero"/><hfield name="h" size="1 1 1 1" file="zero"/>
+<material name="gray" texture="t" rgba="0.1 0.2 0.3 1"/><mesh name="w" file="nix.stl"/></asset>
+<worldbody><light pos="0 0 1"/><geom name="ground" type="hfield" hfield="h"/>
+<body name="b" childclass="link" gravcomp="1" user="1 2 3"><camera name="c"/><joint name="j"/>
+<inertial pos="0 0 0.1" mass="2" diaginertia="1 1 1"/><geom size="0.1"/>
+<geom type="mesh" mesh="w" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor>
+<keyframe><key name="home" qpos="0.5" qvel="0.1" ctrl="3"/></keyframe></mujoco>"""
 
 
-@pytest.mark.parametrize(
-    "way",
-    ['zaxis="1 1 0"', 'axisangle="1 2 -1 40"', 'xyaxes="1 1 0 -1 1 1"', 'euler="10 70 -40"'],
-)
-def test_an_orientation_in_one_way_replaces_that_of_a_default_in_another(way, tmp_path):
-    mujoco = pytest.importorskip("mujoco")
-    path = tmp_path / "ways.xml"
-    path.write_text(WAYS.format(way=way), encoding="utf-8")
-    theirs = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(theirs)
-    mujoco.mj_forward(theirs, data)
-    model = robots.load_file(path).model
-    turn = pin.Quaternion(*theirs.body_iquat[1]).toRotationMatrix()
-    inertia = model.inertias[1]
-    expected = turn @ np.diag(theirs.body_inertia[1]) @ turn.T
-    assert np.allclose(inertia.inertia, expected, rtol=0, atol=1e-12)
-    assert np.allclose(inertia.lever, theirs.body_ipos[1], rtol=0, atol=1e-14)
-    ours = model.createData()
-    pin.framesForwardKinematics(model, ours, pin.neutral(model))
-    for site in ("way", "site"):
-        found = ours.oMf[model.getFrameId(site)].rotation
-        assert np.allclose(found, data.site(site).xmat.reshape(3, 3), rtol=0, atol=1e-12)
+def test_what_only_shows_or_moves_the_robot_is_not_read(tmp_path):
+    """Neither are the files that it names: a device would have no end."""
+    (tmp_path / "r.xml").write_text(SHOWN)
+    with pytest.warns(RobotWarning) as caught:
+        robot = robots.load_file(tmp_path / "r.xml", pose="home")
+    said = " ".join(str(one.message) for one in caught)
+    assert "left out: 'hfield'" in said
+    assert "nix.stl" in said
+    assert robot.q0 == [0.5]
+    assert robot.model.inertias[1].mass == 2.0
+    assert robot.model.damping == [2.0]
+    (ball,) = robot.visual_model.geometryObjects or robot.collision_model.geometryObjects
+    np.testing.assert_allclose(ball.meshColor, [0.1, 0.2, 0.3, 1], atol=1e-6)

@@ -1,6 +1,7 @@
 """Meshes written anew: the same points, faces and colors, and nothing that they name."""
 
 import importlib.util
+import os
 import sysconfig
 import time
 import xml.etree.ElementTree as ET
@@ -10,6 +11,8 @@ import coal
 import numpy as np
 import pytest
 
+from sphshell_pin import robots
+from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.plain_mesh import FORMATS, plain_mesh
 
 HEAD = '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">'
@@ -37,6 +40,42 @@ def test_an_obj_file_keeps_its_numbers_alone(content):
     )
     assert not {word for word in made.split() if word.isalpha()} - {b"v", b"vn", b"f"}
     assert plain_mesh(".obj", made) == made
+
+
+GLTF = '{"asset": {"version": "2.0"}, "buffers": [{"%s": "%s", "byteLength": 36}]}'
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("m.obj", OBJ),  # assimp looks for m.mtl
+        ("m.obj", b"mtllib other\n" + OBJ),
+        ("m.obj", b"# x\rmtllib other\r" + OBJ),
+        ("m.obj", b"mtl\\\nlib other\n" + OBJ),
+        ("m.obj", b"mtllib ./sub/../other\n" + OBJ),
+        ("m.obj", b"mtl\\\x0c\nlib other\n" + OBJ),
+        ("m.gltf", (GLTF % ("uri", "other")).encode()),
+        ("m.gltf", (GLTF % ("\\u0075ri", "%6fther")).encode()),
+        ("m.gltf", (GLTF % ("uri", "other")).replace("}]", "}], 'buffers': []").encode()),
+        ("m.glb", b"glTF" + bytes(8) + b"\x80" + bytes(7) + (GLTF % ("uri", "other")).encode()),
+    ],
+)
+@pytest.mark.parametrize("kind", ["visual", "collision"])
+def test_what_a_mesh_names_is_a_regular_file(name, content, kind, tmp_path):
+    """Pinocchio's reader opens it, holding the interpreter's lock."""
+    (tmp_path / "sub").mkdir()
+    (tmp_path / name).write_bytes(content)
+    os.mkfifo(tmp_path / ("m.mtl" if content == OBJ else "other"))
+    mesh = f"<geometry><mesh filename='{name}'/></geometry>"
+    (tmp_path / "r.urdf").write_text(
+        f"<robot name='r'><link name='a'><{kind}>{mesh}</{kind}></link></robot>"
+    )
+    if kind == "collision":
+        with pytest.raises(robots.RobotError, match=f"a mesh cannot be loaded .*{name}"):
+            robots.load_file(tmp_path / "r.urdf")
+    else:
+        with pytest.warns(RobotWarning, match=f"missing or broken: {name}"):
+            assert robots.load_file(tmp_path / "r.urdf").visual_model.ngeoms == 0
 
 
 def test_a_collada_file_keeps_what_is_drawn_and_no_names_of_files():

@@ -1,10 +1,9 @@
-"""What commands leave behind when they are killed, and when the disk is full.
+"""What commands leave behind when they are killed at random times.
 
 `python -m tests.scenario.kills` runs each command of `COMMANDS` over its own earlier results and
-kills it: at every system call that touches the folder's files (with strace), and at random times.
-After each kill the folder must have all old files or all new ones, and those of others. Then it
-runs them on small file systems in memory (where it may mount them). Returns 1 if anything else was
-found.
+kills it. After each kill the folder must have all old files or all new ones, and those of others.
+Returns 1 if anything else was found. `test_results_kills` ends what writes at every file operation,
+and on full disks.
 """
 
 import argparse
@@ -12,8 +11,7 @@ import hashlib
 import json
 import os
 import random
-import re
-import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -27,11 +25,27 @@ from sphshell_pin.atomic import AtomicFolder
 from tests.scenario.operations import visible
 
 MAIN = [sys.executable, "-c", "from sphshell_pin.cli import main; main()"]
-CALLS = (
-    "openat,write,pwrite64,writev,rename,renameat,renameat2,unlink,unlinkat,link,linkat,symlink,"
-    "symlinkat,mkdir,mkdirat,rmdir,fsync,fdatasync,ftruncate,chmod,fchmod,fchmodat,chown,flock"
-)
+REPORT = """
+import sys
+from sphshell_pin.study.report.making import Part, make_report
+from sphshell_pin.cases.contents import Finding, Section
+value = float(sys.argv[1])
+found = Section("x", "X", findings=[Finding("a", "a", value)])
+make_report("out", parts=[Part("x", "X", lambda **_: found, (1.0, 1.0))])
+"""
 SCENE, STIFFNESS = "sphere_on_shell", "contact.ball-bowl.law.k"
+
+
+def report_of(files: dict[str, bytes]) -> str:
+    """Return the figure of the report whose files these are: its page has the time of day."""
+    data = json.loads(files["report.json"])
+    if {*files} != {"report.html", "report.json", *data["files"]}:
+        return f"not complete: {sorted(files)}"
+    (figure,) = data["sections"][0]["findings"]
+    known = f"{figure['value']:g}"
+    same = files["findings.csv"].decode().rstrip().splitlines()[-1].split(",")[3]
+    shown = f">{figure['row'][1]}" in files["report.html"].decode()
+    return known if float(same) == figure["value"] and shown else f"{known}, {same} and a page"
 
 
 def run_of(files: dict[str, bytes]) -> str:
@@ -58,8 +72,7 @@ class Command:
     """What it resumes from; it is removed once the command has done all."""
     beside: str = ""
     """The command whose results are in the same folder."""
-    browser: bool = False
-    """Whether a browser draws: strace and a full disk would meet that, too."""
+    program: Sequence[str] = tuple(MAIN)
     whole: Callable[[dict[str, bytes]], str] | None = None
     """Returns the value whose files these are. By default they have always the same bytes."""
 
@@ -79,7 +92,6 @@ COMMANDS = {
         "render ../run --to {value} --fps 400 --size 320x240 --out out",
         ("0.02", "0.03"),
         "frame_0001.png",
-        browser=True,
     ),
     "sweep": Command(
         f"sweep {SCENE} --duration 0.01 --vary {STIFFNESS}=1e4:{{value}}:4 --workers 0 "
@@ -88,6 +100,18 @@ COMMANDS = {
         "sweep.parquet",
         journal="sweep.parquet.journal",
         beside="run",
+    ),
+    "new": Command(
+        "new --robot three_link_finger --radius {value} --out out/new.toml --force",
+        ("0.01", "0.02"),
+        "new.toml",
+    ),
+    "report": Command(
+        "{value}",
+        ("1", "2"),
+        "report.json",
+        program=(sys.executable, "-c", REPORT),
+        whole=report_of,
     ),
 }
 
@@ -114,12 +138,13 @@ class Trial:
 
     def words(self, value: str) -> list[str]:
         """Return the command with one of its values."""
-        return [*MAIN, *self.command.words.format(value=value).split()]
+        return [*self.command.program, *self.command.words.format(value=value).split()]
 
-    def run(self, value: str, before: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
-        """Run to the end, below the command `before`."""
-        words = [*before, *self.words(value)]
-        return subprocess.run(words, cwd=self.place, capture_output=True, text=True, check=False)
+    def run(self, value: str) -> subprocess.CompletedProcess[str]:
+        """Run to the end."""
+        return subprocess.run(
+            self.words(value), cwd=self.place, capture_output=True, text=True, check=False
+        )
 
     def begin(self) -> None:
         """Put the results of others and those of the first value there."""
@@ -182,52 +207,10 @@ class Trial:
         }
 
 
-def calls_on(place: Path, log: Path) -> list[tuple[str, int]]:
-    """Return the system calls that touched files below `place`, each with its ordinal.
-
-    `log` is strace's, of one process: descriptors are shown with their paths.
-    """
-    counts: Counter[str] = Counter()
-    found = []
-    for line in log.read_text(errors="replace").splitlines():
-        call = re.match(r"(?:\d+ +)?(\w+)\(", line)
-        if call is None:
-            continue
-        counts[call[1]] += 1
-        if str(place) in line and not (call[1] == "openat" and "O_RDONLY" in line):
-            found.append((call[1], counts[call[1]]))
-    return found
-
-
-def kill_at_every_call(trial: Trial) -> list[str]:
-    """Kill the command at each of its system calls on files; return what was wrong."""
-    place, value = trial.place, trial.values[1]
-    log, keep = place.with_suffix(".strace"), place.with_suffix(".keep")
-    trial.begin()
-    shutil.copytree(place, keep)
-    traced = trial.run(value, ["strace", "-y", "-o", str(log), "-e", f"trace={CALLS}"])
-    assert traced.returncode == 0, traced.stderr
-    calls = calls_on(place, log)
-    print(f"{len(calls)} system calls: {dict(Counter(name for name, _ in calls))}", flush=True)
-    found: Counter[str] = Counter()
-    wrong = []
-    for name, ordinal in calls:
-        shutil.rmtree(place)
-        shutil.copytree(keep, place)
-        inject = f"inject={name}:signal=KILL:when={ordinal}"
-        done = trial.run(value, ["strace", "-o", "/dev/null", "-e", f"trace={name}", "-e", inject])
-        left = trial.state()
-        found[f"exit code {done.returncode}, results of {left}"] += 1
-        if left not in trial.values:
-            wrong.append(f"{name} {ordinal}: {left}")
-    print(dict(found), flush=True)
-    return wrong + trial.ends()
-
-
 def kill_at_random(trial: Trial, times: int) -> list[str]:
     """Kill a chain of commands, each over what the one before left; return what was wrong.
 
-    Half of them at any time, half while the files are being written.
+    Half of them at any time, half while the files are being written; a third by Ctrl-C.
     """
     trial.begin()
     rng = random.Random(1)
@@ -259,57 +242,23 @@ def kill_at_random(trial: Trial, times: int) -> list[str]:
             try:
                 process.wait(wait)
             except subprocess.TimeoutExpired:
-                process.kill()
+                process.send_signal(signal.SIGINT if n % 3 == 2 else signal.SIGKILL)
         left = trial.state()
         found["old" if left == before else "new" if left == wanted else "wrong"] += 1
-        if process.returncode not in (0, -9) or left not in trial.values:
+        # Python itself ends with -2 or 1 while it starts.
+        ends = (0, 130, -2, 1) if n % 3 == 2 else (0, -9)
+        if process.returncode not in ends or left not in trial.values:
             wrong.append(f"{n}, exit code {process.returncode}: {left}")
         if left == wanted:
             trial.forget()
-    print(f"{times} SIGKILLs at random times leave {dict(found)}", flush=True)
+    print(f"{times} signals at random times leave {dict(found)}", flush=True)
     return wrong + trial.ends()
 
 
-def fill_disks(trial: Trial, sizes: int = 24) -> list[str]:
-    """Run on file systems that are full after a while; return what was wrong."""
-    place = trial.place
-    trial.begin()
-    keep = shutil.copytree(place, place.with_suffix(".keep"))
-    wrong = []
-    found: Counter[str] = Counter()
-    begin_size, told = 0, ""
-    for n in range(sizes):
-        options = ["-t", "tmpfs", "-o", "size=64m", "tmpfs", str(place)]
-        if subprocess.run(["mount", *options], capture_output=True, check=False).returncode:
-            print("full disks: left out, for file systems cannot be mounted here")
-            return wrong
-        try:
-            shutil.copytree(keep, place, dirs_exist_ok=True)
-            used = shutil.disk_usage(place).used
-            begin_size = begin_size or used
-            room = used + n * begin_size // (sizes - 4)
-            resize = f"remount,size={room}"
-            subprocess.run(["mount", "-o", resize, str(place)], check=True)
-            done = trial.run(trial.values[1])
-            left = trial.state()
-            expected = {0: trial.values[1], 2: trial.values[0]}.get(done.returncode, "?")
-            found[f"exit code {done.returncode}"] += 1
-            if left != expected or os.listdir(place) != ["out"]:
-                wrong.append(f"{room} bytes: {left}, {os.listdir(place)}: {done.stderr}")
-            elif done.returncode and done.stderr.count("\n") != 1:
-                wrong.append(f"{room} bytes: {done.stderr}")
-            told = done.stderr if done.returncode else told
-        finally:
-            subprocess.run(["umount", str(place)], check=True)
-    print(f"{sizes} small file systems: {dict(found)}; the last error was\n  {told}", flush=True)
-    return wrong
-
-
 def main() -> int:
-    """Kill and fill; return 1 if anything but whole results was found."""
+    """Kill; return 1 if anything but whole results was found."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--times", type=int, default=75, help="SIGKILLs at random times, of each")
-    parser.add_argument("--only", choices=["calls", "random", "full"])
+    parser.add_argument("--times", type=int, default=75, help="signals at random times, of each")
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
     chosen = parser.parse_args()
     wrong = []
@@ -317,13 +266,7 @@ def main() -> int:
         prepare(Path(folder))
         for name in chosen.commands:
             print(f"{name}:", flush=True)
-            traced = shutil.which("strace") and not COMMANDS[name].browser
-            if chosen.only in (None, "calls") and traced:
-                wrong += kill_at_every_call(Trial(name, Path(folder) / f"{name}-calls"))
-            if chosen.only in (None, "random"):
-                wrong += kill_at_random(Trial(name, Path(folder) / f"{name}-random"), chosen.times)
-            if chosen.only in (None, "full") and not COMMANDS[name].browser:
-                wrong += fill_disks(Trial(name, Path(folder) / f"{name}-full"))
+            wrong += kill_at_random(Trial(name, Path(folder) / name), chosen.times)
     for one in wrong:
         print(f"wrong: {one}")
     print("failed" if wrong else "whole old or whole new each time")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sphshell_pin.benchmarks.new_study import DATA, ask, read_once, sections
+from tests.new_study import DATA, ask, read_once, sections
 
 ROBOTS = ("three_link_finger", "arm_with_probe", "ball")
 

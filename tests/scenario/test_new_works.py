@@ -176,7 +176,7 @@ def test_an_arm_whose_collection_lets_it_float_is_fixed(tmp_path):
 
 def test_links_in_a_part_are_found():
     """A cube of 0.1 m before, around and beside links of the arm that stands straight up."""
-    robot = robots.load_urdf(PROBE)
+    robot = robots.load_file(PROBE)
     q = pin.neutral(robot.model)
     cube = sp.Shell.from_geometry(coal.Box(0.1, 0.1, 0.1), side="outside")
     tip = Tip("link_5", 0.01, np.array([0, 0, 0.08]), "")
@@ -249,7 +249,7 @@ def test_a_sphere_is_put_where_it_is_asked_for(tmp_path):
 
 def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
     """A capsule ends in its own half ball; on a cylinder's end stands a ball, in its middle."""
-    robot = robots.load_urdf(PROBE)
+    robot = robots.load_file(PROBE)
     for shape, radius in ((coal.Capsule(0.02, 0.1), 0.02), (coal.Cylinder(0.03, 0.1), None)):
         geometry = pin.GeometryModel()
         link = robot.model.getFrameId("link_5")

@@ -143,7 +143,7 @@ def test_a_scenario_of_another_robot_is_refused(folder):
 
 def test_a_scenario_of_other_contacts_is_refused(folder, tmp_path):
     other = write(tmp_path, DROP.replace("ball-plate", "ball-table"))
-    with pytest.raises(ResultError, match="were ball-plate, the scenario has ball-table"):
+    with pytest.raises(ResultError, match="were ball-plate, the scene has ball-table"):
         Replay(folder / "out" / "run.npz", scenario=other)
 
 

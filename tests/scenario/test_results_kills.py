@@ -15,7 +15,6 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.atomic import AtomicFolder, write_whole
-from sphshell_pin.cases.contents import Column, Section, Table
 from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
@@ -23,6 +22,7 @@ from sphshell_pin.scenario.drafting import new
 from sphshell_pin.scenario.running import run
 from sphshell_pin.shell.converting import convert
 from sphshell_pin.study.report import making
+from sphshell_pin.study.report.contents import Column, Section, Table
 from sphshell_pin.study.sweep.table import write_table
 from tests import meshes
 from tests.scenario.files import write

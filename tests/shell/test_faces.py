@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.shell.faces import described, distances_from, not_exact
-from sphshell_pin.study.validation.rattleback import ellipsoid
+from tests.validation.rattleback import ellipsoid
 
 SEGMENTS = 48
 
@@ -202,3 +203,22 @@ def test_two_triangles_of_a_coarse_bend_are_no_plane():
     strips = [[k, k + 2, k + 3, k + 1] for k in range(0, 2 * len(profile) - 2, 2)]
     triangles = [[q[0], *pair] for q in strips for pair in (q[1:3], q[2:4])]
     assert not sp.Shell(vertices, triangles).faces
+
+
+@pytest.mark.parametrize("taper", [0.0, 4.0, 4.2, 8.0])
+def test_of_two_kinds_that_fit_the_simpler_one_is_taken(taper):
+    """A tube of 6 m in whole millimeters: a taper of four of them is hardly more than rounding."""
+    turn = pin.utils.rpyToMatrix(0.3, 0.5, 0.7)
+    angles, heights = 2 * np.pi * np.arange(32) / 32, np.linspace(0, 20, 13)
+    points = [
+        [(6 + 1e-3 * taper * (z / 20 - 0.5)) * f for f in (np.cos(a), np.sin(a))] + [z]
+        for z in heights
+        for a in angles
+    ]
+    cells = [
+        (32 * k + i, 32 * k + (i + 1) % 32, 32 * (k + 1) + (i + 1) % 32, 32 * (k + 1) + i)
+        for k in range(12)
+        for i in range(32)
+    ]
+    (face,) = sp.Shell(np.round(np.array(points) @ turn.T, 3), cells).faces
+    assert face.kind == ("cone" if taper > 5 else "cylinder")

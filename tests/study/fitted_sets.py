@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.arrays import Array
-from sphshell_pin.cases.machine import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.quantities import quantities_of
+from sphshell_pin.study.report.machine import machine
 
 NOISE, STEP = 0.02, 2e-4  # of the largest value of each column; between times [s]
 SCENARIO = """

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from sphshell_pin.cases.contents import Finding, number
+from sphshell_pin.study.report.contents import Finding, number
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,6 @@ import sphshell_pin as sp
 from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
 from sphshell_pin.scenario.format.reading import find_scenario
-from sphshell_pin.study.fit import runs
-from sphshell_pin.study.fit.data import read_experiment
-from sphshell_pin.study.fit.parameters import free_parameters
-from sphshell_pin.study.fit.runs import Runs, Trial
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
 from sphshell_pin.study.quantities import quantities_of, row_step
 from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
@@ -271,47 +267,10 @@ def test_what_is_seen_stands_out_from_the_error_of_slopes():
     assert np.isfinite(spread_of(jacobian, error).deviations).tolist() == [True, False, False]
 
 
-def test_rows_with_inexact_slopes_take_nothing_from_the_others():
-    """What some rows determine, all determine; what no rows determine stays open."""
-    rng = np.random.default_rng(1)
-    exact, groups = rng.normal(size=(40, 2)), np.repeat([0, 1], [60, 40])
-    jacobian = np.vstack((5.0 * rng.normal(size=(60, 2)), exact))
-    error = np.vstack((4.0 * rng.normal(size=(60, 2)), 1e-3 * rng.normal(size=(40, 2))))
-    assert np.isinf(spread_of(jacobian, error).deviations).all()
-    found = spread_of(jacobian, error, groups)
-    np.testing.assert_allclose(found.covariance, np.linalg.inv(exact.T @ exact), rtol=1e-9)
-    assert found.left_out == (0,)
-    # The inexact rows may be needed for the first x: the second is open in both groups.
-    error[60:, 1] *= 1e4
-    assert np.isfinite(spread_of(jacobian, error, groups).deviations).tolist() == [True, False]
-    # Where all rows together determine everything, all count.
-    everything = spread_of(jacobian, 1e-3 * error, groups)
-    expected = np.linalg.inv(jacobian.T @ jacobian)
-    np.testing.assert_allclose(everything.covariance, expected, rtol=1e-9)
-    assert everything.left_out == ()
-
-
 # Of a ball in a bowl: pulses of its force are so short that derivatives by its height fail.
 IN_BOWL = "pairs.ball-bowl.normal_force"
 START = "robot.ball.start.root_joint.2"
 SOFT = {"contact.law.k": "2e3", "contact.law.c": "0.2"}
-
-
-@pytest.mark.parametrize("names", [[HEIGHT], [HEIGHT, IN_BOWL]])
-def test_inexact_slopes_of_one_column_do_not_hide_what_another_says(names):
-    """The height is measured itself."""
-    t = np.linspace(0.0, 0.12, 601)
-    exact = columns_of(find_scenario("sphere_on_shell"), t, names, SOFT)
-    rng = np.random.default_rng(1)
-    sigma = {f"{HEIGHT} [m]": 1e-5, f"{IN_BOWL} [N]": 1.0}
-    data = {name: one + sigma[name] * rng.normal(size=601) for name, one in exact.items()}
-    start = {"contact.law.k": 2e3, "contact.law.c": 0.19, START: 0.0732}
-    found = sp.fit("sphere_on_shell", {"t [s]": t, **data}, [START], changes=start)
-    assert found.determined
-    assert found[START].value == pytest.approx(0.073, abs=2e-5)
-    begin = f"the derivatives of {IN_BOWL} of experiment 1 are inexact: intervals follow from the"
-    said = [one.startswith(begin) for one in found.remarks if "inexact" in one]
-    assert said == [True] * (len(names) - 1)
 
 
 def test_inexact_slopes_keep_the_value_and_are_said():
@@ -339,30 +298,6 @@ def test_false_alarms_of_the_test_for_noise_are_rare():
     assert not seen.independent
     assert seen.correlation == pytest.approx(0.5, abs=0.02)
     assert seen.inflation == pytest.approx(math.sqrt(3.0), rel=0.03)
-
-
-def test_slopes_by_sensitivities_are_those_of_differences(bounce, monkeypatch):
-    """Of forces, friction, depth and a speed; with a fixed step both are exact."""
-    names = [FORCE, "pairs.tip.force_x", "pairs.tip.friction_force_x", "pairs.tip.depth"]
-    names += ["v.root_joint.2"]
-    t = np.linspace(0.0, 0.05, 101)
-    fixed = bounce.with_name("fixed.toml")
-    fixed.write_text(SCENARIO.replace("rtol = 1e-7", 'dt = 5e-5\nintegrator = "runge-kutta-4"'))
-    data = sp.Experiment({"t [s]": t, **columns_of(fixed, t, names)})
-    built = build(fixed)
-    trial = Trial(built, read_experiment(data, 1, quantities_of(built), 0.25))
-    free = free_parameters(list(TRUTH), built.scenario, fixed)
-    x = np.array([one.to_x(one.start * 1.01) for one in free])
-    ends = np.full(3, np.inf)
-    monkeypatch.setattr(runs, "COST_OF_SENSITIVITIES", 0)
-    followed = Runs([trial], free)
-    found = followed.derivatives(x, -ends, ends, 1e-4)
-    assert followed.count == 1
-    for k in range(3):
-        expected = followed.slope(x, k, -ends, ends, 1e-4, central=True)
-        for part in np.split(np.arange(len(expected)), len(names)):
-            error = np.linalg.norm(found[part, k] - expected[part])
-            assert error <= 2e-3 * np.linalg.norm(expected[part]) + 1e-7 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sphshell_pin.benchmarks import analytic_cases, sizes, step, timing
-from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
-from sphshell_pin.cases.contents import Spread
+from benchmarks import growth
+from sphshell_pin.study.report import closed_forms, timing
+from sphshell_pin.study.report.contents import Spread
+from sphshell_pin.study.report.swing import GRAVITY, MASS, RADIUS
 
 
 def integrated(slope, start, t, method="DOP853"):
@@ -17,7 +18,7 @@ def integrated(slope, start, t, method="DOP853"):
 
 
 def test_closed_form_of_the_bobbing_ball():
-    case = analytic_cases.bob()
+    case = closed_forms.bob()
     t = np.linspace(0, 0.1, 26)
     sag = MASS * GRAVITY / 1e4
     rows = integrated(lambda _, y: [y[1], -1e4 / MASS * y[0]], [0.8 * sag, 0.0], t)
@@ -32,32 +33,32 @@ def test_closed_form_of_the_bounces():
         return [y[1], -GRAVITY + 1e4 / MASS * max(0.0, -y[0])]
 
     found = solve_ivp(
-        slope, (0, 0.2), [analytic_cases.FALL, 0.0], "DOP853", t, rtol=1e-12, atol=1e-15,
+        slope, (0, 0.2), [closed_forms.FALL, 0.0], "DOP853", t, rtol=1e-12, atol=1e-15,
         max_step=1e-4,
     )  # fmt: skip
-    assert analytic_cases.bounce(t, 1e4)[0] == pytest.approx(found.y[0], abs=1e-8)
+    assert closed_forms.bounce(t, 1e4)[0] == pytest.approx(found.y[0], abs=1e-8)
 
 
 def test_closed_form_of_the_gliding_ball():
-    case = analytic_cases.glide()
+    case = closed_forms.glide()
     t = np.linspace(0, 0.1, 21)
-    sag, damping = MASS * GRAVITY / analytic_cases.STIFF, 1e4
+    sag, damping = MASS * GRAVITY / closed_forms.STIFF, 1e4
 
     def slope(_, y):
         depth = -y[0]
-        push = analytic_cases.STIFF * depth - damping * y[1]
+        push = closed_forms.STIFF * depth - damping * y[1]
         return [y[1], -GRAVITY + push / MASS]
 
     rows = integrated(slope, [-1.5 * sag, 0.0], t, "Radau")
     figures = case.exact(t)[0]
     assert figures[:, 2] == pytest.approx(-rows[:, 0] / sag, abs=1e-6)
-    along = np.cos(np.sqrt(analytic_cases.SPRING / MASS) * t)
+    along = np.cos(np.sqrt(closed_forms.SPRING / MASS) * t)
     assert figures[:, 0] == pytest.approx(along)
 
 
 def test_contestants_answer_from_their_own_processes():
-    names, notes = [sizes.OURS, sizes.COAL], []
-    rows = sizes.measure_one(names, 22, 2, notes)
+    names, notes = [growth.OURS, growth.COAL], []
+    rows = growth.measure_one(names, 22, 2, notes)
     assert [row.name for row in rows] == names
     assert notes == []
     assert all(row.triangles == 968 and row.query.median > 0 for row in rows)
@@ -65,32 +66,21 @@ def test_contestants_answer_from_their_own_processes():
 
 
 def test_who_cannot_answer_is_left_out_with_a_reason(monkeypatch):
-    monkeypatch.setitem(sizes.NEEDS, sizes.TRIMESH, "no_such_module")
-    names, notes = sizes.installed()
-    assert sizes.TRIMESH not in names
+    monkeypatch.setitem(growth.NEEDS, growth.TRIMESH, "no_such_module")
+    names, notes = growth.installed()
+    assert growth.TRIMESH not in names
     assert "no_such_module is missing" in " ".join(notes)
-    names, notes = ["nobody", sizes.OURS_FLAT], []
-    rows = sizes.measure_one(names, 22, 1, notes)
-    assert [row.name for row in rows] == names == [sizes.OURS_FLAT]
+    names, notes = ["nobody", growth.OURS_FLAT], []
+    rows = growth.measure_one(names, 22, 1, notes)
+    assert [row.name for row in rows] == names == [growth.OURS_FLAT]
     assert notes[0].startswith("nobody is left out from 968 triangles on: KeyError: 'nobody'.")
 
 
 def test_sheets_that_do_not_fit_the_memory_are_left_out(monkeypatch):
-    monkeypatch.setattr(sizes, "available", lambda: 1e6)
-    rows, notes = sizes.measure((1000,), 1)
+    monkeypatch.setattr(growth, "available", lambda: 1e6)
+    rows, notes = growth.measure((1000,), 1)
     assert rows == []
     assert "2000000 triangles are left out" in notes[-1]
-
-
-def test_the_parts_of_a_step_add_up():
-    rng = np.random.default_rng(0)
-    names = (step.BARE, step.FREE, step.FAR, step.TOUCHING)
-    times = {name: rng.uniform(1e-6, 2e-6, 5) for name in names}
-    parts = step.parts_of(times)
-    assert set(parts) == set(names[1:])
-    for name, found in parts.items():
-        assert set(found) == set(step.PARTS)
-        assert sum(found.values()) == pytest.approx(times[name])
 
 
 def test_one_core_for_a_while():
@@ -105,13 +95,3 @@ def test_spread():
     heard = []
     timing.part(heard.append, 0.25, 0.5)(0.5)
     assert heard == [0.375]
-
-
-def test_what_does_not_fit_together_runs_one_after_another(monkeypatch):
-    names = [sizes.OURS, sizes.OURS_FLAT, sizes.COAL]
-    monkeypatch.setattr(sizes, "installed", lambda: (list(names), []))
-    monkeypatch.setattr(sizes, "available", lambda: 2.0 * 968 * sizes.MEMORY_PER_TRIANGLE)
-    rows, notes = sizes.measure((22, 100), 1)
-    assert [(row.name, row.triangles) for row in rows] == [(name, 968) for name in names]
-    assert "one contestant after another" in notes[0]
-    assert "20000 triangles are left out" in notes[1]

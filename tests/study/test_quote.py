@@ -1,8 +1,21 @@
 """What the README and the documents quote is what was measured."""
 
-from sphshell_pin.benchmarks import quote
-from sphshell_pin.cases.contents import Column, Finding, Section, Table
+import importlib.util
+from pathlib import Path
+
+import pytest
+
 from sphshell_pin.study.report import making
+from sphshell_pin.study.report.contents import Column, Finding, Section, Table
+
+
+@pytest.fixture(scope="module")
+def quote():
+    file = Path(__file__).parents[2] / "docs" / "site" / "quote.py"
+    spec = importlib.util.spec_from_file_location("quote", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def report(folder, error=None):
@@ -23,7 +36,7 @@ def report(folder, error=None):
     return folder
 
 
-def test_blocks_are_tables_of_markdown(tmp_path):
+def test_blocks_are_tables_of_markdown(quote, tmp_path):
     blocks = quote.blocks_of(quote.read(report(tmp_path / "report") / "report.json"))
     assert "| who | s |\n| --- | --- |\n| a\\|b | 43.8 |\n" in blocks["times"]
     assert "| coal / ours | 33.8 x | 29.9 to 35.5 | at least 15 x |" in blocks["summary"]
@@ -31,7 +44,7 @@ def test_blocks_are_tables_of_markdown(tmp_path):
     assert 'a "fast" one, 2026-11-21, with `--quick`' in blocks["summary"]
 
 
-def test_a_report_that_is_not_whole_is_not_quoted(tmp_path, monkeypatch, capsys):
+def test_a_report_that_is_not_whole_is_not_quoted(quote, tmp_path, monkeypatch, capsys):
     folder = report(tmp_path / "report", error="no rtree")
     for one, words in ((folder, "'Queries' was not measured: no rtree"), (tmp_path / "no", "No")):
         monkeypatch.setattr("sys.argv", ["quote", str(one)])

@@ -15,23 +15,16 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks import analytic_cases, convergence, hard_cases, step
-from sphshell_pin.benchmarks import queries as query_section
-from sphshell_pin.benchmarks import work_precision as work
-from sphshell_pin.benchmarks.peers import section as peers_section
-from sphshell_pin.benchmarks.peers.measuring import Ratio
-from sphshell_pin.benchmarks.peers.measuring import Row as PeerRow
-from sphshell_pin.benchmarks.sizes import Row as SizeRow
-from sphshell_pin.cases import machine
-from sphshell_pin.cases.contents import Column, Finding, Section, Table, Verdict
-from sphshell_pin.cases.drawing import spread_apart
 from sphshell_pin.errors import Interrupted
-from sphshell_pin.study.report import PAGE, making
-from sphshell_pin.study.report.page import Heading
+from sphshell_pin.study.report import PAGE, closed_forms, convergence, machine, making, steps
+from sphshell_pin.study.report import integrators as work
+from sphshell_pin.study.report import queries as query_section
+from sphshell_pin.study.report.contents import Column, Finding, Section, Table
+from sphshell_pin.study.report.drawing import spread_apart
 from tests.command import call
 
 pytest.importorskip("matplotlib")
-KEYS = ["forces", "queries", "integrators", "steps", "hard_cases", "peers"]
+KEYS = ["forces", "queries", "integrators", "steps"]
 RNG = np.random.default_rng(4)
 
 
@@ -55,55 +48,32 @@ def forces(*, quick, progress):
 
 
 def queries(*, quick, progress):
-    rows = [
-        SizeRow(name, "contacts", count, times(seconds), 0.1, 500.0 * count)
-        for name, seconds in (("smooth", 1e-6), ("facets", 9e-7), ("coal::collide", 4e-5))
-        for count in (2048, 199_712)
-    ]
-    return query_section.assemble(rows, ["trimesh is left out."])
+    costs = (("smooth", 1e-6), ("facets", 9e-7), ("coal::collide", 4e-5))
+    found = {(name, 199_712): times(seconds) for name, seconds in costs}
+    return query_section.assemble(found | {("smooth", 2048): times(1e-6)})
 
 
 def integrators(*, quick, progress):
     chosen = (sp.RungeKutta4(1e-3), sp.RungeKutta4(2e-4), sp.Implicit(1e-3), sp.Implicit(1e-5))
     rows, cases = [], []
-    for case in (analytic_cases.bob(), analytic_cases.bounces()):
+    for case in (closed_forms.bob(), closed_forms.bounces()):
         cases.append(replace(case, integrators=chosen))
         rows += work.measure(cases[-1], work.Judge(case), 1)
     return work.assemble(cases, rows, SimpleNamespace(rms=1e-8, energy=2e-6))
 
 
-def steps(*, quick, progress):
-    names = (*step.WHOLE[:-1], "... and damping")
+def panda(*, quick, progress):
+    names = (*steps.WHOLE[:-1], "... and damping")
     whole = {name: times(2e-6 + 2e-7 * k) for k, name in enumerate(names)}
-    whole[step.CONTROL_TOUCHING] = times(3.5e-6)
+    whole[steps.CONTROL_TOUCHING] = times(3.5e-6)
     imports = {"sphshell_pin": times(0.14), "pinocchio": times(0.13)}
-    return step.assemble(whole, imports)
-
-
-def hard(*, quick, progress):
-    row = replace(Verdict.on("ball", "a < b & c", "1", 1.0, 1.0, 1e-9, 1e-6), group="Impacts")
-    bad = replace(row, measured="passed", expected="none", value=math.inf)
-    nothing = replace(row, value=0.0, aim=0.0)
-    return hard_cases.assemble(hard_cases.Found([row, bad, nothing], 2, 1.0), quick=quick)
-
-
-def peers(*, quick, progress):
-    swing = {"period": 1e-4, "energy": 1e-3}
-    ours = PeerRow("bowl", "ours", "sphshell_pin 0", params={"dt": 1e-3}, errors=swing, cost=0.01)
-    other = replace(ours, engine="mujoco", settings={"solver": "<Newton>"}, cost=1.0)
-    press = replace(ours, scene="press", errors={"pressed [mm]": 0.1}, unit="us / step")
-    absent = PeerRow("bowl", "drake", note="not installed: no module named pydrake")
-    ratios = [
-        Ratio("swing", other, ours, 120.0, 110.0, 130.0),
-        Ratio("press", replace(press, engine="mujoco"), press, 1.2, 1.1, 1.3),
-    ]
-    return peers_section.assemble([ours, other, press, absent], ratios)
+    return steps.assemble(whole, imports)
 
 
 def parts_of(*measures) -> tuple[making.Part, ...]:
     return tuple(
         making.Part(known.key, known.title, measure, (1.0, 1.0), pinned=False)
-        for known, measure in zip((*making.PARTS, making.PEERS), measures, strict=True)
+        for known, measure in zip(making.PARTS, measures, strict=True)
     )
 
 
@@ -113,12 +83,9 @@ def small(monkeypatch):
 
     def put(**others) -> None:
         measures = {
-            "forces": forces, "queries": queries, "integrators": integrators, "steps": steps,
-            "hard_cases": hard, "peers": peers,
+            "forces": forces, "queries": queries, "integrators": integrators, "steps": panda,
         } | others  # fmt: skip
-        made = parts_of(*measures.values())
-        monkeypatch.setattr(making, "PARTS", made[:-1])
-        monkeypatch.setattr(making, "PEERS", made[-1])
+        monkeypatch.setattr(making, "PARTS", parts_of(*measures.values()))
 
     put()
     return put
@@ -173,10 +140,10 @@ def table_of(path):
 def test_whole_report(small, tmp_path):
     heard = []
     report = making.make_report(
-        tmp_path, quick=True, with_peers=True, command="sphshell-pin report <x>",
+        tmp_path, quick=True, command="sphshell-pin report <x>",
         tell=lambda title, share: heard.append(share),
     )  # fmt: skip
-    assert [s.error for s in report.sections] == [None] * 6
+    assert [s.error for s in report.sections] == [None] * 4
     assert heard == sorted(heard)
     assert 0 <= heard[0] <= heard[-1] <= 1 + 1e-12
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
@@ -186,7 +153,6 @@ def test_whole_report(small, tmp_path):
     # One file that makes no requests: links and pictures are on the page.
     assert all(address.startswith(("#", "data:image/png")) for address in page.addresses)
     assert re.search("https?:|url\\(|@import", text) is None
-    assert "&lt;Newton&gt;" in text
     assert "sphshell-pin report &lt;x&gt;" in text
     judged = [f.met for s in report.sections for f in s.findings if f.met is not None]
     assert f"{sum(judged)} of {len(judged)} aims are met." in text
@@ -198,15 +164,12 @@ def test_whole_report(small, tmp_path):
     ]  # fmt: skip
     assert {row["method"] for row in found} == set(convergence.RULES)
     verdicts = {row["key"]: row["met"] for row in table_of(tmp_path / "findings.csv")}
-    assert verdicts["peers_swing"] == "True"
-    assert verdicts["peers_press"] == "False"
-    assert verdicts["hard_cases"] == "False"
     assert verdicts["swing_energy"] == "False"
     data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert {"processor", "cores", "system", "packages", "date", "command"} <= set(data["machine"])
     pictures = list(tmp_path.glob("*.png"))
     assert set(data["files"]) == {f.name for f in (*tmp_path.glob("*.csv"), *pictures)}
-    assert len(pictures) == 7
+    assert len(pictures) == 2
     for picture in pictures:
         content = picture.read_bytes()
         assert int.from_bytes(content[16:20], "big") > 800  # its width
@@ -215,7 +178,7 @@ def test_whole_report(small, tmp_path):
 
 @pytest.mark.browser
 def test_the_page_in_a_browser(small, tmp_path, browser):
-    making.make_report(tmp_path, with_peers=True)
+    making.make_report(tmp_path)
     address = (tmp_path / PAGE).as_uri()
     asked, complaints, looks = [], [], []
     for width, scheme in ((400, "light"), (1400, "dark")):
@@ -230,7 +193,7 @@ def test_the_page_in_a_browser(small, tmp_path, browser):
         heights = page.evaluate(
             "[...document.querySelectorAll('img')].map(s => s.getBoundingClientRect().height)"
         )
-        assert len(heights) == 7
+        assert len(heights) == 2
         assert min(heights) > 80
         looks.append(page.evaluate("getComputedStyle(document.body).backgroundColor"))
         context.close()
@@ -278,15 +241,14 @@ def test_a_broken_section_does_not_lose_the_others(stubs, tmp_path):
     stubs(**dict.fromkeys(KEYS, stub) | {"queries": broken})
     ran = call("report", "--out", tmp_path)
     assert ran.exit_code == 1
-    assert "not measured: Time and memory of a query: ValueError: a <b> broke" in ran.stderr
+    assert "not measured: Time of a query: ValueError: a <b> broke" in ran.stderr
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "could not be measured: ValueError: a &lt;b&gt; broke" in text
-    assert "4 of 4 aims are met. 1 section could not be measured." in text
-    assert "--peers" in text
+    assert "3 of 3 aims are met. 1 section could not be measured." in text
 
 
 def test_exit_code_and_table(stubs, tmp_path):
-    ran = call("report", "--quick", "--peers", "--out", tmp_path / "new")
+    ran = call("report", "--quick", "--out", tmp_path / "new")
     assert ran.exit_code == 0, ran.output
     assert "at most 2" in ran.stdout
     assert str(tmp_path / "new" / PAGE) in ran.stdout
@@ -311,7 +273,6 @@ def test_the_page_names_the_aims_that_are_not_met(stubs, tmp_path):
         "query: theirs / ours; the same with sand: 0.5 x, aim at least 1 x",
         "cost of a step, aim at most 2",
         "libigl: not installed",
-        "bowl swing, CPU time at equal errors",
     ):
         assert f"<li>{line}" in text
     assert "h is the mean length" in text.partition('<ul class="cards">')[0]
@@ -330,12 +291,6 @@ def test_a_busy_machine_is_said_on_the_page(stubs, tmp_path, monkeypatch, cores)
         assert page.index("The machine was busy") < page.index('<ul class="cards">')
     data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert bool(data["caution"]) == busy
-
-
-def test_a_report_without_times_has_no_caution(stubs, tmp_path, monkeypatch):
-    monkeypatch.setattr(machine.OtherWork, "cores", lambda self: 1.5)
-    made = making.make_report(tmp_path, parts=making.PARTS, heading=Heading("A", "B"))
-    assert made.caution == ""
 
 
 @pytest.mark.skipif(not Path("/proc/stat").exists(), reason="needs Linux's /proc/stat")
@@ -358,7 +313,7 @@ def test_an_interrupted_run_leaves_the_old_page(stubs, tmp_path, kind):
     def interrupted(*, quick, progress):
         raise kind
 
-    stubs(**dict.fromkeys(KEYS, stub) | {"hard_cases": interrupted})
+    stubs(**dict.fromkeys(KEYS, stub) | {"steps": interrupted})
     ran = call("report", "--out", tmp_path)
     assert ran.exit_code == 130
     assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == before
@@ -384,29 +339,3 @@ def test_a_folder_that_cannot_be(stubs, tmp_path):
     assert ran.exit_code == 2
     assert "cannot hold a report" in ran.stderr
     assert (tmp_path / "file").read_text() == "mine"
-
-
-def test_away_from_the_checkout_there_are_no_hard_cases(monkeypatch, tmp_path):
-    monkeypatch.setattr(hard_cases.sphshell_pin, "__file__", str(tmp_path / "p" / "__init__.py"))
-    section = hard_cases.section(quick=True, progress=lambda share: None)
-    assert section.error is None
-    assert "part of the checkout" in section.notes[0]
-
-
-def test_hard_cases_run_in_a_process_of_their_own():
-    shares = []
-    found = hard_cases.measure(
-        hard_cases.checkout(), quick=True, only="impact of Hunt", progress=shares.append
-    )
-    assert (found.cases, len(found.rows)) == (1, 4)
-    assert all(row.ok and row.value <= row.aim for row in found.rows)
-    assert shares == [1.0]
-
-
-def test_a_hard_case_that_ends_its_process_is_told(tmp_path):
-    (tmp_path / "tests" / "hard_cases").mkdir(parents=True)
-    (tmp_path / "tests" / "__init__.py").touch()
-    (tmp_path / "tests" / "hard_cases" / "__init__.py").touch()
-    (tmp_path / "tests" / "hard_cases" / "__main__.py").write_text("raise SystemExit('no luck')")
-    with pytest.raises(RuntimeError, match="ended early: no luck"):
-        hard_cases.measure(tmp_path)

@@ -124,4 +124,4 @@ def test_integrators_may_vary_where_the_file_gives_a_step(tmp_path):
 
 def test_axes_have_the_units_of_the_scenario(tmp_path):
     plan = plan_sweep(write(tmp_path), {KEY: [1e5, 2e5], "run.rtol": [1e-5], "run.duration": [0.1]})
-    assert [axis.unit for axis in plan.axes] == ["N/m^1.5", "", "s"]
+    assert [plan.units.get(axis.key) for axis in plan.axes] == ["N/m^1.5", None, "s"]

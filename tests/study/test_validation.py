@@ -7,21 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sphshell_pin.benchmarks.rolling import turned
-from sphshell_pin.cases.contents import Finding, Picture
-from sphshell_pin.errors import NameNotFound, ResultError
-from sphshell_pin.study.report import PAGE
-from sphshell_pin.study.validation import (
-    Outcome,
-    carried,
-    cases,
-    collect,
-    make_validation,
-    rattleback,
-    tosses,
-)
-from tests.command import call
+from sphshell_pin.errors import NameNotFound
+from tests.rolling import turned
 from tests.studies import mostly_studies
+from tests.validation import carried, cases, rattleback, tosses
+from tests.validation.cases import collect
 
 pytest.importorskip("matplotlib")
 DOCS = Path(__file__).parents[2] / "docs"
@@ -84,50 +74,8 @@ def test_page_of_the_docs_has_every_case():
     data = json.loads((DOCS / "measured" / "validation.json").read_text(encoding="utf-8"))
     sections = {one.get("title"): one for one in data["sections"]}
     for one in collect():
-        assert one.title in sections, "run python docs/site/validation.py"
-        assert one.source in sections[one.title]["notes"][0], "run python docs/site/validation.py"
-
-
-def outcome(value: float, explained: dict[str, str]) -> Outcome:
-    finding = Finding("error", "error of force", value, aim=1.0, headline=True)
-    return Outcome([finding], [Picture("x", b"png", "x", "x")], explained=explained)
-
-
-def test_command(tmp_path, monkeypatch):
-    """It writes the page; a figure that is out stands with its explanation."""
-    ran = {"here": outcome(0.5, {}), "far": outcome(2.0, {"error": "Balls have hair."})}
-    made = [
-        cases.Case(
-            key=key,
-            title=f"Case {key}",
-            source="S, https://x",
-            setting="P",
-            bound="B",
-            leaves_out="L",
-            run=lambda key=key: ran[key],
-        )
-        for key in ran
-    ]
-    monkeypatch.setattr(cases, "collect", lambda quick: made)
-    done = call("report", "--validation", "--out", tmp_path)
-    assert done.exit_code == 0, done.output
-    text = (tmp_path / PAGE).read_text(encoding="utf-8")
-    assert "against published experiments" in text
-    assert "1 of 2 aims are met" in text
-    assert "Out of bounds: error of force. Balls have hair." in text
-    assert "Source: S, https://x" in text
-
-
-def test_other_engines_are_not_asked():
-    done = call("report", "--validation", "--peers")
-    assert done.exit_code == 2
-    assert "leave out --peers" in done.output
-
-
-def test_without_a_checkout_it_says_what_it_needs(tmp_path, monkeypatch):
-    monkeypatch.setattr(cases, "DATA", Path("nowhere"))
-    with pytest.raises(ResultError, match="run the validation from a checkout"):
-        make_validation(tmp_path)
+        assert one.title in sections, "run python -m tests.validation"
+        assert one.source in sections[one.title]["notes"][0], "run python -m tests.validation"
 
 
 def test_data_file():

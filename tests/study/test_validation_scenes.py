@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from sphshell_pin.benchmarks.rolling import Ball, swing_period
-from sphshell_pin.benchmarks.swing import GRAVITY
+from sphshell_pin.study.report.swing import GRAVITY
+from tests.rolling import Ball, swing_period
 
 pytest.importorskip("matplotlib")
-from sphshell_pin.study.validation import cam, rolling
+from tests.validation import cam, rolling
 
 
 @pytest.mark.parametrize("angle", [1e-3, 0.3, 2.0, 3.1])

@@ -1,1 +1,96 @@
-../../../sphshell_pin/__init__.py
+"""Exact contact of spheres with CAD surfaces, as wrenches for Pinocchio's dynamics.
+
+The public names are loaded when they are first used.
+"""
+
+from __future__ import annotations
+
+from sphshell_pin._interrupts import interrupts_delayed
+
+# isort: split
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+with interrupts_delayed():
+    from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
+    from sphshell_pin.deprecation import FormerModules
+
+sys.meta_path.append(FormerModules())
+
+if TYPE_CHECKING:
+    from sphshell_pin.contact import *  # noqa: F403
+    from sphshell_pin.contact.laws import *  # noqa: F403
+    from sphshell_pin.dynamics import *  # noqa: F403
+    from sphshell_pin.dynamics.control.controllers import *  # noqa: F403
+    from sphshell_pin.dynamics.run.integrators import *  # noqa: F403
+    from sphshell_pin.dynamics.sensing.sensors import *  # noqa: F403
+    from sphshell_pin.errors import InvalidParameter as InvalidParameter
+    from sphshell_pin.errors import SphshellError as SphshellError
+    from sphshell_pin.patches import *  # noqa: F403
+    from sphshell_pin.shell import CleanedSurface as CleanedSurface
+    from sphshell_pin.shell import ClosestPoints as ClosestPoints
+    from sphshell_pin.shell import Face as Face
+    from sphshell_pin.shell import Shell as Shell
+    from sphshell_pin.shell import ShellHealth as ShellHealth
+    from sphshell_pin.study.fit import *  # noqa: F403
+
+__version__ = "0.2.0"
+
+_PARTS = (
+    "contact",
+    "dynamics",
+    "errors",
+    "patches",
+    "robots",
+    "scenario",
+    "shell",
+    "units",
+    "view",
+)
+# What a type checker sees above; tests compare the two.
+_NAMES = {
+    "contact": "BristleFriction BristleState ContactSet CoulombFriction Feature FoundationLaw "
+    "Friction FunctionFriction FunctionLaw HertzLaw MATERIALS Material Method "
+    "MindlinFriction NormalLaw Plane Sphere TableLaw contact_wrench find_material "
+    "foundation_pressure friction_between restitution_between",
+    "contact.laws": "HuntCrossleyLaw ImpactLaw",
+    "dynamics": "CartesianImpedance ContactForceDerivatives ContactLog ContactPair "
+    "DynamicsDerivatives EnergyAudit Event JointComponents JointFigures JointFriction "
+    "JointLimits PairFigures Readings Result Rollout RunStats Scene SceneContacts "
+    "SceneState Sensitivities SensorLog Simulation StepDerivatives",
+    "dynamics.control.controllers": "GravityCompensation JointPD",
+    "dynamics.run.integrators": "Adaptive Implicit LinearlyImplicitEuler RungeKutta4 "
+    "SemiImplicitEuler",
+    "dynamics.sensing.sensors": "ContactSwitch ForceTorqueSensor JointTorqueSensor",
+    "errors": "InvalidParameter SphshellError",
+    "patches": "ShellTaxels TaxelGrid TaxelImages WearMap wear_maps",
+    "shell": "CleanedSurface ClosestPoints Face Shell ShellHealth",
+    "study.fit": "Experiment Fit Fitted Series fit",
+}
+_HOME = {name: part for part, names in _NAMES.items() for name in names.split()}
+
+__all__ = sorted(_HOME)  # noqa: PLE0605
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """Load a public name or a part of the package at its first use."""
+        if name in _HOME:
+            value = getattr(import_module(f"sphshell_pin.{_HOME[name]}"), name)
+            globals()[name] = value
+            return value
+        if name == "JointIngredients":
+            from sphshell_pin.deprecation import warn_former
+
+            warn_former(f"sphshell_pin.{name}", "it is called JointComponents")
+            return __getattr__("JointComponents")
+        if name in _PARTS:
+            return import_module(f"sphshell_pin.{name}")
+        raise AttributeError(f"module 'sphshell_pin' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted([*_HOME, *_PARTS, "__version__"])

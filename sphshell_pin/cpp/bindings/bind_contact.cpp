@@ -10,7 +10,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "contact/laws/dual.hpp"
-#include "contact/laws/friction.hpp"
+#include "sphshell_pin/laws/friction.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -18,9 +18,29 @@ using namespace sphshell;
 
 namespace {
 
+// The parameters of a kind as rows of name, unit, bounds (above, at least, at most) and default.
+template <class Family>
+nb::list parameters_of(const std::string& kind) {
+  struct Lister {
+    nb::list rows;
+    void operator()(const char* name, double value, const Bounds& b) {
+      rows.append(nb::make_tuple(name, b.unit, b.above, b.at_least, b.at_most, value));
+    }
+    void operator()(const char* name, const std::optional<double>& value, const Bounds& b) {
+      rows.append(nb::make_tuple(name, b.unit, b.above, b.at_least, b.at_most,
+                                 value ? nb::cast(*value) : nb::none()));
+    }
+    void operator()(const char* name, const std::vector<double>&, const Bounds& b) {
+      rows.append(nb::make_tuple(name, b.unit, b.above, b.at_least, b.at_most, nb::none()));
+    }
+  } lister;
+  Kinds<Family>::of(kind, [&](auto law, auto*) { law.each(law, lister); });
+  return std::move(lister.rows);
+}
+
 // A family whose member `law` holds one of its kinds.
-// A law by its name and the numbers of its dataclass, and the names of all: what a new kind needs
-// on this side.
+// A law by its name and the numbers of its dataclass, the names of all, and what C++ states of
+// their parameters: what a new kind needs on this side.
 template <class Law>
 nb::class_<Law> bind_family(nb::module_& m, const char* name, nb::type_slots parts) {
   using Family = Kinds<decltype(Law::law)>;
@@ -31,7 +51,8 @@ nb::class_<Law> bind_family(nb::module_& m, const char* name, nb::type_slots par
             new (self) Law{Family::make(kind, numbers)};
           },
           "kind"_a, "numbers"_a)
-      .def_static("kinds", &Family::names);
+      .def_static("kinds", &Family::names)
+      .def_static("parameters", &parameters_of<decltype(Law::law)>, "kind"_a);
 }
 
 // A law of a user's functions; without one of energy that is the integral of the force.
@@ -89,6 +110,15 @@ void bind_contact(nb::module_& m) {
       .def_prop_ro("has_state", &FrictionLaw::has_state)
       .def_prop_ro("torsional", &FrictionLaw::torsional)
       .def("coefficient", &FrictionLaw::coefficient, "speed"_a, "load"_a = 1.0);
+  m.def(
+      "contact_moduli",
+      [](const Numbers& materials) {
+        // E*, 8 G* and 16/3 G of sphere and shell [Pa].
+        Materials both{};
+        Materials::each(both, NumberReader{materials});
+        return nb::make_tuple(both.modulus(), both.shear(), both.twist());
+      },
+      "materials"_a);
   m.def(
       "contact_force",
       [](const NormalLaw& law, const FrictionLaw* friction, double depth, const Vec3& normal,

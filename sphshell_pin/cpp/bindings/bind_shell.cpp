@@ -248,22 +248,23 @@ Array<int> triangle_face(const Shell& shell) {
   return to_array(std::move(out));
 }
 
-// Per face whether it gives the closest points of its elements.
-Array<std::uint8_t> exact_faces(const Shell& shell) {
+// Per triangle whether the face it lies on gives its closest points.
+Array<std::uint8_t> exact_triangles(const Shell& shell) {
   std::vector<std::uint8_t> out;
-  if (shell.curved()) {
+  if (const CurvedShell* surface = shell.curved()) {
+    const Faces& faces = surface->faces();
     // Where no face has to, all are flat or none gives anything.
-    for (const Primitive& face : shell.curved()->faces().shapes)
-      out.push_back(face.kind == FaceKind::Plane);
-    if (!shell.curved()->face_cells().empty()) std::fill(out.begin(), out.end(), 1);
-    for (const FaceCell& cell : shell.curved()->face_cells())
-      if (cell.face >= 0) out[cell.face] = out[cell.face] && cell.exact;
+    for (const int face : faces.of)
+      out.push_back(face >= 0 && faces.shapes[face].kind == FaceKind::Plane);
+    out.resize(shell.triangles().size(), 0);
+    for (std::size_t f = 0; f < surface->face_cells().size(); ++f)
+      out[shell.triangle_of_facet(static_cast<int>(f))] = surface->face_cells()[f].exact;
   }
   return to_array(std::move(out));
 }
 
-// Faces that do not give closest points: which, beside which other one (-1: none), and how far off
-// [m]; (n, 3).
+// Faces that do not give all closest points: which, beside which other one (-1: none), and how far
+// off [m]; (n, 3).
 Array<double> inexact_faces(const Shell& shell) {
   std::vector<double> out;
   if (shell.curved())
@@ -369,7 +370,7 @@ void bind_shell(nanobind::module_& m) {
   array("corner_normals", &corner_normals);
   array("bending", &bending);
   array("triangle_face", &triangle_face);
-  array("exact_faces", &exact_faces);
+  array("exact_triangles", &exact_triangles);
   array("inexact_faces", &inexact_faces);
   array("chord_errors", [](const Shell& s) {
     return to_array(s.curved() ? s.curved()->chord_errors(s) : std::vector<double>());

@@ -9,6 +9,7 @@ namespace {
 constexpr double kFirst = 0x1p-20;    // where the octaves begin: a depth of 1e-12 m [m^0.5]
 constexpr double kTolerance = 1e-11;  // of an interval, as a share of the energy so far
 constexpr int kMostHalvings = 24;
+constexpr int kMostJumps = 1000;  // noise has one everywhere: then no interval is halved any more
 
 }  // namespace
 
@@ -30,7 +31,9 @@ void LawIntegral::divide(double from, double to, double whole, const double* par
   const double middle = (from + to) / 2;
   const double low = gauss(from, middle, parameters), high = gauss(middle, to, parameters);
   const double size = std::abs(table.energy) + std::abs(low) + std::abs(high);
-  if (halvings == 0 || std::abs(low + high - whole) <= kTolerance * size) {
+  if (halvings == 0 || table.jumps > kMostJumps ||
+      std::abs(low + high - whole) <= kTolerance * size) {
+    table.jumps += halvings == 0;
     table.intervals.push_back({from, table.energy});
     table.energy += whole;
     return;

@@ -28,6 +28,7 @@ class LawIntegral {
     std::vector<Interval> intervals;
     double end;     // [m^0.5]
     double energy;  // at the end [J]
+    int jumps = 0;  // intervals that were halved as often as possible
   };
   // Threads may extend the same table at once: each makes the same one, and publishes it.
   struct Found {

@@ -4,10 +4,8 @@
 #include <memory>
 #include <mutex>
 
-#include "contact/laws/friction.hpp"
 #include "contact/query/query.hpp"
 #include "shell/curved/curved.hpp"
-#include "sphshell_pin/laws.hpp"
 #include "sphshell_pin/query.hpp"
 #include "sphshell_pin/shell.hpp"
 
@@ -32,14 +30,6 @@ struct Shell::Impl {
     });
     return smooth;
   }
-};
-
-struct NormalLaw::Impl {
-  core::NormalLaw law;
-};
-
-struct FrictionLaw::Impl {
-  core::FrictionLaw law;
 };
 
 core::Method checked(Method method);

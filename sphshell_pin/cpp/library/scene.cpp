@@ -115,8 +115,8 @@ int Scene::add_contact(const Sphere& sphere, const Shell& shell, const NormalLaw
   pair.placement_j = frame.placement * mount.placement;
   pair.radius = sphere.radius;
   pair.geometry = core::ShellSurface{{}, shell.impl().with(mount.method), method};
-  pair.law = law.impl().law;
-  pair.friction = friction.impl().law;
+  pair.law = law.core();
+  pair.friction = friction.core();
   pair.name = sphere.frame + "-" + mount.frame;
   return impl_->add(std::move(pair));
 }
@@ -128,8 +128,8 @@ int Scene::add_contact(const Sphere& sphere, const Sphere& other, const NormalLa
   pair.placement_j = impl_->center_of(other, pair.joint_j);
   pair.radius = sphere.radius;
   pair.geometry = core::Ball{{}, other.radius};
-  pair.law = law.impl().law;
-  pair.friction = friction.impl().law;
+  pair.law = law.core();
+  pair.friction = friction.core();
   pair.name = sphere.frame + "-" + other.frame;
   return impl_->add(std::move(pair));
 }

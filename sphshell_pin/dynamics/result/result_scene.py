@@ -37,6 +37,24 @@ def scene_of(result: Result, scene: Scene | None = None) -> Scene:
     return found
 
 
+def check_scene(result: Result, scene: Scene, name: str) -> None:
+    """Raise ResultError, about `name`, where `scene` has other coordinates or contacts."""
+    ran, now = (result.q.shape[1], result.v.shape[1]), (scene.model.nq, scene.model.nv)
+    if ran != now:
+        raise ResultError(
+            name,
+            f"its model had nq = {ran[0]}, nv = {ran[1]}, that of the scene has nq = {now[0]}, "
+            f"nv = {now[1]}: the robot or its locked joints have changed since",
+        )
+    pairs = tuple(pair.name for pair in scene.pairs)
+    if pairs != tuple(result.pairs):
+        raise ResultError(
+            name,
+            f"its contacts were {', '.join(result.pairs) or 'none'}, the scene has "
+            f"{', '.join(pairs) or 'none'}: it is another one, or has changed since",
+        )
+
+
 def sound_rows(name: str, *states: NDArray[np.float64], limit: float = np.inf) -> int:
     """Return how many rows of `states`, (n, k) each, there are up to where their numbers end.
 

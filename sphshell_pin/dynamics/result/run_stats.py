@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-from sphshell_pin.deprecation import FormerDict
 from sphshell_pin.summary import Detail, Fact, Summarized
 
 # Kinds of events in the order of the compiled core; from "stop" on, of joints.
@@ -26,7 +25,7 @@ EventKind = Literal[
 
 
 @dataclass(frozen=True)
-class PairFigures(FormerDict):
+class PairFigures:
     """Figures of one contact pair over all steps of a run, recorded or not.
 
     `contact_time` [s] spent in touch; `impulse` [N s] of the normal force; `peak_force` [N] the
@@ -102,7 +101,7 @@ class JointFigures:
 
 
 @dataclass(frozen=True, repr=False)
-class RunStats(FormerDict, Summarized):
+class RunStats(Summarized):
     """Cost and figures of a run; zeros for the rows of a run that goes on.
 
     `steps` accepted, `rejected` for their error or a sphere's motion, `event_steps` made to end at

@@ -40,7 +40,13 @@ from sphshell_pin.dynamics.scene.joint_components import moving_joints
 from sphshell_pin.dynamics.scene.models import find_joint
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
-from sphshell_pin.errors import DeepStart, InvalidParameter, SetupWarning, WeakLawWarning
+from sphshell_pin.errors import (
+    DeepStart,
+    InvalidParameter,
+    SetupWarning,
+    SphshellError,
+    WeakLawWarning,
+)
 
 AnyController = Controller | Callback | None
 # A compiled run, or what a rollout keeps of one.
@@ -261,6 +267,8 @@ def result_of(
     """Make the result of a compiled run, or of what is left of one, and its record."""
     names = tuple(pair.name for pair in scene.pairs)
     summaries = core.summaries
+    if len(summaries) != len(names) + len(scene.joints.stopped_joints(scene.model)):
+        raise SphshellError("the scene's contacts were changed during the run: it has no result")
     counts, wall_time = core.counts, core.wall_time
     simulated = core.time - float(record["t"][0] if len(record["t"]) else core.time)
     figures = map(PairFigures.from_core, summaries[: len(names)])

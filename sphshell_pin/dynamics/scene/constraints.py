@@ -46,8 +46,11 @@ def constraints_of(
     columns = contacts.pair, contacts.point_world, contacts.normal_world, contacts.depth
     for k, point, normal, depth in zip(*columns, strict=True):
         pair = pairs[k]
+        # The point is on the shell, or on the plane, which has the part of the sphere.
         on_shell = pin.SE3(_frame(normal), point)
         on_sphere = pin.SE3(on_shell.rotation, point - depth * normal)
+        if pair.plane is not None:
+            on_shell, on_sphere = pin.SE3(on_shell.rotation, point + depth * normal), on_shell
         ends = (pair.joint_j, on_shell), (pair.joint_i, on_sphere)
         placed = [one for joint, at in ends for one in (joint, data.oMi[joint].actInv(at))]
         made = pin.PointContactConstraintModel(model, *placed)

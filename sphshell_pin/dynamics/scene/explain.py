@@ -18,6 +18,7 @@ from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
+from sphshell_pin.dynamics.scene.sphere_arguments import corner_warning, seam_warning
 from sphshell_pin.dynamics.scene.touches import Touch, touches_at
 
 if TYPE_CHECKING:
@@ -317,8 +318,12 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
         sentence = unit_warning(scene.model, radius, shell.size) if pair.spheres else None
         out += [f"{where}: {sentence}"] if sentence else []
         out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
+    corners = corner_warning(pair)
+    out += [corners] if corners else []
     if not pair.spheres:
         return out
+    earlier = scene.pairs[: scene.pairs.index(pair)]
+    out += [text for one in earlier if (text := seam_warning(one, pair))]
     weak = weakness(pair, figures)
     if weak is not None:
         out.append(weak)

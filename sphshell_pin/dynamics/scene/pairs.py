@@ -23,7 +23,6 @@ from sphshell_pin.contact import (
 )
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
-from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.scene.sources import Find, checked_source
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
@@ -67,10 +66,6 @@ class ContactPair(Summarized):
     group: str = ""
     plane: Plane | None = None
 
-    frame = renamed("frame", "frame_j")
-    sphere_placement = renamed("sphere_placement", "placement_i")
-    shell_placement = renamed("shell_placement", "placement_j")
-
     def __post_init__(self) -> None:
         """Check law, friction and method, and what needs a sphere or a shell where there is none.
 
@@ -101,9 +96,15 @@ class ContactPair(Summarized):
 
     @cached_property
     def plane_law(self) -> NormalLaw:
-        """The law, and of one that follows the curvature of the shell that of a plane shell."""
+        """The law, and of one that follows the curvature of the shell that of a plane shell.
+
+        Of a foundation beside a Plane it is that of a face as large as the shell's box: stiffest.
+        """
         if not self.law.needs_shape:
             return self.law
+        if self.plane and self.shell and isinstance(self.law, FoundationLaw):
+            sides = np.sort(np.ptp(self.shell.vertices, axis=0))
+            return self.law.on_face(float(sides[1] * sides[2]))
         return self.law.on_plane(1 / sum(1 / one.radius for one in self.spheres))
 
     @property
@@ -147,8 +148,9 @@ class ContactPair(Summarized):
     def _check_plane(self) -> None:
         """Refuse what follows from the radius of a sphere, and flat elements."""
         why = "beside a Plane: it follows from the radius of a Sphere"
-        if self.law.needs_shape:
-            raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}")
+        if self.law.needs_shape and not isinstance(self.law, FoundationLaw):
+            must = "take law.on_plane(radius), or a FoundationLaw, which needs no radius"
+            raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}; {must}")
         friction = self.friction
         if friction is not None and (
             isinstance(friction, MindlinFriction) or friction._binding.torsional

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.arrays import Array
 from sphshell_pin.checks import read_only
-from sphshell_pin.deprecation import renamed
 from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized
 
 Columns = dict[str, NDArray[Any]]  # of numbers of several kinds
@@ -46,8 +45,6 @@ class SceneContacts(Summarized):
     element: NDArray[np.int32]
     feature: NDArray[np.uint8]
     contact_id: NDArray[np.int32]
-
-    number = renamed("number", "contact_id")
 
     def __len__(self) -> int:
         """Return the number of contacts."""

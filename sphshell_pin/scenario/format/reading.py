@@ -19,7 +19,6 @@ from pydantic import ValidationError
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError, did_you_mean
-from sphshell_pin.named_numbers import present_name
 from sphshell_pin.parameters import parameters_of
 from sphshell_pin.regular_file import MOST_TEXT, read_text
 from sphshell_pin.scenario.format.schema import LISTS, STEPPING, RunSection, Scenario
@@ -183,8 +182,6 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
     data = scenario.model_dump()
     node, last, trail = _descend(data, key, path)
     numbers = [str(i) for i in range(len(node))] if isinstance(node, list) else []
-    if not numbers:
-        last = present_name(owner_of(scenario, trail), last)
     if last not in (numbers or node):
         named = [_item_name(item) for item in node if isinstance(item, dict)] if numbers else node
         known = [one for one in named if one] or numbers
@@ -277,7 +274,7 @@ def _change(
 
     `data` is what the file of `scenario` gives.
     """
-    node, rest, trail = _descend(data, key, path)
+    node, rest, _trail = _descend(data, key, path)
     whole, _, index = key.rpartition(".")
     if index.isdecimal() and not isinstance(node, list):
         # One number of a list that stands at its default.
@@ -298,7 +295,7 @@ def _change(
         node = node.setdefault(table, {})
         if not isinstance(node, dict):
             raise ScenarioError(path, key, f"'{table}' holds no further keys", value)
-    node[last if tables else present_name(owner_of(scenario, trail), last)] = value
+    node[last] = value
 
 
 def _descend(

@@ -316,8 +316,7 @@ def _check_integrator(kind: str) -> str:
 class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integrators have
     """How long and how finely to simulate [s]; `recording_speed` 0.1 films in slow motion.
 
-    With `record = ["patch"]` the patch of each contact is recorded and drawn; from the patches
-    follows what Preston's law wears off the shells, with the coefficient `wear`.
+    With `record = ["patch"]` the patch of each contact is recorded and drawn.
 
     The parameters of the integrator stand in this table; it is adaptive unless `dt` is given.
     """
@@ -327,15 +326,7 @@ class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integ
     control_dt: Annotated[Positive | None, Parameter("s", "control period")] = None
     record_dt: Annotated[Positive | None, Parameter("s", "time between rows")] = None
     record: list[Literal["patch", "torque"]] = Field(default_factory=list)
-    wear: Annotated[Positive | None, Parameter("1/Pa", "Preston coefficient")] = None
     recording_speed: Annotated[Positive, Parameter(label="speed of the recording")] = 1.0
-
-    @model_validator(mode="after")
-    def check_wear(self) -> RunSection:
-        """Refuse wear without the patches that it follows from."""
-        if self.wear is not None and "patch" not in self.record:
-            raise ValueError("wear follows from the patches of contacts: set record = ['patch']")
-        return self
 
     @model_validator(mode="after")
     def check_steps(self) -> RunSection:

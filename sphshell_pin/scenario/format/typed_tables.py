@@ -21,7 +21,6 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from sphshell_pin.errors import did_you_mean
-from sphshell_pin.named_numbers import present_name
 from sphshell_pin.parameters import Component, parameters_of
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -78,13 +77,6 @@ def _without_type(kind: type[Component], value: object) -> object:
     """Take the key `type` off a table; refuse keys that no file may state."""
     if not isinstance(value, dict):
         return value
-    # In the table itself, where errors look for the place of a key.
-    for key in list(value):
-        now = present_name(kind, key)
-        if now in value and now != key:
-            said = f"'{key}' is a former name of '{now}', which is given as well: leave '{key}' out"
-            raise PydanticCustomError("given_twice", "{said}", {"said": said})
-        value[now] = value.pop(key)
     table = {k: v for k, v in value.items() if k != "type"}
     refuse_unknown_keys(table, list(parameters_of(kind)))
     return table

@@ -13,7 +13,6 @@ import pinocchio as pin
 from sphshell_pin import _core
 from sphshell_pin.arrays import Array
 from sphshell_pin.checks import check_finite, check_not_negative, check_positive, check_vector
-from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.run.advance import AnyController, step_of
@@ -130,8 +129,6 @@ class LiveRun:
     def parameters(self) -> tuple[LiveParameter, ...]:
         """The parameters of the scenario with a slider, with their present values."""
         return self._parameters
-
-    knobs = renamed("knobs", "parameters")
 
     @property
     def bodies(self) -> tuple[str, ...]:

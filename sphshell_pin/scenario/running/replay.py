@@ -12,11 +12,10 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.arrays import Array
-from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
-from sphshell_pin.dynamics.result.result_scene import sound_rows
+from sphshell_pin.dynamics.result.result_scene import check_scene, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SlowLawWarning, SphshellError
 from sphshell_pin.scenario.format.build import Built, build_scenario
@@ -88,7 +87,6 @@ class Replay:
         self._time, self._row, self._given = self.start, 0, 0
 
     parameters: tuple[LiveParameter, ...] = ()
-    knobs = renamed("knobs", "parameters")
     bodies: tuple[str, ...] = ()
 
     @property
@@ -224,21 +222,7 @@ class Replay:
 
     def _check(self) -> None:
         """Refuse a scene in which these rows mean nothing."""
-        model = self.scene.model
-        ran, now = (self.result.q.shape[1], self.result.v.shape[1]), (model.nq, model.nv)
-        if ran != now:
-            raise ResultError(
-                self._name,
-                f"its model had nq = {ran[0]}, nv = {ran[1]}, that of the scenario has "
-                f"nq = {now[0]}, nv = {now[1]}: the robot or its locked joints have changed since",
-            )
-        names = tuple(pair.name for pair in self.scene.pairs)
-        if names != tuple(self.result.pairs):
-            raise ResultError(
-                self._name,
-                f"its contacts were {', '.join(self.result.pairs) or 'none'}, the scenario has "
-                f"{', '.join(names) or 'none'}: it is another scenario, or has changed since",
-            )
+        check_scene(self.result, self.scene, self._name)
         log = self.result.contacts
         for index, pair in enumerate(self.scene.pairs):
             most = 0 if pair.shell is None else len(pair.shell.elements)

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
-from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
@@ -53,8 +52,6 @@ RESULTS = (
     "energy.png",
     "contact_path.png",
     "contact_map.png",
-    "wear.npz",
-    "wear.png",
     "sensors.png",
     RECORDING,
 )
@@ -78,7 +75,6 @@ class RunReport:
     """Differences of the contacts from those on the exact CAD faces, if that was asked for."""
     warnings: tuple[str, ...] = ()
     """What in the run shows that the scenario is probably a mistake; one sentence each."""
-    doubts = renamed("doubts", "warnings")
 
 
 def run_scenario(
@@ -277,17 +273,9 @@ def _draw(
         view = result.view(built.scene, built.visual_model, speed=speed, title=title)
         view.save(staging / RECORDING)
 
-    def write_wear() -> None:
-        if scenario.run.wear is not None:
-            from sphshell_pin.patches.wear import save_wear, wear_maps
-
-            maps = wear_maps(result, scenario.run.wear, built.scene)
-            save_wear(maps, staging, figure=figures)
-
     writers: dict[str, Callable[[], object]] = {}
     if figures:
         writers["figures"] = lambda: result.save_figures(staging, built.scene)
-    writers["wear"] = write_wear
     if recording:
         writers[RECORDING] = write_recording
     for what, write in writers.items():

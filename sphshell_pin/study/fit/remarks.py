@@ -14,8 +14,6 @@ from sphshell_pin.study.fit.statistics import Spread, serial_of, variance_is
 
 # A pair of which one explains so much of the variance of the other is told.
 _SHARED = 0.9
-# Of a list, so many names are told.
-_MOST_NAMES = 3
 
 
 def remarks_on(
@@ -27,13 +25,11 @@ def remarks_on(
     tolerance: float,
     *,
     still: NDArray[np.bool_],
-    inexact: Sequence[str],
     converged: bool,
 ) -> list[str]:
     """Return what is to be said of a fit; `tolerance` is the relative error of its runs.
 
-    `still` (p,) are parameters that change nothing, `inexact` columns whose derivatives
-    were left out.
+    `still` (p,) are parameters that change nothing.
     """
     out = []
     if not converged:
@@ -42,14 +38,6 @@ def remarks_on(
             "run the fit again from these values"
         )
     out += _undetermined(fitted, free, spread, still)
-    if inexact:
-        names = list(inexact)
-        if len(names) > _MOST_NAMES:
-            names[_MOST_NAMES:] = [f"{len(names) - _MOST_NAMES} more"]
-        out.append(
-            f"the derivatives of {' and '.join(names)} are inexact: intervals follow from the "
-            "other columns alone, and are rather too wide; a smaller run.rtol or run.dt may help"
-        )
     out += [
         f"{one.key} stands at its bound, {one.value:.6g} {one.unit}".rstrip()
         + ": the data would have it beyond; it has no interval, and those of others hold for it so"

@@ -20,7 +20,6 @@ from sphshell_pin.errors import (
     UnitWarning,
     WeakLawWarning,
 )
-from sphshell_pin.parameters import parameters_of
 from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.reading import change_scenario
 from sphshell_pin.study.fit.data import Measured
@@ -30,8 +29,6 @@ from sphshell_pin.study.quantities import row_step
 # Of integrators with a fixed step: differences see rounding and the kinks at touches.
 _FIXED_STEP_TOLERANCE = 1e-9
 _LEAST_TOLERANCE = 1e-12
-# A run with sensitivities takes about as long as so many without (`docs/fitting.md`).
-COST_OF_SENSITIVITIES = 8
 
 
 @dataclass(frozen=True)
@@ -70,9 +67,6 @@ class Runs:
         self.failure: SphshellError | None = None
         self._progress = progress
         self._known: dict[bytes, Array] = {}
-        # Differences of a few parameters take fewer runs than sensitivities cost.
-        enough = len(self.free) > COST_OF_SENSITIVITIES
-        self._names = _sensitivity_names(self.trials, self.free) if enough else ()
 
     @property
     def tolerance(self) -> float:
@@ -99,8 +93,8 @@ class Runs:
             self._known[key] = found
         return self._known[key]
 
-    def result(self, trial: Trial, x: Array, sensitivities: Sequence[str] = ()) -> sp.Result:
-        """Return the result of one experiment at x, with `sensitivities` by these names."""
+    def result(self, trial: Trial, x: Array) -> sp.Result:
+        """Return the result of one experiment at x."""
         texts = {
             key: one.text(value)
             for one, value in zip(self.free, x.tolist(), strict=True)
@@ -127,7 +121,6 @@ class Runs:
                 built.controller,
                 run.control_dt,
                 record_dt=trial.row_step or None,
-                sensitivities=tuple(sensitivities),
             )
         if self._progress is not None:
             self._progress(self.count)
@@ -148,40 +141,10 @@ class Runs:
         return np.concatenate(parts)
 
     def derivatives(self, x: Array, low: Array, high: Array, step: float) -> Array:
-        """Return the derivatives (N, p) of the predicted values by x.
-
-        They follow from sensitivities of the runs where all parameters and columns have them, else
-        from one-sided differences.
-        """
-        found = self._by_sensitivities(x) if self._names else None
-        if found is not None:
-            return found
+        """Return the derivatives (N, p) of the predicted values by x: one-sided differences."""
         return np.column_stack(
             [self.slope(x, k, low, high, step, central=False) for k in range(len(x))]
         )
-
-    def _by_sensitivities(self, x: Array) -> Array | None:
-        """Return `derivatives` by one run of each experiment; None where that is impossible."""
-        names = [name for several in self._names for name in several]
-        rates = [one.rate(value) for one, value in zip(self.free, x.tolist(), strict=True)]
-        parts = []
-        try:
-            for trial in self.trials:
-                result, t = self.result(trial, x, names), trial.data.t
-                for column in trial.data.columns:
-                    assert column.quantity.derivatives is not None
-                    parts.append(column.quantity.derivatives(result, t[column.rows]))
-        except Interrupted:
-            raise
-        except SphshellError:
-            self._names = ()
-            return None
-        whole, out, first = np.concatenate(parts), [], 0
-        for several, rate in zip(self._names, rates, strict=True):
-            out.append(rate * whole[:, first : first + len(several)].sum(axis=1))
-            first += len(several)
-        derivatives = np.column_stack(out)
-        return derivatives if np.isfinite(derivatives).all() else None
 
     def slope(
         self, x: Array, k: int, low: Array, high: Array, step: float, *, central: bool
@@ -222,31 +185,6 @@ def forward_step(tolerance: float) -> float:
 def central_step(tolerance: float) -> float:
     """Return the step of a central difference whose error is least: cbrt(3 tolerance)."""
     return float(np.cbrt(3.0 * tolerance))
-
-
-def _sensitivity_names(
-    trials: Sequence[Trial], free: Sequence[Free]
-) -> tuple[tuple[str, ...], ...]:
-    """Return the names that runs are differentiated by, for each parameter; () where one has none.
-
-    Fields of a law or friction have them where the scenario states them as the pair has them.
-    """
-    quantities = [column.quantity for trial in trials for column in trial.data.columns]
-    if any(quantity.derivatives is None for quantity in quantities):
-        return ()
-    built = trials[0].built
-    pairs = {pair.name: pair for pair in built.scene.pairs}
-    known = set()
-    for contact in built.scenario.contact:
-        pair = pairs.get(contact.name)
-        for part in ("law", "friction"):
-            if pair is not None and type(getattr(contact, part)) is type(getattr(pair, part)):
-                fields_of = parameters_of(getattr(pair, part))
-                known |= {f"{contact.name}.{part}.{field}" for field in fields_of}
-    names = tuple(tuple(key.removeprefix("contact.") for key in one.keys) for one in free)
-    keys = [key for one in free for key in one.keys]
-    plain = all(key.startswith("contact.") and key[8:] in known for key in keys)
-    return names if plain else ()
 
 
 def _quiet(sensor: Sensor) -> Sensor:

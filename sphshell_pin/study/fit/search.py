@@ -28,9 +28,6 @@ _SMALL_ERROR, _MOST_HALVINGS = 0.01, 8
 _STAGES = (0.125, 0.25, 0.5)
 # A value feels the parameters if its slope is so large a part of the largest.
 _FELT = 1e-3
-# Derivatives of fewer values may agree by chance: such columns are judged with others of their
-# name.
-_FEW = 10
 # How far the first step may go in x.
 _FIRST_STEP = 0.5
 
@@ -112,13 +109,12 @@ class Search:
     def report(self, scenario: str, level: float) -> Fit:
         """Return the fit at the values found."""
         jacobian, error, still = self._final_derivatives()
-        groups, called = self._groups()
         dof = len(self.measured) - len(self.free)
         factor = student_factor(dof, level)
-        spread = spread_of(jacobian, error, groups)
+        spread = spread_of(jacobian, error)
         middle, held = self._beyond(jacobian, factor * spread.deviations)
         if held.any():
-            spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held], groups), held)
+            spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held]), held)
         self._leave_unfelt(spread, still)
         fitted = tuple(
             _fitted(one, x, (center - half, center + half), held=bool(bound))
@@ -140,7 +136,6 @@ class Search:
             dof,
             self.runs.tolerance,
             still=still,
-            inexact=[called[group] for group in spread.left_out],
             converged=self.converged,
         )
         notes = [note for trial in self.runs.trials for note in trial.data.notes]
@@ -169,19 +164,6 @@ class Search:
         sigma = self._estimated_sigma()
         weighted = (self.measured - values) / sigma
         return float(np.sum(np.log(sigma)) + 0.5 * weighted @ weighted)
-
-    def _groups(self) -> tuple[NDArray[np.intp], list[str]]:
-        """Return the group (N,) of each value: its column; and what the groups are called."""
-        called: list[str] = []
-        groups = np.zeros(len(self.measured), dtype=np.intp)
-        for part in self.parts:
-            name = part.data.name
-            if len(part.data.t) >= _FEW:
-                name = f"{name} of {part.data.experiment}"
-            if name not in called:
-                called.append(name)
-            groups[part.at] = called.index(name)
-        return groups, called
 
     def _leave_unfelt(self, spread: Spread, still: NDArray[np.bool_]) -> None:
         """Put parameters that change nothing that was measured back to where they started."""
@@ -356,7 +338,7 @@ def _with_held(spread: Spread, held: NDArray[np.bool_]) -> Spread:
     covariance[held, held] = np.nan
     blind = np.zeros((len(spread.blind), count))
     blind[:, kept] = spread.blind
-    return Spread(covariance, blind, spread.left_out)
+    return Spread(covariance, blind)
 
 
 def _fitted(one: Free, x: float, span: tuple[float, float], *, held: bool) -> Fitted:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin.arrays import Array
 
@@ -19,13 +17,11 @@ FALSE_ALARM = 0.01
 class Spread:
     """Of p parameters x: `covariance` (p, p), infinite on the diagonal of undetermined ones.
 
-    `blind` (k, p) are changes of x, of length 1, along which the data say nothing. `left_out` are
-    the groups of rows that say nothing of some x, as their derivatives are inexact.
+    `blind` (k, p) are changes of x, of length 1, along which the data say nothing.
     """
 
     covariance: Array
     blind: Array
-    left_out: tuple[int, ...] = ()
 
     @property
     def deviations(self) -> Array:
@@ -44,37 +40,8 @@ class Spread:
         return np.asarray(out)
 
 
-def spread_of(jacobian: Array, error: Array, groups: NDArray[np.intp] | None = None) -> Spread:
+def spread_of(jacobian: Array, error: Array) -> Spread:
     """Return what the Jacobian (N, p) of weighted residuals determines; `error` is its own error.
-
-    `groups` (N,) numbers groups of rows, of which one may have exact derivatives and another not.
-    Rows add to J^T J what is not negative: what some of them determine, all determine, and at least
-    as well. So where all together leave something open, the groups with most of the error are left
-    out if the others then determine more.
-    """
-    groups = np.zeros(len(jacobian), dtype=np.intp) if groups is None else groups
-    best = _spread_of_rows(jacobian, error)
-    for kept in _kept(error, groups):
-        if not len(best.blind):
-            break
-        rows = kept[groups]
-        spread = _spread_of_rows(jacobian[rows], error[rows])
-        if np.isinf(spread.deviations).sum() < np.isinf(best.deviations).sum():
-            left_out = tuple(np.flatnonzero(~kept).tolist())
-            best = Spread(spread.covariance, spread.blind, left_out)
-    return best
-
-
-def _kept(error: Array, groups: NDArray[np.intp]) -> Iterator[NDArray[np.bool_]]:
-    """Yield which groups to keep: of each column, all but those with most of its error."""
-    for column in error.T:
-        size = np.bincount(groups, column**2)
-        for most in np.unique(size)[:0:-1]:
-            yield size < most
-
-
-def _spread_of_rows(jacobian: Array, error: Array) -> Spread:
-    """Return what all rows together determine.
 
     A column that is not longer than twice its error says nothing of its parameter. The others are
     brought to one length, which leaves the condition about as good as any lengths can (van der

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
-from sphshell_pin.benchmarks import convergence, hard_cases, queries, step, timing, work_precision
-from sphshell_pin.benchmarks.peers import section as peers
-from sphshell_pin.cases.contents import Column, Progress, Section, Table, findings_table
-from sphshell_pin.cases.machine import OtherWork, caution_of, describe
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
 from sphshell_pin.json_text import json_text
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.regular_file import read_text
+from sphshell_pin.study.report import convergence, integrators, queries, steps, timing
+from sphshell_pin.study.report.contents import Column, Progress, Section, Table, findings_table
+from sphshell_pin.study.report.machine import OtherWork, caution_of, describe
 from sphshell_pin.study.report.page import SPEED, Heading, render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
@@ -44,12 +43,10 @@ class Part:
 
 PARTS = (
     Part(convergence.KEY, convergence.TITLE, convergence.section, (8.0, 20.0)),
-    Part(queries.KEY, queries.TITLE, queries.section, (40.0, 300.0)),
-    Part(work_precision.KEY, work_precision.TITLE, work_precision.section, (10.0, 120.0)),
-    Part(step.KEY, step.TITLE, step.section, (15.0, 60.0)),
-    Part(hard_cases.KEY, hard_cases.TITLE, hard_cases.section, (60.0, 300.0), pinned=False),
+    Part(queries.KEY, queries.TITLE, queries.section, (30.0, 240.0)),
+    Part(integrators.KEY, integrators.TITLE, integrators.section, (10.0, 120.0)),
+    Part(steps.KEY, steps.TITLE, steps.section, (15.0, 60.0)),
 )
-PEERS = Part(peers.KEY, peers.TITLE, peers.section, (180.0, 1200.0), pinned=False)
 
 
 @dataclass(frozen=True)
@@ -72,7 +69,6 @@ def make_report(
     out: Path,
     *,
     quick: bool = False,
-    with_peers: bool = False,
     command: str = "",
     tell: Tell | None = None,
     parts: Sequence[Part] | None = None,
@@ -93,13 +89,8 @@ def make_report(
     """
     new_figure(1.0, 1.0)  # raises now what would be raised at the end
     with _report_folder(out) as place:
-        if parts is None:
-            parts = (*PARTS, PEERS) if with_peers else PARTS
-        report = dataclasses.replace(_measure(parts, quick, command, tell), heading=heading)
-        if not heading.timed:
-            report = dataclasses.replace(report, caution="")
-        if heading is SPEED and not with_peers:
-            report.sections.append(peers.left_out())
+        measured_now = _measure(parts or PARTS, quick, command, tell)
+        report = dataclasses.replace(measured_now, heading=heading)
         _write(report, out, place)
     return report
 

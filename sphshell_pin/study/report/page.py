@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from string import Template
 
-from sphshell_pin.cases.contents import Finding, Picture, Section, Table, findings_table
+from sphshell_pin.study.report.contents import Finding, Picture, Section, Table, findings_table
 
 TEMPLATE = Path(__file__).with_name("page.html")
 
@@ -19,8 +19,6 @@ class Heading:
 
     title: str
     text: str
-    timed: bool = False
-    """Whether it is of times, which other work on the machine changes."""
 
 
 SPEED = Heading(
@@ -29,7 +27,6 @@ SPEED = Heading(
     "medians; ratios are taken round by round, of contestants that take turns on one core, and are "
     "shown with their quartiles. Aims are those of the design. In h / r, h is the mean length of "
     "the elements' sides and r the radius of the sphere.",
-    timed=True,
 )
 
 

@@ -33,8 +33,6 @@ class Axis:
 
     key: str
     values: tuple[Value, ...]
-    unit: str = ""
-    """Unit of the values, once the scenario is known."""
 
 
 def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:

@@ -6,7 +6,7 @@ import contextlib
 import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -120,7 +120,7 @@ def plan_sweep(
     _check_keys(given, changes or {}, path, word)
     points = points_of(given, together) if design is None else design.points
     fixed = read_scenario(path, changes)
-    axes = tuple(replace(axis, unit=_unit(fixed, axis.key, path)) for axis in given)
+    axes = tuple(given)
     runs = [
         Run(
             number=i,
@@ -172,15 +172,7 @@ def plan_sweep(
         token=digest([str(path.absolute()), head]),
         curves=curves,
     )
-    units = figure_units(built)
-    if len(fixed.robot) == 1:
-        # A start value has the unit of the joint, which the built scene knows.
-        for axis in axes:
-            found = _START.fullmatch(axis.key)
-            end = found and f"final.{'q' if found[1] == 'start' else 'v'}.{found[2]}"
-            if end in units:
-                units[axis.key] = units[end]
-    units |= _units_of_all(axes, runs, fixed, path)
+    units = _units(axes, runs, fixed, built)
     return Plan(axes, points, runs, digests, tuple(figures), job, head, design, units)
 
 
@@ -259,16 +251,21 @@ def _unit(scenario: Scenario, key: str, path: Path) -> str:
         return ""  # not in the file; read_scenario raises if no file may have it
 
 
-def _units_of_all(
-    axes: tuple[Axis, ...], runs: list[Run], scenario: Scenario, path: Path
+def _units(
+    axes: tuple[Axis, ...], runs: list[Run], scenario: Scenario, built: Built
 ) -> dict[str, str]:
-    """Return the units of the axes, but of those that follow another key that varies."""
-    ends = [changed(scenario, run, path) for run in (runs[0], runs[-1])]
-    return {
-        axis.key: axis.unit
-        for axis in axes
-        if axis.unit and {_unit(one, axis.key, path) for one in ends} == {axis.unit}
-    }
+    """Return the units of figures and axes, but of axes whose unit follows another that varies."""
+    units = dict(figure_units(built))
+    ends = [changed(scenario, run, built.path) for run in (runs[0], runs[-1])]
+    for axis in axes:
+        unit, other = (_unit(one, axis.key, built.path) for one in ends)
+        found = _START.fullmatch(axis.key)
+        if found and len(scenario.robot) == 1:
+            # A start value has the unit of the joint, which the built scene knows.
+            unit = other = units.get(f"final.{'q' if found[1] == 'start' else 'v'}.{found[2]}", "")
+        if unit and unit == other:
+            units[axis.key] = unit
+    return units
 
 
 def _build_one(runs: list[Run], scenario: Scenario, path: Path) -> tuple[Run, Built]:

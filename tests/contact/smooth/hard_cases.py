@@ -11,9 +11,9 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from benchmarks.measured import Measured, write
 from sphshell_pin import Shell
 from sphshell_pin.arrays import Array
-from sphshell_pin.cases.measured import Measured, write
 from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import jittered_grid
 from tests.contact.smooth.test_real_surfaces import faults, jump

@@ -10,10 +10,10 @@ import pytest
 
 from sphshell_pin import Shell
 from sphshell_pin.shell.contact_set import Feature
-from sphshell_pin.study.validation.rattleback import ellipsoid
 from tests.contact.helpers import force_sum
 from tests.contact.smooth.surfaces import SIDES, SURFACES, can, shell_of, side_of
 from tests.studies import mostly_studies
+from tests.validation.rattleback import ellipsoid
 
 COUNT = 300
 DEPTHS = (0.04, 0.004, 0.0004)

@@ -200,23 +200,12 @@ bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideF
   const Primitive& shape = surface.faces().shapes[cell.face];
   const double *p = cell.place[k], *q = cell.place[next_corner(k)];
   if (!shape.has_parameters() || std::isnan(p[0]) || std::isnan(q[0])) return false;
-  const double du = q[0] - p[0], dv = q[1] - p[1], size = shell.size();
-  const Vec3 &axis = shape.axis, east = axis.unitOrthogonal(), north = axis.cross(east);
-  const double slope = shape.kind == FaceKind::Cone ? std::tan(shape.second) : 0;
+  const double du = q[0] - p[0], dv = q[1] - p[1];
   const auto pull = [&](double t) {
-    const double u = p[0] + t * du, v = p[1] + t * dv, c = std::cos(u), s = std::sin(u);
-    // The radius and the height, and how they change.
-    double radius = shape.radius + slope * v * size, widens = slope * size;
-    double height = v * size, rises = size;
-    if (shape.kind == FaceKind::Torus) {
-      rises = shape.second * std::cos(v), height = shape.second * std::sin(v);
-      radius = shape.radius + rises, widens = -height;
-    }
-    const Vec3 out_from_axis = c * east + s * north;
+    Vec3 along[2];
     out.t = t;
-    out.point = shape.point + radius * out_from_axis + height * axis;
-    out.tangent =
-        widens * dv * out_from_axis + radius * du * (c * north - s * east) + rises * dv * axis;
+    out.point = shape.at({p[0] + t * du, p[1] + t * dv}, shell.size(), along);
+    out.tangent = du * along[0] + dv * along[1];
     return probe.pull(out.point).dot(out.tangent);
   };
   const double last = pull(1), first = pull(0);
@@ -371,8 +360,9 @@ Vec3 inward(const Shell& shell, int h, double t, const Vec3& point, const Vec3& 
   if (const Primitive* face = surface.face_of(f)) {
     Vec3 n;
     face->distance(point, n);
-    in = n.cross(along);
-    if (in.dot(facet.normal.cross(facet.corner[next_corner(k)] - facet.corner[k])) < 0) in = -in;
+    // The facet's own normal leans any way where its chords leave the tube of a torus.
+    in = surface.face_cells()[f].sign * n.cross(along);
+    if (along.dot(facet.corner[next_corner(k)] - facet.corner[k]) < 0) in = -in;
   } else {
     in = surface.facets()[f].patch(facet).inward(k, t);
   }

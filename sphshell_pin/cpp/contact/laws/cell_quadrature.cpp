@@ -58,7 +58,8 @@ void Sextic::roots(double begin, double end, int depth, double* out, int& count)
 }
 
 // The arc from a to b, counterclockwise round the region, in pieces that are nearly straight.
-bool CellQuadrature::add_arc(const Vec2& a, const Vec2& b, const Part& w, int depth) {
+template <class Region>
+bool CellQuadrature<Region>::add_arc(const Vec2& a, const Vec2& b, const Part& w, int depth) {
   // Halved at the point over the middle of its chord until it is nearly straight.
   const Arc arc(*this, a, b);
   if (arc.lean() > kFlatArc) {
@@ -69,20 +70,20 @@ bool CellQuadrature::add_arc(const Vec2& a, const Vec2& b, const Part& w, int de
   Vec2 middle;
   if (depth > 6 || !root_towards((a + b) / 2, arc.out(), w, middle)) {
     // An arc shorter than round-off bounds nothing.
-    return to_plane(b - a).squaredNorm() < 1e-20 * radius2_;
+    return to_plane(b - a).squaredNorm() < 1e-20 * region_.size() * region_.size();
   }
   return add_arc(a, middle, w, depth + 1) && add_arc(middle, b, w, depth + 1);
 }
 
 // A boundary that meets no side; `found`: there is one.
-bool CellQuadrature::add_loop(const Part& w, bool& found) {
+template <class Region>
+bool CellQuadrature<Region>::add_loop(const Part& w, bool& found) {
   found = false;
   const Vec2 start = (w.corner[0] + w.corner[1] + w.corner[2]) / 3;
   CellPoint lowest;
-  if (!find_minimum(patch_, Sphere{Vec3::Zero(), 0, 0}, {start.x(), start.y()}, lowest))
-    return true;
-  if (!(lowest.point.squaredNorm() < radius2_)) return true;
-  // A closed curve round the point nearest to the ball's center, if that is in the part: four
+  if (!find_minimum(patch_, region_.probe(), {start.x(), start.y()}, lowest)) return true;
+  if (!(region_.value(lowest.point) < 0)) return true;
+  // A closed curve round the deepest point, if that is in the part: four
   // points of it, and the arcs between them.
   const Vec2 center(lowest.u, lowest.v);
   for (int k = 0; k < 3; ++k) {
@@ -100,9 +101,10 @@ bool CellQuadrature::add_loop(const Part& w, bool& found) {
   return true;
 }
 
-// Where the ray from a place inside the ball leaves it, within the part.
-bool CellQuadrature::root_towards(const Vec2& from, const Vec2& direction, const Part& w,
-                                  Vec2& out) const {
+// Where the ray from a place inside the region leaves it, within the part.
+template <class Region>
+bool CellQuadrature<Region>::root_towards(const Vec2& from, const Vec2& direction, const Part& w,
+                                          Vec2& out) const {
   double most = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k) {
     const Vec2 d = w.corner[next_corner(k)] - w.corner[k], to = w.corner[k] - from;
@@ -115,7 +117,7 @@ bool CellQuadrature::root_towards(const Vec2& from, const Vec2& direction, const
   double a = 0, b = most * (1 + 1e-12), fa, fb, value = 0;
   gradient(from, &fa), gradient(from + b * direction, &fb);
   if (!(fa < 0) || !(fb >= 0)) return false;
-  // rho^2 is nearly a parabola: sqrt's guess, then Newton's method between the ends.
+  // The value is nearly a parabola: sqrt's guess, then Newton's method between the ends.
   double t = b * std::sqrt(-fa / (fb - fa));
   for (int i = 0; i < 60 && b - a > 1e-14 * most; ++i) {
     const double slope = 2 * gradient(from + t * direction, &value).dot(along);
@@ -130,5 +132,8 @@ bool CellQuadrature::root_towards(const Vec2& from, const Vec2& direction, const
   out = from + b * direction;
   return true;
 }
+
+template class CellQuadrature<BallRegion>;
+template class CellQuadrature<HalfSpace>;
 
 }  // namespace sphshell

@@ -1,4 +1,4 @@
-// Integrals over the part of a curved element inside a ball.
+// Integrals over the part of a curved element inside a ball, or below a plane.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -11,12 +11,20 @@
 
 namespace sphshell {
 
-// The square of the distance along a cubic side, less that of the ball's radius: degree 6, by its
-// Bernstein coefficients.
+// A polynomial of degree 6 by its Bernstein coefficients. Along a cubic side it is the square of
+// the distance less that of the ball's radius, or a cubic, the height over a plane.
 struct Sextic {
   double f[7];
 
   Sextic() = default;
+  Sextic(double a, double b, double c, double d)
+      : f{a,
+          (a + b) / 2,
+          (a + 3 * b + c) / 5,
+          (a + 9 * b + 9 * c + d) / 20,
+          (b + 3 * c + d) / 5,
+          (c + d) / 2,
+          d} {}
   Sextic(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, double radius2)
       : f{a.dot(a),
           a.dot(b),
@@ -34,23 +42,97 @@ struct Sextic {
   void roots(double begin, double end, int depth, double* out, int& count) const;
 };
 
+// A region is where its value is negative. `plan` says whether a part of an element, as large as
+// the square root of size2 and whose bounds are these, is too large for Gauss's rules, and their
+// order.
+struct Bounds {
+  double low, high;  // of the region's measure of depth: see the regions
+};
+struct Plan {
+  bool too_large;
+  int order;
+};
+
+// The inside of a ball about the origin. Bounds are on the distance from its center, and its
+// square.
+struct BallRegion {
+  double radius, radius2;
+
+  explicit BallRegion(double r) : radius(r), radius2(r * r) {}
+  double size() const { return radius; }
+  double value(const Vec3& x) const { return x.squaredNorm() - radius2; }
+  const Vec3& half_gradient(const Vec3& x) const { return x; }
+  Sextic along(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) const {
+    return Sextic(a, b, c, d, radius2);
+  }
+  Sphere probe() const { return {Vec3::Zero(), 0, 0}; }
+  Bounds bounds(const Vec3 (&net)[3][4], const Vec3& middle) const {
+    const Vec3 towards = (net[0][0] + net[1][0] + net[2][0]).normalized();
+    Bounds out{middle.dot(towards), middle.squaredNorm()};
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < 3; ++i) {
+        out.low = std::min(out.low, net[k][i].dot(towards));
+        out.high = std::max(out.high, net[k][i].squaredNorm());
+      }
+    return out;
+  }
+  bool misses(const Bounds& at) const { return at.low >= radius; }
+  bool holds(const Bounds& at) const { return at.high <= radius2; }
+  // Where the pressure is analytic decides on the order.
+  Plan plan(const Bounds& at, double size2) const {
+    double size = std::sqrt(size2);
+    if (at.low > 0) size = std::min(size, 2 * std::sqrt(radius2 - at.low * at.low));
+    const double ratio = size / std::max(at.low, 1e-3 * size);
+    return {size > at.low, ratio < 0.1    ? 3
+                           : ratio < 0.25 ? 4
+                           : ratio < 0.5  ? 5
+                           : ratio < 0.8  ? 6
+                                          : 7};
+  }
+};
+
+// Below a plane through the origin. Bounds are on the height over it.
+struct HalfSpace {
+  Vec3 normal;
+  double extent;  // of the shell [m]
+
+  double size() const { return extent; }
+  double value(const Vec3& x) const { return 2 * normal.dot(x); }
+  const Vec3& half_gradient(const Vec3&) const { return normal; }
+  Sextic along(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) const {
+    return Sextic(normal.dot(a), normal.dot(b), normal.dot(c), normal.dot(d));
+  }
+  Plane probe() const { return {normal, 0, extent, 0}; }
+  Bounds bounds(const Vec3 (&net)[3][4], const Vec3& middle) const {
+    Bounds out{normal.dot(middle), normal.dot(middle)};
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < 3; ++i) {
+        const double height = normal.dot(net[k][i]);
+        out.low = std::min(out.low, height), out.high = std::max(out.high, height);
+      }
+    return out;
+  }
+  bool misses(const Bounds& at) const { return at.low >= 0; }
+  bool holds(const Bounds& at) const { return at.high <= 0; }
+  // All integrands are polynomials.
+  Plan plan(const Bounds&, double) const { return {false, 3}; }
+};
+
 // Green's formula in the plane of the parameters: with H(w) the integral of s g(o + s (w - o)) over
 // s from 0 to 1, that of g over a region is the one of H(w) (w - o) x dw round it, for any pole o.
-// The region is the part of a triangle inside the ball, where rho^2 is convex: round it go pieces
-// of the triangle's sides, between roots of a polynomial, and arcs of rho = R, each over a chord.
-// All that g is evaluated at is inside the triangle. Parts that are large against their distance
-// from the center, and those in which the walk fails, are divided.
+// The region is the part of a triangle inside the ball, where rho^2 is convex, or below the plane:
+// round it go pieces of the triangle's sides, between roots of a polynomial, and arcs of the
+// border, each over a chord. All that g is evaluated at is inside the triangle. Parts that are
+// large against their distance from the center, and those in which the walk fails, are divided.
+template <class Region>
 class CellQuadrature {
  public:
   using Vec2 = Eigen::Vector2d;
 
-  // The patch is relative to the ball's center; least_order: of Gauss's rules.
-  CellQuadrature(const CubicPatch& patch, const FacetAxes& axes, double radius, int least_order)
-      : patch_(patch),
-        axes_(axes),
-        radius_(radius),
-        radius2_(radius * radius),
-        least_order_(least_order) {}
+  // The patch is relative to the region's origin; least_order: of Gauss's rules.
+  CellQuadrature(const CubicPatch& patch, const FacetAxes& axes, const Region& region,
+                 int least_order)
+      : patch_(patch), axes_(axes), region_(region), least_order_(least_order) {}
 
   // visit(x, area vector by parameters, weight) for all quadrature points.
   template <class Visit>
@@ -92,12 +174,13 @@ class CellQuadrature {
       at(pole + rule.nodes[i] * from, weight * rule.nodes[i] * rule.weights[i], visit);
   }
 
-  // Of rho^2 - R^2 over the parameters: half its gradient in right-angled axes, and itself.
+  // Of the region's value over the parameters: half its gradient in right-angled axes, and itself.
   Vec2 gradient(const Vec2& w, double* value = nullptr) const {
     const Vec3 x = patch_.point(w.x(), w.y());
-    double gu = x.dot(patch_.along_u(w.x(), w.y())), gv = x.dot(patch_.along_v(w.x(), w.y()));
+    const Vec3& half = region_.half_gradient(x);
+    double gu = half.dot(patch_.along_u(w.x(), w.y())), gv = half.dot(patch_.along_v(w.x(), w.y()));
     axes_.first(gu, gv);
-    if (value) *value = x.squaredNorm() - radius2_;
+    if (value) *value = region_.value(x);
     return {gu, gv};
   }
   // From parameters to meters in the facet's plane (an upper triangular matrix), and back.
@@ -109,7 +192,7 @@ class CellQuadrature {
     return {(d.x() - axes_.b * v) / axes_.a, v};
   }
 
-  // Pieces of the circle rho = R from a to b, each flat enough for a graph over its chord; a whole
+  // Pieces of the region's border from a to b, each flat enough for a graph over its chord; a whole
   // loop of it inside the part; and a point of it along a ray. False where they fail: the part is
   // then divided.
   bool add_arc(const Vec2& a, const Vec2& b, const Part& w, int depth);
@@ -123,14 +206,15 @@ class CellQuadrature {
 
   CubicPatch patch_;
   const FacetAxes& axes_;
-  double radius_, radius2_;
+  Region region_;
   int least_order_;
   Piece pieces_[kMostPieces];
   int count_ = 0;
 };
 
-// An arc of rho = R as a graph over its chord.
-class CellQuadrature::Arc {
+// An arc of the region's border as a graph over its chord.
+template <class Region>
+class CellQuadrature<Region>::Arc {
  public:
   Arc(const CellQuadrature& cell, const Vec2& a, const Vec2& b)
       : cell_(cell), a_(a), chord_(b - a) {
@@ -141,7 +225,7 @@ class CellQuadrature::Arc {
     out_ = Vec2(chord.y(), -chord.x()) / length_;
     out_parameters_ = cell.to_parameters(out_);
     const Vec2 ga = cell.gradient(a), gb = cell.gradient(b);
-    // The gradient of rho^2 points out of the ball; where it leans far from the chord's normal the
+    // The gradient points out of the region; where it leans far from the chord's normal the
     // arc is no graph over the chord.
     lean_ = std::min(ga.dot(out_) / ga.norm(), gb.dot(out_) / gb.norm());
     rise_a_ = -ga.dot(chord) / ga.dot(out_), rise_b_ = -gb.dot(chord) / gb.dot(out_);
@@ -166,7 +250,7 @@ class CellQuadrature::Arc {
       if (std::abs(step) < 1e-7 * length_) break;
     }
     w = a_ + t * chord_ + s * out_parameters_;
-    // By implicit differentiation of rho = R.
+    // By implicit differentiation.
     const double slope = -g.dot(chord_plane_) / g.dot(out_);
     return {w, chord_ + slope * out_parameters_};
   }
@@ -179,8 +263,9 @@ class CellQuadrature::Arc {
 
 // Into four similar triangles by the middles of the sides. Those of a long one would all be long:
 // it is cut in two, from its longest side to the corner opposite.
+template <class Region>
 template <class Visit>
-void CellQuadrature::divide(const Part& w, int level, Visit& visit) {
+void CellQuadrature<Region>::divide(const Part& w, int level, Visit& visit) {
   int k = 0;
   double longest2 = 0;
   for (int i = 0; i < 3; ++i) {
@@ -200,7 +285,7 @@ void CellQuadrature::divide(const Part& w, int level, Visit& visit) {
   // from the center. Where that vanishes, cuts would leave slivers: a share of the radius instead.
   const Vec3 from = patch_.point(p.x(), p.y()), along = patch_.point(q.x(), q.y()) - from;
   const double near = std::clamp(-from.dot(along) / longest2, 0.0, 1.0);
-  const double size = std::max((from + near * along).norm(), radius_ / 16);
+  const double size = std::max((from + near * along).norm(), region_.size() / 16);
   const double reach = size / (2 * std::sqrt(longest2));
   const double t = reach > 0.25 ? 0.5 : near < 0.5 ? near + reach : near - reach;
   const Vec2 cut = p + t * (q - p);
@@ -210,8 +295,9 @@ void CellQuadrature::divide(const Part& w, int level, Visit& visit) {
 
 // Stroud's rule of degree 5, Dunavant's of degree 8 (Int. J. Numer. Methods Eng. 21 (1985) 1129),
 // or a product of Gauss's.
+template <class Region>
 template <class Visit>
-void CellQuadrature::whole(const Part& w, int order, Visit& visit) {
+void CellQuadrature<Region>::whole(const Part& w, int order, Visit& visit) {
   struct Orbit {
     double weight, a, b, c;
   };
@@ -247,8 +333,9 @@ void CellQuadrature::whole(const Part& w, int order, Visit& visit) {
   }
 }
 
+template <class Region>
 template <class Visit>
-void CellQuadrature::part(const Part& w, int level, Visit& visit) {
+void CellQuadrature<Region>::part(const Part& w, int level, Visit& visit) {
   // Its control points: of the three sides, each from its corner on, and the middle one.
   Vec3 net[3][4], middle;
   if (level == 0) {
@@ -273,31 +360,16 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
     middle = patch_.polar(w.corner[0], w.corner[1], w.corner[2]);
   }
   for (int k = 0; k < 3; ++k) net[k][3] = net[next_corner(k)][0];
-  // Bounds from the convex hull of the control points: low on the distance from the center, high2
-  // on its square, size2 on the size of the part.
-  const Vec3 towards = (net[0][0] + net[1][0] + net[2][0]).normalized();
-  double low = middle.dot(towards), high2 = middle.squaredNorm(), size2 = 0;
-  for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < 3; ++i) {
-      low = std::min(low, net[k][i].dot(towards));
-      high2 = std::max(high2, net[k][i].squaredNorm());
-    }
-    size2 = std::max(size2, (net[k][3] - net[k][0]).squaredNorm());
-  }
-  // All of it is outside the ball.
-  if (low >= radius_) return;
-  // Where p is analytic decides on the order.
-  double size = std::sqrt(size2);
-  if (low > 0) size = std::min(size, 2 * std::sqrt(radius2_ - low * low));
-  if (size > low && level < kMostLevels) return divide(w, level, visit);
-  const double ratio = size / std::max(low, 1e-3 * size);
-  const int order = std::max(least_order_, ratio < 0.1    ? 3
-                                           : ratio < 0.25 ? 4
-                                           : ratio < 0.5  ? 5
-                                           : ratio < 0.8  ? 6
-                                                          : 7);
+  // From the convex hull of the control points.
+  const Bounds bounds = region_.bounds(net, middle);
+  if (region_.misses(bounds)) return;
+  double size2 = 0;
+  for (int k = 0; k < 3; ++k) size2 = std::max(size2, (net[k][3] - net[k][0]).squaredNorm());
+  const Plan plan = region_.plan(bounds, size2);
+  if (plan.too_large && level < kMostLevels) return divide(w, level, visit);
+  const int order = std::max(least_order_, plan.order);
   // All of it is inside: a rule for triangles.
-  if (high2 <= radius2_) return whole(w, order, visit);
+  if (region_.holds(bounds)) return whole(w, order, visit);
 
   count_ = 0;
   int corners_inside = 0;
@@ -305,9 +377,9 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
   Vec2 exit, first_entry;
   for (int k = 0; k < 3; ++k) {
     const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
-    // Walks round the triangle: pieces of the sides inside the ball, and arcs from where the
-    // boundary leaves the ball to where it comes back.
-    const Sextic along(net[k][0], net[k][1], net[k][2], net[k][3], radius2_);
+    // Walks round the triangle: pieces of the sides inside the region, and arcs from where the
+    // boundary leaves it to where it comes back.
+    const Sextic along = region_.along(net[k][0], net[k][1], net[k][2], net[k][3]);
     double t[8];
     int count = 0;
     along.roots(0, 1, 0, t, count);
@@ -341,10 +413,10 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
   if (fails && level < kMostLevels) return divide(w, level, visit);
   if (!any) return;
 
-  // Pieces in line with the pole contribute nothing: a corner inside the ball, else a crossing.
+  // Pieces in line with the pole contribute nothing: a corner inside, else a crossing.
   Vec2 pole = pieces_[0].a;
   for (int k = 0; k < 3; ++k)
-    if (net[k][0].squaredNorm() < radius2_) pole = w.corner[k];
+    if (region_.value(net[k][0]) < 0) pole = w.corner[k];
   if (corners_inside == 0 && looped) pole = (pieces_[0].a + pieces_[count_ / 2].a) / 2;
   const GaussRule rule = gauss_rule(order);
   const GaussRule along_arc = gauss_rule(std::max(order, 5));

@@ -141,14 +141,32 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
     if (flat) {
       if (!add_flat_facet(corner, facet.normal, radius, sum)) continue;
       if (points) {
-        CellQuadrature(flat_patch(corner), FacetAxes(facet), radius, least_order).run(visit);
-        // The closed form is exact, its points are not: they share what is missing.
+        CellQuadrature(flat_patch(corner), FacetAxes(facet), BallRegion(radius), least_order)
+            .run(visit);
+        // The closed form is exact, its points are not: factors of their areas that are linear in
+        // the place, from the middle, give them its force and its center.
         double found = 0;
-        for (std::size_t i = first_point; i < points_.size(); ++i)
-          found += points_[i].force.dot(facet.normal);
-        const double share = found > 0 ? sum.pressure / found : 0;
+        Vec3 first = Vec3::Zero();
+        Mat3 second = Mat3::Zero();
+        const Vec3 middle = sum.first / std::max(sum.pressure, 1e-300);
         for (std::size_t i = first_point; i < points_.size(); ++i) {
-          points_[i].area *= share;
+          const Vec3 from = points_[i].point - middle;
+          const double push = points_[i].area * points_[i].pressure;
+          found += push, first += push * from, second += push * from * from.transpose();
+        }
+        const double size = second.trace(), sum_pressure = sum.pressure;
+        Vec3 tilt = Vec3::Zero();
+        double share = 0;
+        if (found > 0 && size > 0) {
+          // Across the plane, and a needle, the moments are next to zero: the matrix is made
+          // regular.
+          const Mat3 spread =
+              second - first * first.transpose() / found + 1e-9 * size * Mat3::Identity();
+          tilt = -sum_pressure / found * spread.inverse() * first;
+          share = (sum_pressure - tilt.dot(first)) / found;
+        }
+        for (std::size_t i = first_point; i < points_.size(); ++i) {
+          points_[i].area *= share + tilt.dot(points_[i].point - middle);
           points_[i].normal = facet.normal;
           points_[i].force = points_[i].area * points_[i].pressure * facet.normal;
         }
@@ -157,7 +175,7 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
       CubicPatch relative = curved->facets()[f].patch(facet);
       relative.c00 -= center;
       const FacetAxes axes(facet);
-      CellQuadrature(relative, axes, radius, least_order).run(visit);
+      CellQuadrature(relative, axes, BallRegion(radius), least_order).run(visit);
     }
     // Less is round-off.
     if (!(sum.pressure > kRoundOff * radius * radius2)) {
@@ -170,11 +188,12 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
     row.sum.add(sum);
     // A curved facet may be nearer than its flat one by the bulge: its depth is found later, if it
     // can matter.
-    const double nearest = closest_on_triangle(Vec3::Zero(), corner, facet.normal).point.norm();
+    const Vec3 nearest = closest_on_triangle(Vec3::Zero(), corner, facet.normal).point;
     if (!flat)
-      counted_.push_back({f, number, nearest - curved->cells()[f].bulge});
-    else if (radius - nearest > row.depth)
-      row.depth = radius - nearest, row.element = facet.element;
+      counted_.push_back({f, number, nearest.norm() - curved->cells()[f].bulge});
+    else if (radius - nearest.norm() > row.depth)
+      row.depth = radius - nearest.norm(), row.element = facet.element,
+      row.away = -nearest.normalized();
     for (int k = 0; k < 3; ++k) {
       // Bit k: side k is a border of its sheet.
       if (!(sheets.rim[triangle] >> k & 1)) continue;
@@ -208,6 +227,7 @@ void Foundation::find_depths(const Shell& shell, const Vec3& center, double radi
     const double depth = radius - (found.at.point - center).norm();
     if (depth <= row.depth) return;
     row.depth = depth, row.element = facet.element;
+    row.away = (center - found.at.point).normalized();
   };
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const Counted* best = nullptr;
@@ -296,7 +316,65 @@ void Foundation::find_on_ball(double ball, const Vec3& center, double radius, bo
   // Along the axis the slope of the force, across it force / distance, as the axis turns.
   sum.slope =
       slope * axis * axis.transpose() + force / e * (Mat3::Identity() - axis * axis.transpose());
-  rows_.push_back({0, 0, 0, radius - (e - ball), center + sum.first / sum.pressure, sum});
+  rows_.push_back({0, 0, 0, radius - (e - ball), center + sum.first / sum.pressure, sum, axis});
+}
+
+void Foundation::find_below(const Shell& shell, const Mat3& turn, const Vec3& shift,
+                            bool friction) {
+  rows_.clear(), points_.clear(), areas_.clear(), below_.clear();
+  const CurvedShell* curved = shell.curved();
+  const Sheets& sheets = shell.sheets();
+  // About the foot of the shell's origin on the plane, in the shell's frame.
+  const Vec3 normal = turn.row(2), foot = -shift.z() * normal, across(shift.x(), shift.y(), 0);
+  const HalfSpace below{normal, shell.size()};
+  shell.bvh().find_below(normal, -shift.z() + (curved ? curved->bulge() : 0), below_, [](int) {});
+  // The points of a sheet have its number for a row until it is known where its body is.
+  for (const int f : below_) {
+    const Facet& facet = shell.facets()[f];
+    const bool flat = !curved || curved->facets()[f].flat;
+    const Vec3 corner[3] = {facet.corner[0] - foot, facet.corner[1] - foot, facet.corner[2] - foot};
+    CubicPatch patch = flat ? flat_patch(corner) : curved->facets()[f].patch(facet);
+    if (!flat) patch.c00 -= foot;
+    const int sheet = sheets.sheet[shell.triangle_of_facet(f)];
+    const auto visit = [&](const Vec3& x, const Vec3& area, double weight) {
+      const Vec3 at = turn * x + across, part = weight * (turn * area);
+      areas_.push_back(part);
+      points_.push_back({Vec3(at.x(), at.y(), 0), Vec3::UnitZ(), -part.z(), -at.z(),
+                         Vec3(0, 0, part.z() * at.z()), sheet});
+    };
+    // Exact on flat elements. Friction is less smooth than pressure, on large ones.
+    const double longest = std::max({(corner[1] - corner[0]).norm(), (corner[2] - corner[1]).norm(),
+                                     (corner[0] - corner[2]).norm()});
+    const int order = flat && !(friction && longest > shell.size() / 4) ? 3 : 4;
+    CellQuadrature(patch, FacetAxes(facet), below, order).run(visit);
+  }
+  FoundationSum sum;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const int sheet = points_[i].row;
+    if (sheet < 0) continue;
+    double energy = 0;
+    for (std::size_t k = i; k < points_.size(); ++k)
+      if (points_[k].row == sheet) energy += points_[k].pressure * points_[k].force.z() / 2;
+    const bool turned = shell.side() == Side::Both ? energy < 0 : shell.side() == Side::Inside;
+    sum.energy += turned ? -energy : energy;
+    for (std::size_t k = i; k < points_.size(); ++k) {
+      FoundationPoint& point = points_[k];
+      if (point.row != sheet) continue;
+      point.row = -1;
+      if (turned) point.area *= -1, point.force *= -1, areas_[k] *= -1;
+      sum.force += point.force;
+      // As the shell turns so does its area, whose depth^2 / 2 adds nothing where the surface is
+      // closed.
+      const double half = point.pressure * point.pressure / 2;
+      sum.first += point.force.z() * point.point + half * Vec3(areas_[k].x(), areas_[k].y(), 0);
+    }
+  }
+  for (FoundationPoint& point : points_) point.row = 0;
+  sum.pressure = sum.force.z();
+  if (sum.pressure > 0)
+    rows_.push_back({0, 0, 0, 0, sum.first / sum.pressure, sum});
+  else
+    points_.clear(), areas_.clear();
 }
 
 }  // namespace sphshell

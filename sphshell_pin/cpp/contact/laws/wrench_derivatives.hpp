@@ -1,7 +1,7 @@
 // How the wrench of one contact, and the rate of its bristle, change with the relative motion.
 #pragma once
 
-#include "contact/laws/friction.hpp"
+#include "sphshell_pin/laws/friction.hpp"
 #include "contact/laws/hertz.hpp"
 #include "contact/query/query.hpp"
 
@@ -33,19 +33,20 @@ struct ContactSite {
 };
 
 // Derivatives at a ContactSite. `place`: a displacement of what the contact follows, `twist`: the
-// relative twist, `depth`: alone.
+// relative twist, `depth`: alone. `turn`: a rotation about the origin, besides what it does to the
+// place; zero but beside a plane whose foundation has a shell's area for its contact.
 struct ContactSlopes {
-  Eigen::RowVector3d depth_by_place;
+  Eigen::RowVector3d depth_by_place, depth_by_turn;
   Mat3 normal_by_place;
-  Vector6 wrench;     // on the sphere's body
-  Matrix63 by_place;  // of the wrench
+  Vector6 wrench;              // on the sphere's body
+  Matrix63 by_place, by_turn;  // of the wrench
   Matrix6 by_twist;
   Vector6 by_depth;  // where the contact stays where it is
   // Of each ring of a bristle, whose state is a stretch.
   struct Ring {
     Matrix63 by_stretch;       // of the wrench
     Vec3 rate, rate_by_depth;  // of the stretch; without its turning with the normal
-    Mat3 rate_by_place;
+    Mat3 rate_by_place, rate_by_turn;
     Matrix36 rate_by_twist;
     Mat3 rate_by_stretch[kMostRings];  // by that of each ring
   } rings[kMostRings];

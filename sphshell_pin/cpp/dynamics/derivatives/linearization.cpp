@@ -112,6 +112,7 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
       sum.wrench += slopes_.wrench;
       // The sum over the contacts of a pair first: the chain's products are then made once a pair.
       sum.by_displacement += slopes_.by_place * displacement_of(site);
+      sum.by_displacement.rightCols<3>() += slopes_.by_turn;
       sum.by_twist += slopes_.by_twist;
       if (jacobian && active[next].slot >= 0) add_bristle(active[next], site, chain, *jacobian);
       if (jacobian) add_parameters(active[next], site, chain);
@@ -135,6 +136,8 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
 }
 
 void Linearization::find_slopes(const ActiveContact& active, const ContactSite& site) {
+  slopes_.depth_by_turn.setZero(), slopes_.by_turn.setZero();
+  for (ContactSlopes::Ring& ring : slopes_.rings) ring.rate_by_turn.setZero();
   std::visit([&](const auto& forces) { forces.slopes(scene_, active, site, slopes_); },
              scene_.forces_of(active));
 }
@@ -146,7 +149,8 @@ void Linearization::add_bristle(const ActiveContact& active, const ContactSite& 
   for (int r = 0; r < rings; ++r) {
     const ContactSlopes::Ring& ring = slopes_.rings[r];
     const Eigen::Index z = 3 * (active.slot + r);
-    const Matrix36 by_displacement = ring.rate_by_place * displacement_of(site);
+    Matrix36 by_displacement = ring.rate_by_place * displacement_of(site);
+    by_displacement.rightCols<3>() += ring.rate_by_turn;
     auto rate = jacobian.middleRows<3>(nv + z);
     for (int m = 0; m < chain.size(); ++m) {
       const int k = chain.velocity(m);
@@ -173,10 +177,15 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
       active.contact, state.center, pair.has_sphere(),   pair.radius, scene_.disc_radius(active),
       twist,          {},           scene_.shape(active)};
   if (!site.follows) site.place = site.contact.point;
-  if (pair.on_plane()) {
-    // A point that the body carries along, but for where it is lowest as it turns.
-    static const Mat3 kCarried = Mat3::Identity();
-    site.follows = true, site.point_by = &kCarried;
+  if (pair.on_plane() && pair.law.foundation()) {
+    // Derivatives by turns are given besides those by the place.
+    site.follows = true, site.place.setZero();
+  } else if (pair.on_plane()) {
+    // The lowest point, which the body carries along, but for where it is lowest as it turns. The
+    // contact is over it, in the plane z = 0.
+    static const Mat3 kInPlane = Vec3(1, 1, 0).asDiagonal();
+    site.follows = true, site.point_by = &kInPlane;
+    site.place -= site.contact.depth * site.contact.normal;
     site.place_by_turn =
         site.contact.dn_dc * cross_matrix(site.contact.normal) / site.contact.weight;
     site.contact.dn_dc.setZero();

@@ -61,8 +61,6 @@ class Linearization {
                    MatrixX& jacobian);
   // Fills slopes_, as the pair's kind of forces has them.
   void find_slopes(const ActiveContact& active, const ContactSite& site);
-  Eigen::RowVector3d plain_depth_by_place(
-      const ContactSite& site) const;  // of the slopes found last
   // How the slopes found last, and the depth, answer a parameter of their pair.
   struct Answer {
     Vector6 wrench = Vector6::Zero();  // in the shell's frame
@@ -71,6 +69,8 @@ class Linearization {
     Vec3 normal = Vec3::Zero();
     Vector6 moved = Vector6::Zero();  // the twist by which the shell's frame moves
   };
+  // A displacement of the sphere's body against the shell, of a contact with this many rings.
+  Answer displaced(const Vector6& by, const ContactSite& site, int rings) const;
   Answer answer_of(const Parameter& parameter, const ActiveContact& active,
                    const ContactSite& site);
   void add_differences(const Parameter& parameter, const ActiveContact& active,

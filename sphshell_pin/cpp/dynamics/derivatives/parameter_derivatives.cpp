@@ -14,10 +14,18 @@ Vec3 motion_of(const Vector6& twist, const ContactSite& site) {
 
 }  // namespace
 
-// The depth without the rise of a curved shell falls along the normal alone.
-Eigen::RowVector3d Linearization::plain_depth_by_place(const ContactSite& site) const {
-  Eigen::RowVector3d out = slopes_.depth_by_place;
-  if (site.shape) out += site.shape->tilt.transpose();
+// The velocities of the body stay as they are.
+Linearization::Answer Linearization::displaced(const Vector6& by, const ContactSite& site,
+                                               int rings) const {
+  const Vec3 moved = motion_of(by, site), turned = by.tail<3>();
+  Answer out;
+  out.wrench = slopes_.by_place * moved + slopes_.by_turn * turned;
+  out.depth = slopes_.depth_by_place * moved + slopes_.depth_by_turn.dot(turned.transpose());
+  // The depth without the rise of a curved shell falls along the normal alone.
+  out.plain_depth = out.depth + (site.shape ? site.shape->tilt.dot(moved) : 0.0);
+  out.normal = slopes_.normal_by_place * moved;
+  for (int i = 0; i < rings; ++i)
+    out.rates[i] = slopes_.rings[i].rate_by_place * moved + slopes_.rings[i].rate_by_turn * turned;
   return out;
 }
 
@@ -32,28 +40,24 @@ Linearization::Answer Linearization::answer_of(const Parameter& parameter,
   if (parameter.kind == Kind::Offset || parameter.kind == Kind::Placement) {
     const Pair& pair = scene_.pairs()[active.pair];
     const SE3& world_from_j = scene_.states()[active.pair].world_from_j;
-    Vec3 moved;  // the place, against the shell
-    Vector6 twist = Vector6::Zero();
+    Vector6 by = Vector6::Zero(), twist = Vector6::Zero(), frame = Vector6::Zero();
     if (pair.on_plane()) {
       // The shell, along an axis of its own frame.
       const SE3 shell =
           world_from_j.actInv(scene_.body().world_from(pair.joint_i, pair.placement_i));
-      moved = motion_of(shell.toActionMatrix().col(parameter.axis), site);
+      by = shell.toActionMatrix().col(parameter.axis);
     } else if (parameter.kind == Kind::Offset) {
       const auto from_i = scene_.body().world_from(pair.joint_i, pair.placement_i).rotation();
-      moved = world_from_j.rotation().transpose() * from_i.col(parameter.axis);
+      by.head<3>() = world_from_j.rotation().transpose() * from_i.col(parameter.axis);
     } else {
-      out.moved[parameter.axis] = 1;
-      moved = -motion_of(out.moved, site);
-      twist = -pinocchio::Motion(out.moved).cross(pinocchio::Motion(site.twist)).toVector();
+      frame[parameter.axis] = 1;
+      by = -frame;
+      twist = -pinocchio::Motion(frame).cross(pinocchio::Motion(site.twist)).toVector();
     }
-    out.wrench = slopes_.by_place * moved + slopes_.by_twist * twist;
-    out.depth = slopes_.depth_by_place * moved;
-    out.plain_depth = plain_depth_by_place(site) * moved;
-    out.normal = slopes_.normal_by_place * moved;
-    for (int i = 0; i < rings; ++i)
-      out.rates[i] =
-          slopes_.rings[i].rate_by_place * moved + slopes_.rings[i].rate_by_twist * twist;
+    out = displaced(by, site, rings);
+    out.moved = frame;
+    out.wrench += slopes_.by_twist * twist;
+    for (int i = 0; i < rings; ++i) out.rates[i] += slopes_.rings[i].rate_by_twist * twist;
     return out;
   }
   if (parameter.kind != Kind::Field) {
@@ -147,11 +151,9 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     };
     for (int m = 0; m < chain.size(); ++m) {
       const Vector6 axis = chain.axes().col(m), rate = chain.twist_by_q().col(m);
-      const Vec3 moved = motion_of(axis, site);
-      const Vec3 by_q =
-          slopes_.by_place.topRows<3>() * moved + slopes_.by_twist.topRows<3>() * rate;
-      add(chain.velocity(m), by_q, slopes_.normal_by_place * moved, slopes_.depth_by_place * moved,
-          plain_depth_by_place(site) * moved);
+      const Answer by = displaced(axis, site, 0);
+      const Vec3 by_q = by.wrench.head<3>() + slopes_.by_twist.topRows<3>() * rate;
+      add(chain.velocity(m), by_q, by.normal, by.depth, by.plain_depth);
       add(nv + chain.velocity(m), slopes_.by_twist.topRows<3>() * axis, Vec3::Zero(), 0, 0);
     }
     // The shell's frame turns with its body.

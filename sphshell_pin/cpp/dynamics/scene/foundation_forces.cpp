@@ -23,11 +23,61 @@ struct Pressed {
         slip(v - gap_rate * n) {
     if (friction) drag = share * friction->over_speed(slip.squaredNorm());
   }
+
+  // Of share n - drag slip: the normal part -b n n^T, and of the drag the product rule over share
+  // and coefficient.
+  Mat3 by_velocity(const FoundationLaw& law, const CoulombFriction* friction, const Vec3& n) const {
+    Mat3 out = Mat3::Zero();
+    if (!(share > 0)) return out;
+    out -= law.dissipation * n * n.transpose();
+    if (!friction) return out;
+    const Dual<1> over = friction->over_speed(Dual<1>::seed(slip.squaredNorm(), 0));
+    const Mat3 flat = Mat3::Identity() - n * n.transpose();
+    out += law.dissipation * over.value * slip * n.transpose() -
+           share * (over.value * flat + 2 * over.slope[0] * slip * slip.transpose());
+    return out;
+  }
 };
 
 const CoulombFriction* sliding_friction(const Pair& pair) {
   return std::get_if<CoulombFriction>(&pair.friction.law);
 }
+
+// What the derivative of a force at x by the velocity there adds to that of the wrench by the
+// twist: v = linear - [x] angular, moment = [x] force.
+void add_by_twist(const Mat3& by_velocity, const Vec3& x, Matrix6& by_twist) {
+  const Mat3 arm = cross_matrix(x);
+  by_twist.topLeftCorner<3, 3>() += by_velocity;
+  by_twist.topRightCorner<3, 3>() -= by_velocity * arm;
+  by_twist.bottomLeftCorner<3, 3>() += arm * by_velocity;
+  by_twist.bottomRightCorner<3, 3>() -= arm * by_velocity * arm;
+}
+
+// A contact of a constant normal force with and without friction, and how the wrench and the rates
+// of bristles answer that force. The force passes for one in proportion to the depth.
+struct BristleSlopes {
+  ContactSlopes all, without, more;
+  Vector6 by_force;
+  double share;  // depth over force
+
+  BristleSlopes(const FrictionLaw& friction, double relaxation, const ContactSite& at,
+                double normal_force) {
+    const double size = std::max(normal_force, 1e-300);
+    share = at.contact.depth / size;
+    NormalLaw held, steep;
+    held.law = ImpactLaw({size, 0});
+    steep.law = ImpactLaw({size / at.contact.depth, 1});
+    contact_slopes(held, friction, relaxation, at, all);
+    contact_slopes(held, FrictionLaw(), relaxation, at, without);
+    contact_slopes(steep, friction, relaxation, at, more);
+    Vector6 normal_by_depth;
+    normal_by_depth << at.contact.normal, at.contact.point.cross(at.contact.normal);
+    by_force = (more.by_depth - all.by_depth) * share - normal_by_depth;
+  }
+  Vec3 rate_by_force(int ring) const {
+    return (more.rings[ring].rate_by_depth - all.rings[ring].rate_by_depth) * share;
+  }
+};
 
 // The derivative of the pressure at a point this far from the sphere's center by that center.
 Vec3 pressure_by_center(const Vec3& from, double radius) {
@@ -55,6 +105,18 @@ void FoundationForces::find(const Pair& pair, const Vec3& center, bool slopes,
     // It has no sides: the foundation knows where it pushes.
     contact.rim = true;
   }
+}
+
+void FoundationForces::find_below(const Pair& pair, const PlaneBelow& plane,
+                                  std::vector<Contact>& contacts) {
+  contacts.clear();
+  foundation_.find_below(*plane.shell, plane_from_shell_.rotation(),
+                         plane_from_shell_.translation(), sliding_friction(pair) != nullptr);
+  if (foundation_.rows().empty()) return;
+  center_ = foundation_.rows()[0].center;
+  Contact& contact = contacts.emplace_back(lowest_);
+  contact.point = center_, contact.dn_dc.setZero();
+  contact.weight = 1, contact.feature = Feature::Face, contact.rim = true;
 }
 
 FoundationForce FoundationForces::force(const Pair& pair, std::size_t i, const Vec3& velocity,
@@ -91,6 +153,7 @@ PatchRow FoundationForces::patch(SceneData& scene, const ActiveContact& active,
   const double force = shown.normal_force;
   const int number = active.index;
   Foundation found;  // with its points, which a scene has only where it needs them
+  if (pair.on_plane()) found = foundation_;
   pair.ask([&](const auto& one) { one.overlap(found, center_, pair.radius, false, true); });
   const FoundationRow& row = found.rows()[static_cast<std::size_t>(number)];
   double area = 0, peak = 0;
@@ -100,7 +163,7 @@ PatchRow FoundationForces::patch(SceneData& scene, const ActiveContact& active,
     area += one.area, middle += one.area * one.point, push += one.force;
     peak = std::max(peak, one.pressure);
   }
-  if (!(area > 0)) return unknown_patch(row.depth);
+  if (!(area > 0)) return unknown_patch(shown.depth);
   // Centroid of the area, and the second moments about it in the tangent plane.
   middle /= area;
   const Vec3 normal = row.normal(), east = normal.unitOrthogonal(), north = normal.cross(east);
@@ -116,7 +179,7 @@ PatchRow FoundationForces::patch(SceneData& scene, const ActiveContact& active,
   const Vec3 axis =
       scene.state_of(active).world_from_j.rotation() * (longer[0] * east + longer[1] * north);
   // Damping is shared out as the elastic pressure is.
-  PatchRow out{{half[1], half[0]}, {}, peak * force / push.norm(), force / area, row.depth};
+  PatchRow out{{half[1], half[0]}, {}, peak * force / push.norm(), force / area, shown.depth};
   std::copy_n(axis.data(), 3, out.axis);
   return out;
 }
@@ -126,6 +189,7 @@ PatchRow FoundationForces::patch(SceneData& scene, const ActiveContact& active,
 void FoundationForces::slopes(const Pair& pair, std::size_t i, double relaxation,
                               const ContactSite& site, double normal_force,
                               ContactSlopes& out) const {
+  if (pair.on_plane()) return slopes_below(pair, relaxation, site, normal_force, out);
   const FoundationLaw& law = *pair.law.foundation();
   const double kappa = law.modulus / law.thickness;
   const FoundationRow& row = foundation_.rows()[i];
@@ -135,7 +199,8 @@ void FoundationForces::slopes(const Pair& pair, std::size_t i, double relaxation
   out.wrench << force, center_.cross(force);
   out.by_place << slope, cross_matrix(center_) * slope - cross_matrix(force);
   out.by_twist.setZero();
-  out.depth_by_place = -site.contact.normal.transpose();
+  // Beside a border the closest point is not where the force points.
+  out.depth_by_place = -row.away.transpose();
   out.normal_by_place = site.contact.dn_dc;
   const CoulombFriction* friction = sliding_friction(pair);
   for (const FoundationPoint& point : foundation_.points()) {
@@ -143,34 +208,16 @@ void FoundationForces::slopes(const Pair& pair, std::size_t i, double relaxation
     const Vec3 &x = point.point, &n = point.normal;
     const Vec3 v = site.twist.head<3>() + site.twist.tail<3>().cross(x);
     const Pressed pressed(law, friction, n, v);
-    // Of a pressure of one: the force, and its derivative by the velocity.
-    // Damping and drag per unit of pressure, and their derivative by the velocity of the point: the
-    // normal part -b n n^T, and of the drag the product rule over share and coefficient.
     const double area = kappa * point.area;
     const Vec3 unit = area * ((pressed.share - 1) * n - pressed.drag * pressed.slip);
-    Mat3 by_velocity = Mat3::Zero();
-    if (pressed.share > 0) {
-      by_velocity -= law.dissipation * n * n.transpose();
-      if (friction) {
-        const Dual<1> over = friction->over_speed(Dual<1>::seed(pressed.slip.squaredNorm(), 0));
-        const Mat3 flat = Mat3::Identity() - n * n.transpose();
-        by_velocity += law.dissipation * over.value * pressed.slip * n.transpose() -
-                       pressed.share * (over.value * flat + 2 * over.slope[0] * pressed.slip *
-                                                                pressed.slip.transpose());
-      }
-    }
-    by_velocity *= area * point.pressure;
+    const Mat3 by_velocity = area * point.pressure * pressed.by_velocity(law, friction, n);
     const Vec3 pressure_by = pressure_by_center(x - center_, pair.radius);
-    const Mat3 arm = cross_matrix(x), by_place = unit * pressure_by.transpose();
+    const Mat3 by_place = unit * pressure_by.transpose();
     out.wrench.head<3>() += point.pressure * unit;
     out.wrench.tail<3>() += point.pressure * x.cross(unit);
     out.by_place.topRows<3>() += by_place;
-    out.by_place.bottomRows<3>() += arm * by_place;
-    // v = linear - [x] angular, moment = [x] force.
-    out.by_twist.topLeftCorner<3, 3>() += by_velocity;
-    out.by_twist.topRightCorner<3, 3>() -= by_velocity * arm;
-    out.by_twist.bottomLeftCorner<3, 3>() += arm * by_velocity;
-    out.by_twist.bottomRightCorner<3, 3>() -= arm * by_velocity * arm;
+    out.by_place.bottomRows<3>() += cross_matrix(x) * by_place;
+    add_by_twist(by_velocity, x, out.by_twist);
   }
   if (pair.friction.has_state()) add_bristle(pair, i, relaxation, site, normal_force, out);
 }
@@ -200,7 +247,6 @@ void FoundationForces::add_bristle(const Pair& pair, std::size_t i, double relax
                                    const ContactSite& site, double normal_force,
                                    ContactSlopes& out) const {
   const Vec3& n = site.contact.normal;
-  const double size = std::max(normal_force, 1e-300), depth = site.contact.depth;
   // Of the pressure's force along the normal.
   const Vec3 push = out.wrench.head<3>();
   const Eigen::RowVector3d by_place =
@@ -210,25 +256,93 @@ void FoundationForces::add_bristle(const Pair& pair, std::size_t i, double relax
   at.disc_radius = 2 * pair.disc_radius();
   const Mat3 point_by = center_slopes(i, pair.radius);
   at.point_by = &point_by;
-  NormalLaw held, steep;  // the same force here, constant, and in proportion to the depth
-  held.law = ImpactLaw({size, 0, 0, 1});
-  steep.law = ImpactLaw({size / depth, 1, 0, 1});
-  ContactSlopes all, without, more;
-  contact_slopes(held, pair.friction, relaxation, at, all);
-  contact_slopes(held, FrictionLaw(), relaxation, at, without);
-  contact_slopes(steep, pair.friction, relaxation, at, more);
-  Vector6 normal_by_depth;
-  normal_by_depth << n, site.contact.point.cross(n);
-  const Vector6 by_force = (more.by_depth - all.by_depth) * (depth / size) - normal_by_depth;
-  out.wrench += all.wrench - without.wrench;
-  out.by_place += all.by_place - without.by_place + by_force * by_place;
-  out.by_twist += all.by_twist - without.by_twist + by_force * by_twist;
+  const BristleSlopes bristle(pair.friction, relaxation, at, normal_force);
+  out.wrench += bristle.all.wrench - bristle.without.wrench;
+  // The disc follows the depth.
+  const Eigen::RowVector3d depth_by = out.depth_by_place + n.transpose();
+  out.by_place += bristle.all.by_place - bristle.without.by_place + bristle.by_force * by_place +
+                  (bristle.all.by_depth - bristle.without.by_depth) * depth_by;
+  out.by_twist += bristle.all.by_twist - bristle.without.by_twist + bristle.by_force * by_twist;
   for (int k = 0; k < pair.friction.rings(); ++k) {
-    ContactSlopes::Ring& ring = out.rings[k] = all.rings[k];
-    const Vec3 by = (more.rings[k].rate_by_depth - ring.rate_by_depth) * (depth / size);
-    ring.rate_by_place += by * by_place;
-    ring.rate_by_twist += by * by_twist;
+    ContactSlopes::Ring& ring = out.rings[k] = bristle.all.rings[k];
+    ring.rate_by_turn.setZero();
+    ring.rate_by_place += bristle.rate_by_force(k) * by_place + ring.rate_by_depth * depth_by;
+    ring.rate_by_twist += bristle.rate_by_force(k) * by_twist;
   }
+}
+
+// Beside a plane the points are the shell's and move with it; that the border of the area moves as
+// well adds nothing. All in the frame of the plane, z = 0.
+void FoundationForces::slopes_below(const Pair& pair, double relaxation, const ContactSite& site,
+                                    double normal_force, ContactSlopes& out) const {
+  using Row6 = Eigen::Matrix<double, 1, 6>;
+  const FoundationLaw& law = *pair.law.foundation();
+  const double kappa = law.modulus / law.thickness;
+  const Vec3 n = Vec3::UnitZ();
+  const CoulombFriction* friction = sliding_friction(pair);
+  Matrix6 by = Matrix6::Zero();  // of the wrench, by a displacement of the shell
+  // First moment of the push, and its derivative.
+  Vec3 first = Vec3::Zero();
+  Matrix36 first_by = Matrix36::Zero();
+  Row6 sum_by = Row6::Zero();
+  double sum = 0;
+  out.wrench.setZero(), out.by_twist.setZero();
+  const std::vector<FoundationPoint>& points = foundation_.points();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3 &x = points[i].point, area = kappa * foundation_.areas()[i];
+    const double depth = points[i].pressure, push = -area.z() * depth, half = depth * depth / 2;
+    const Vec3 turned = area.cross(n), level(area.x(), area.y(), 0);
+    Row6 depth_by, push_by;
+    depth_by << -n.transpose(), -x.cross(n).transpose();
+    push_by = -area.z() * depth_by;
+    push_by.tail<3>() -= depth * turned.transpose();
+    Matrix36 x_by;  // in the plane
+    x_by << Mat3::Identity(), -cross_matrix(x - depth * n);
+    x_by.row(2).setZero();
+    // The first moment holds what the turn of the area adds where the surface has a border.
+    first += push * x + half * level;
+    first_by += x * push_by + push * x_by + depth * level * depth_by;
+    Mat3 level_by = -half * cross_matrix(area);
+    level_by.row(2).setZero();
+    first_by.rightCols<3>() += level_by;
+    sum += push, sum_by += push_by;
+    // Of friction and damping; the rest follows from the sums.
+    const Vec3 v = site.twist.head<3>() + site.twist.tail<3>().cross(x);
+    const Pressed pressed(law, friction, n, v);
+    const Vec3 unit = (pressed.share - 1) * n - pressed.drag * pressed.slip;
+    const Mat3 by_velocity = push * pressed.by_velocity(law, friction, n);
+    const Matrix36 force_by =
+        unit * push_by + by_velocity * cross_matrix(site.twist.tail<3>()) * x_by;
+    out.wrench.head<3>() += push * unit;
+    out.wrench.tail<3>() += push * x.cross(unit);
+    by.topRows<3>() += force_by;
+    by.bottomRows<3>() += cross_matrix(x) * force_by - push * cross_matrix(unit) * x_by;
+    add_by_twist(by_velocity, x, out.by_twist);
+  }
+  out.wrench[2] += sum, out.wrench.tail<3>() += first.cross(n);
+  by.row(2) += sum_by, by.bottomRows<3>() -= cross_matrix(n) * first_by;
+  if (pair.friction.has_state()) {
+    const Matrix36 point_by = (first_by - first / sum * sum_by) / sum;
+    const Row6 normal_by = by.row(2), normal_by_twist = out.by_twist.row(2);
+    static const Mat3 kCarried = Mat3::Identity();
+    ContactSite at = site;
+    at.place = at.contact.point, at.point_by = &kCarried;
+    const BristleSlopes bristle(pair.friction, relaxation, at, normal_force);
+    out.wrench += bristle.all.wrench - bristle.without.wrench;
+    by +=
+        (bristle.all.by_place - bristle.without.by_place) * point_by + bristle.by_force * normal_by;
+    out.by_twist +=
+        bristle.all.by_twist - bristle.without.by_twist + bristle.by_force * normal_by_twist;
+    for (int k = 0; k < pair.friction.rings(); ++k) {
+      ContactSlopes::Ring& ring = out.rings[k] = bristle.all.rings[k];
+      const Matrix36 rate_by = ring.rate_by_place * point_by + bristle.rate_by_force(k) * normal_by;
+      ring.rate_by_place = rate_by.leftCols<3>(), ring.rate_by_turn = rate_by.rightCols<3>();
+      ring.rate_by_twist += bristle.rate_by_force(k) * normal_by_twist;
+    }
+  }
+  out.by_place = by.leftCols<3>(), out.by_turn = by.rightCols<3>();
+  out.depth_by_place = -n.transpose(), out.depth_by_turn = -lowest_.point.cross(n).transpose();
+  out.normal_by_place.setZero();
 }
 
 // The force of a row of a foundation, in place of that of its depth.
@@ -237,7 +351,7 @@ void FoundationForces::complete(const SceneData& scene, ActiveContact& active) c
   const PairState& state = scene.state_of(active);
   const ContactKinematics<double>& m = active.kinematics;
   const auto& turn = state.world_from_j.rotation();
-  const Vec3 center = state.world_from_j.act(state.center);
+  const Vec3 center = state.world_from_j.act(center_);
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
   if (pair.needs_velocity()) {
     velocity = turn.transpose() * scene.relative_velocity(pair, center);
@@ -280,14 +394,20 @@ bool FoundationForces::changed(SceneData& scene, const Pair& pair, const ActiveC
   // With scratch of its own, as this one holds the state of the scene.
   FoundationForces foundation;
   std::vector<Contact> contacts;
-  foundation.find(pair, site.place, true, contacts);
+  if (const PlaneBelow* plane = std::get_if<PlaneBelow>(&pair.geometry)) {
+    foundation.plane_from_shell_ = plane_from_shell_, foundation.lowest_ = lowest_;
+    foundation.find_below(pair, *plane, contacts);
+  } else {
+    foundation.find(pair, site.place, true, contacts);
+  }
   const std::size_t i = static_cast<std::size_t>(active.index);
   if (i >= contacts.size()) return false;
   ContactSite other = site;
   other.contact = contacts[i];
   other.radius = pair.radius;
   other.disc_radius = pair.disc_radius();
-  const Vec3 spin = site.twist.tail<3>(), velocity = site.twist.head<3>() + spin.cross(site.place);
+  const Vec3 spin = site.twist.tail<3>(),
+             velocity = site.twist.head<3>() + spin.cross(foundation.center_);
   const Vec3 normal = foundation.force(pair, i, velocity, spin).normal;
   foundation.slopes(pair, i, scene.relaxation(pair), other,
                     std::max(0.0, other.contact.normal.dot(normal)), out);

@@ -38,7 +38,9 @@ void PlaneBelow::find(const SE3& plane_from_shell, Query& query) const {
   const Mat3& turn = plane_from_shell.rotation();
   query.find_below(*shell, turn.row(2).transpose(), -plane_from_shell.translation().z());
   for (Contact& contact : query.contacts) {
+    // In the plane, over the lowest point: friction acts in the surface of the solid.
     contact.point = plane_from_shell.act(contact.point);
+    contact.point.z() = 0;
     contact.normal = Vec3::UnitZ();
     contact.dn_dc = (turn * contact.dn_dc * turn.transpose()).eval();
   }

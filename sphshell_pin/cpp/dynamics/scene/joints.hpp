@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "contact/laws/laws.hpp"
+#include "sphshell_pin/laws/normal.hpp"
 #include "dynamics/scene/multibody.hpp"
 
 namespace sphshell {

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "contact/laws/friction.hpp"
+#include "sphshell_pin/laws/friction.hpp"
 #include "dynamics/scene/geometry.hpp"
 
 namespace sphshell {

@@ -56,11 +56,20 @@ class FoundationForces {
   static constexpr bool kDepthHeld = false;
 
   template <class Pose>
-  void find(const Pair& pair, const Pose&, const SE3&, const Vec3& center, bool slopes,
-            Query& query) {
-    find(pair, center, slopes || pair.friction.has_state(), query.contacts);
+  void find(const Pair& pair, const Pose& pose_i, const SE3& pose_j, const Vec3& center,
+            bool slopes, Query& query) {
+    const PlaneBelow* plane = std::get_if<PlaneBelow>(&pair.geometry);
+    if (!plane) return find(pair, center, slopes || pair.friction.has_state(), query.contacts);
+    // Its lowest point first: most often there is none.
+    plane_from_shell_ = pose_j.actInv(pose_i());
+    plane->find(plane_from_shell_, query);
+    if (query.contacts.empty()) return;
+    lowest_ = query.contacts.front();
+    find_below(pair, *plane, query.contacts);
   }
   void find(const Pair& pair, const Vec3& center, bool slopes, std::vector<Contact>& contacts);
+  // Of a shell whose lowest point is known.
+  void find_below(const Pair& pair, const PlaneBelow& plane, std::vector<Contact>& contacts);
   void complete(const SceneData& scene, ActiveContact& active) const;
   // The ellipse with the area's second moments, and the pressures.
   PatchRow patch(SceneData& scene, const ActiveContact& active, const ContactRow& row) const;
@@ -76,13 +85,17 @@ class FoundationForces {
                         const Vec3& spin) const;
   void slopes(const Pair& pair, std::size_t i, double relaxation, const ContactSite& site,
               double normal_force, ContactSlopes& out) const;
+  void slopes_below(const Pair& pair, double relaxation, const ContactSite& site,
+                    double normal_force, ContactSlopes& out) const;
   // See the definitions: the derivative of the center of pressure, and what a bristle adds.
   Mat3 center_slopes(std::size_t i, double radius) const;
   void add_bristle(const Pair& pair, std::size_t i, double relaxation, const ContactSite& site,
                    double normal_force, ContactSlopes& out) const;
 
-  Vec3 center_ = Vec3::Zero();
+  Vec3 center_ = Vec3::Zero();  // of the sphere; beside a plane, of the pressure
   Foundation foundation_;
+  SE3 plane_from_shell_ = SE3::Identity();
+  Contact lowest_;  // beside a plane
 };
 
 using PairForces = std::variant<PointForces, FoundationForces>;

@@ -170,15 +170,22 @@ void CurvedShell::build_cones(const Shell& shell) {
     const Primitive* face = closed ? &faces_.shapes[face_cells_[f].face] : nullptr;
     // The face's own normals at corners and at the middles of sides, a little wider for what is
     // between.
-    for (int i = 0; face != nullptr && i < 6; ++i) {
-      const Vec3 &p = facet.corner[i % 3], &q = facet.corner[i < 3 ? i : next_corner(i - 3)];
+    double sagitta = 0;
+    std::array<Vec3, 4> middles;
+    if (face != nullptr) middles = middles_of(*face, face_cells_[f], facet, shell.size());
+    for (int i = 0; face != nullptr && i < 7; ++i) {
+      const Vec3* corner = facet.corner;
+      const Vec3 chord = i < 3   ? Vec3((corner[i] + corner[next_corner(i)]) / 2)
+                         : i < 4 ? Vec3((corner[0] + corner[1] + corner[2]) / 3)
+                                 : corner[i - 4];
+      const Vec3 x = i < 4 ? middles[i] : chord;
       Vec3 n;
-      face->distance((p + q) / 2, n);
-      const double along = std::abs(n.dot(axis)), across = n.cross(axis).norm();
+      face->distance(x, n);
+      sagitta = std::max(sagitta, kBulgeMargin * (x - chord).norm());
+      const double along = face_cells_[f].sign * n.dot(axis), across = n.cross(axis).norm();
       tangent = std::max(tangent, along > 0 ? 1.001 * across / along + 1e-6 : kAny);
     }
     // Borders of a closed cell bulge beyond its chords, in a flat one, too.
-    double sagitta = face != nullptr ? sagitta_of(facet, *face) : 0;
     for (int k = 0; k < 3 && closed; ++k)
       sagitta = std::max<double>(sagitta, face_cells_[f].bulge[k]);
     NormalCone& cone = cones_[f];

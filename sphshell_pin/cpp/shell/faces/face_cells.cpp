@@ -9,8 +9,6 @@
 namespace sphshell {
 namespace {
 
-// What is measured at a few places may be larger between them.
-constexpr double kMargin = 1.5;
 constexpr double kTurn = 6.283185307179586;
 // Facets of one face overlap by this share of their parameters: one of them has each point.
 constexpr double kOverlap = 1e-9;
@@ -22,13 +20,25 @@ double difference(double from, double to, bool angle) {
 
 }  // namespace
 
-// The most that a face is off a facet of it, by its middle and those of its sides.
-double sagitta_of(const Facet& facet, const Primitive& shape) {
-  const Vec3* p = facet.corner;
-  double most = std::abs(shape.distance((p[0] + p[1] + p[2]) / 3));
-  for (int k = 0; k < 3; ++k)
-    most = std::max(most, std::abs(shape.distance((p[k] + p[next_corner(k)]) / 2)));
-  return kMargin * most;
+std::array<Vec3, 4> middles_of(const Primitive& shape, const FaceCell& cell, const Facet& facet,
+                               double size) {
+  std::array<Vec3, 4> out;
+  for (int i = 0; i < 4; ++i) {
+    Vec3 chord = Vec3::Zero();
+    Eigen::Vector2d place(0, 0);
+    int turned = 0, count = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (i < 3 && k == previous_corner(i)) continue;
+      chord += facet.corner[k], ++count;
+      place[1] += cell.place[k][1];
+      // The tip of a cone has no angle.
+      if (!std::isnan(cell.place[k][0])) place[0] += cell.place[k][0], ++turned;
+    }
+    place[0] /= turned, place[1] /= count;
+    out[i] =
+        shape.has_parameters() && turned > 0 ? shape.at(place, size) : shape.onto(chord / count);
+  }
+  return out;
 }
 
 WithinLine within_line(const Primitive& shape, const FaceCell& cell, const Facet& facet, int k,
@@ -59,8 +69,8 @@ class CellMaker {
   FaceCells make() {
     if (faces_.of.empty()) return {};
     out_.of.resize(facets_.size());
-    off_.assign(3 * facets_.size(), 0);
-    open_.assign(faces_.shapes.size(), 0);
+    open_.assign(facets_.size(), 0);
+    told_.assign(faces_.shapes.size(), 0);
     for (std::size_t f = 0; f < facets_.size(); ++f) place(static_cast<int>(f));
     for (std::size_t f = 0; f < facets_.size(); ++f)
       for (int k = 0; k < 3; ++k) decide(static_cast<int>(f), k);
@@ -81,9 +91,23 @@ class CellMaker {
     return vertex(h) != vertex(g) ? shell_.facet_half_edge(g) : -1;
   }
 
-  void give_up(int face, int other, double off) {
-    if (!open_[face]) out_.inexact.push_back({face, other, off});
-    open_[face] = 1;
+  // Leaves a facet to its cubic: its border to another face (its own: a vertex) is off its face.
+  void give_up(int f, int other, double off) {
+    const int face = out_.of[f].face;
+    if (!told_[face]) out_.inexact.push_back({face, other, off});
+    told_[face] = 1;
+    if (!open_[f]) opened_.push_back(f);
+    open_[f] = 1;
+  }
+
+  // How far the cubic of a side is off the facet's face [m].
+  double off_face(int f, int k) const {
+    const Primitive& shape = faces_.shapes[out_.of[f].face];
+    const CubicCurve side = facets_[f].side(shell_.facets()[f], k);
+    double most = 0;
+    for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85})
+      most = std::max(most, std::abs(shape.distance(side.point(s))));
+    return most;
   }
 
   void place(int f) {
@@ -92,14 +116,10 @@ class CellMaker {
     if (cell.face < 0) return;
     const Facet& facet = shell_.facets()[f];
     const Primitive& shape = faces_.shapes[cell.face];
-    Vec3 n;
-    shape.distance((facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3, n);
-    cell.sign = n.dot(facet.normal) < 0 ? -1 : 1;
     double first[2] = {0, 0};
     for (int i = 0; i < 3; ++i) {
-      cell.upright[i] = static_cast<float>(cell.sign * n[i]);
       const double off = std::abs(shape.distance(facet.corner[i]));
-      if (!(off <= gap_)) give_up(cell.face, cell.face, off);
+      if (!(off <= gap_)) give_up(f, cell.face, off);
       if (!shape.has_parameters()) continue;
       const Eigen::Vector2d at = shape.parameters(facet.corner[i], shell_.size());
       for (int c = 0; c < 2; ++c) {
@@ -109,6 +129,24 @@ class CellMaker {
         if (angle && !std::isnan(mine)) mine -= kTurn * std::round((mine - first[c]) / kTurn);
       }
     }
+    Vec3 n;
+    shape.distance(middles_of(shape, cell, facet, shell_.size())[3], n);
+    cell.sign = turn_of(shape, cell, facet, n) < 0 ? -1 : 1;
+    for (int i = 0; i < 3; ++i) cell.upright[i] = static_cast<float>(cell.sign * n[i]);
+  }
+
+  // Positive where a facet turns as the face's parameters do, or about the center of a sphere.
+  static double turn_of(const Primitive& shape, const FaceCell& cell, const Facet& facet,
+                        const Vec3& normal) {
+    if (shape.has_parameters()) {
+      const double (&at)[3][2] = cell.place;
+      const double u = at[1][0] - at[0][0], v = at[1][1] - at[0][1];
+      const double s = at[2][0] - at[0][0], t = at[2][1] - at[0][1], turn = u * t - s * v;
+      // But not of three corners on one of their lines, nor at a tip.
+      if (std::abs(turn) > kOverlap * (std::abs(u) + std::abs(v) + std::abs(s) + std::abs(t)))
+        return turn;
+    }
+    return normal.dot(facet.normal);
   }
 
   // Flat facets of planes far from anything round stay as they are.
@@ -129,17 +167,10 @@ class CellMaker {
     if (cell.face < 0 || cell.side[k] == FaceCell::Side::Border) return;  // decided from beyond it
     if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
     if (other == cell.face || !(is_bent(f) || (h >= 0 && is_bent(triangle_of(h))))) return;
-    const Facet& facet = shell_.facets()[f];
-    const Primitive& shape = faces_.shapes[cell.face];
-    const CubicCurve side = facets_[f].side(facet, k);
-    double apart = 0;
-    for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85})
-      apart = std::max(apart, std::abs(shape.distance(side.point(s))));
-    off_[3 * f + k] = static_cast<float>(apart);
-    cell.bulge[k] = static_cast<float>(kMargin * bulge_of(f, k) + gap_);
+    cell.bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
     const int joint = other >= 0 && h > 3 * f + k ? joint_of(f, k, cell.face, other) : -1;
     if (joint >= 0 && agree(joint, 3 * f + k, h)) return;
-    if (apart > gap_) give_up(cell.face, other, apart);
+    if (const double off = off_face(f, k); off > gap_) give_up(f, other, off);
   }
 
   double bulge_of(int f, int k) const {
@@ -173,15 +204,30 @@ class CellMaker {
     std::vector<int>& known = joints_[{a, b}];
     for (const int j : known) {
       const FaceJoint& it = faces_.joints[j];
-      if (it.kind == found->kind && it.ends_tangent == found->ends_tangent &&
-          std::equal(it.branch, it.branch + 2, found->branch) &&
-          (it.point - found->point).norm() <= gap_ && std::abs(it.radius - found->radius) <= gap_ &&
-          (it.kind != FaceJoint::Kind::Line || it.axis.cross(found->axis).norm() <= kMostGap))
+      if (it.kind != found->kind) continue;
+      if (it.kind == FaceJoint::Kind::Crossing
+              ? it.ends_tangent == found->ends_tangent &&
+                    std::equal(it.branch, it.branch + 2, found->branch)
+              : is_one(it, *found, p, q))
         return j;
     }
     known.push_back(static_cast<int>(faces_.joints.size()));
     faces_.joints.push_back(*found);
     return known.back();
+  }
+
+  // Whether two lines or circles are one, as both faces are one between them. Faces that are nearly
+  // tangent cross twice, and rounding chooses which of both a side is: all along it must be one.
+  bool is_one(const FaceJoint& known, const FaceJoint& found, const Vec3& p, const Vec3& q) const {
+    for (const double s : {0.0, 0.5, 1.0}) {
+      const Vec3 x = found.nearest(p + s * (q - p)), y = known.nearest(x), middle = (x + y) / 2;
+      if (!((y - x).norm() < (q - p).norm())) return false;
+      for (const int face : known.face)
+        if (!(std::abs(faces_.shapes[face].distance(middle)) <= gap_ &&
+              std::abs(faces_.shapes[face].distance(y)) <= gap_))
+          return false;
+    }
+    return true;
   }
 
   // Writes a joint to the facets on both sides of it. False, and to none, if it does not divide
@@ -222,38 +268,24 @@ class CellMaker {
       const int k = side_of(halves[i]);
       cell.side[k] = FaceCell::Side::Border;
       cell.joint[k] = j, cell.turn[k] = turn[i];
-      cell.bulge[k] = static_cast<float>(kMargin * bulge + gap_);
+      cell.bulge[k] = static_cast<float>(kBulgeMargin * bulge + gap_);
     }
-    // Of a face that is given up its cubic side counts.
-    const int f = triangle_of(g), k = side_of(g);
-    const Primitive& shape = faces_.shapes[out_.of[f].face];
-    for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85})
-      off_[g] = std::max<float>(
-          off_[g], std::abs(shape.distance(facets_[f].side(shell_.facets()[f], k).point(s))));
     return true;
   }
 
-  // Giving up one face changes the sides of its neighbors, until nothing changes. Then what each
-  // facet is.
+  // Of facets that are left to their cubics the neighbors end on the same curves, and are left,
+  // too, where those are off their face. Then what each facet is.
   void settle() {
-    const auto gives = [&](int face) { return face >= 0 && !open_[face]; };
-    const auto other_face = [&](const FaceCell& cell, int k) {
-      const FaceJoint& joint = faces_.joints[cell.joint[k]];
-      return joint.face[1 - joint.which(cell.face)];
-    };
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (std::size_t f = 0; f < out_.of.size(); ++f)
-        for (int k = 0; k < 3; ++k) {
-          FaceCell& cell = out_.of[f];
-          if (cell.side[k] != FaceCell::Side::Border) continue;
-          const int other = other_face(cell, k);
-          const bool here = gives(cell.face), there = gives(other);
-          if (faces_.joints[cell.joint[k]].tangent ? here && there : here || there) continue;
-          cell.side[k] = FaceCell::Side::Cubic;
-          if (here && off_[3 * f + k] > gap_)
-            give_up(cell.face, other, off_[3 * f + k]), changed = true;
-        }
+    while (!opened_.empty()) {
+      const int g = opened_.back();
+      opened_.pop_back();
+      for (int i = 0; i < 3; ++i) {
+        const int h = beyond(g, i), f = triangle_of(h), k = side_of(h);
+        if (h < 0 || out_.of[f].face < 0 || open_[f]) continue;
+        out_.of[f].side[k] = FaceCell::Side::Cubic;
+        out_.of[f].bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
+        if (const double off = off_face(f, k); off > gap_) give_up(f, out_.of[g].face, off);
+      }
     }
     for (std::size_t f = 0; f < out_.of.size(); ++f) {
       FaceCell& cell = out_.of[f];
@@ -262,11 +294,11 @@ class CellMaker {
       bool needed = is_round(cell.face) || !facets_[f].flat;
       for (int k = 0; k < 3; ++k)
         if (cell.side[k] == FaceCell::Side::Border) {
-          const int other = other_face(cell, k);
-          needed = needed || (is_round(other) && gives(other));
+          const FaceJoint& joint = faces_.joints[cell.joint[k]];
+          needed = needed || is_round(joint.face[1 - joint.which(cell.face)]);
         }
-      cell.exact = !needed || gives(cell.face);
-      cell.closed = needed && gives(cell.face);
+      cell.exact = !needed || !open_[f];
+      cell.closed = needed && !open_[f];
       for (int k = 0; k < 3 && !cell.closed; ++k) cell.side[k] = FaceCell::Side::Cubic;
     }
   }
@@ -334,8 +366,9 @@ class CellMaker {
   const LargeArray<CurvedFacet>& facets_;
   const double gap_;
   FaceCells out_;
-  std::vector<char> open_;  // faces that do not hold their own facets exactly: left to the cubics
-  std::vector<float> off_;  // of cubic sides from the face [m]
+  std::vector<char> open_;   // facets that are left to their cubics
+  std::vector<int> opened_;  // those whose neighbors do not know of it yet
+  std::vector<char> told_;   // faces of which it is said why
   std::map<std::pair<int, int>, std::vector<int>> joints_;
 };
 

@@ -2,6 +2,7 @@
 // face gives the numbers.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "shell/faces/face_joints.hpp"
@@ -11,6 +12,9 @@ namespace sphshell {
 
 class CurvedFacet;
 struct Faces;
+
+// What is measured at a few places may be larger between them.
+constexpr double kBulgeMargin = 1.5;
 
 // What a facet is of the face it lies on.
 struct FaceCell {
@@ -59,7 +63,9 @@ struct WithinLine {
 WithinLine within_line(const Primitive& shape, const FaceCell& cell, const Facet& facet, int k,
                        const Vec3& point, const Eigen::Vector2d& place, double tolerance);
 
-// How far the face is off the flat facet, about: at its middle and those of its sides [m].
-double sagitta_of(const Facet& facet, const Primitive& shape);
+// The points of a face in the middle of the sides of a facet, and of the facet: a long chord of a
+// thin tube may be on its other side.
+std::array<Vec3, 4> middles_of(const Primitive& shape, const FaceCell& cell, const Facet& facet,
+                               double size);
 
 }  // namespace sphshell

@@ -209,6 +209,23 @@ Eigen::Vector2d Primitive::parameters(const Vec3& x, double size) const {
   return {u, kind == FaceKind::Torus ? std::atan2(at.h, at.off - radius) : at.h / size};
 }
 
+Vec3 Primitive::at(const Eigen::Vector2d& place, double size, Vec3* along) const {
+  const Vec3 east = axis.unitOrthogonal(), north = axis.cross(east);
+  const double c = std::cos(place[0]), s = std::sin(place[0]);
+  const double slope = kind == FaceKind::Cone ? std::tan(second) : 0;
+  // The radius and the height, and how they change.
+  double off = radius + slope * place[1] * size, widens = slope * size;
+  double height = place[1] * size, rises = size;
+  if (kind == FaceKind::Torus) {
+    rises = second * std::cos(place[1]), height = second * std::sin(place[1]);
+    off = radius + rises, widens = -height;
+  }
+  const Vec3 out = c * east + s * north;
+  if (along != nullptr)
+    along[0] = off * (c * north - s * east), along[1] = widens * out + rises * axis;
+  return point + off * out + height * axis;
+}
+
 // Of the circle about the axis, at the height of x.
 double Primitive::radius_at(const Vec3& x) const {
   if (kind == FaceKind::Cone) return radius + (x - point).dot(axis) * std::tan(second);

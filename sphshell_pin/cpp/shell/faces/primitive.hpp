@@ -39,6 +39,8 @@ struct Primitive {
   // share of `size`, or the angle of the tube. Right-handed about the normal; the first is not
   // finite on the axis.
   Eigen::Vector2d parameters(const Vec3& x, double size) const;
+  // The point of given parameters, and how it moves with each.
+  Vec3 at(const Eigen::Vector2d& place, double size, Vec3* along = nullptr) const;
   bool has_parameters() const { return kind != FaceKind::Plane && kind != FaceKind::Sphere; }
   // The second derivatives of the distance at x [1/m]: how its gradient turns.
   Mat3 hessian(const Vec3& x) const;

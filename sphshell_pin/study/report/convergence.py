@@ -1,0 +1,310 @@
+"""Error of the contact force against the size of the elements, and cost, of every contact method.
+
+A sphere of radius r lies 0.04 r deep in or on a surface whose elements have sides of the mean
+length h, at 300 random places; its force of the law k depth^1.5 is compared, as a vector, with that
+of the exact surface. Bowl and dome are the inside and the outside of a sphere of 4 r, the torus
+(inside) has radii of 6 r and 3 r, the flat plate is made of random triangles. The method "smooth"
+bends the elements to the normals of their vertices, exact ones or those estimated from the mesh;
+"facets" is the exact polyhedron; "elements" sums over all elements, as SPHSHL3 did. On a faceted
+bowl the sphere is pushed by both sides of every edge, and refinement does not help; the sum over
+elements grows without limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sphshell_pin import Shell
+from sphshell_pin.arrays import Array
+from sphshell_pin.study.report import drawing
+from sphshell_pin.study.report.contents import (
+    Finding,
+    Picture,
+    Progress,
+    Section,
+    Spread,
+    Table,
+    about,
+    columns,
+    number,
+)
+from sphshell_pin.study.report.surfaces import (
+    DEPTH,
+    RADIUS,
+    SURFACES,
+    Mesh,
+    Surface,
+)
+from sphshell_pin.study.report.timing import part, per_center, silent, take_turns
+
+PLACES = 300
+EXPONENT = 1.5
+TIMED_PLACES = 2000
+
+
+UNTIMED = Spread(math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Errors of one rule on one mesh, over all places.
+
+    Of the force as a vector, divided by the exact one; of its magnitude alone; of its direction
+    [deg], where there is a force.
+    """
+
+    surface: str
+    rule: str
+    triangles: int
+    side: float  # mean side of the elements / radius of the sphere
+    mean: float
+    largest: float
+    magnitude: float
+    direction: float
+    time: Spread = UNTIMED  # of a query [s]
+
+
+REPORTED = ("bowl", "dome", "torus", "flat plate")
+SMOOTH, ESTIMATED = "smooth, exact normals", "smooth, estimated normals"
+# Method, and whether the shell is given the exact normals.
+RULES = {
+    SMOOTH: ("smooth", True),
+    ESTIMATED: ("smooth", False),
+    "facets": ("facets", False),
+    "elements": ("elements", False),
+}
+
+
+def relative_forces(shell: Shell, method: str, centers: Array) -> Array:
+    """Return the forces (n, 3) of the law k depth^1.5, divided by the exact magnitude."""
+    forces = np.empty((len(centers), 3))
+    for i, center in enumerate(centers):
+        terms = shell.contacts(center, RADIUS, method=method).terms
+        forces[i] = (terms.weight * (terms.depth / DEPTH) ** EXPONENT) @ terms.normal
+    return forces
+
+
+def measure(
+    name: str, surface: Surface, rounds: int = 0, progress: Progress = silent, finest: int = 5
+) -> list[Row]:
+    """Measure every rule on the first `finest` meshes of a surface; queries timed in `rounds`."""
+    centers, normals = surface.touching(0, PLACES)
+    elsewhere, _ = surface.touching(1, TIMED_PLACES)
+    rows, contestants = [], {}
+    meshes = surface.meshes()[:finest]
+    for k, mesh in enumerate(meshes):
+        # Free shapes are meant: these would be recognized as spheres and tori, and be exact.
+        estimated = Shell(mesh.vertices, mesh.triangles, faces=False)
+        exact = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals, faces=False)
+        for label, (method, exact_normals) in RULES.items():
+            shell = exact if exact_normals else estimated
+            rows.append(row_of(name, label, mesh, relative_forces(shell, method, centers), normals))
+            contestants[str(len(rows) - 1)] = query_contestant(shell, elsewhere, RADIUS, method)
+        progress(0.5 * (k + 1) / len(meshes))
+    if rounds == 0:
+        return rows
+    times = take_turns(contestants, rounds, part(progress, 0.5, 1.0))
+    return [replace(row, time=Spread.of(times[str(k)])) for k, row in enumerate(rows)]
+
+
+def query_contestant(
+    shell: Shell, centers: Array, radius: float, method: str
+) -> Callable[[], float]:
+    """Return what asks the shell for the contacts of all spheres and times one of them."""
+    radii = np.full(len(centers), radius)
+    return per_center(
+        lambda: shell.contacts_batch(centers, radii, method=method, threads=1), len(centers)
+    )
+
+
+def row_of(name: str, label: str, mesh: Mesh, forces: Array, normals: Array) -> Row:
+    """Return the errors of relative forces (n, 3) whose exact values are the normals (n, 3)."""
+    errors = np.linalg.norm(forces - normals, axis=1)
+    magnitudes = np.linalg.norm(forces, axis=1)
+    some = magnitudes > 0
+    sines = np.linalg.norm(np.cross(forces, normals), axis=1)[some]
+    angles = np.arctan2(sines, np.einsum("ij,ij->i", forces, normals)[some])
+    return Row(
+        surface=name,
+        rule=label,
+        triangles=len(mesh.triangles),
+        side=mesh.mean_side / RADIUS,
+        mean=float(errors.mean()),
+        largest=float(errors.max()),
+        magnitude=float(np.abs(magnitudes - 1).mean()),
+        direction=float(np.degrees(angles).mean()),
+    )
+
+
+KEY, TITLE = "forces", "Error of the contact force"
+# Name, color, marker, line: estimated normals are exact on a sphere, and one hides the other.
+LOOKS = {
+    SMOOTH: ("smooth", drawing.BLUE, "o", "-"),
+    ESTIMATED: ("smooth, estimated", drawing.GREEN, "s", drawing.DASHED),
+    "facets": ("facets", drawing.ORANGE, "^", "-"),
+    "elements": ("elements", drawing.RED, "v", "-"),
+}
+CURVED = ("bowl", "dome", "torus")
+AT = 0.3  # h / r at which errors are compared
+TEXT = about(__doc__)
+
+
+def section(*, quick: bool, progress: Progress) -> Section:
+    """Measure and return the section."""
+    names = REPORTED
+    rows: list[Row] = []
+    for k, name in enumerate(names):
+        share = part(progress, k / len(names), (k + 1) / len(names))
+        surface, rounds, finest = SURFACES[name], 3 if quick else 7, 4 if quick else 5
+        rows += measure(name, surface, rounds, share, finest)
+    return assemble(names, rows)
+
+
+def assemble(names: tuple[str, ...], rows: list[Row]) -> Section:
+    """Return the section of measured rows."""
+    return Section(
+        KEY,
+        TITLE,
+        TEXT,
+        findings=findings_of(rows),
+        pictures=[picture(names, rows)],
+        tables=[orders_table(names, rows), errors_table(rows)],
+    )
+
+
+def of(rows: list[Row], surface: str, rule: str) -> list[Row]:
+    """Return the rows of one line, coarse to fine."""
+    return [row for row in rows if (row.surface, row.rule) == (surface, rule)]
+
+
+def order(line: list[Row]) -> float:
+    """Return the power of h that the mean error follows, by a fit over all meshes."""
+    side, error = np.array([(row.side, row.mean) for row in line]).T
+    return float(np.polyfit(np.log(side), np.log(error), 1)[0])
+
+
+def error_at(line: list[Row], which: str = "mean", side: float = AT) -> float:
+    """Return the mean or largest error at h / r, between two meshes by a power law."""
+    sides = np.log([row.side for row in reversed(line)])
+    errors = np.log([getattr(row, which) for row in reversed(line)])
+    return float(np.exp(np.interp(np.log(side), sides, errors)))
+
+
+def findings_of(rows: list[Row]) -> list[Finding]:
+    """Return the figures that have aims."""
+    lines = [of(rows, name, SMOOTH) for name in CURVED]
+    estimated = [of(rows, name, ESTIMATED) for name in CURVED]
+    error = (
+        f"force error, mean: elements of {AT} sphere radii (h / r = {AT}), exact normals; "
+        "worst of bowl, dome, torus"
+    )
+    lowest = "order of the force error in h, exact normals: lowest of bowl, dome, torus"
+    flat = "force error on a flat plate, any refinement, side force included"
+    return [
+        Finding("force_error", error, max(map(error_at, lines)), aim=1e-4, headline=True),
+        Finding(
+            "force_error_largest",
+            "the same, the largest error at any place",
+            max(error_at(line, "largest") for line in lines),
+        ),
+        Finding("force_order", lowest, min(map(order, lines)), aim=3.5, sense=">="),
+        Finding(
+            "force_order_estimated",
+            "the same with normals estimated from the mesh",
+            min(map(order, estimated)),
+            aim=2.0,
+            sense=">=",
+        ),
+        Finding(
+            "flat_error",
+            flat,
+            max(row.largest for row in of(rows, "flat plate", SMOOTH)),
+            aim=1e-12,
+            headline=True,
+        ),
+    ]
+
+
+def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
+    """Return order and error at h / r = AT of every method on every surface."""
+    cells = []
+    for name in names:
+        for rule in LOOKS:
+            line = of(rows, name, rule)
+            fine = line[-1]
+            exact = max(row.largest for row in line) < 1e-12
+            cells.append(
+                (name, rule, None if exact else order(line), error_at(line))
+                + (error_at(line, "largest"), fine.triangles, fine.mean, fine.time.median)
+            )
+    return Table(
+        "forces_orders",
+        "Orders by a fit over all meshes; none where the force is exact at any size.",
+        columns(
+            "surface; method; order; mean_error_at_0.3: error at h/r = 0.3; largest_error_at_0.3: "
+            "largest; finest_triangles: triangles of the finest mesh; finest_mean_error: error "
+            "there; query_s: query [us]"
+        ),
+        cells,
+    )
+
+
+def errors_table(rows: list[Row]) -> Table:
+    """Return every row that was measured."""
+    return Table(
+        "forces",
+        "All meshes: errors of the force over the force, and time of a query.",
+        columns(
+            "surface; method; triangles; side_over_radius: h/r; mean_error; largest_error: "
+            "largest; mean_magnitude_error: of the magnitude; mean_direction_error_deg: of the "
+            "direction [deg]; query_s: query [us]; query_low_s: lower quartile; query_high_s: "
+            "upper quartile"
+        ),
+        [
+            (row.surface, row.rule, row.triangles, row.side, row.mean, row.largest)
+            + (row.magnitude, row.direction, row.time.median, row.time.low, row.time.high)
+            for row in rows
+        ],
+        folded=True,
+    )
+
+
+def picture(names: tuple[str, ...], rows: list[Row]) -> Picture:
+    """Draw mean errors up to the largest against the number of elements, one panel per surface."""
+    with drawing.canvas(7.8, 5.8) as figure:
+        figure.set_layout_engine("constrained", h_pad=0.09)
+        panels = figure.subplots(2, 2, sharex=True).ravel()
+        for axis, name in zip(panels, names, strict=True):
+            flat = name == "flat plate"
+            drawing.logarithmic(axis, counts=True, every=(1, 3 if flat else 2))
+            axis.set_ylim(*((1e-17, 1e3) if flat else (1e-10, 1e2)))
+            axis.set_title(name)
+            for rule, (_, color, marker, dashes) in LOOKS.items():
+                line = of(rows, name, rule)
+                mean, x = [r.mean for r in line], [r.triangles for r in line]
+                axis.plot(x, mean, color=color, marker=marker, linestyle=dashes)
+                largest = [r.largest for r in line]
+                axis.fill_between(x, mean, largest, color=color, alpha=0.15, linewidth=0)
+            if not flat:
+                drawing.guide(axis, (350, 2e-7), 2500, -1, "order 2")
+                drawing.guide(axis, (350, 2e-7), 2500, -2, "order 4")
+        for axis, name in zip(panels, names, strict=True):  # now that all have their limits
+            lasts = [(of(rows, name, rule)[-1], *look[:2]) for rule, look in LOOKS.items()]
+            ends = [(last.triangles, last.mean, label, color) for last, label, color in lasts]
+            drawing.label_ends(axis, ends)
+        figure.supxlabel("elements", fontsize=drawing.SMALL + 1)
+        figure.supylabel("error of the force / force", fontsize=drawing.SMALL + 1)
+        png = drawing.png_of(figure)
+    best = number(error_at(of(rows, names[0], SMOOTH)))
+    return Picture(
+        "force_elements",
+        png,
+        f"Error of the force against the number of elements; smooth reaches {best} on the "
+        f"{names[0]} at h/r = {AT}.",
+        "Mean error (line) and up to the largest (band) against the number of elements, with the "
+        "slopes of orders 2 and 4 in the size of the elements.",
+    )

@@ -1,0 +1,252 @@
+"""What a step of a Panda with a fingertip on 200 k triangles costs, by its parts.
+
+Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
+triangles, forces, losses and figures of every pair included, against Pinocchio's ABA and integrate
+alone, in a compiled loop. What a component adds is a difference to the scene without contact, whose
+step is ABA, continuous collision detection, the energy audit and summaries.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin import robots
+from sphshell_pin.arrays import Array
+from sphshell_pin.dynamics.run.advance import AnyController
+from sphshell_pin.study.report.contents import (
+    TIME_COLUMNS,
+    Finding,
+    Progress,
+    Section,
+    Spread,
+    Table,
+    about,
+    columns,
+    times_table,
+)
+from sphshell_pin.study.report.surfaces import wavy_sheet
+from sphshell_pin.study.report.timing import measure_import, part, silent, take_turns
+
+Times = dict[str, Array]
+DT, STEPS, RADIUS = 1e-5, 5000, 0.012
+FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
+START = np.array([0, 0.35, 0, -2.0, 0, 2.35, 0.8])
+LAW = sp.ImpactLaw(1e4, 1.5, 50.0, 1e-4)
+UNDAMPED = sp.ImpactLaw(1e4, 1.5)
+FRICTION = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
+
+
+def panda(lock: tuple[str, ...] = FINGERS) -> sp.Scene:
+    """Return the Panda without contacts."""
+    return sp.Scene(robots.load("panda").model, lock=lock)
+
+
+def start_of(scene: sp.Scene) -> Array:
+    """Return the start (nq,) of the arm, with open fingers if they are not locked."""
+    return START if scene.model.nq == len(START) else np.r_[START, 0.02, 0.02]
+
+
+def tip_position(scene: sp.Scene, q: Array) -> Array:
+    """Return where the fingertip is (3,) [m]."""
+    data = scene.model.createData()
+    pin.framesForwardKinematics(scene.model, data, q)
+    tip: Array = data.oMf[scene.model.getFrameId("panda_hand_tcp")].translation
+    return tip
+
+
+def with_sheet(
+    scene: sp.Scene,
+    shell: sp.Shell,
+    rise: float,
+    law: sp.ImpactLaw = LAW,
+    friction: sp.CoulombFriction | None = FRICTION,
+) -> sp.Scene:
+    """Put the sheet under the fingertip, `rise` [m] above the height at which it just touches."""
+    q = start_of(scene)
+    place = tip_position(scene, q) + [0, 0, rise - RADIUS]
+    scene.add_contact(
+        sphere=sp.Sphere(RADIUS, "panda_hand_tcp"),
+        shell=shell,
+        placement=pin.SE3(np.eye(3), place),
+        law=law,
+        friction=friction,
+    )
+    return scene
+
+
+def runner(scene: sp.Scene, controller: AnyController = None) -> Callable[[], float]:
+    """Seconds per step of a run that records two rows."""
+    simulation = sp.Simulation(scene, sp.SemiImplicitEuler(DT))
+    q = start_of(scene)
+
+    def run() -> float:
+        result = simulation.run(q, None, STEPS * DT, controller, record_dt=STEPS * DT)
+        return float(result.stats.wall_time) / STEPS
+
+    return run
+
+
+def bare(scene: sp.Scene) -> Callable[[], float]:
+    """Seconds per step of ABA and integrate alone, of many states at once in Pinocchio's loop.
+
+    All joints must be revolute or prismatic: then integrate is a sum.
+    """
+    model = scene.model
+    pool = pin.ModelPool(model, 1)
+    q = start_of(scene)
+    start = np.asfortranarray(np.tile(q[:, None], STEPS))
+    torque, acceleration = np.zeros((2, STEPS, model.nv))
+
+    def run() -> float:
+        states, velocities = start.copy(order="F"), np.zeros_like(start)
+        begin = time.perf_counter()
+        pin.abaInParallel(1, pool, states, velocities, torque.T, acceleration.T)
+        velocities += DT * acceleration.T
+        states += DT * velocities
+        return (time.perf_counter() - begin) / STEPS
+
+    return run
+
+
+BARE, FREE, FAR = "ABA + integrate alone, C++", "scene without contact", "far sphere"
+TOUCHING = "touching, damping and friction"
+CONTROL_FREE, CONTROL_TOUCHING = "joint PD + gravity, no contact", "joint PD + gravity, touching"
+WHOLE = (BARE, FREE, FAR, TOUCHING, CONTROL_FREE, CONTROL_TOUCHING)
+
+
+def with_moving_sheet(shell: sp.Shell) -> sp.Scene:
+    """Let the Panda carry the sheet on its hand and touch a fixed ball with it.
+
+    The same joints move; the wrench acts on the shell's side instead of the sphere's.
+    """
+    scene = panda()
+    tip = tip_position(scene, START)
+    data = scene.model.createData()
+    pin.framesForwardKinematics(scene.model, data, START)
+    hand = data.oMf[scene.model.getFrameId("panda_hand_tcp")]
+    sheet_world = pin.SE3(np.eye(3), tip + [0, 0, 5e-4 - RADIUS])
+    scene.add_contact(
+        sphere=sp.Sphere(RADIUS, "universe", tuple(tip)),
+        shell=shell,
+        frame="panda_hand_tcp",
+        placement=hand.actInv(sheet_world),
+        law=UNDAMPED,
+    )
+    return scene
+
+
+def measure(rounds: int, progress: Progress = silent) -> Times:
+    """Return the times of a step [s]: of WHOLE, then of scenes that differ by one component."""
+    shell = sp.Shell(*wavy_sheet(316, 1.0))
+    pd = sp.JointPD(100.0, 10.0)
+
+    def touching(
+        law: sp.ImpactLaw = LAW, friction: sp.CoulombFriction | None = FRICTION
+    ) -> sp.Scene:
+        return with_sheet(panda(), shell, 5e-4, law, friction)
+
+    def plain() -> sp.Scene:
+        return touching(UNDAMPED, None)
+
+    def zero(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:
+        return np.zeros_like(v)
+
+    second = "... and a {} second sphere"
+    return take_turns(
+        {
+            BARE: bare(panda()),
+            FREE: runner(panda()),
+            FAR: runner(with_sheet(panda(), shell, -1.0)),
+            TOUCHING: runner(touching()),
+            CONTROL_FREE: runner(panda(), pd),
+            CONTROL_TOUCHING: runner(touching(), pd),
+            "fingers not locked, no contact": runner(panda(lock=())),
+            "far sphere, no damping, no friction": runner(
+                with_sheet(panda(), shell, -1.0, UNDAMPED, None)
+            ),
+            "touching, no damping, no friction": runner(plain()),
+            "... and damping": runner(touching(friction=None)),
+            "... and friction": runner(touching(law=UNDAMPED)),
+            second.format("far"): runner(with_sheet(plain(), shell, -1.0, UNDAMPED, None)),
+            second.format("touching"): runner(with_sheet(plain(), shell, 5e-4, UNDAMPED, None)),
+            "... and the shell on a moving body": runner(with_moving_sheet(shell)),
+            "... and a Python controller": runner(plain(), zero),
+        },
+        rounds,
+        progress,
+    )
+
+
+KEY, TITLE = "steps", "Cost of a step"
+TEXT = about(__doc__)
+
+
+def section(*, quick: bool, progress: Progress) -> Section:
+    """Measure and return the section."""
+    rounds = 8 if quick else 50
+    steps = measure(rounds, part(progress, 0.0, 0.9))
+    imports = measure_import(5 if quick else 15, part(progress, 0.9, 1.0))
+    return assemble(steps, imports)
+
+
+def assemble(steps: Times, imports: Times) -> Section:
+    """Return the section of what was measured."""
+    bare, control = steps[BARE], steps[CONTROL_TOUCHING]
+    return Section(
+        KEY,
+        TITLE,
+        TEXT,
+        findings=[
+            Finding.of_rounds(
+                "step_touching",
+                "Panda and fingertip touching 200 k triangles: whole step / bare ABA + integrate",
+                steps[TOUCHING] / bare,
+                aim=1.8,
+                headline=True,
+            ),
+            Finding.of_rounds("step_far", "the same with the sphere far away", steps[FAR] / bare),
+            Finding.of_rounds(
+                "step_control",
+                "Panda with joint PD and gravity compensation: step touching / without any contact",
+                control / steps[CONTROL_FREE],
+                aim=1.35,
+                headline=True,
+            ),
+            Finding.of_rounds(
+                "import",
+                "import sphshell_pin / import pinocchio, whole interpreter",
+                imports["sphshell_pin"] / imports["pinocchio"],
+                aim=1.2,
+            ),
+        ],
+        tables=[
+            times_table(
+                "steps",
+                "Whole steps, in turn in one process.",
+                "scene",
+                {name: steps[name] for name in WHOLE},
+                BARE,
+                "over_bare: over ABA + integrate",
+            ),
+            components_table(steps),
+        ],
+    )
+
+
+def components_table(steps: Times) -> Table:
+    """Return what each component of a scene adds."""
+    return Table(
+        "steps_components",
+        "What a component adds to the step; a scene without it does not pay.",
+        columns("scene", TIME_COLUMNS, "added_s: added [us]"),
+        [
+            (name, *Spread.of(times), float(np.median(times - steps[FREE])))
+            for name, times in steps.items()
+            if name == FREE or name not in WHOLE
+        ],
+    )

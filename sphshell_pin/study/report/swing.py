@@ -1,0 +1,223 @@
+"""Period and energy of a ball that swings in a bowl without friction, against the exact bowl."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
+from sphshell_pin.arrays import Array
+from sphshell_pin.dynamics import Result
+from sphshell_pin.study.report.models import model_of
+from sphshell_pin.study.report.surfaces import Mesh, icosphere
+
+RADIUS, BOWL = 0.010, 0.040  # of the ball and of the bowl [m]
+ARM = BOWL - RADIUS
+MASS, STIFFNESS, GRAVITY = 0.050, 1e4, 9.81
+LAW = ImpactLaw(STIFFNESS, exponent=1.0)
+ANGLE = math.radians(40)
+# At rest at the turning point the normal force is m g cos(40 deg): the ball starts in balance.
+START_DEPTH = MASS * GRAVITY * math.cos(ANGLE) / STIFFNESS
+ENERGY = MASS * GRAVITY * ARM * (1 - math.cos(ANGLE))
+DT, LONG_DT, PERIODS = 1e-4, 2e-3, 4
+AZIMUTHS = 0.1 + np.linspace(0, 2 * np.pi, 8, endpoint=False)
+LEVELS = {0.6: 3, 0.3: 4, 0.15: 5}  # of the icosphere, by h / r
+BARS = {0.3: (5e-6, 1e-5), 0.15: (5e-7, 1e-6)}  # of period and energy, with exact normals
+
+
+@dataclass(frozen=True)
+class Swing:
+    """One run: mean period [s], largest change of energy / energy of the swing, CPU s per s."""
+
+    period: float
+    energy: float
+    cpu: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """Runs in several directions: errors of the period / period, energy of the worst, mean cost."""
+
+    rms: float
+    mean: float
+    largest: float
+    energy: float
+    cpu: float
+
+
+def any_turn() -> Array:
+    """Return a rotation that puts the mirror planes of the icosphere off every swing."""
+    turn: Array = pin.utils.rpyToMatrix(0.4, 1.1, 2.3)
+    return turn
+
+
+def bowl(side: float, turn: Array | None = None) -> Mesh:
+    """Return the sphere whose elements have sides of `side` radii of the ball, as in LEVELS."""
+    mesh = icosphere(LEVELS[side], BOWL)
+    turn = any_turn() if turn is None else turn
+    return Mesh(mesh.vertices @ turn.T, mesh.triangles, mesh.normals @ turn.T)
+
+
+def ball_model() -> pin.Model:
+    """Return the ball on a joint that moves along x, y, z: nothing turns it without friction."""
+    inertia = pin.Inertia.FromSphere(MASS, RADIUS)
+    return model_of(("ball", pin.JointModelTranslation(), inertia), gravity=GRAVITY)
+
+
+def mesh_scene(mesh: Mesh, method: str = "smooth", exact_normals: bool = True) -> Scene:
+    """Return the ball and the surface of a mesh."""
+    normals = mesh.normals if exact_normals else None
+    shell = Shell(mesh.vertices, mesh.triangles, normals=normals)
+    scene = Scene(ball_model())
+    scene.add_contact(Sphere(RADIUS, "ball"), shell, law=LAW, method=method)
+    return scene
+
+
+def exact_scene() -> Scene:
+    """Return the ball and the exact bowl; what is wrong there is the stepper's."""
+
+    def touch(ball: pin.SE3, _: pin.SE3) -> tuple[list[Array], list[Array], list[float]]:
+        center: Array = ball.translation
+        out = float(np.linalg.norm(center))
+        outward = center / out
+        return [BOWL * outward], [-outward], [out - ARM]
+
+    scene = Scene(ball_model())
+    scene.add_contact_source(touch, "ball", "universe", LAW)
+    return scene
+
+
+def start(azimuth: float) -> Array:
+    """Return the center (3,) [m] at the turning point of the exact bowl, in balance."""
+    reach = ARM + START_DEPTH
+    side = reach * math.sin(ANGLE)
+    return np.array([side * math.cos(azimuth), side * math.sin(azimuth), -reach * math.cos(ANGLE)])
+
+
+def downward_crossings(t: Array, x: Array, v: Array) -> Array:
+    """Return when x falls through zero [s], by cubics through x and v at both ends of a step."""
+    rows = np.flatnonzero((x[:-1] > 0) & (x[1:] <= 0))
+    step = t[rows + 1] - t[rows]
+    a, b, va, vb = x[rows], x[rows + 1], v[rows] * step, v[rows + 1] * step
+    share = a / (a - b)
+    for _ in range(8):  # Newton's method, from the chord
+        cubic = 2 * a + va - 2 * b + vb, -3 * a - 2 * va + 3 * b - vb, va, a
+        value = ((cubic[0] * share + cubic[1]) * share + cubic[2]) * share + cubic[3]
+        derivative = (3 * cubic[0] * share + 2 * cubic[1]) * share + cubic[2]
+        share = share - value / derivative
+    crossings: Array = t[rows] + share * step
+    return crossings
+
+
+def mean_period(t: Array, x: Array, v: Array, periods: int) -> float:
+    """Return the mean of the first `periods` periods [s].
+
+    From one fall through the middle to another: a slope of the surface there delays all of them
+    alike. NaN where the run is too short.
+    """
+    crossings = downward_crossings(t, x, v)
+    if len(crossings) <= periods:
+        return math.nan
+    return float(crossings[periods] - crossings[0]) / periods
+
+
+def reference_period(dt: float = 2e-5, periods: int = PERIODS) -> float:
+    """Return the mean period [s] of the exact bowl with its spring, by a code of its own.
+
+    In the plane of the swing, by the classical method of order 4; a fifth of the step of the runs
+    leaves an error below 1e-9 of it.
+    """
+    pull, stretch = STIFFNESS / MASS, ARM
+
+    def rates(x: float, z: float, vx: float, vz: float) -> tuple[float, float, float, float]:
+        reach = math.sqrt(x * x + z * z)
+        back = pull * max(0.0, reach - stretch) / reach
+        return vx, vz, -back * x, -back * z - GRAVITY
+
+    first = start(0.0)
+    state = (float(first[0]), float(first[2]), 0.0, 0.0)
+    count = math.ceil((periods + 0.4) * 4 * math.sqrt(ARM / GRAVITY) * 1.7 / dt)
+    rows = np.empty((count + 1, 2))
+    for i in range(count + 1):
+        x, z, vx, vz = state
+        rows[i] = x, vx
+        a = rates(x, z, vx, vz)
+        h = 0.5 * dt
+        b = rates(x + h * a[0], z + h * a[1], vx + h * a[2], vz + h * a[3])
+        c = rates(x + h * b[0], z + h * b[1], vx + h * b[2], vz + h * b[3])
+        d = rates(x + dt * c[0], z + dt * c[1], vx + dt * c[2], vz + dt * c[3])
+        w = dt / 6
+        state = (
+            x + w * (a[0] + 2 * (b[0] + c[0]) + d[0]),
+            z + w * (a[1] + 2 * (b[1] + c[1]) + d[1]),
+            vx + w * (a[2] + 2 * (b[2] + c[2]) + d[2]),
+            vz + w * (a[3] + 2 * (b[3] + c[3]) + d[3]),
+        )
+    t = np.linspace(0, count * dt, count + 1)
+    return mean_period(t, rows[:, 0], rows[:, 1], periods)
+
+
+def closed_form() -> float:
+    """Return the period [s] in closed form, to first order of e = m g / (k L), L = R - r.
+
+        4 sqrt(L / g) K(sin 20 deg) (1 + e (15 <cos a> - 13 cos 40 deg) / 4).
+
+    It has the sink s = m (g cos a + L a'^2) / k = e L (3 cos a - 2 cos 40 deg) into the spring,
+    what the spring holds and gravity's work on the change of s. The mean <> over time is that over
+    phi, sin(a / 2) = sin(20 deg) sin(phi), with the weights 1 / sqrt(1 - sin(a / 2)^2), of which K
+    is the integral up to pi / 2.
+    """
+    phi = np.pi * (np.arange(64) + 0.5) / 128
+    half = math.sin(ANGLE / 2) * np.sin(phi)
+    weight = 1 / np.sqrt(1 - half**2)
+    rigid = 4 * math.sqrt(ARM / GRAVITY) * float(weight.mean()) * math.pi / 2
+    cosine = float((weight * (1 - 2 * half**2)).sum() / weight.sum())
+    e = MASS * GRAVITY / (STIFFNESS * ARM)
+    return rigid * (1 + e * (15 * cosine - 13 * math.cos(ANGLE)) / 4)
+
+
+def energy_changes(result: Result, swing_energy: float = ENERGY) -> Array:
+    """Return (E(t) - E(0)) / energy of the swing; E is kinetic, of gravity and of the contacts."""
+    changes: Array = result.energy.residual / swing_energy
+    return changes
+
+
+def swing(scene: Scene, azimuth: float, dt: float = DT, periods: int = PERIODS) -> Swing:
+    """Let the ball go at `azimuth` for a third of a period more than `periods`."""
+    duration = (periods + 0.35) * closed_form()
+    before = time.process_time()
+    result = Simulation(scene, RungeKutta4(dt)).run(start(azimuth), duration=duration)
+    spent = time.process_time() - before
+    along = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    period = mean_period(result.t, result.q @ along, result.v @ along, periods)
+    return Swing(period, float(np.abs(energy_changes(result)).max()), spent / duration)
+
+
+def measure(
+    scene: Scene,
+    period: float,
+    azimuths: Sequence[float] | Array = AZIMUTHS,
+    dt: float = DT,
+    periods: int = PERIODS,
+) -> Row:
+    """Swing in every direction; `period` [s] is the exact one."""
+    runs = [swing(scene, float(azimuth), dt, periods) for azimuth in azimuths]
+    errors = np.array([run.period for run in runs]) / period - 1
+    return Row(
+        rms=float(np.sqrt(np.mean(errors**2))),
+        mean=float(np.mean(errors)),
+        largest=float(np.abs(errors).max()),
+        energy=max(run.energy for run in runs),
+        cpu=float(np.mean([run.cpu for run in runs])),
+    )
+
+
+def long_run(scene: Scene, center: Array, swings: int) -> Result:
+    """Run for so many periods of the bowl, with a row every millisecond."""
+    simulation = Simulation(scene, RungeKutta4(DT))
+    return simulation.run(center, duration=swings * closed_form(), record_dt=1e-3)

@@ -1,0 +1,213 @@
+"""A FoundationLaw beside a Plane: the volume below it, rest, friction and derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial import ConvexHull
+
+import sphshell_pin as sp
+from sphshell_pin import testing
+from sphshell_pin.errors import InvalidParameter, SetupWarning
+from tests.contact.test_planes import egg, pose, rotations, scene_of, support
+from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
+from tests.meshes import cube, grid_plate, icosphere
+from tests.models import add_body, empty
+
+KAPPA = 2e8  # [Pa/m]
+LAW = sp.FoundationLaw(2e5, 1e-3, 3.0)
+ELASTIC = sp.FoundationLaw(2e5, 1e-3)
+
+
+def box(sides=(0.06, 0.05, 0.04)) -> sp.Shell:
+    vertices, elements = cube(1.0, quads=True)
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    return sp.Shell((vertices - middle) * sides, elements)
+
+
+def clipped(vertices: np.ndarray, edges: np.ndarray) -> tuple[float, np.ndarray]:
+    """Volume and centroid of a convex body's part below z = 0, as a hull of its own."""
+    a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
+    over = a[:, 2] * b[:, 2] < 0
+    t = (a[over, 2] / (a[over, 2] - b[over, 2]))[:, None]
+    points = np.vstack([vertices[vertices[:, 2] <= 0], a[over] + t * (b[over] - a[over])])
+    hull = ConvexHull(points)
+    tops, inside = hull.points[hull.simplices], hull.points[hull.vertices].mean(axis=0)
+    volumes = np.abs(np.linalg.det(tops - inside)) / 6
+    return volumes.sum(), volumes @ (tops.sum(axis=1) + inside) / 4 / volumes.sum()
+
+
+def edges_of(shell: sp.Shell) -> np.ndarray:
+    return np.vstack([shell.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+
+
+@pytest.mark.parametrize("name", ["box", "polyhedron"])
+def test_the_force_is_that_of_the_volume_below_at_its_centroid(name: str) -> None:
+    shell = box() if name == "box" else sp.Shell(*icosphere(1, 0.05), crease_angle=0.0)
+    scene = scene_of(shell, ELASTIC)
+    rng = np.random.default_rng(2)
+    for rotation in rotations(30):
+        lowest = (shell.vertices @ rotation.T)[:, 2].min()
+        q = pose(rotation, -lowest * rng.uniform(0.2, 0.99))
+        volume, centroid = clipped(shell.vertices @ rotation.T + q[:3], edges_of(shell))
+        found = scene.contacts(q)
+        assert found.normal_force == pytest.approx([KAPPA * volume], rel=1e-9)
+        expected = [*centroid[:2], 0.0]
+        assert found.point_world[0] == pytest.approx(expected, abs=1e-9)
+        assert found.depth == pytest.approx([-(lowest + q[2])], rel=1e-9)
+        wrench = scene.external_forces(q, np.zeros(6))[1].vector
+        assert wrench[:3] == pytest.approx(rotation.T @ [0, 0, KAPPA * volume], rel=1e-9)
+
+
+def test_the_cap_of_an_ellipsoid() -> None:
+    """pi a b c t^2 (1 - t / 3), t the depth over the support; off as its curved elements are."""
+    axes, errors = np.array([0.03, 0.02, 0.025]), []
+    for cells in (8, 16):
+        scene, worst = scene_of(egg(cells, axes), ELASTIC), 0.0
+        for rotation in rotations(10, 1):
+            reach = support(axes, rotation)
+            t = 0.02
+            cap = KAPPA * np.pi * np.prod(axes) * t**2 * (1 - t / 3)
+            force = scene.contacts(pose(rotation, reach * (1 - t))).normal_force
+            worst = max(worst, abs(force[0] / cap - 1))
+        errors.append(worst)
+    assert errors[1] < min(1e-3, 0.12 * errors[0])
+
+
+def test_a_sheet_bears_by_its_area() -> None:
+    """Level: kappa depth area, at its middle; and a plate whose border is below has a potential."""
+    shell = sp.Shell(*grid_plate(3, 3, 0.1))
+    scene = scene_of(shell, ELASTIC)
+    middle = shell.vertices.mean(axis=0)
+    q = pose(np.eye(3), -1e-4 - middle[2])
+    found = scene.contacts(q)
+    assert found.normal_force == pytest.approx([KAPPA * 1e-4 * 0.01])
+    assert found.point_world[0] == pytest.approx([*(q[:2] + middle[:2]), 0.0])
+
+
+FRICTIONS = [
+    None,
+    sp.CoulombFriction(0.3, 0.2, 0.05, 0.5),
+    sp.BristleFriction(0.4, 0.3, 2e4, 5.0),
+]
+INERTIA = pin.Inertia(0.5, np.array([0.002, -0.001, -0.003]), np.diag([1.5e-4, 2e-4, 1.8e-4]))
+SHELLS = {
+    "box": box,
+    "egg": lambda: egg(10, np.array([0.03, 0.02, 0.025])),
+    "sheet": lambda: sp.Shell(*grid_plate(2, 2, 0.05)),
+}
+
+
+def tilted(name: str, law, friction, *, ground: bool) -> tuple[sp.Scene, np.ndarray, np.ndarray]:
+    """A body that is partly below a plane, which stands or moves as well, and its state."""
+    model, frame, shell = empty(), "universe", SHELLS[name]()
+    if not ground:
+        frame = "table"
+        add_body(model, frame, pin.JointModelFreeFlyer())
+    add_body(model, "body", pin.JointModelFreeFlyer(), inertia=INERTIA)
+    scene = sp.Scene(model)
+    plane = sp.Plane(frame, (0.0, 0.0, 0.01), (0.1, -0.05, 1.0))
+    scene.add_contact(plane, shell, "body", None, law, friction)
+    rng = np.random.default_rng(5)
+    q = pin.neutral(model)
+    place = plane.placement
+    if not ground:
+        q = pin.integrate(model, q, 0.3 * rng.normal(size=model.nv))
+        data = model.createData()
+        pin.forwardKinematics(model, data, q)
+        place = data.oMi[1] * place
+    turn = place.rotation @ pin.exp3(np.array([0.02, 0.03, 0.4]))
+    lowest = (shell.vertices @ (place.rotation.T @ turn).T)[:, 2].min()
+    q[-7:-4] = place.act(np.array([0.01, 0.02, -lowest - 8e-4]))
+    q[-4:] = pin.Quaternion(turn).coeffs()
+    return scene, q, rng.normal(size=model.nv) * 0.3
+
+
+@pytest.mark.parametrize("ground", [True, False])
+@pytest.mark.parametrize("friction", FRICTIONS)
+@pytest.mark.parametrize("name", SHELLS)
+def test_derivatives_are_those_of_finite_differences(name: str, friction, ground: bool) -> None:
+    scene, q, v = tilted(name, LAW, friction, ground=ground)
+    assert_derivatives(scene, q, v)
+    assert_rows(scene, q, v)
+    if not ground:
+        testing.assert_wrenches_cancel(scene, q, v)
+
+
+def thrown(shell: sp.Shell, inertia: pin.Inertia, law, friction, tilt: float = 0.0):
+    """A free body over a plane that leans by `tilt` about y."""
+    model = empty()
+    add_body(model, "body", pin.JointModelFreeFlyer(), inertia=inertia)
+    scene = sp.Scene(model)
+    normal = (np.sin(tilt), 0.0, np.cos(tilt))
+    scene.add_contact(sp.Plane("universe", normal=normal), shell, "body", None, law, friction)
+    return scene
+
+
+BOX = pin.Inertia.FromBox(0.2, 0.06, 0.05, 0.04)
+
+
+@pytest.mark.parametrize(
+    "integrator", [sp.Adaptive(1e-6, 1e-9), sp.Implicit(1e-6, 1e-9), sp.RungeKutta4(5e-5)]
+)
+def test_a_box_comes_to_rest_at_an_ordinary_cost(integrator) -> None:
+    """It falls on a corner, tumbles, and lies still; the energies close."""
+    shell = box()
+    friction = sp.CoulombFriction(0.4, 0.4, 0.01, 0.1)
+    scene = thrown(shell, BOX, sp.FoundationLaw(1e5, 1e-3, 10.0), friction)
+    turn = pin.rpy.rpyToMatrix(0.5, 0.3, 0.2)
+    height = 0.005 - (shell.vertices @ turn[2]).min()
+    q = np.r_[0, 0, height, pin.Quaternion(turn).coeffs()]
+    result = sp.Simulation(scene, integrator).run(q, np.array([0.1, 0, -0.2, 1.0, 2.0, 5.0]), 1.0)
+    assert result.stats.steps <= 20_000
+    assert np.abs(result.v[-1]).max() < 1e-6
+    assert np.abs(result.energy.residual).max() < 1e-6 * result.energy.exchanged
+
+
+@pytest.mark.parametrize("slope", [0.3, 0.45])
+def test_a_block_on_a_slope_slides_above_the_angle_of_friction_alone(slope: float) -> None:
+    mu = 0.4
+    friction = sp.BristleFriction(mu, mu, 1e5, 30.0)
+    scene = thrown(box(), BOX, sp.FoundationLaw(5e5, 1e-3, 10.0), friction, slope)
+    turn = pin.utils.rotate("y", slope)
+    q = np.r_[turn @ [0, 0, 0.02], pin.Quaternion(turn).coeffs()]
+    result = sp.Simulation(scene, sp.Implicit(1e-6, 1e-9)).run(q, np.zeros(6), 0.3)
+    moved = (result.v @ np.eye(6, 3))[:, 0]  # down the slope, in the box's frame
+    if slope < np.arctan(mu):
+        assert np.abs(result.v[-1]).max() < 1e-6
+    else:
+        late = result.t > 0.2
+        found = np.polyfit(result.t[late], moved[late], 1)[0]
+        expected = 9.81 * (np.sin(slope) - mu * np.cos(slope))
+        assert found == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_tall_block_tips_where_its_corner_says() -> None:
+    """Between sides in the ratio of the slope's tangent it falls over, else it stands."""
+    slope, stands = 0.2, []
+    for width in (0.9, 1.1):
+        height = 0.06
+        sides = (width * height * np.tan(slope), 0.05, height)
+        scene = thrown(
+            box(sides),
+            pin.Inertia.FromBox(0.2, *sides),
+            sp.FoundationLaw(5e7, 1e-3, 1.0),
+            sp.CoulombFriction(0.9, 0.9, 0.001, 0.1),
+            slope,
+        )
+        turn = pin.utils.rotate("y", slope)
+        q = np.r_[turn @ [0, 0, height / 2], pin.Quaternion(turn).coeffs()]
+        result = sp.Simulation(scene, sp.Implicit(1e-6, 1e-9)).run(q, np.zeros(6), 0.5)
+        lean = turn.T @ pin.Quaternion(result.q[-1, 3:]).matrix()
+        stands.append(bool(lean[2, 2] > 0.99))
+    assert stands == [False, True]
+
+
+def test_a_flat_face_with_a_law_of_a_point_is_warned_of() -> None:
+    with pytest.warns(SetupWarning, match="stands on one corner at a time"):
+        scene_of(box(), sp.ImpactLaw(1e6))
+    with pytest.raises(InvalidParameter, match=r"take law.on_plane\(radius\), or a FoundationLaw"):
+        scene_of(box(), sp.HertzLaw(1e9, 0.3))
+    with pytest.raises(InvalidParameter, match="follows from the radius"):
+        scene_of(box(), LAW, sp.MindlinFriction("rubber", "rubber", young=1e7, poisson=0.5))

@@ -1,0 +1,69 @@
+"""Registers of cases: functions that run something and judge it, each with its name.
+
+A module of hard cases:
+
+    \"\"\"Heading of its table.  What the cases share follows as text above the table.\"\"\"
+
+    @case("ball on a plate")
+    def at_rest() -> Verdicts:
+        yield compare("at rest", "ball of 1 kg", "depth = m g / k", expected, measured, 1e-9)
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, Protocol, TypeVar
+
+
+class Known(Protocol):
+    """What a register holds: a function `run`, which may be slow."""
+
+    @property
+    def run(self) -> Callable[[], Any]:
+        """Runs and judges."""
+
+    @property
+    def slow(self) -> bool:
+        """Whether it takes more than a few seconds."""
+
+
+K = TypeVar("K", bound=Known)
+F = TypeVar("F", bound=Callable[..., object])
+
+
+class Register(Generic[K]):
+    """The cases of some modules of a package, by their names, in the order of the modules.
+
+    `make` makes one of its name, its function and what else the decorator `case` is given.
+    """
+
+    def __init__(self, package: str, modules: Sequence[str], make: Callable[..., K]) -> None:
+        self.modules = [f"{package}.{name}" for name in modules]
+        self._make = make
+        self._known: dict[str, K] = {}
+
+    def case(self, name: str, **facts: object) -> Callable[[F], F]:
+        """Decorate the function that runs a case; ValueError where the name is taken."""
+
+        def register(run: F) -> F:
+            if name in self._known:
+                raise ValueError(f"two cases are called {name!r}")
+            self._known[name] = self._make(name, run, **facts)
+            return run
+
+        return register
+
+    def collect(self, *, quick: bool = False, only: str | None = None) -> list[K]:
+        """Import the modules and return their cases; `quick` leaves out the slow ones.
+
+        `only`: those with this word in their module or name.
+        """
+        for name in self.modules:
+            importlib.import_module(name)
+        chosen = [
+            known
+            for name, known in self._known.items()
+            if not (quick and known.slow) and (not only or only in f"{known.run.__module__} {name}")
+        ]
+        return sorted(chosen, key=lambda known: self.modules.index(known.run.__module__))

@@ -1,0 +1,1 @@
+"""The package against published experiments: cases, their data and their bounds."""

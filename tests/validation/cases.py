@@ -1,0 +1,163 @@
+"""What a case of the validation is.
+
+A module of MODULES holds the cases of one subject. A case is a function with the decorator `case`,
+and a table of cases.toml with its source; it runs the scenes and returns an Outcome: error figures
+with their bounds, and a picture. What it is compared with lies in tests/data/validation, a csv file
+for each source; the lines of such a file that begin with "#" say where the numbers come from and
+how they were read, and stand on the page.
+"""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin.arrays import Array
+from sphshell_pin.errors import NameNotFound
+from sphshell_pin.regular_file import read_text
+from sphshell_pin.study.report.contents import Finding, Picture, Table
+from tests.register import Register
+
+MODULES = (
+    "kharaz",
+    "chung_ooi_normal",
+    "chung_ooi_spin",
+    "pressed",
+    "ellipses",
+    "finger_pad",
+    "cam",
+    "rolling",
+    "restitution",
+    "leaving",
+    "carried",
+    "tippe_top",
+    "rattleback",
+    "tosses",
+)
+"""In the order of the page."""
+DATA = Path(__file__).parents[1] / "data" / "validation"
+STATED: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("cases.toml").read_text(encoding="utf-8")
+)
+NOT_FOUND: list[str] = STATED.pop("not_found")
+"""What could not be compared, as its numbers were not found: none is made up."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a case found: `findings` with bounds, the first of which stands for the case.
+
+    `explained` names, by the key of a finding that is out of its bound, the physics that the theory
+    leaves out.
+    """
+
+    findings: Sequence[Finding]
+    pictures: Sequence[Picture]
+    tables: Sequence[Table] = ()
+    notes: Sequence[str] = ()
+    explained: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def unexplained(self) -> list[Finding]:
+        """The findings that are out of their bounds without an explanation."""
+        return [f for f in self.findings if f.met is False and f.key not in self.explained]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One comparison: `source` is a citation with its address, `files` are names of csv files.
+
+    `bound` says where the bounds of the figures come from; `leaves_out` what the theory does not
+    hold; `reading` how data were read that no file has.
+    """
+
+    key: str
+    title: str
+    source: str
+    setting: str
+    bound: str
+    leaves_out: str
+    run: Callable[[], Outcome]
+    files: Sequence[str] = ()
+    slow: bool = False
+    reading: str = ""
+
+    @property
+    def data(self) -> str:
+        """How the data were read, as their files say."""
+        return " ".join(filter(None, [self.reading, *(read(name).origin for name in self.files)]))
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """The statements about the case, by their headings."""
+        return {
+            "Source": self.source,
+            "Data": self.data,
+            "Parameters": self.setting,
+            "Bounds": self.bound,
+            "Left out by the theory": self.leaves_out,
+        }
+
+
+def within(aim: float, *errors: tuple[str, str, float], unit: str = "") -> list[Finding]:
+    """Return findings of errors (key, what, error), of which only the size counts."""
+    return [Finding(key, what, abs(float(error)), unit, aim=aim) for key, what, error in errors]
+
+
+def explanations(found: Outcome) -> list[str]:
+    """Return why findings are out of their bounds, a text for those that have the same reason."""
+    reasons: dict[str, list[str]] = {}
+    for finding in found.findings:
+        if finding.met is False and finding.key in found.explained:
+            reasons.setdefault(found.explained[finding.key], []).append(finding.what)
+    return [f"Out of bounds: {'; '.join(names)}. {text}" for text, names in reasons.items()]
+
+
+# What a case states of itself is in cases.toml.
+CASES = Register(__package__, MODULES, lambda key, run: Case(key=key, run=run, **STATED[key]))
+case, collect = CASES.case, CASES.collect
+
+
+@dataclass(frozen=True)
+class Data:
+    """A csv file: `origin` is its source and how it was read, `columns` its columns by name."""
+
+    name: str
+    origin: str
+    columns: Mapping[str, Sequence[str]]
+
+    def texts(self, column: str) -> list[str]:
+        """Return a column as it is written."""
+        if column not in self.columns:
+            raise NameNotFound("column", column, self.name, self.columns)
+        return list(self.columns[column])
+
+    def __getitem__(self, column: str) -> Array:
+        """Return a column (n,) of numbers."""
+        return np.array(self.texts(column), dtype=float)
+
+    @property
+    def published(self) -> dict[str, float]:
+        """The column "value" by the column "quantity"."""
+        return dict(zip(self.texts("quantity"), self["value"].tolist(), strict=True))
+
+    def where(self, column: str, value: str) -> Data:
+        """Return the rows whose `column` is `value`."""
+        chosen = [k for k, text in enumerate(self.texts(column)) if text == value]
+        rows = {name: [cells[k] for k in chosen] for name, cells in self.columns.items()}
+        return Data(self.name, self.origin, rows)
+
+
+def read(name: str) -> Data:
+    """Return the data of the file `name`.csv."""
+    path = DATA / f"{name}.csv"
+    lines = read_text(path).splitlines()
+    origin = " ".join(line.lstrip("# ").rstrip() for line in lines if line.startswith("#"))
+    head, *rows = csv.reader(line for line in lines if line and not line.startswith("#"))
+    return Data(name, origin, {one: [row[k] for row in rows] for k, one in enumerate(head)})

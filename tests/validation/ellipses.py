@@ -1,0 +1,183 @@
+"""Elliptical contacts at rest: half axes, approach and pressure under a published load."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin.arrays import Array
+from sphshell_pin.contact.normal_law import NormalLaw
+from sphshell_pin.study.report.contents import Table, columns
+from sphshell_pin.study.report.models import model_of
+from tests.validation.balls import plane
+from tests.validation.cases import Data, Outcome, case, read, within
+from tests.validation.pictures import Panel, draw
+
+FILE = "elliptical_contacts"
+SIDE = 0.02  # of the elements, over the smallest radius of ball and shell
+FLAT = 1e-9  # curvature, over that of the ball
+QUANTITIES = ("a", "b", "approach", "pressure")
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A contact: its force [N], half axes a >= b [m], approach [m] and largest pressure [Pa]."""
+
+    force: float
+    a: float
+    b: float
+    approach: float
+    pressure: float
+
+
+def press(radius: float, shell: sp.Shell, law: NormalLaw, approach: float) -> Touch:
+    """Return the contact of a ball of `radius` [m] over the shell, whose top is at the origin."""
+    ball = ("ball", pin.JointModelPZ(), pin.Inertia.FromSphere(1e3, radius))
+    scene = sp.Scene(model_of(ball))
+    scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law)
+    start = np.array([radius - approach])
+    result = sp.Simulation(scene).run(start, None, 1e-12, record=("patch",))
+    (a, b), patch = result.patches["half_axes"][0], result.patches[0]
+    force = float(result.contacts.normal_force[0])
+    return Touch(force, float(a), float(b), float(patch["approach"]), float(patch["peak_pressure"]))
+
+
+def under(force: float, radius: float, shell: sp.Shell, law: NormalLaw) -> Touch:
+    """Return the contact under `force` [N]: for a given shape that grows as approach^1.5."""
+    first = press(radius, shell, law, 1e-5 * radius)
+    return press(radius, shell, law, first.approach * (force / first.force) ** (2 / 3))
+
+
+def saddle(round_: float, along: float, side: float) -> sp.Shell:
+    """Return a ring about y whose top is at the origin; `side` [m] is that of its elements.
+
+    `round_` > 0 is its curvature [1/m] round the axis, `along` <= 0 that of its profile: a
+    cylinder, or a groove in it.
+    """
+    arc = side * np.arange(-3.0, 4.0)
+    tilt = along * arc
+    if along:
+        lift, across = (1 - np.cos(tilt)) / -along, np.sin(tilt) / along
+    else:
+        lift, across = np.zeros(arc.size), arc
+    inner = 1 / round_
+    turn = np.arange(-3.0, 4.0) * min(side * round_, 0.4)
+    out = np.stack([np.sin(turn), np.zeros(turn.size), np.cos(turn)], axis=1)
+    normals = np.cos(tilt)[:, None, None] * out
+    normals[:, :, 1] = np.sin(tilt)[:, None]
+    vertices = (inner + lift)[:, None, None] * out
+    vertices[:, :, 1] = across[:, None]
+    vertices[:, :, 2] -= inner
+    corner = np.arange(turn.size * arc.size).reshape(arc.size, turn.size)
+    elements = np.stack(
+        [corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1
+    )
+    return sp.Shell(
+        vertices.reshape(-1, 3), elements.reshape(-1, 4), normals=normals.reshape(-1, 3)
+    )
+
+
+def shell_under(ball: float, a: float, b: float) -> sp.Shell:
+    """Return the shell that makes the gap a x^2 + b y^2 [1/m], a >= b, under a `ball` [m]."""
+    round_, along = 2 * a - 1 / ball, 2 * b - 1 / ball
+    round_, along = (0.0 if abs(one) < FLAT / ball else one for one in (round_, along))
+    radii = [ball, *(1 / abs(one) for one in (round_, along) if one)]
+    return saddle(round_, along, SIDE * min(radii)) if round_ else plane(10 * ball)
+
+
+def ours(row: Data) -> Touch:
+    """Return the contact of a row of the file: a ball on a shell with the rest of A and B."""
+    millimeter, mega = 1e-3, 1e6
+    ball = row["ball"].item() * millimeter
+    shell = shell_under(ball, row["A"].item() / millimeter, row["B"].item() / millimeter)
+    shear, poisson = row["shear_modulus"].item() * mega, row["poisson"].item()
+    law = sp.HertzLaw(2 * shear * (1 + poisson), poisson)
+    return under(row["force"].item(), ball, shell, law)
+
+
+@case("elliptical_contacts")
+def elliptical_contacts() -> Outcome:
+    """Press each of them."""
+    data = read(FILE)
+    scale = {"a": 1e3, "b": 1e3, "approach": 1e3, "pressure": 1e-6}
+    errors: dict[str, dict[str, float]] = {}
+    rows = []
+    for name in data.texts("name"):
+        row = data.where("name", name)
+        touch, errors[name] = ours(row), {}
+        for one in QUANTITIES:
+            text = row.texts(one)[0]
+            mine = scale[one] * float(getattr(touch, one))
+            if text:
+                errors[name][one] = mine / float(text) - 1
+            error = errors[name].get(one, math.nan)
+            rows.append((name, one, text, f"{mine:.5g}", f"{error:.1e}" if text else ""))
+
+    def worst(names: list[str], quantities: tuple[str, ...]) -> float:
+        return max(abs(errors[n][q]) for n in names for q in quantities if q in errors[n])
+
+    contact = [name for name in errors if name != "bearing"]
+    axes, numerical = (
+        worst(contact, ("a", "b")),
+        "largest error relative to CONTACT's numerical one",
+    )
+    bearing = "bearing 6206, half axes and pressure relative to those of approximate formulas"
+    findings = [
+        *within(5e-4, ("axes", "half axes, largest error relative to CONTACT's", axes)),
+        *within(
+            4e-3,
+            ("approach", f"approach, {numerical}", worst(contact, ("approach",))),
+            ("pressure", f"largest pressure, {numerical}", worst(contact, ("pressure",))),
+        ),
+        *within(0.03, ("bearing", bearing, worst(["bearing"], QUANTITIES))),
+    ]
+    panels = []
+    for one, unit in (("a", "mm"), ("b", "mm"), ("pressure", "MPa")):
+        published = data[one]
+        values = np.array([float(r[3]) for r in rows if r[1] == one])
+        line: Array = np.array([published.min() / 2, published.max() * 2])
+        marks, equal = ("contacts", published, values), ("equal", line, line)
+        names = f"published {one} [{unit}]", f"our {one} [{unit}]"
+        panels.append(Panel(*names, [marks], (), [equal], logarithmic=True))
+    heads = ("contact", "quantity", "published: published [mm, MPa]", "ours", "error")
+    return Outcome(
+        findings,
+        [draw(FILE, panels, "Half axes and largest pressures of six contacts.")],
+        [Table(FILE, "All figures.", columns(*heads), rows)],
+    )
+
+
+@case("hertz_coefficients")
+def hertz_coefficients() -> Outcome:
+    """Press a ball on a cylinder of each of the ratios."""
+    data = read("hertz_coefficients")
+    law, young, poisson = sp.HertzLaw(2e11, 0.3), 2e11, 0.3
+    total, force = 100.0, 10.0  # sum of the curvatures [1/m], load [N]
+    unit = (3 * force * (1 - poisson**2) / (young * total)) ** (1 / 3)
+    found: dict[str, list[float]] = {"xi": [], "eta": [], "zeta": []}
+    for share in data["cos_tau"]:
+        a, b = (1 + share) * total / 4, (1 - share) * total / 4
+        ball = 1 / (2 * b)
+        touch = under(force, ball, shell_under(ball, a, b), law)
+        found["xi"].append(touch.a / unit)
+        found["eta"].append(touch.b / unit)
+        found["zeta"].append(2 * touch.approach / (total * unit**2))
+    names = {"xi": "half axis a", "eta": "half axis b", "zeta": "approach"}
+    what = "largest error relative to the printed coefficient"
+    errors = {key: np.abs(np.array(found[key]) / data[key] - 1).max() for key in names}
+    findings = within(0.006, *((key, f"{names[key]}, {what}", errors[key]) for key in names))
+    # From a circle at the right to slender ellipses at the left.
+    x = 1 - data["cos_tau"]
+    panel = Panel(
+        "1 - cos tau: ratio of curvatures",
+        "coefficient",
+        [(f"printed, {name}", x, data[key]) for key, name in names.items()],
+        [(f"ours, {name}", x, found[key]) for key, name in names.items()],
+        logarithmic=True,
+    )
+    caption = "Printed coefficients of half axes and approach, and those of our contacts."
+    return Outcome(findings, [draw("hertz_coefficients", [panel], caption)])

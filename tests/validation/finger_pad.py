@@ -1,0 +1,91 @@
+"""A finger pad against a plate: what measurements say, and what two laws make of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import sphshell_pin as sp
+from tests.validation.balls import plane
+from tests.validation.cases import Outcome, case, read, within
+from tests.validation.ellipses import Touch, press
+from tests.validation.pictures import Panel, draw
+
+RADIUS, MODULUS, POISSON, THICKNESS = 8e-3, 1e5, 0.49, 4e-3  # all cancel in what is compared
+BOUND = 0.05
+LAYER = (
+    "FoundationLaw takes the pad for a thin layer whose points give way alone, so that the force "
+    "grows as approach^2. A pad is thick against the contact: its tissue hangs together, as in "
+    "Hertz's half-space."
+)
+BONE = (
+    "Hertz's half-space has no bone. Under larger forces the contact is wide against the tissue "
+    "over the bone, and the pressure follows the local compression."
+)
+
+
+def exponent(touches: list[Touch]) -> float:
+    """Return n of approach ~ force^n, from the first contact to the last."""
+    first, last = touches[0], touches[-1]
+    return float(np.log(last.approach / first.approach) / np.log(last.force / first.force))
+
+
+@case("finger_pad")
+def finger_pad() -> Outcome:
+    """Compare how displacement grows with force, and the largest pressure with the mean one."""
+    published = read("finger_pad").published
+    plate, approaches = plane(1.0), RADIUS * np.geomspace(1e-3, 5e-2, 9)
+    laws = {
+        "FoundationLaw": sp.FoundationLaw(MODULUS, THICKNESS),
+        "HertzLaw": sp.HertzLaw(MODULUS, POISSON),
+    }
+    touches = {
+        name: [press(RADIUS, plate, law, approach) for approach in approaches]
+        for name, law in laws.items()
+    }
+    findings = []
+    for name, found in touches.items():
+        last = found[-1]
+        ratio = last.pressure * np.pi * last.a * last.b / last.force
+        shape = f"{name}: largest over mean pressure, relative to that of a paraboloid"
+        power = f"{name}: exponent of displacement over force, relative to the measured 2/3"
+        measured = published["displacement_exponent"]
+        findings += within(
+            BOUND,
+            (f"{name}_shape", shape, ratio / published["peak_over_mean"] - 1),
+            (f"{name}_exponent", power, exponent(found) / measured - 1),
+        )
+    x = np.linspace(-1, 1, 201)
+    # The definition of FoundationLaw on a plane, at the largest approach.
+    height = RADIUS - approaches[-1]
+    from_center = np.hypot(height, x * np.sqrt(RADIUS**2 - height**2))
+    pressure = (RADIUS**2 / from_center - from_center) / (RADIUS**2 / height - height)
+    panels = [
+        Panel(
+            "place / half width of the contact",
+            "pressure / largest",
+            (),
+            [("FoundationLaw", x, pressure), ("HertzLaw", x, np.sqrt(1 - x**2))],
+            [("paraboloid, as measured", x, 1 - x**2)],
+        ),
+        Panel(
+            "force / largest",
+            "displacement / largest",
+            (),
+            [
+                (
+                    name,
+                    [one.force / found[-1].force for one in found],
+                    [one.approach / found[-1].approach for one in found],
+                )
+                for name, found in touches.items()
+            ],
+            [("power of 2/3, as measured", line := np.geomspace(1e-3, 1, 9), line**measured)],
+            logarithmic=True,
+        ),
+    ]
+    caption = "Pressure over the contact, and displacement against force, of the two laws."
+    return Outcome(
+        findings,
+        [draw("finger_pad", panels, caption)],
+        explained={"FoundationLaw_exponent": LAYER, "HertzLaw_shape": BONE},
+    )

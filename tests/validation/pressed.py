@@ -1,0 +1,52 @@
+"""Balls pressed together at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.study.report.models import model_of
+from tests.validation.cases import Outcome, case, read
+from tests.validation.pictures import Panel, draw
+
+RADIUS, YOUNG, POISSON = 0.05, 2e10, 0.3
+
+
+@case("ssnv104")
+def two_balls() -> Outcome:
+    """Press two balls together, and compare pressure and radius of the contact."""
+    data = read("ssnv104")
+    upper = ("upper", pin.JointModelPZ(), pin.Inertia.FromSphere(1.0, RADIUS))
+    scene = sp.Scene(model_of(upper, gravity=9.81))
+    scene.add_contact(
+        sp.Sphere(RADIUS, "upper"), sp.Sphere(RADIUS, "universe"), law=sp.HertzLaw(YOUNG, POISSON)
+    )
+
+    def pressed(approach: float) -> tuple[float, float]:
+        """Return peak pressure [Pa] and radius [m] of the contact, as a run records them."""
+        start = np.array([2 * RADIUS - approach])
+        instant = sp.Simulation(scene, sp.SemiImplicitEuler(1e-9))
+        patch = instant.run(start, duration=1e-9, record=("patch",)).patches[0]
+        return float(patch["peak_pressure"]), float(patch["half_axes"][0])
+
+    peak, radius = pressed(4e-3)
+    there = {name: float(data[name][0]) for name in ("pressure", "radius")}
+    apart = abs(peak / there["pressure"] - 1), abs(radius / there["radius"] - 1)
+    findings = [
+        Finding("pressure", "peak pressure, relative", apart[0], aim=1e-4),
+        Finding("radius", "radius of the contact, relative", apart[1], aim=1e-4),
+    ]
+    approaches = np.linspace(1e-5, 5e-3, 60)
+    ours = np.array([pressed(one) for one in approaches])
+    curves = (
+        ("peak pressure [MPa]", 1e-6 * there["pressure"], 1e-6 * ours[:, 0]),
+        ("radius of the contact [mm]", 1e3 * there["radius"], 1e3 * ours[:, 1]),
+    )
+    x = 1e3 * approaches
+    panels = [
+        Panel("approach [mm]", label, [("Code_Aster", [4.0], [value])], [("ours", x, line)])
+        for label, value, line in curves
+    ]
+    return Outcome(findings, [draw("ssnv104", panels, "Peak pressure and radius of the contact.")])
