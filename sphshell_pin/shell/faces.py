@@ -54,6 +54,7 @@ class Face:
 
     @property
     def exact(self) -> bool:
+        """Whether no element of it is curved."""
         return len(self.curved) == 0
 
 
@@ -135,7 +136,8 @@ def described(faces: Sequence[Face], elements: int) -> str:
 def not_exact(faces: Sequence[Face], shares: Floats, off: Floats) -> tuple[str, ...]:
     """Return a sentence for each reason why faces are not exact, which names them and the cost.
 
-    shares : of the area of the shell (n,); off : of their elements from the faces (n,) [m]
+    shares : of their curved elements, of the area of the shell (n,)
+    off : of these elements from the faces (n,) [m]
     """
     groups: dict[str, list[int]] = {}
     for k, face in enumerate(faces):
