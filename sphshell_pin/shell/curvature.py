@@ -87,8 +87,7 @@ def _not_exact(shell: ShellBase, areas: Floats) -> tuple[str, ...]:
     share, off = np.zeros(len(faces)), np.zeros(len(faces))
     of_element = np.full(shell.num_elements, -1)
     for k, face in enumerate(faces):
-        if not face.exact:
-            of_element[face.elements] = k
+        of_element[face.curved] = k
     of = of_element[shell.triangle_element]
     order = np.argsort(of, kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(of[order])) + 1):

@@ -135,7 +135,8 @@ def described(faces: Sequence[Face], elements: int) -> str:
 def not_exact(faces: Sequence[Face], shares: Floats, off: Floats) -> tuple[str, ...]:
     """Return a sentence for each reason why faces are not exact, which names them and the cost.
 
-    shares : of the area of the shell (n,); off : of their elements from the faces (n,) [m]
+    shares : of their curved elements, of the area of the shell (n,)
+    off : of these elements from the faces (n,) [m]
     """
     groups: dict[str, list[int]] = {}
     for k, face in enumerate(faces):

@@ -156,7 +156,7 @@ def test_faces_that_are_not_exact_are_all_named_with_what_they_cost():
     some = [face for face in mesh(base).faces for _ in range(3)]
     reasons = ["a vertex is off it by 77 nm", "its border is off it by 0.8 nm"]
     faces = [
-        replace(face, exact=False, reason=reasons[k % 2], name=f"Face {k}")
+        replace(face, curved=face.elements, reason=reasons[k % 2], name=f"Face {k}")
         for k, face in enumerate(some)
     ]
     told = not_exact(faces, np.full(count, 0.1), 1e-9 * np.arange(count))

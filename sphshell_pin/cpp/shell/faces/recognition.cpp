@@ -24,8 +24,9 @@ constexpr std::size_t kFewVertices = 8, kManyVertices = 12;
 // was not recognized; one of fewer triangles more.
 constexpr int kFewOfPlane = 4;
 constexpr double kFarther = 3, kFarLarger = 6;
-// Or it turns there by so many times more than beside what is narrow.
-constexpr double kMuchSharper = 3;
+// Or it turns there by so many times more than beside what is narrow; by less if it also stands off
+// by so many times more.
+constexpr double kMuchSharper = 3, kSharper = 1.5;
 // A prism with sides that turn by this share of the crease angle may be meant as one.
 constexpr double kMostTurn = 0.95;
 // A turn [rad] that is none.
@@ -337,8 +338,12 @@ void Recognizer::add_planes(Faces& faces) const {
   const auto count = static_cast<std::size_t>(regions_.size());
   std::vector<char> plane(count, 1);
   std::vector<int> number(count, -1), some(count, -1);
-  // The largest turn at sides beyond which a region goes on narrowly, the smallest at others [rad].
-  std::vector<std::pair<double, double>> turns(count, {0, std::numeric_limits<double>::infinity()});
+  // The largest turn at sides beyond which a region goes on narrowly, the smallest at others [rad],
+  // and the sagitta of that [m].
+  struct Turns {
+    double narrow = 0, alike = std::numeric_limits<double>::infinity(), sagitta = alike;
+  };
+  std::vector<Turns> turns(count);
   const std::vector<Moments> moments = moments_of_regions();
   // Of a region across a side: that of a rectangle with the same second moment [m].
   const auto width = [&](int h) {
@@ -357,19 +362,26 @@ void Recognizer::add_planes(Faces& faces) const {
     for (int k = 0; k < 3 && is_plane; ++k) {
       const int h = 3 * static_cast<int>(t) + k, u = beside_[h];
       if (u < 0 || regions_.of(u) == regions_.of(int(t))) continue;
-      if (of_[u] >= 0) continue;  // its normals are known
       const bool few = regions_.count(regions_.of(int(t))) < kFewOfPlane;
-      auto& [narrow, alike] = turns[regions_.of(int(t))];
-      if (width(h) > (few ? kFarLarger : kFarther) * width(topology.other_half_edge(h)))
+      auto& [narrow, alike, sagitta] = turns[regions_.of(int(t))];
+      const double here = width(h), there = width(topology.other_half_edge(h));
+      if (here > (few ? kFarLarger : kFarther) * there)
         narrow = std::max(narrow, turn(int(t), u));
-      else
-        alike = std::min(alike, turn(int(t), u));
+      else if (of_[u] < 0)  // else its normals are known
+        alike = std::min(alike, turn(int(t), u)),
+        sagitta = std::min(sagitta, turn(int(t), u) * std::min(here, there) / 8);
     }
   }
-  // Whoever divides what is round into narrow strips there makes no turns that are larger.
+  // Whoever divides what is round into narrow strips there makes no turns that are much larger, nor
+  // chords that stand off much more than those of the faces that were found.
+  double most = std::numeric_limits<double>::infinity();
+  if (!faces_.empty()) most = 0;
+  for (const Growth& face : faces_) most = std::max(most, face.deviation);
   for (std::size_t r = 0; r < count; ++r) {
-    const auto& [narrow, alike] = turns[r];
-    plane[r] = plane[r] && (std::isinf(alike) || (narrow > 0 && alike > kMuchSharper * narrow));
+    const auto& [narrow, alike, sagitta] = turns[r];
+    const bool sharper = alike > kMuchSharper * narrow ||
+                         (alike > kSharper * narrow && sagitta > kMuchSharper * most);
+    plane[r] = plane[r] && (std::isinf(alike) || (narrow > 0 && sharper));
   }
   for (std::size_t t = 0; t < of_.size(); ++t) {
     const int r = regions_.of(int(t));
