@@ -28,7 +28,7 @@ MAIN = [sys.executable, "-c", "from sphshell_pin.cli import main; main()"]
 REPORT = """
 import sys
 from sphshell_pin.study.report.making import Part, make_report
-from sphshell_pin.cases.contents import Finding, Section
+from sphshell_pin.study.report.contents import Finding, Section
 value = float(sys.argv[1])
 found = Section("x", "X", findings=[Finding("a", "a", value)])
 make_report("out", parts=[Part("x", "X", lambda **_: found, (1.0, 1.0))])
