@@ -28,8 +28,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.measured import Measured, write
 from sphshell_pin import robots
-from sphshell_pin.cases.measured import Measured, write
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.study.robot_check import QUICK, check_robot
