@@ -181,7 +181,7 @@ void CurvedShell::build_cones(const Shell& shell) {
       const Vec3 x = i < 4 ? middles[i] : chord;
       Vec3 n;
       face->distance(x, n);
-      sagitta = std::max(sagitta, kMargin * (x - chord).norm());
+      sagitta = std::max(sagitta, kBulgeMargin * (x - chord).norm());
       const double along = face_cells_[f].sign * n.dot(axis), across = n.cross(axis).norm();
       tangent = std::max(tangent, along > 0 ? 1.001 * across / along + 1e-6 : kAny);
     }

@@ -167,7 +167,7 @@ class CellMaker {
     if (cell.face < 0 || cell.side[k] == FaceCell::Side::Border) return;  // decided from beyond it
     if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
     if (other == cell.face || !(is_bent(f) || (h >= 0 && is_bent(triangle_of(h))))) return;
-    cell.bulge[k] = static_cast<float>(kMargin * bulge_of(f, k) + gap_);
+    cell.bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
     const int joint = other >= 0 && h > 3 * f + k ? joint_of(f, k, cell.face, other) : -1;
     if (joint >= 0 && agree(joint, 3 * f + k, h)) return;
     if (const double off = off_face(f, k); off > gap_) give_up(f, other, off);
@@ -268,7 +268,7 @@ class CellMaker {
       const int k = side_of(halves[i]);
       cell.side[k] = FaceCell::Side::Border;
       cell.joint[k] = j, cell.turn[k] = turn[i];
-      cell.bulge[k] = static_cast<float>(kMargin * bulge + gap_);
+      cell.bulge[k] = static_cast<float>(kBulgeMargin * bulge + gap_);
     }
     return true;
   }
@@ -283,7 +283,7 @@ class CellMaker {
         const int h = beyond(g, i), f = triangle_of(h), k = side_of(h);
         if (h < 0 || out_.of[f].face < 0 || open_[f]) continue;
         out_.of[f].side[k] = FaceCell::Side::Cubic;
-        out_.of[f].bulge[k] = static_cast<float>(kMargin * bulge_of(f, k) + gap_);
+        out_.of[f].bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
         if (const double off = off_face(f, k); off > gap_) give_up(f, out_.of[g].face, off);
       }
     }

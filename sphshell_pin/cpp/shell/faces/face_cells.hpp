@@ -14,7 +14,7 @@ class CurvedFacet;
 struct Faces;
 
 // What is measured at a few places may be larger between them.
-constexpr double kMargin = 1.5;
+constexpr double kBulgeMargin = 1.5;
 
 // What a facet is of the face it lies on.
 struct FaceCell {
