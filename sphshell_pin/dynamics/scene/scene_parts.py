@@ -86,8 +86,9 @@ class SceneParts(Summarized):
         self._shown: pin.Model | None = None
         self._pairs: tuple[ContactPair, ...] = ()
         self._core: _core.Scene | None = None
+        self._robot: _core.CompiledRobot | None = None
         self.compiled = compiled
-        self._robot = load_compiled(self._model) if compiled else None
+        self._load_robot()
 
     def _facts(self) -> list[Fact]:
         model = self._model
@@ -108,11 +109,6 @@ class SceneParts(Summarized):
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""
         return {**self.__dict__, "_core": None, "_robot": None}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        """Load a compiled robot again, from the cache of this machine."""
-        self.__dict__.update(state)
-        self._robot = load_compiled(self._model) if self.compiled else None
 
     @property
     def model(self) -> pin.Model:
@@ -283,9 +279,16 @@ class SceneParts(Summarized):
         convert = partial(_converted, self._model, shown, self.lock)
         return kind(self._model, shown, pairs, self.bind_joints(), convert)
 
+    def _load_robot(self) -> None:
+        """Load what is compiled, anew after pickling; `compiled` then says whether it is used."""
+        if self.compiled and self._robot is None:
+            self._robot = load_compiled(self._model)
+            self.compiled = self._robot is not None
+
     def bind_joints(self) -> _core.JointEffects | None:
         """Return what the core makes of the joints, with the compiled robot; None for neither."""
         effects = self._joints._bind(self._model)
+        self._load_robot()
         if self._robot is not None:
             none = np.zeros(0)
             effects = effects or _core.JointEffects(none, none, none, none)
@@ -355,6 +358,7 @@ class SceneParts(Summarized):
         """Return a scene of the same model, which both share, with other `pairs`."""
         other = copy(self)
         other._shown, other._pairs, other._core = self.model, pairs, None
+        other._robot = self._robot
         return other
 
     def frame_in_joint(self, name: str, called: str = "frame") -> tuple[int, pin.SE3]:

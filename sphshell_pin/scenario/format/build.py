@@ -180,7 +180,8 @@ def build_scenario(
             lock=assembly.lock,
             q_lock=q_lock,
             joints=joints,
-            compiled=any(robot.compiled for robot in scenario.robot),
+            # What is only looked at starts no compiler.
+            compiled=function is load_function and any(one.compiled for one in scenario.robot),
         )
     shells: dict[str, ShellPlace] = {}
     for i, section in enumerate(scenario.shell):

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <random>
 #include <stdexcept>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "dynamics/scene/multibody.hpp"
