@@ -132,9 +132,9 @@ def inverse(function: Callable[[float], float], value: float) -> float:
     high = 1e-6
     while function(high) < value:
         high *= 2
-        if high > 1e6:
+        if high > 1e12:
             what = function.__name__.replace("_", " ")
-            said = f"the {what} of a law stays below {value:.4g} at any depth up to 1000 km"
+            said = f"the {what} of a law stays below {value:.4g} at any depth"
             raise SphshellError(f"{said}: it must grow with the depth")
     return bisect(lambda x: function(x) - value, 0.0, high)
 

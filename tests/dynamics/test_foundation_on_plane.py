@@ -210,4 +210,4 @@ def test_a_flat_face_with_a_law_of_a_point_is_warned_of() -> None:
     with pytest.raises(InvalidParameter, match=r"take law.on_plane\(radius\), or a FoundationLaw"):
         scene_of(box(), sp.HertzLaw(1e9, 0.3))
     with pytest.raises(InvalidParameter, match="follows from the radius"):
-        scene_of(box(), LAW, sp.MindlinFriction("rubber", "rubber", young=1e7, poisson=0.5))
+        scene_of(box(), LAW, sp.MindlinFriction.of("rubber", "rubber"))
