@@ -15,7 +15,6 @@
 
 #include <Eigen/Core>
 
-#include "contact/laws/gauss.hpp"
 #include "sphshell_pin/laws/parameters.hpp"
 
 namespace sphshell_pin {
@@ -370,7 +369,7 @@ struct FunctionLaw : OwnFunction {
   static constexpr const char* kind = "function";
   static constexpr double kLeastRate = 1e-2;  // over which slopes are taken at rest [m/s]
 
-  std::function<double(double, const double*)> potential;  // [J]; empty: the integral of the force
+  std::function<double(double, const double*)> potential;  // [J]
 
   bool needs_rate() const { return true; }
 
@@ -392,18 +391,8 @@ struct FunctionLaw : OwnFunction {
     }
   }
 
-  // The integral goes over the root of the depth: Gauss's rule is exact for a sum of its powers,
-  // halves among them, up to the seventh.
   double energy(double depth) const {
-    if (potential)
-      return checked(potential(depth, parameters.data()), "energy of a FunctionLaw", depth, 0);
-    const GaussRule rule = gauss_rule(8);
-    double sum = 0;
-    for (int i = 0; i < rule.size; ++i) {
-      const double s = rule.nodes[i];
-      sum += rule.weights[i] * 2 * s * at(depth * s * s, 0);
-    }
-    return sum * depth;
+    return checked(potential(depth, parameters.data()), "energy of a FunctionLaw", depth, 0);
   }
 
  private:
