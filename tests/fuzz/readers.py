@@ -116,7 +116,7 @@ def read_measured(path: Path) -> None:
 def read_run(home: Path) -> None:
     """Look at the results in a folder in one of the ways that there are, or two."""
     run = home / "run.npz"
-    whole = run.is_file() and run.stat().st_size < 1e7
+    whole = run.is_file() and 0 < run.stat().st_size < 1e7
     number = zlib.crc32(run.read_bytes()) if whole else 0
     fault = None
     for way in (LOOKS[0], LOOKS[number % len(LOOKS)]):
