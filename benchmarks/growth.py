@@ -61,7 +61,7 @@ QUESTIONS = {
     LIBIGL: "closest point",
     FCPW: "closest point, single precision",
 }
-NEEDS = {TRIMESH: "rtree", LIBIGL: "igl", FCPW: "fcpw"}  # modules, all of the extra `bench`
+NEEDS = {TRIMESH: "rtree", LIBIGL: "igl", FCPW: "fcpw"}  # modules of benchmarks/pyproject.toml
 QUERIES = {COAL: 2000, TRIMESH: 200}  # in a round; 20 000 for the others
 
 
