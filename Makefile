@@ -9,7 +9,7 @@ OUT ?= results
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick studies lint format bench report robots validation hard-cases rollouts \
+.PHONY: help demo test quick slow-tests studies lint format bench report robots validation hard-cases rollouts \
   joints real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
 
 help:

@@ -274,7 +274,7 @@ def _change(
 
     `data` is what the file of `scenario` gives.
     """
-    node, rest, _trail = _descend(data, key, path)
+    node, rest, _ = _descend(data, key, path)
     whole, _, index = key.rpartition(".")
     if index.isdecimal() and not isinstance(node, list):
         # One number of a list that stands at its default.

@@ -17,24 +17,13 @@ from sphshell_pin import _core, regular_file
 from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used, write_own
 from sphshell_pin.errors import UnitWarning
 from sphshell_pin.shell.cad.options import PACKAGE, CadOptions
-from sphshell_pin.shell.cleaned import Array, CleanedSurface, Known, check_arrays
+from sphshell_pin.shell.cleaned import ARRAYS, Array, CleanedSurface, check_arrays
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.readers.text import read_bytes
 
 MOST_BYTES = 500_000_000
 """Of all surfaces together; those used longest ago go."""
 
-_ARRAYS: Known = {
-    "vertices": ("f8", ("n", 3)),
-    "elements": ("i4", ("m", 4)),
-    "triangles": ("i4", ("t", 3)),
-    "triangle_element": ("i4", ("t",)),
-    "source_element": ("i4", ("m",)),
-    "normals": ("f8", ("t", 3, 3)),
-    "element_face": ("i4", ("m",)),
-    "face_shapes": ("f8", ("f", 9)),
-    "straight": ("b1", ("t", 3)),
-}
 _ALWAYS = ("vertices", "elements", "triangles", "triangle_element", "source_element")
 _DIGEST = hashlib.blake2b().digest_size
 
@@ -86,7 +75,7 @@ class KeptSurface:
         if self.path is None or any(type(one) is not UnitWarning for one in heard):
             return
         surface, unit, factor = read
-        arrays = {k: v for k in _ARRAYS if (v := getattr(surface, k)) is not None}
+        arrays = {k: v for k in ARRAYS if (v := getattr(surface, k)) is not None}
         told = {
             "unit": unit,
             "factor": factor,
@@ -110,8 +99,8 @@ def _surface(
     arrays: dict[str, Array], names: tuple[str, ...], health: ShellHealth, rounding: float
 ) -> CleanedSurface:
     """Return the surface; InvalidShell, TypeError or ValueError if the arrays are of none."""
-    given = {name: arrays[name] for name in _ARRAYS if name in arrays}
-    check_arrays(given, _ARRAYS, _ALWAYS)
+    given = {name: arrays[name] for name in ARRAYS if name in arrays}
+    check_arrays(given, ARRAYS, _ALWAYS)
     limits = {
         "elements": (-1, len(given["vertices"])),
         "triangles": (0, len(given["vertices"])),
