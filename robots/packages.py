@@ -79,7 +79,7 @@ class Folders:
         if "share" in parts[:-2]:  # where ROS installs packages
             k = parts.index("share") + 1
             yield from (folder.joinpath(*parts[k + 1 :]) for folder in self.packages(parts[k]))
-        for k in range(1, len(parts)):
+        for k in range(1, len(parts) - 1):  # its last folder, too: other robots name parts alike
             yield from (folder.joinpath(*parts[k:]) for folder in (home, *home.parents[:2]))
 
     def beside(self, name: str) -> Path:

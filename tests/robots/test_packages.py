@@ -130,7 +130,7 @@ def test_names_of_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyP
     "uri",
     [
         "package://renamed/meshes/one.obj",
-        "package://no/folder/one.obj",
+        "package://no/urdf/one.obj",
         "file:///home/another/arm%20support/meshes/one.obj",
         "/home/another/arm_support/meshes/one.obj",
         "file:///opt/ros/share/arm_resources/folder/one.obj",
@@ -147,6 +147,14 @@ def test_a_mesh_of_a_package_that_is_nowhere_is_found_beside_the_robot(
     mesh.rename(near / "one.obj")
     file.write_text(file.read_text().replace("package://arm_resources/meshes/one.obj", uri))
     assert len(robots.load_file(file).collision_model.geometryObjects) == 1
+
+
+def test_a_mesh_of_another_folder_is_not_taken_for_a_missing_one(tmp_path: Path) -> None:
+    file = workspace(tmp_path, "src/vendor/arm_resources")
+    mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
+    mesh.rename(file.with_name("one.obj"))
+    with pytest.raises(robots.RobotError, match=r"a mesh cannot be loaded.*meshes/one\.obj"):
+        robots.load_file(file)
 
 
 @pytest.mark.parametrize(
