@@ -45,7 +45,7 @@ struct Sextic {
 // A region is where its value is negative. `plan` says whether a part of an element, as large as
 // the square root of size2 and whose bounds are these, is too large for Gauss's rules, and their
 // order.
-struct Bounds {
+struct Range {
   double low, high;  // of the region's measure of depth: see the regions
 };
 struct Plan {
@@ -66,9 +66,9 @@ struct BallRegion {
     return Sextic(a, b, c, d, radius2);
   }
   Sphere probe() const { return {Vec3::Zero(), 0, 0}; }
-  Bounds bounds(const Vec3 (&net)[3][4], const Vec3& middle) const {
+  Range bounds(const Vec3 (&net)[3][4], const Vec3& middle) const {
     const Vec3 towards = (net[0][0] + net[1][0] + net[2][0]).normalized();
-    Bounds out{middle.dot(towards), middle.squaredNorm()};
+    Range out{middle.dot(towards), middle.squaredNorm()};
     for (int k = 0; k < 3; ++k)
       for (int i = 0; i < 3; ++i) {
         out.low = std::min(out.low, net[k][i].dot(towards));
@@ -76,10 +76,10 @@ struct BallRegion {
       }
     return out;
   }
-  bool misses(const Bounds& at) const { return at.low >= radius; }
-  bool holds(const Bounds& at) const { return at.high <= radius2; }
+  bool misses(const Range& at) const { return at.low >= radius; }
+  bool holds(const Range& at) const { return at.high <= radius2; }
   // Where the pressure is analytic decides on the order.
-  Plan plan(const Bounds& at, double size2) const {
+  Plan plan(const Range& at, double size2) const {
     double size = std::sqrt(size2);
     if (at.low > 0) size = std::min(size, 2 * std::sqrt(radius2 - at.low * at.low));
     const double ratio = size / std::max(at.low, 1e-3 * size);
@@ -103,8 +103,8 @@ struct HalfSpace {
     return Sextic(normal.dot(a), normal.dot(b), normal.dot(c), normal.dot(d));
   }
   Plane probe() const { return {normal, 0, extent, 0}; }
-  Bounds bounds(const Vec3 (&net)[3][4], const Vec3& middle) const {
-    Bounds out{normal.dot(middle), normal.dot(middle)};
+  Range bounds(const Vec3 (&net)[3][4], const Vec3& middle) const {
+    Range out{normal.dot(middle), normal.dot(middle)};
     for (int k = 0; k < 3; ++k)
       for (int i = 0; i < 3; ++i) {
         const double height = normal.dot(net[k][i]);
@@ -112,10 +112,10 @@ struct HalfSpace {
       }
     return out;
   }
-  bool misses(const Bounds& at) const { return at.low >= 0; }
-  bool holds(const Bounds& at) const { return at.high <= 0; }
+  bool misses(const Range& at) const { return at.low >= 0; }
+  bool holds(const Range& at) const { return at.high <= 0; }
   // All integrands are polynomials.
-  Plan plan(const Bounds&, double) const { return {false, 3}; }
+  Plan plan(const Range&, double) const { return {false, 3}; }
 };
 
 // Green's formula in the plane of the parameters: with H(w) the integral of s g(o + s (w - o)) over
@@ -361,7 +361,7 @@ void CellQuadrature<Region>::part(const Part& w, int level, Visit& visit) {
   }
   for (int k = 0; k < 3; ++k) net[k][3] = net[next_corner(k)][0];
   // From the convex hull of the control points.
-  const Bounds bounds = region_.bounds(net, middle);
+  const Range bounds = region_.bounds(net, middle);
   if (region_.misses(bounds)) return;
   double size2 = 0;
   for (int k = 0; k < 3; ++k) size2 = std::max(size2, (net[k][3] - net[k][0]).squaredNorm());

@@ -15,7 +15,7 @@ constexpr double kSameSide = 0.9;
 // Triangles within so many tolerances of a plane may be in it once it is fitted, to so many
 // triangles at least, so many times.
 constexpr double kBeside = 30;
-constexpr std::size_t kFewToFit = 3, kMostRounds = 6;
+constexpr std::size_t kFewToFit = 3, kMostFits = 6;
 
 }  // namespace
 
@@ -80,7 +80,7 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
         continue;
       }
       if (settled || !any_beside || found.size() < kFewToFit || found.size() == before ||
-          round == kMostRounds)
+          round == kMostFits)
         break;
       last = {out.normal, origin};
       before = found.size();
