@@ -105,8 +105,9 @@ class Journal:
     def _begin(self, head: JsonObject, runs: int) -> None:
         whole = self._file.read()
         first, *lines = whole.split(b"\n")
-        if not whole:
-            self._write(json.dumps(head).encode() + b"\n")
+        start = json.dumps(head).encode() + b"\n"
+        if start.startswith(whole) and whole != start:  # a new file, or its head was cut off
+            self._write(start[len(whole) :])
             sync_folder(self.path.parent)
             return
         try:
