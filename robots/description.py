@@ -31,7 +31,10 @@ MOST_LINKS = 5000
 """Links in all: the time to read them grows with their square."""
 
 MOST_MEMORY = 2e9
-"""[B] of a pinocchio.Data, which holds eight arrays of one number per three velocities."""
+"""[B] while a pinocchio.Data is made: it has four arrays of one number per three velocities.
+
+Python copies it once.
+"""
 
 
 @dataclass(frozen=True)

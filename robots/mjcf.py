@@ -10,7 +10,7 @@ without `pos`, damping of ball joints and equalities, and makes one nameless joi
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -21,7 +21,7 @@ from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.arrays import Array
 from sphshell_pin.errors import import_extra
 from sphshell_pin.robots.description import MOST_LINKS, Description, check_memory
-from sphshell_pin.robots.mjcf_compile import LEFT_OUT, Compiled
+from sphshell_pin.robots.mjcf_compile import LEFT_OUT, Compiled, silent
 from sphshell_pin.robots.mjcf_couplings import couplings
 from sphshell_pin.robots.mjcf_includes import include
 from sphshell_pin.robots.packages import Folders
@@ -52,9 +52,9 @@ def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> 
     if links > MOST_LINKS:
         raise ValueError(f"it has {links} links; at most {MOST_LINKS} can be read")
     if floats is not None:
-        _set_base(root, floats=floats)
-    for tag in _UNKNOWN:
-        if root.find(f".//{tag}") is not None:
+        _set_base(mujoco, root, floats=floats)
+    for tag in _UNKNOWN:  # plugins of actuators and sensors are not read
+        if any(root.find(path + tag) is not None for path in ("", "worldbody//", "asset//")):
             raise ValueError(
                 f"<{tag}> is not supported: let MuJoCo write the bodies out "
                 "(mujoco.MjSpec.from_file(...), compile(), to_xml())"
@@ -69,25 +69,53 @@ def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> 
     return _Reader(mujoco, root, folders).read()
 
 
-def _set_base(root: ET.Element, *, floats: bool) -> None:
+def _set_base(mujoco: Any, root: ET.Element, *, floats: bool) -> None:
     """Give the only body of the world a free joint, or take it; its keys lose what was of it."""
-    bodies = root.findall("worldbody/body")
+    worlds = root.findall("worldbody")
+    bodies = [one for world in worlds for _, one in _inside(world) if one.tag == "body"]
     if len(bodies) != 1:
         raise ValueError(f"its world has {len(bodies)} bodies: state in it which of them are free")
     (body,) = bodies
-    free = [one for one in body if one.tag == "freejoint" or one.get("type") == "free"]
+    joints = [one for one in _inside(body) if one[1].tag in ("joint", "freejoint")]
+    free = [one for one in joints if one[1].tag == "freejoint" or one[1].get("type") == "free"]
     if not floats:
-        for joint in free:
-            body.remove(joint)
+        for holder, joint in free:
+            holder.remove(joint)
     elif not free:
-        if body.find("joint") is not None:
+        if joints:
             raise ValueError(f"body '{body.get('name')}' has a joint already: it cannot float")
         body.insert(0, ET.Element("freejoint"))
     if floats != bool(free):
+        place = _place(mujoco, root)
         for key in root.iterfind("keyframe/key"):
-            qpos = key.get("qpos", "").split()
-            place = [*body.get("pos", "0 0 0").split(), "1", "0", "0", "0"]
-            key.set("qpos", " ".join(place + qpos if floats else qpos[7:]))
+            if qpos := key.get("qpos", "").split():  # a key without is as drawn
+                key.set("qpos", " ".join([place, *qpos] if floats else qpos[7:]))
+
+
+def _inside(element: ET.Element) -> Iterator[tuple[ET.Element, ET.Element]]:
+    """Yield the elements of a body, and what each is in: frames within it hold some."""
+    for one in element:
+        yield from _inside(one) if one.tag == "frame" else [(element, one)]
+
+
+def _place(mujoco: Any, root: ET.Element) -> str:
+    """Return pos and quat of the only body of the world, in whatever way they are stated."""
+    bare = ET.Element("mujoco")
+    for one in root.findall("compiler"):
+        units = {k: v for k, v in one.attrib.items() if k in ("angle", "eulerseq")}
+        ET.SubElement(bare, "compiler", units)
+    bare.extend(_emptied(one) for one in root.findall("worldbody"))
+    with silent(mujoco):
+        model = mujoco.MjModel.from_xml_string(ET.tostring(bare, encoding="unicode"))
+    return _text(*model.body_pos[1], *model.body_quat[1])
+
+
+def _emptied(element: ET.Element) -> ET.Element:
+    """Return frames and bodies in `element`, and nothing in the bodies."""
+    made = ET.Element(element.tag, {k: v for k, v in element.attrib.items() if k != "childclass"})
+    if element.tag != "body":
+        made.extend(_emptied(one) for one in element if one.tag in ("frame", "body"))
+    return made
 
 
 class _Reader(Compiled):

@@ -93,8 +93,10 @@ class Compiled:
             if element.tag == "freejoint":
                 element.attrib.pop("align", None)
         count = iter(range(MOST_LINKS))
+        taken = {one.get("name", "") for one in root.iterfind("worldbody//joint")}
+        taken |= {one.get("name", "") for one in root.iterfind("worldbody//freejoint")}
         for world in root.findall("worldbody"):
-            _name_bodies(world, "world", count)
+            _name_bodies(world, "world", count, taken)
         return self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
 
     def _mesh(self, one: ET.Element, compiler: Mapping[str, str]) -> None:
@@ -165,17 +167,21 @@ class Compiled:
             ) from None
 
 
-def _name_bodies(element: ET.Element, body: str, count: Iterator[int]) -> None:
-    """Give the bodies and joints below an element names, where they have none."""
-    joints = 0
+def _name_bodies(element: ET.Element, body: str, count: Iterator[int], taken: set[str]) -> None:
+    """Give the bodies and joints below an element names, where they have none.
+
+    Frames within a body hold joints of it, so that `taken` has all joints' names.
+    """
     for one in element:
         if one.tag == "body":
             number = next(count)
             name = one.attrib.setdefault("name", f"{body}_body{number}")
-            _name_bodies(one, name, count)
+            _name_bodies(one, name, count, taken)
         elif one.tag == "frame":
-            _name_bodies(one, body, count)
-        elif one.tag in ("joint", "freejoint"):
+            _name_bodies(one, body, count, taken)
+        elif one.tag in ("joint", "freejoint") and "name" not in one.attrib:
             free = one.tag == "freejoint" or one.get("type") == "free"
-            one.attrib.setdefault("name", f"{body}_{'free' if free else f'joint{joints or str()}'}")
-            joints += 1
+            stem = f"{body}_{'free' if free else 'joint'}"
+            names = (f"{stem}{k or ''}" for k in range(len(taken) + 1))
+            one.set("name", next(name for name in names if name not in taken))
+            taken.add(one.attrib["name"])

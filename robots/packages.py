@@ -70,17 +70,34 @@ class Folders:
         else:
             roots = (self.file.parent, *self.given)
             places = (folder / uri for folder in roots)  # of an absolute path, itself
-        places = chain(places, self._moved(Path(unquote(rest or uri)).parts))
-        return next((place for place in places if os.path.isfile(place)), None)
+        parts = Path(unquote(rest or uri)).parts
+        tried = list[Path]()
+        for place in chain(places, self._moved(parts)):
+            if os.path.isfile(place):
+                return place
+            tried.append(place)
+        # Where no folder is called as its own is, all files may have been put into one.
+        whole = any(os.path.isdir(place.parent) for place in tried)
+        return None if whole else self._alone(parts[-1])
 
     def _moved(self, parts: Sequence[str]) -> Iterator[Path]:
         """Yield where a file of a renamed package, or of another machine's folders, may be."""
-        home = self.file.resolve().parent
         if "share" in parts[:-2]:  # where ROS installs packages
             k = parts.index("share") + 1
             yield from (folder.joinpath(*parts[k + 1 :]) for folder in self.packages(parts[k]))
-        for k in range(1, len(parts)):
-            yield from (folder.joinpath(*parts[k:]) for folder in (home, *home.parents[:2]))
+        for k in range(1, len(parts) - 1):
+            yield from (folder.joinpath(*parts[k:]) for folder in self._near())
+
+    def _alone(self, name: str) -> Path | None:
+        """Return the file of that name in a folder near the robot's, if it is the only one."""
+        near = self._near()
+        places = {one / name for folder in near for one in (folder, *folder.glob("*"))}
+        alike = [place for place in places if os.path.isfile(place)]
+        return alike[0] if len(alike) == 1 and alike[0].parent in near else None
+
+    def _near(self) -> tuple[Path, ...]:
+        home = self.file.resolve().parent
+        return (home, *home.parents[:2])
 
     def beside(self, name: str) -> Path:
         """Return the path that an MJCF calls `name`; nothing is there if it may not be read."""

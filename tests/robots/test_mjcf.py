@@ -233,6 +233,7 @@ def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, word
     ("inside", "head", "words"),
     [
         ("<replicate count='2'/>", "", "<replicate> is not supported"),
+        (f"{ARM}<geom size='1'><plugin plugin='p'/></geom>", "", "<plugin> is not supported"),
         (ARM, "<compiler coordinate='global'/>", "coordinate"),
         (ARM, "<include file='nix.xml'/>", "includes nix.xml, which is not there"),
         ("<body><joint class='x'/></body>", "", "unknown default class name 'x'"),
@@ -277,6 +278,16 @@ LIMB = """<mujoco><compiler angle="radian"/><worldbody>
 <keyframe><key name="home" qpos="{place} 0.3"/></keyframe></mujoco>"""
 
 
+def test_joints_without_names_get_names_of_their_own(tmp_path):
+    """Also those in frames, which are of the body, and beside names that the file states."""
+    inside = (
+        '<body name="a"><joint axis="1 0 0"/><frame pos="0 0 1"><joint axis="0 1 0"/></frame>'
+        '<geom size="1"/><body><joint name="a_joint1"/><geom size="1"/></body></body>'
+    )
+    names = list(robots.load_file(written(tmp_path, inside)).model.names)
+    assert names[1:] == ["a_joint", "a_joint2", "a_joint1"]
+
+
 def test_a_base_is_freed_and_fixed(tmp_path):
     """As in a file that states it so; keys keep the joints' own numbers."""
     free, fixed = tmp_path / "free.xml", tmp_path / "fixed.xml"
@@ -292,6 +303,12 @@ def test_a_base_is_freed_and_fixed(tmp_path):
                 made.model.jointPlacements[-1].homogeneous,
                 told.model.jointPlacements[-1].homogeneous,
             )
+    turned = LIMB.format(free="", place="").replace('"0 0 0.5"', '"0 0 0.5" euler="0 1.5 0"')
+    framed = turned.replace("<body", '<frame euler="0.5 0 0"><body', 1)
+    free.write_text(framed.replace("</worldbody>", "</frame></worldbody>"))
+    as_drawn = robots.load_file(free, free_flyer=True).q0
+    np.testing.assert_allclose(robots.load_file(free, free_flyer=True, pose="home").q0[:7],
+                               as_drawn[:7])  # fmt: skip
     with pytest.raises(robots.RobotError, match="has a joint already: it cannot float"):
         robots.load_file(FOLDER / "hinge.xml", free_flyer=True)
 
@@ -348,7 +365,8 @@ SHOWN = """<mujoco model="arm"><compiler angle="radian" meshdir="a" texturedir="
 <body name="b" childclass="link" gravcomp="1" user="1 2 3"><camera name="c"/><joint name="j"/>
 <inertial pos="0 0 0.1" mass="2" diaginertia="1 1 1"/><geom size="0.1"/>
 <geom type="mesh" mesh="w" contype="0" conaffinity="0"/></body></worldbody>
-<actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor>
+<actuator><motor joint="j"/><plugin joint="j" plugin="p"/></actuator>
+<sensor><jointpos joint="j"/></sensor><extension><plugin plugin="p"/></extension>
 <keyframe><key name="home" qpos="0.5" qvel="0.1" ctrl="3"/></keyframe></mujoco>"""
 
 

@@ -130,6 +130,7 @@ def test_names_of_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyP
     "uri",
     [
         "package://renamed/meshes/one.obj",
+        "package://no/urdf/one.obj",
         "package://no/folder/one.obj",
         "file:///home/another/arm%20support/meshes/one.obj",
         "/home/another/arm_support/meshes/one.obj",
@@ -147,6 +148,21 @@ def test_a_mesh_of_a_package_that_is_nowhere_is_found_beside_the_robot(
     mesh.rename(near / "one.obj")
     file.write_text(file.read_text().replace("package://arm_resources/meshes/one.obj", uri))
     assert len(robots.load_file(file).collision_model.geometryObjects) == 1
+
+
+@pytest.mark.parametrize("other", ["urdf/one.obj", "../arm_resources/one.obj"])
+def test_a_mesh_of_another_folder_is_not_taken_for_a_missing_one(
+    tmp_path: Path, other: str
+) -> None:
+    """Its own folder is there without it, or several files have its name."""
+    file = workspace(tmp_path, "src/vendor/arm_resources")
+    mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
+    file.with_name("one.obj").write_bytes(mesh.read_bytes())
+    mesh.rename(file.parents[1] / other)
+    uri = "meshes" if other.startswith("urdf") else "folder"
+    file.write_text(file.read_text().replace("resources/meshes/", f"resources/{uri}/"))
+    with pytest.raises(robots.RobotError, match=rf"a mesh cannot be loaded.*{uri}/one\.obj"):
+        robots.load_file(file)
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin import _core
-from sphshell_pin.atomic import write_whole
-from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used
-from sphshell_pin.errors import ResultError, UnitWarning
+from sphshell_pin import _core, regular_file
+from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used, write_own
+from sphshell_pin.errors import UnitWarning
 from sphshell_pin.shell.cad.options import PACKAGE, CadOptions
 from sphshell_pin.shell.cleaned import ARRAYS, Array, CleanedSurface, check_arrays
 from sphshell_pin.shell.health import ShellHealth
@@ -55,7 +54,7 @@ class KeptSurface:
         if self.path is None or not is_own(self.path):
             return None
         try:
-            whole = self.path.read_bytes()
+            whole = regular_file.read_bytes(self.path)
             content = memoryview(whole)[_DIGEST:]
             if hashlib.blake2b(content).digest() != whole[:_DIGEST]:
                 return None
@@ -90,8 +89,8 @@ class KeptSurface:
         np.savez(buffer, allow_pickle=False, told=text, **arrays)
         content = buffer.getvalue()
         try:
-            write_whole(self.path, hashlib.blake2b(content).digest() + content)
-        except ResultError:
+            write_own(self.path, hashlib.blake2b(content).digest() + content)
+        except OSError:
             return  # a full disk: it is read again next time
         keep_newest(self.path.parent, MOST_BYTES)
 
@@ -123,10 +122,12 @@ def _health(values: dict[str, object]) -> ShellHealth:
 
 def _versions() -> tuple[object, ...]:
     """Return what the surface of a file depends on besides: the code that reads and cleans it."""
-    folder = Path(__file__).parent.parent
-    code = [*sorted(folder.rglob("*.py")), Path(_core.__file__)]
+    folder = Path(__file__).parents[2]
+    code = [*folder.glob("*.py"), *(folder / "shell").rglob("*.py"), Path(_core.__file__)]
     about = [
-        (path.name, found.st_size, found.st_mtime_ns) for path in code if (found := os.stat(path))
+        (path.name, found.st_size, found.st_mtime_ns)
+        for path in sorted(code)
+        if (found := os.stat(path))
     ]
     try:
         kernel = version(PACKAGE)

@@ -14,6 +14,7 @@ import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from sphshell_pin import regular_file
 from sphshell_pin.atomic.file import sync_folder
 from sphshell_pin.atomic.lock import lock_file
 from sphshell_pin.errors import ResultError, SweepError
@@ -103,7 +104,7 @@ class Journal:
             raise self._broken(fault) from None
 
     def _begin(self, head: JsonObject, runs: int) -> None:
-        whole = self._file.read()
+        whole = regular_file.read_bytes(self.path)
         first, *lines = whole.split(b"\n")
         start = json.dumps(head).encode() + b"\n"
         if start.startswith(whole) and whole != start:  # a new file, or its head was cut off
