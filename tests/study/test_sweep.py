@@ -191,6 +191,7 @@ def test_a_journal_without_a_whole_head_is_a_new_one(finished, count):
     sweep(path, SMALL, workers=0, out=out)
     assert out.read_bytes() == whole
     check_once(out, 4)
+    assert run_plan(plan_sweep(path, SMALL), workers=0, out=out).resumed == 4
 
 
 def test_a_line_that_a_kill_cut_off_is_written_again(finished):

@@ -108,7 +108,8 @@ class Journal:
         first, *lines = whole.split(b"\n")
         start = json.dumps(head).encode() + b"\n"
         if start.startswith(whole) and whole != start:  # a new file, or its head was cut off
-            self._write(start[len(whole) :])
+            self._file.seek(0)
+            self._write(start)
             sync_folder(self.path.parent)
             return
         try:
