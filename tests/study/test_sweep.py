@@ -182,14 +182,16 @@ def test_a_file_that_is_no_journal_is_refused_and_left_alone(finished, damage):
     assert journal.read_bytes() == damage
 
 
-def test_an_empty_journal_is_a_new_one(finished):
+@pytest.mark.parametrize("count", [0, 20])
+def test_a_journal_without_a_whole_head_is_a_new_one(finished, count):
     path, out, journal = finished
     whole = out.read_bytes()
-    journal.write_bytes(b"")
+    journal.write_bytes(journal.read_bytes()[:count])
     out.unlink()
     sweep(path, SMALL, workers=0, out=out)
     assert out.read_bytes() == whole
     check_once(out, 4)
+    assert run_plan(plan_sweep(path, SMALL), workers=0, out=out).resumed == 4
 
 
 def test_a_line_that_a_kill_cut_off_is_written_again(finished):

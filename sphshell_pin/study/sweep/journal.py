@@ -106,8 +106,10 @@ class Journal:
     def _begin(self, head: JsonObject, runs: int) -> None:
         whole = regular_file.read_bytes(self.path)
         first, *lines = whole.split(b"\n")
-        if not whole:
-            self._write(json.dumps(head).encode() + b"\n")
+        start = json.dumps(head).encode() + b"\n"
+        if start.startswith(whole) and whole != start:  # a new file, or its head was cut off
+            self._file.seek(0)
+            self._write(start)
             sync_folder(self.path.parent)
             return
         try:
