@@ -1,16 +1,15 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# What the Python module is made of; the C++ library and its consumers have more.
-CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp' \
-	-not -path '*/cpp/library/*' -not -path '*/cpp/include/*')
+# What the Python module is made of; the C++ library has more.
+CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp' -not -path '*/cpp/library/*')
 ALL_CPP := $(shell find sphshell_pin/cpp tests/cpp docs/examples -name '*.[ch]pp')
 OUT ?= results
 # Modules are compiled once, and not in every process of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick studies lint format bench report robots validation hard-cases rollouts \
+.PHONY: help demo test quick slow-tests studies lint format bench report robots validation hard-cases rollouts \
   joints real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
 
 help:

@@ -8,6 +8,7 @@ pin.computeABADerivatives by taking the Python call off, which is timed with a m
 from __future__ import annotations
 
 import time
+import timeit
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -27,14 +28,7 @@ CALLS, ROUNDS = 2000, 50
 
 def timed(call: Callable[[], object], calls: int = CALLS) -> Callable[[], float]:
     """Return what measures the seconds of one call."""
-
-    def run() -> float:
-        begin = time.perf_counter()
-        for _ in range(calls):
-            call()
-        return (time.perf_counter() - begin) / calls
-
-    return run
+    return lambda: timeit.timeit(call, number=calls) / calls
 
 
 def pinocchios(model: pin.Model, q: Array, v: Array) -> Callable[[], float]:

@@ -34,14 +34,7 @@ from sphshell_pin.study.report.contents import (
 )
 from sphshell_pin.study.report.convergence import query_contestant
 from sphshell_pin.study.report.machine import machine
-from sphshell_pin.study.report.queries import (
-    COAL,
-    DEPTH,
-    OURS,
-    RADIUS,
-    SIDE,
-    coal_contestant,
-)
+from sphshell_pin.study.report.queries import COAL, DEPTH, OURS, RADIUS, SIDE, coal_contestant
 from sphshell_pin.study.report.queries import FLAT as OURS_FLAT
 from sphshell_pin.study.report.surfaces import touching_centers, wavy_sheet
 from sphshell_pin.study.report.timing import one_core, per_center, silent
@@ -61,7 +54,7 @@ QUESTIONS = {
     LIBIGL: "closest point",
     FCPW: "closest point, single precision",
 }
-NEEDS = {TRIMESH: "rtree", LIBIGL: "igl", FCPW: "fcpw"}  # modules, all of the extra `bench`
+NEEDS = {TRIMESH: "rtree", LIBIGL: "igl", FCPW: "fcpw"}  # modules of benchmarks/pyproject.toml
 QUERIES = {COAL: 2000, TRIMESH: 200}  # in a round; 20 000 for the others
 
 

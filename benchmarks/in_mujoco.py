@@ -5,7 +5,7 @@ Run it with `python -m benchmarks.in_mujoco`.
 
 from __future__ import annotations
 
-import time
+import timeit
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -111,13 +111,8 @@ def step_from(model: mujoco.MjModel, data: mujoco.MjData, q: Array) -> None:
 
 def median(call: Callable[[], None]) -> float:
     """Return the median of ROUNDS times of a call [us]."""
-    times = []
-    for _ in range(ROUNDS):
-        begin = time.perf_counter()
-        for _ in range(CALLS):
-            call()
-        times.append((time.perf_counter() - begin) / CALLS * 1e6)
-    return float(np.median(times))
+    times = timeit.repeat(call, number=CALLS, repeat=ROUNDS)
+    return float(np.median(times)) / CALLS * 1e6
 
 
 if __name__ == "__main__":

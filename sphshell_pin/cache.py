@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -39,6 +40,19 @@ def is_own(path: Path, kind: Callable[[int], bool] = stat.S_ISREG) -> bool:
     except OSError:
         return False
     return kind(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
+
+
+def write_own(path: Path, data: bytes) -> None:
+    """Write `data` as the file at `path`, which only this user may write, whole or not at all."""
+    descriptor, made = tempfile.mkstemp(dir=path.parent)
+    try:
+        with open(descriptor, "wb") as file:
+            file.write(data)
+        os.replace(made, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(made)
+        raise
 
 
 def keep_newest(folder: Path, most: int) -> None:

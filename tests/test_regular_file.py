@@ -66,7 +66,7 @@ READS = re.compile(
 OWN = re.compile(  # the package's own data, the system's files, pipes and what is written
     r"__file__|/proc/|PARTS|TEMPLATE|viewer_script|data_folder|devnull|os\.open\(|\"wb\"|"
     r"open\((source|target)|ZipFile\(file\)|archive\.open\(|Image\.open|webbrowser|def open|"
-    r"regular_file\.read|xacro\.open|self\._files"
+    r"regular_file\.read|xacro\.open|self\._files|BytesIO"
 )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,9 +18,9 @@ from benchmarks.peers.drake_plant import (
     sum_of_forces,
     wall_forces,
 )
-from benchmarks.peers.engine import Params, Trajectory
+from benchmarks.peers.engine import Engine, Params, Trajectory
 from benchmarks.peers.merged import MeshFiles, merged_urdf
-from benchmarks.peers.press import FRAME, PressScene
+from benchmarks.peers.press import FRAME, PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
 from benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact
@@ -39,14 +38,10 @@ PERIOD_MATCH = 1.6
 PRESS_STEPS = 1000  # of the arm: its steps are long
 
 
-class Drake:
+class Drake(Engine):
     """Drake's MultibodyPlant, stepped by its Simulator."""
 
-    name = "Drake"
-
-    def version(self) -> str:
-        """Return name and version."""
-        return f"Drake {importlib.metadata.version('drake')}"
+    name, package = "Drake", "drake"
 
     def settings(self, scene: Scene) -> dict[str, str]:
         """Return what was set, and the pages that recommend it."""
@@ -208,18 +203,9 @@ class Drake:
         arm.simulator.get_mutable_context().SetTime(0.0)
         plant.SetPositionsAndVelocities(context, np.r_[scene.q0, np.zeros(len(scene.q0))])
         short = replace(scene, steps=min(scene.steps, PRESS_STEPS))
-        t, states, cpu, steps = advance(arm.simulator, plant, short, params)
-        position, velocity, spin = motion_of(plant, context, arm.body, states[-1], arm.center)
-        return Trajectory(
-            t=t[-1:],
-            position=position[None],
-            velocity=velocity[None],
-            angular_velocity=spin[None],
-            cpu=cpu,
-            simulated=t[-1],
-            steps=steps,
-            force=sum_of_forces(plant, context, states[-1])[None],
-        )
+        _, states, cpu, steps = advance(arm.simulator, plant, short, params)
+        q, v = np.split(states[-1], 2)
+        return at_the_end(short, q, v, cpu, steps, sum_of_forces(plant, context, states[-1]))
 
     def _arm(self, scene: PressScene, params: Params) -> Arm:
         """Return the arm, kept for runs that follow: the mesh takes seconds to load."""
@@ -239,25 +225,23 @@ class Drake:
             actuator.set_controller_gains(PdControllerGains(p=scene.kp, d=scene.kd))
         plant.set_gravity_enabled(model, False)
         link, center = tip(scene)
-        body = plant.GetBodyByName(f"link{link}")
-        self._touch(plant, scene, params, (body, center), plant.world_body())
+        ball = plant.GetBodyByName(f"link{link}"), center
+        self._touch(plant, scene, params, ball, plant.world_body())
         plant.Finalize()
         simulator, context = simulation(builder, plant, params)
         wanted = np.r_[scene.q_ref, np.zeros(len(scene.q_ref))]
         plant.get_desired_state_input_port(model).FixValue(context, wanted)
-        self._arms[key] = Arm(plant, simulator, context, body, center)
+        self._arms[key] = Arm(plant, simulator, context)
         return self._arms[key]
 
 
 @dataclass(frozen=True)
 class Arm:
-    """The plant of the press, its simulator and context; the fingertip in its body (3,) [m]."""
+    """The plant of the press, its simulator and context."""
 
     plant: Any
     simulator: Any
     context: Any
-    body: Any
-    center: Array
 
 
 def load(scene: Scene) -> float:

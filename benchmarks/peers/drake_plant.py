@@ -98,16 +98,12 @@ def advance(
     return np.array(t), states, cpu, int(simulator.get_num_steps_taken())
 
 
-def motion_of(
-    plant: Any, context: Any, body: Any, state: Array, center: Any = (0.0, 0.0, 0.0)
-) -> tuple[Array, Array, Array]:
-    """Return place [m], velocity [m/s] and angular velocity [rad/s] of a body's point."""
+def motion_of(plant: Any, context: Any, body: Any, state: Array) -> tuple[Array, Array, Array]:
+    """Return place [m], velocity [m/s] and angular velocity [rad/s] of a body's origin."""
     plant.SetPositionsAndVelocities(context, state)
     pose = plant.EvalBodyPoseInWorld(context, body)
     motion = plant.EvalBodySpatialVelocityInWorld(context, body)
-    arm = pose.rotation() @ np.array(center)
-    spin = motion.rotational()
-    return pose.translation() + arm, motion.translational() + np.cross(spin, arm), spin
+    return pose.translation(), motion.translational(), motion.rotational()
 
 
 def contacts(plant: Any, context: Any) -> list[Any]:

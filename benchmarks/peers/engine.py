@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from importlib import metadata
 from typing import TYPE_CHECKING, Any, Protocol
 
 from sphshell_pin.arrays import Array
@@ -46,9 +47,11 @@ class Engine(Protocol):
     """One engine. The module imports without the engine; methods import it."""
 
     name: str
+    package: str = ""
 
     def version(self) -> str:
         """Return name and version; raise ImportError where the engine is not installed."""
+        return f"{self.name} {metadata.version(self.package)}"
 
     def settings(self, scene: Scene) -> dict[str, str]:
         """Return what was set, and the page of the engine's documentation that recommends it.

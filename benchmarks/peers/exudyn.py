@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from benchmarks.peers.engine import CannotDo, CpuClock, Params, Trajectory
+from benchmarks.peers.engine import CannotDo, CpuClock, Engine, Params, Trajectory
 from benchmarks.peers.press import PressScene
 from benchmarks.peers.scenes import Scene
 
@@ -18,14 +17,10 @@ MOST_CELLS = 40  # of the search tree along a side
 REGULARIZED = 1e-3  # slip below which friction is proportional to it [m/s]: the default
 
 
-class Exudyn:
+class Exudyn(Engine):
     """EXUDYN's multibody dynamics; a solver call runs the whole scene."""
 
-    name = "EXUDYN"
-
-    def version(self) -> str:
-        """Return name and version."""
-        return f"EXUDYN {importlib.metadata.version('exudyn')}"
+    name, package = "EXUDYN", "exudyn"
 
     def settings(self, scene: Scene) -> dict[str, str]:
         """Return what was set, and the pages that recommend it."""

@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.peers.engine import Params
 from benchmarks.peers.scenes import SCENES
 from benchmarks.peers.workers import ENGINES, NoAnswer, Ran, Worker
+from sphshell_pin.study.report.contents import number
 
 OURS = "ours"
 SWINGS = ("bowl", "bowl fine")
@@ -165,14 +166,24 @@ class Field:
         return Ratio(what, peer, ours, float(median), float(low), float(high))
 
 
+def params_text(params: Params) -> str:
+    """Return a setting in a few words."""
+    return ", ".join(
+        f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in params.items()
+    )
+
+
+def errors_text(errors: dict[str, float]) -> str:
+    """Return errors as "period 2.0e-4, energy ..."."""
+    return ", ".join(f"{name} {number(value)}" for name, value in errors.items())
+
+
 def line(row: Row) -> str:
     """Return a row as one line of progress."""
-    params = " ".join(
-        f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.params.values()
-    )
-    errors = "  ".join(f"{name} {value:.1e}" for name, value in row.errors.items())
+    params, errors = params_text(row.params), errors_text(row.errors)
     cost = "" if row.note else f"{row.cost:.4g} {row.unit}"
-    return f"  {row.scene:10s} {row.engine:9s} {params:40s} {errors}  {cost} {row.note}".rstrip()
+    return f"  {row.scene:10s} {row.engine:9s} {params:60s} {errors}  {cost} {row.note}".rstrip()
 
 
 def measure(

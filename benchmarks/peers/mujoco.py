@@ -7,20 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.peers.engine import CpuClock, Params, Trajectory
+from benchmarks.peers.engine import CpuClock, Engine, Params, Trajectory
 from benchmarks.peers.merged import text
 from benchmarks.peers.press import FRAME, PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
-from benchmarks.peers.truths import (
-    BallScene,
-    Bowl,
-    Cylinder,
-    Groove,
-    Impact,
-    Plate,
-    Turntable,
-)
+from benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact, Plate, Turntable
 from sphshell_pin.arrays import Array
 
 # A contact of impedance d answers the share d of a load by itself and leaves 1 - d to the spring:
@@ -32,16 +24,10 @@ TABLE_INERTIA = 1e4  # [kg m^2]: the ball does not slow the table
 FIELD, BOXES = "height field", "boxes"
 
 
-class MuJoCo:
+class MuJoCo(Engine):
     """MuJoCo, stepped by mujoco.rollout: no Python between steps."""
 
-    name = "MuJoCo"
-
-    def version(self) -> str:
-        """Return name and version."""
-        import mujoco
-
-        return f"MuJoCo {mujoco.__version__}"
+    name, package = "MuJoCo", "mujoco"
 
     def settings(self, scene: Scene) -> dict[str, str]:
         """Return the options and the chapters of the documentation that recommend them."""

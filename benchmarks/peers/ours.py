@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from benchmarks.peers.engine import CpuClock, Params, Trajectory
+from benchmarks.peers.engine import CpuClock, Engine, Params, Trajectory
 from benchmarks.peers.press import FRAME, PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
@@ -27,14 +27,10 @@ CREEP = 1e-3  # [m/s]: up to here the Panda's Coulomb friction is regularised, a
 TABLE_INERTIA = 1e4  # [kg m^2]: the ball does not slow the table
 
 
-class Ours:
+class Ours(Engine):
     """sphshell_pin: curved elements, one contact per place of touch."""
 
-    name = "sphshell_pin"
-
-    def version(self) -> str:
-        """Return name and version."""
-        return f"sphshell_pin {sp.__version__}"
+    name, package = "sphshell_pin", "sphshell-pin"
 
     def settings(self, scene: Scene) -> dict[str, str]:
         """Return the law, the friction and where their choice is explained."""

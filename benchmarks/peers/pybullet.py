@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.peers.engine import CpuClock, Params, Trajectory
+from benchmarks.peers.engine import CpuClock, Engine, Params, Trajectory
 from benchmarks.peers.merged import MeshFiles, merged_urdf
 from benchmarks.peers.press import PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
@@ -24,14 +23,10 @@ HEAVY = 1e6  # moment of inertia of what keeps its rate, in PyBullet's units
 RIGID = 1e18  # [N/m]: springs act in series, and that of the surface counts for nothing
 
 
-class PyBullet:
+class PyBullet(Engine):
     """Bullet's multi-body dynamics, stepped from Python."""
 
-    name = "PyBullet"
-
-    def version(self) -> str:
-        """Return name and version."""
-        return f"PyBullet {importlib.metadata.version('pybullet')}"
+    name, package = "PyBullet", "pybullet"
 
     def settings(self, scene: Scene) -> dict[str, str]:
         """Return what was set, and the pages that recommend it."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.peers.engine import CpuClock, Params, Trajectory
+from benchmarks.peers.engine import CpuClock, Engine, Params, Trajectory
 from benchmarks.peers.press import FRAME, PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
@@ -23,7 +23,7 @@ CREEP = 1e-3  # [m/s]: up to here Coulomb friction grows in proportion to the sl
 PYTHON, PARTS = "Python", "C++, parts alone"
 
 
-class PythonLoop:
+class PythonLoop(Engine):
     """Semi-implicit Euler with `pin.aba`; of contacts with like normals the deepest counts."""
 
     name = "Python loop"

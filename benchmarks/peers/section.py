@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 
 from benchmarks.measured import Measured
-from benchmarks.peers.engine import Params
-from benchmarks.peers.measuring import Ratio, Row
+from benchmarks.peers.measuring import Ratio, Row, errors_text, params_text
 from benchmarks.peers.scenes import SCENES
+from benchmarks.peers.workers import engine_called
 from sphshell_pin.study.report.contents import (
     TIMES,
     Finding,
@@ -22,20 +22,10 @@ from sphshell_pin.study.report.contents import (
     Table,
     about,
     columns,
-    number,
 )
 from sphshell_pin.study.report.machine import machine
 
 KEY, TITLE = "peers", "Other engines"
-NAMES = {
-    "ours": "sphshell_pin",
-    "mujoco": "MuJoCo",
-    "drake": "Drake",
-    "pybullet": "PyBullet",
-    "exudyn": "EXUDYN",
-    "loop": "Python loop",
-}
-"""Names on the page; an engine that is not here has its own."""
 SWING = "bowl"
 TITLES = {name: make().title for name, make in SCENES.items()}
 TEXT = about(__doc__)
@@ -65,7 +55,7 @@ def assemble(rows: list[Row], ratios: list[Ratio]) -> Section:
 
 def name_of(engine: str) -> str:
     """Return the name of an engine on the page."""
-    return NAMES.get(engine, engine)
+    return engine_called(engine).name
 
 
 def notes_of(rows: list[Row]) -> list[str]:
@@ -92,19 +82,6 @@ def findings_of(ratios: list[Ratio]) -> list[Finding]:
         )
         for key, what, one, aim in chosen
     ]  # fmt: skip
-
-
-def params_text(params: Params) -> str:
-    """Return a setting in a few words."""
-    return ", ".join(
-        f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}"
-        for name, value in params.items()
-    )
-
-
-def errors_text(errors: dict[str, float]) -> str:
-    """Return errors as "period 2.0e-4, energy ..."."""
-    return ", ".join(f"{name} {number(value)}" for name, value in errors.items())
 
 
 def ratios_table(ratios: list[Ratio]) -> Table:

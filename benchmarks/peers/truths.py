@@ -43,9 +43,9 @@ class BallScene(ABC):
     title: str
     surface: shapes.Surface
     duration: float
-    record_dt: float
-    dts: tuple[float, ...]
     position: Vector
+    record_dt: float = 1e-3
+    dts: tuple[float, ...] = (1e-3, 2e-4, 1e-4, 5e-5)
     velocity: Vector = (0.0, 0.0, 0.0)
     angular_velocity: Vector = (0.0, 0.0, 0.0)
     radius: float = RADIUS

@@ -123,6 +123,7 @@ def main() -> int:
             found.append(read(folder / "report.json"))
         sections = [section for one in found for section in one["sections"]]
         data = found[0] | {"sections": sections}
+        data.pop("files", None)  # they are not beside it
         blocks_of(data)
         text = json.dumps(data, indent=1, ensure_ascii=False) + "\n"
         with atomic_file(ROOT / DATA) as file:

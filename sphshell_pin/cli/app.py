@@ -238,7 +238,7 @@ def changes_of(
     changes = dict(stated_pairs("--set", set_ or [], must))
     for key, value in (("run.dt", dt), ("run.duration", duration)):
         changes |= {} if value is None else {key: repr(value)}
-    return changes | ({"robot.compiled": "true"} if compiled else {})
+    return changes | ({"robot.0.compiled": "true"} if compiled else {})
 
 
 def xacro_args_of(stated: list[str] | None) -> dict[str, str]:

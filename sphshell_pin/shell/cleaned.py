@@ -17,6 +17,18 @@ Array: TypeAlias = NDArray[Any]
 Arrays = Mapping[str, Array]
 Known: TypeAlias = dict[str, tuple[str, tuple[str | int, ...]]]
 """Numbers and shape of arrays by name: letters stand for sizes that several of them share."""
+ARRAYS: Known = {
+    "vertices": ("f8", ("n", 3)),
+    "elements": ("i4", ("m", 4)),
+    "triangles": ("i4", ("t", 3)),
+    "triangle_element": ("i4", ("t",)),
+    "source_element": ("i4", ("m",)),
+    "normals": ("f8", ("t", 3, 3)),
+    "element_face": ("i4", ("m",)),
+    "face_shapes": ("f8", ("f", 9)),
+    "straight": ("b1", ("t", 3)),
+}
+"""Those of a CleanedSurface, with n vertices, m elements, t triangles and f faces."""
 
 
 @dataclass(frozen=True)

@@ -7,19 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from sphshell_pin.errors import InvalidShell
-from sphshell_pin.shell.cleaned import Array, Arrays, Known, check_arrays
+from sphshell_pin.shell.cleaned import ARRAYS, Array, Arrays, Known, check_arrays
 from sphshell_pin.shell.raw import KINDS
 from sphshell_pin.shell.shell import Shell
 
-# Numbers and shape of each, with n vertices, m elements, t triangles and f faces.
+# A shell of these finds the other two again.
 _ARRAYS: Known = {
-    "vertices": ("f8", ("n", 3)),
-    "elements": ("i4", ("m", 4)),
-    "triangles": ("i4", ("t", 3)),
-    "normals": ("f8", ("t", 3, 3)),
-    "element_face": ("i4", ("m",)),
-    "face_shapes": ("f8", ("f", 9)),
-    "straight": ("b1", ("t", 3)),
+    name: one for name, one in ARRAYS.items() if name not in ("triangle_element", "source_element")
 }
 _ALWAYS = ("vertices", "elements", "triangles")
 

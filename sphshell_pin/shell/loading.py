@@ -64,7 +64,9 @@ def _load_cad(
         return known[0]
     heard: list[Warning] = []
     read: Read = run_in_child("read", arguments, file, purpose, cad, heard=heard)
-    kept.save(read, heard)
+    # Unless the file was saved anew meanwhile.
+    if KeptSurface.of(file, cad, (unit, number, crease_angle)) == kept:
+        kept.save(read, heard)
     return read
 
 

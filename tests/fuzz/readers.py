@@ -21,6 +21,7 @@ from sphshell_pin.export.mcap import write_mcap
 from sphshell_pin.export.tables import write_tables
 from sphshell_pin.patches import TaxelGrid
 from sphshell_pin.plot.compare import plot_compare
+from sphshell_pin.regular_file import read_bytes
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.study.compare import compare, measured, tables_of
@@ -115,9 +116,9 @@ def read_measured(path: Path) -> None:
 
 def read_run(home: Path) -> None:
     """Look at the results in a folder in one of the ways that there are, or two."""
-    run = home / "run.npz"
-    whole = run.is_file() and 0 < run.stat().st_size < 1e7
-    number = zlib.crc32(run.read_bytes()) if whole else 0
+    run, number = home / "run.npz", 0
+    with contextlib.suppress(OSError):
+        number = zlib.crc32(read_bytes(run, 1e7))
     fault = None
     for way in (LOOKS[0], LOOKS[number % len(LOOKS)]):
         try:

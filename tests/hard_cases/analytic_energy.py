@@ -31,6 +31,7 @@ from tests.hard_cases.balls import (
     PRECISE,
     RADIUS,
     bristle,
+    exact_scene,
     free_ball,
     scene_of,
     spring,
@@ -81,7 +82,7 @@ def swings() -> Verdicts:
 def exact_swings() -> Verdicts:
     """What the surface has no part in: a contact source is called at every evaluation."""
     tried = "20 swings, the surface by its formula (contact source)"
-    yield from of_energy(tried, drift(swing.exact_scene(), 20), 1e-8)
+    yield from of_energy(tried, drift(exact_scene(), 20), 1e-8)
 
 
 def free_body(moments: tuple[float, float, float]) -> pin.Model:

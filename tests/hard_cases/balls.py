@@ -13,6 +13,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.arrays import Array
 from sphshell_pin.dynamics import Result
+from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.swing import GRAVITY, MASS, RADIUS
 from tests.rolling import PRECISE, RATIO, Ball, state, turned, velocities
 
@@ -63,3 +64,17 @@ def center_at(result: Result, t: float) -> tuple[Array, Array]:
 def event_times(result: Result, kind: str) -> list[float]:
     """Return when contacts of a kind of event came [s]."""
     return [event.t for event in result.events if event.kind == kind]
+
+
+def exact_scene() -> sp.Scene:
+    """Return the ball and the exact bowl; what is wrong there is the stepper's."""
+
+    def touch(ball: pin.SE3, _: pin.SE3) -> tuple[list[Array], list[Array], list[float]]:
+        center: Array = ball.translation
+        out = float(np.linalg.norm(center))
+        outward = center / out
+        return [swing.BOWL * outward], [-outward], [out - swing.ARM]
+
+    scene = sp.Scene(swing.ball_model())
+    scene.add_contact_source(touch, "ball", "universe", swing.LAW)
+    return scene

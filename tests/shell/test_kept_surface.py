@@ -97,6 +97,17 @@ def test_a_warning_of_the_first_reading_is_given_again(reads: list[str]) -> None
     assert len(reads) == 1
 
 
+def test_files_that_others_of_the_group_may_write_by_default_are_kept(reads: list[str]) -> None:
+    """With the umask 002 of many systems new files belong to the group."""
+    before = os.umask(0o002)
+    try:
+        for _ in range(2):
+            load(PART)
+    finally:
+        os.umask(before)
+    assert len(reads) == 1
+
+
 def test_without_a_folder_nothing_is_kept(
     reads: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -252,6 +252,18 @@ def test_a_line_with_a_right_checksum_and_no_figures_is_done_again(finished, fig
     assert [", line 2: is damaged" in note for note in found.notes] == [True]
 
 
+def test_a_journal_of_damaged_lines_alone_is_kept(finished):
+    path, _, journal = finished
+    head, _, lines = journal.read_bytes().partition(b"\n")
+    damaged = head + b"\n" + lines.replace(b'"run"', b'"ran"')
+    journal.write_bytes(damaged)
+    Journal(journal, plan_sweep(path, SMALL).head, 4).close()
+    assert journal.read_bytes() == damaged
+    journal.write_bytes(head + b"\n" + lines[:20])
+    Journal(journal, plan_sweep(path, SMALL).head, 4).close()
+    assert not journal.exists()
+
+
 def test_done_runs_are_not_done_again(scenario):
     path, out = scenario, scenario.parent / "done.parquet"
     sweep(path, SMALL, workers=0, out=out)

@@ -108,3 +108,17 @@ def test_no_scheduler_is_told(tmp_path, monkeypatch):
     for address in ("tcp://127.0.0.1:9", "pigeon://127.0.0.1:9", "localhost:99999"):
         with pytest.raises(SweepError, match=f"no Dask scheduler answers at {address}"):
             sweep(write(tmp_path), VARY, scheduler=address)
+
+
+def test_an_address_of_ipv6_is_understood(monkeypatch, scenario):
+    asked = []
+
+    def connect(place, timeout):
+        asked.append(place)
+        raise OSError("nobody answers")
+
+    monkeypatch.setattr("socket.create_connection", connect)
+    for address in ("tcp://[::1]:8786", "[::1]:8786", "localhost:8786"):
+        with pytest.raises(SweepError, match="nobody answers"):
+            sweep(scenario, VARY, scheduler=address)
+    assert asked == [("::1", 8786), ("::1", 8786), ("localhost", 8786)]

@@ -1,14 +1,23 @@
-"""The command sweep: killed, interrupted, and taken up again; and what it prints."""
+"""Sweeps killed, interrupted, and taken up again; and what the command prints."""
 
 import contextlib
+import errno
+import io
 import os
 import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from unittest.mock import Mock
 
 import pytest
 
+from sphshell_pin.errors import ResultError
+from sphshell_pin.study.sweep import local
+from sphshell_pin.study.sweep.job import DONE, Outcome, Run
+from sphshell_pin.study.sweep.journal import Journal
 from tests.command import call, refused
 from tests.study.resting import check_once, entries
 
@@ -108,6 +117,63 @@ def test_ctrl_c_tells_how_to_go_on(scenario, reference):
     assert call("sweep", scenario, *VARY, "--out", out, "--workers", "0").exit_code == 0
     check_once(out, RUNS)
     assert out.read_bytes() == reference
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_deaths_count_for_each_run_alone(monkeypatch, workers):
+    """The pools break under each run as often as `deaths` says."""
+    deaths = {0: 1, 1: 1, 2: 1, 4: 3}
+
+    class Pool:
+        _processes = None
+        broken = False
+
+        def __init__(self, *_, **__):
+            pass
+
+        def submit(self, call, job, run=None):
+            if self.broken:
+                raise BrokenProcessPool
+            future = Future()
+            if run is not None and deaths.get(run.number, 0):
+                deaths[run.number] -= 1
+                self.broken = True
+                future.set_exception(BrokenProcessPool())
+            else:
+                future.set_result(run and Outcome(run.number, DONE, "", {}))
+            return future
+
+        def shutdown(self, **_):
+            pass
+
+    monkeypatch.setattr(local, "ProcessPoolExecutor", Pool)
+    died: list[int] = []
+    found = list(local.run_locally(None, [Run(i, {}) for i in range(6)], workers, died.append))
+    assert sorted(one.number for one in found) == list(range(6))
+    assert [(one.number, one.error) for one in found if one.status != DONE] == [(4, local.KILLED)]
+    assert sum(died) == 6
+
+
+def test_a_full_disk_is_told_whenever_it_is_noticed(tmp_path, monkeypatch):
+    """The journal passes on what the system says, and closes without writing once more."""
+    journal = Journal(tmp_path / "x.journal", {}, 4)
+    real, full = journal._file, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    journal.add(Outcome(0, DONE, "", {}))
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", Mock(side_effect=full))
+        with pytest.raises(ResultError, match="No space left"):
+            journal.add(Outcome(1, DONE, "", {}))
+    # Writes of five bytes, then none.
+    patchy = Mock(wraps=real, closed=False)
+    patchy.write.side_effect = [*[5] * 3, full]
+    journal._file = patchy
+    with pytest.raises(ResultError, match="No space left"):
+        journal.add(Outcome(2, DONE, "", {}))
+    sent = [call.args[0] for call in patchy.write.call_args_list]
+    assert [len(sent[0]) - len(one) for one in sent] == [0, 5, 10, 15]
+    assert isinstance(real, io.RawIOBase)  # nothing is left for close() to write
+    journal.close()
+    assert real.closed
 
 
 def test_a_script_without_a_guard_is_told(scenario):

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/laws/gauss.hpp"
+
 namespace sphshell {
 namespace {
 

@@ -147,7 +147,7 @@ void Scene::use_compiled(const std::string& path) {
   core::JointEffects effects;
   try {
     effects.compiled = std::make_shared<core::CompiledRobot>(path, impl_->model);
-  } catch (const std::runtime_error& error) {
+  } catch (const std::exception& error) {
     throw InvalidParameter(
         "path", path,
         std::string("must be what compile_robot() made for this model: ") + error.what());

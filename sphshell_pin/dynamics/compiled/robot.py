@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from sphshell_pin import _core
-from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used
+from sphshell_pin import _core, regular_file
+from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used, write_own
 from sphshell_pin.dynamics.compiled.source import c_source
 from sphshell_pin.errors import InvalidParameter, SetupWarning, SphshellError
 
@@ -60,11 +60,10 @@ def compile_robot(model: pin.Model) -> Path:
     source, why = c_source(model)
     if source is None:
         raise InvalidParameter("model", model.name, f"cannot be compiled: {why}")
-    with tempfile.TemporaryDirectory(dir=folder, prefix="making-") as making:
+    with tempfile.TemporaryDirectory() as making:
         made = Path(making) / "robot.so"
         _compile(source, made)
-        os.chmod(made, 0o600)
-        os.replace(made, path)
+        write_own(path, regular_file.read_bytes(made))
     keep_newest(folder, _MOST_BYTES)
     _log.info("the robot is compiled: %.1f s", time.monotonic() - began)
     return path
@@ -76,10 +75,10 @@ def load_compiled(model: pin.Model) -> _core.CompiledRobot | None:
         path = compile_robot(model)
         try:
             return _core.CompiledRobot(str(path), model)
-        except RuntimeError:  # damaged, or of a version that had a fault: made once more
+        except RuntimeError:  # damaged, or of another version: made once more
             path.unlink(missing_ok=True)
             return _core.CompiledRobot(str(compile_robot(model)), model)
-    except (SphshellError, RuntimeError, OSError) as fault:
+    except (SphshellError, RuntimeError, OSError, ValueError) as fault:  # ValueError: inexact
         warnings.warn(
             f"the robot moves by Pinocchio's own algorithms, not compiled: {fault}",
             SetupWarning,
@@ -92,7 +91,7 @@ def _key(model: pin.Model) -> str:
     """Return what the object depends on, as a hash: model, generator, compiler, processor."""
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
+        digest.update(regular_file.read_bytes(path))
     compiler = shutil.which(_compiler()[0]) or ""
     about = os.stat(compiler) if compiler else None
     digest.update(repr((_compiler(), about and (about.st_size, about.st_mtime_ns))).encode())
@@ -108,8 +107,8 @@ def _compiler() -> list[str]:
 def _processor() -> str:
     """Return what instructions the processor has: the folder may be that of several machines."""
     try:
-        with open("/proc/cpuinfo") as file:
-            return next((line for line in file if line.startswith(("flags", "Features"))), "")
+        lines = regular_file.read_text("/proc/cpuinfo").splitlines()
+        return next((line for line in lines if line.startswith(("flags", "Features"))), "")
     except OSError:
         return platform.processor()
 

@@ -274,7 +274,7 @@ def _change(
 
     `data` is what the file of `scenario` gives.
     """
-    node, rest, _trail = _descend(data, key, path)
+    node, rest, _ = _descend(data, key, path)
     whole, _, index = key.rpartition(".")
     if index.isdecimal() and not isinstance(node, list):
         # One number of a list that stands at its default.
@@ -323,7 +323,9 @@ def _descend(
         single = node is data and head in LISTS and isinstance(heads[head], dict)
         trail = [*trail, _spelled_out(node, head)]
         rest, node = rest[len(head) + 1 :], heads[head]
-        # A table alone is a list of one: its name may stand in the key as in a list's.
+        # A table alone is a list of one: its name or number may stand in the key as in a list's.
+        if single:
+            rest = rest.removeprefix("0.")
         if single and (name := _item_name(node)) not in node:
             rest = rest.removeprefix(f"{name}.")
 

@@ -13,29 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin import _core
-from sphshell_pin.atomic import write_whole
-from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used
-from sphshell_pin.errors import ResultError, UnitWarning
+from sphshell_pin import _core, regular_file
+from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used, write_own
+from sphshell_pin.errors import UnitWarning
 from sphshell_pin.shell.cad.options import PACKAGE, CadOptions
-from sphshell_pin.shell.cleaned import Array, CleanedSurface, Known, check_arrays
+from sphshell_pin.shell.cleaned import ARRAYS, Array, CleanedSurface, check_arrays
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.readers.text import read_bytes
 
 MOST_BYTES = 500_000_000
 """Of all surfaces together; those used longest ago go."""
 
-_ARRAYS: Known = {
-    "vertices": ("f8", ("n", 3)),
-    "elements": ("i4", ("m", 4)),
-    "triangles": ("i4", ("t", 3)),
-    "triangle_element": ("i4", ("t",)),
-    "source_element": ("i4", ("m",)),
-    "normals": ("f8", ("t", 3, 3)),
-    "element_face": ("i4", ("m",)),
-    "face_shapes": ("f8", ("f", 9)),
-    "straight": ("b1", ("t", 3)),
-}
 _ALWAYS = ("vertices", "elements", "triangles", "triangle_element", "source_element")
 _DIGEST = hashlib.blake2b().digest_size
 
@@ -66,7 +54,7 @@ class KeptSurface:
         if self.path is None or not is_own(self.path):
             return None
         try:
-            whole = self.path.read_bytes()
+            whole = regular_file.read_bytes(self.path)
             content = memoryview(whole)[_DIGEST:]
             if hashlib.blake2b(content).digest() != whole[:_DIGEST]:
                 return None
@@ -87,7 +75,7 @@ class KeptSurface:
         if self.path is None or any(type(one) is not UnitWarning for one in heard):
             return
         surface, unit, factor = read
-        arrays = {k: v for k in _ARRAYS if (v := getattr(surface, k)) is not None}
+        arrays = {k: v for k in ARRAYS if (v := getattr(surface, k)) is not None}
         told = {
             "unit": unit,
             "factor": factor,
@@ -101,8 +89,8 @@ class KeptSurface:
         np.savez(buffer, allow_pickle=False, told=text, **arrays)
         content = buffer.getvalue()
         try:
-            write_whole(self.path, hashlib.blake2b(content).digest() + content)
-        except ResultError:
+            write_own(self.path, hashlib.blake2b(content).digest() + content)
+        except OSError:
             return  # a full disk: it is read again next time
         keep_newest(self.path.parent, MOST_BYTES)
 
@@ -111,8 +99,8 @@ def _surface(
     arrays: dict[str, Array], names: tuple[str, ...], health: ShellHealth, rounding: float
 ) -> CleanedSurface:
     """Return the surface; InvalidShell, TypeError or ValueError if the arrays are of none."""
-    given = {name: arrays[name] for name in _ARRAYS if name in arrays}
-    check_arrays(given, _ARRAYS, _ALWAYS)
+    given = {name: arrays[name] for name in ARRAYS if name in arrays}
+    check_arrays(given, ARRAYS, _ALWAYS)
     limits = {
         "elements": (-1, len(given["vertices"])),
         "triangles": (0, len(given["vertices"])),
@@ -134,10 +122,12 @@ def _health(values: dict[str, object]) -> ShellHealth:
 
 def _versions() -> tuple[object, ...]:
     """Return what the surface of a file depends on besides: the code that reads and cleans it."""
-    folder = Path(__file__).parent.parent
-    code = [*sorted(folder.rglob("*.py")), Path(_core.__file__)]
+    folder = Path(__file__).parents[2]
+    code = [*folder.glob("*.py"), *(folder / "shell").rglob("*.py"), Path(_core.__file__)]
     about = [
-        (path.name, found.st_size, found.st_mtime_ns) for path in code if (found := os.stat(path))
+        (path.name, found.st_size, found.st_mtime_ns)
+        for path in sorted(code)
+        if (found := os.stat(path))
     ]
     try:
         kernel = version(PACKAGE)

@@ -47,7 +47,6 @@ LARGEST_DRAWN = 0.3
 EXPLICIT = ("SemiImplicitEuler", "RungeKutta4", "Adaptive")
 ERRORS = (1e-2, 1e-4, 1e-6)
 TEXT = about(__doc__)
-TARGET = 1e-4  # error at which costs are compared
 LONG = 0.5  # [s]: runs that take longer are made once
 
 
@@ -112,21 +111,6 @@ def measure(case: Case, judge: Judge, rounds: int, progress: Progress = silent) 
         replace(row, cpu=max(float(np.median(times[i])) - setup, 0.0) / case.duration)
         for i, row in rows.items()
     ]
-
-
-def cost_at(rows: list[Row], integrator: str, what: str = "cpu", error: float = TARGET) -> float:
-    """Return the cost at which an integrator reaches `error`, and stays below it from there on.
-
-    Between two settings by a power law; nan where no two settings enclose the error.
-    """
-    curve = [(row.error, getattr(row, what)) for row in rows if row.integrator == integrator]
-    for (above, cheap), (below, dear) in zip(curve[-2::-1], curve[:0:-1], strict=True):
-        if below > error:
-            return math.nan
-        if above > error:
-            share = math.log(above / error) / math.log(above / below)
-            return float(cheap * (dear / cheap) ** share)
-    return math.nan
 
 
 def thinned(case: Case) -> Case:

@@ -63,10 +63,6 @@ class Judge:
         self.case = case
         self.known = [(type(i), case.figures(case.run(i))) for i in case.references]
 
-    def disagreement(self) -> float:
-        """Return the difference between the references."""
-        return difference(self.known[0][1], self.known[1][1])
-
     def error(self, integrator: Integrator, result: Result) -> float:
         """Return the largest error at any row of a result that `integrator` made."""
         figures = self.case.figures(result)

@@ -27,7 +27,6 @@ ENERGY = MASS * GRAVITY * ARM * (1 - math.cos(ANGLE))
 DT, LONG_DT, PERIODS = 1e-4, 2e-3, 4
 AZIMUTHS = 0.1 + np.linspace(0, 2 * np.pi, 8, endpoint=False)
 LEVELS = {0.6: 3, 0.3: 4, 0.15: 5}  # of the icosphere, by h / r
-BARS = {0.3: (5e-6, 1e-5), 0.15: (5e-7, 1e-6)}  # of period and energy, with exact normals
 
 
 @dataclass(frozen=True)
@@ -75,20 +74,6 @@ def mesh_scene(mesh: Mesh, method: str = "smooth", exact_normals: bool = True) -
     shell = Shell(mesh.vertices, mesh.triangles, normals=normals)
     scene = Scene(ball_model())
     scene.add_contact(Sphere(RADIUS, "ball"), shell, law=LAW, method=method)
-    return scene
-
-
-def exact_scene() -> Scene:
-    """Return the ball and the exact bowl; what is wrong there is the stepper's."""
-
-    def touch(ball: pin.SE3, _: pin.SE3) -> tuple[list[Array], list[Array], list[float]]:
-        center: Array = ball.translation
-        out = float(np.linalg.norm(center))
-        outward = center / out
-        return [BOWL * outward], [-outward], [out - ARM]
-
-    scene = Scene(ball_model())
-    scene.add_contact_source(touch, "ball", "universe", LAW)
     return scene
 
 
@@ -215,9 +200,3 @@ def measure(
         energy=max(run.energy for run in runs),
         cpu=float(np.mean([run.cpu for run in runs])),
     )
-
-
-def long_run(scene: Scene, center: Array, swings: int) -> Result:
-    """Run for so many periods of the bowl, with a row every millisecond."""
-    simulation = Simulation(scene, RungeKutta4(DT))
-    return simulation.run(center, duration=swings * closed_form(), record_dt=1e-3)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
 from itertools import islice
 from typing import Any, TypeAlias
+from urllib.parse import urlsplit
 
 from sphshell_pin.errors import InvalidParameter, SweepError
 from sphshell_pin.study.sweep.job import FAILED, Job, Outcome, Run, need
@@ -70,8 +71,9 @@ def _client(address: str) -> Client:
     distributed = need("distributed")
     try:
         # A client that cannot connect gives up after half a minute.
-        host, _, port = address.rpartition("//")[2].rpartition(":")
-        socket.create_connection((host, int(port)), _CONNECT_TIMEOUT).close()
+        parts = urlsplit(address if "//" in address else f"//{address}")  # no brackets of IPv6
+        place = parts.hostname or "", parts.port or 0
+        socket.create_connection(place, _CONNECT_TIMEOUT).close()
         return distributed.Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     # Another server at that address may be misread in any way.
     except Exception as fault:

@@ -14,6 +14,8 @@ import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from sphshell_pin import regular_file
+from sphshell_pin.atomic.file import sync_folder
 from sphshell_pin.atomic.lock import lock_file
 from sphshell_pin.errors import ResultError, SweepError
 from sphshell_pin.study.sweep.job import JsonObject, Outcome
@@ -58,7 +60,7 @@ class Journal:
         self.notes: list[str] = []
         """What is damaged, one sentence each."""
         try:
-            self._file = os.fdopen(lock_file(path, wait=False)[0], "r+b")
+            self._file = os.fdopen(lock_file(path, wait=False)[0], "r+b", buffering=0)
         except BlockingIOError:
             raise SweepError(f"{path}: another sweep is writing it; give another --out") from None
         except OSError as fault:
@@ -88,24 +90,25 @@ class Journal:
         self.outcomes[outcome.number] = outcome
 
     def close(self) -> None:
-        """Let other processes write the journal; one without any run is removed."""
-        if not self._file.closed and not self.outcomes:
+        """Let other processes write the journal; one of a head alone is removed."""
+        if not self._file.closed and not self.outcomes and not self.notes:
             self.path.unlink(missing_ok=True)
         self._file.close()
 
     def _write(self, line: bytes) -> None:
         try:
-            self._file.write(line)
-            self._file.flush()
+            while line:
+                line = line[self._file.write(line) :]
             os.fsync(self._file.fileno())
         except OSError as fault:
             raise self._broken(fault) from None
 
     def _begin(self, head: JsonObject, runs: int) -> None:
-        whole = self._file.read()
+        whole = regular_file.read_bytes(self.path)
         first, *lines = whole.split(b"\n")
         if not whole:
             self._write(json.dumps(head).encode() + b"\n")
+            sync_folder(self.path.parent)
             return
         try:
             found = json.loads(first)

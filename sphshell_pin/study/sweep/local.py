@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import queue
 import signal
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from itertools import islice
 from typing import TypeVar
 from unittest.mock import patch
 
@@ -42,53 +43,74 @@ def run_locally(
 ) -> Generator[Outcome, None, None]:
     """Yield the outcome of each run, as they come, from `workers` processes.
 
-    A process that dies takes the whole pool with it: `died` is called with 1, and what has no
-    outcome is done again. The last of MOST_DEATHS times one process does it, in order: if it dies,
-    too, it is known of which run. Closing this iterator ends the processes at once.
+    A process that dies takes the whole pool with it. The pool is replaced, and the runs that were
+    under way are done again; a run that was under way at two deaths is tried alone after all
+    others. `died` is called with 1 at each death. Closing this iterator ends the processes at once.
 
     Raises
     ------
     SweepError
         The workers cannot be started, or cannot do any run.
     """
-    waiting = {run.number: run for run in runs}
-    deaths = 0
-    while waiting:
-        alone = deaths == MOST_DEATHS - 1
-        try:
-            for outcome in _pool(job, list(waiting.values()), 1 if alone else workers):
-                del waiting[outcome.number]
+    waiting, suspects = deque(runs), deque[Run]()
+    deaths: Counter[int] = Counter()
+    while waiting or suspects:
+        some, count = (waiting, workers) if waiting else (suspects, 1)
+        broken = False
+        for run, outcome in _pool(job, some, count):
+            if outcome is not None:
                 yield outcome
-        except BrokenProcessPool:
+                continue
+            broken = True
+            deaths[run.number] += 1
+            if deaths[run.number] == MOST_DEATHS:
+                yield Outcome(run.number, FAILED, KILLED, {})
+            else:
+                (waiting if deaths[run.number] == 1 else suspects).appendleft(run)
+        if broken:
             died(1)
-            deaths += 1
-            if alone:
-                first = next(iter(waiting))
-                del waiting[first]
-                deaths = 0
-                yield Outcome(first, FAILED, KILLED, {})
 
 
-def _pool(job: Job, runs: Sequence[Run], count: int) -> Iterator[Outcome]:
-    """Yield the outcomes of runs, of which one process at most does each at a time, in order."""
+def _pool(job: Job, runs: deque[Run], count: int) -> Iterator[tuple[Run, Outcome | None]]:
+    """Take runs from `runs` and yield each with its outcome, None where the pool broke under it.
+
+    Ends when all are done, or the pool is broken.
+    """
     # "spawn": a fresh interpreter, without the threads and locks of this one.
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(count, len(runs)), context, initializer=_begin)
+    ended = queue.SimpleQueue[Future[Outcome]]()
+    under_way: dict[Future[Outcome], Run] = {}
+    broken = False
     try:
-        try:
-            _submit(pool, prepare, job).result()
-        except BrokenProcessPool:
-            raise SweepError(
-                "a worker process ended before it was ready; a script must call sweep below "
-                'if __name__ == "__main__":'
-            ) from None
-        waiting = iter(runs)
-        under_way = {_submit(pool, run_one, job, run) for run in islice(waiting, count)}
-        while under_way:
-            done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
-            outcomes = [future.result() for future in done]
-            under_way |= {_submit(pool, run_one, job, run) for run in islice(waiting, len(done))}
-            yield from outcomes
+        _submit(pool, prepare, job).result()
+        while True:
+            while runs and len(under_way) < count and not broken:
+                run = runs.popleft()
+                try:
+                    future = _submit(pool, run_one, job, run)
+                except BrokenProcessPool:  # a process died that had nothing to do
+                    runs.appendleft(run)
+                    broken = True
+                    break
+                under_way[future] = run
+                future.add_done_callback(ended.put)
+            if not under_way:
+                return
+            future = ended.get()
+            run = under_way.pop(future)
+            try:
+                outcome = future.result()
+            except BrokenProcessPool:
+                broken = True
+                yield run, None
+            else:
+                yield run, outcome
+    except BrokenProcessPool:
+        raise SweepError(
+            "a worker process ended before it was ready; a script must call sweep below "
+            'if __name__ == "__main__":'
+        ) from None
     finally:
         # Before Python 3.14 no public method ends a process that is in a run.
         for process in list((pool._processes or {}).values()):

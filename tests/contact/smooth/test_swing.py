@@ -7,12 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sphshell_pin import Scene
+from sphshell_pin import RungeKutta4, Scene, Simulation
 from sphshell_pin.arrays import Array
+from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.surfaces import Mesh, icosphere
+from tests.hard_cases.balls import exact_scene
 
 PERIODS = 2
+BARS = {0.3: (5e-6, 1e-5), 0.15: (5e-7, 1e-6)}  # of period and energy, with exact normals
 # The elements are far better than the bars that were asked for; keep them so.
 BETTER = 50
 exact_period = cache(swing.reference_period)
@@ -23,7 +26,7 @@ def test_reference_periods_agree() -> None:
     """The closed form leaves out the second order of m g / (k L), 0.0016; the rest is exact."""
     period = exact_period(periods=PERIODS)
     assert swing.closed_form() == pytest.approx(period, rel=3e-6)
-    assert swing.swing(swing.exact_scene(), 0.7, swing.DT, PERIODS).period == pytest.approx(
+    assert swing.swing(exact_scene(), 0.7, swing.DT, PERIODS).period == pytest.approx(
         period, rel=1e-9
     )
     assert (
@@ -39,13 +42,13 @@ def test_crossings_of_a_cosine() -> None:
 
 
 @pytest.mark.parametrize("exact_normals", [True, False])
-@pytest.mark.parametrize("side", swing.BARS)
+@pytest.mark.parametrize("side", BARS)
 def test_period_and_energy(side: float, exact_normals: bool) -> None:
     scene = swing.mesh_scene(swing.bowl(side), exact_normals=exact_normals)
     row = swing.measure(
         scene, exact_period(periods=PERIODS), swing.AZIMUTHS[::2], swing.DT, PERIODS
     )
-    period_bar, energy_bar = swing.BARS[side]
+    period_bar, energy_bar = BARS[side]
     assert row.rms <= period_bar / BETTER
     assert row.energy <= energy_bar / BETTER
 
@@ -54,17 +57,21 @@ def test_swing_along_edges() -> None:
     """Two mirror planes of the mesh, full of edges and vertices, are the planes of the swings."""
     scene = swing.mesh_scene(swing.bowl(0.3, np.eye(3)))
     row = swing.measure(scene, exact_period(periods=PERIODS), (0.0, np.pi / 2), swing.DT, PERIODS)
-    period_bar, energy_bar = swing.BARS[0.3]
+    period_bar, energy_bar = BARS[0.3]
     assert row.rms <= period_bar / BETTER
     assert row.energy <= energy_bar / BETTER
 
 
+def long_run(scene: Scene, center: Array, swings: int) -> Result:
+    """Run for so many periods of the bowl, with a row every millisecond."""
+    simulation = Simulation(scene, RungeKutta4(swing.DT))
+    return simulation.run(center, duration=swings * swing.closed_form(), record_dt=1e-3)
+
+
 def test_energy_does_not_grow() -> None:
     """Twenty swings: within the bar throughout, and always one contact."""
-    result = swing.long_run(
-        swing.mesh_scene(swing.bowl(0.3)), swing.start(float(swing.AZIMUTHS[1])), 20
-    )
-    assert np.abs(swing.energy_changes(result)).max() <= swing.BARS[0.3][1]
+    result = long_run(swing.mesh_scene(swing.bowl(0.3)), swing.start(float(swing.AZIMUTHS[1])), 20)
+    assert np.abs(swing.energy_changes(result)).max() <= BARS[0.3][1]
     assert (result.contacts.row == np.arange(len(result.t))).all()
 
 
@@ -95,11 +102,11 @@ def ellipsoid_energy(scene: Scene, azimuth: float, swings: int) -> float:
     """Return the largest change of energy over the energy of a swing in the ellipsoid."""
     center = ellipsoid_start(azimuth)
     fall = float(center[2] + ELLIPSOID[2] - swing.RADIUS)
-    result = swing.long_run(scene, center, swings)
+    result = long_run(scene, center, swings)
     changes = swing.energy_changes(result, swing.MASS * swing.GRAVITY * fall)
     return float(np.abs(changes).max())
 
 
 @pytest.mark.parametrize("azimuth", [0.1, 0.9])
 def test_energy_in_an_uneven_ellipsoid(azimuth: float) -> None:
-    assert ellipsoid_energy(swing.mesh_scene(ellipsoid(4)), azimuth, 10) <= swing.BARS[0.3][1]
+    assert ellipsoid_energy(swing.mesh_scene(ellipsoid(4)), azimuth, 10) <= BARS[0.3][1]

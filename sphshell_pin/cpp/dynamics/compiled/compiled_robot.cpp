@@ -102,7 +102,7 @@ void CompiledRobot::check(const pinocchio::Model& model) const {
   if (worst <= kAgreement) return;
   char text[16];
   std::snprintf(text, sizeof text, "%.1e", worst);
-  throw std::runtime_error("'" + path_ + "' differs from Pinocchio by " + text +
+  throw std::domain_error("'" + path_ + "' differs from Pinocchio by " + text +
                            " of the largest number of an answer");
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
+#include <utility>
 
 namespace sphshell {
 namespace {
@@ -42,6 +44,8 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     // The plane of the largest triangle is off far from it, by the rounding of its corners: where
     // triangles stand off by little, the plane is fitted to what was found, which is looked for
     // again.
+    std::pair<Vec3, Vec3> last;  // normal and origin before the fit
+    bool settled = false;
     for (std::size_t before = 0, round = 0;; ++round) {
       bool any_beside = false;
       const auto lies_in_plane = [&](int t) {
@@ -68,8 +72,17 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
           found.push_back(u);
         }
       }
-      if (!any_beside || found.size() < kFewToFit || found.size() <= before || round == kMostRounds)
+      if (!settled && found.size() < before) {
+        // The fit was ill-conditioned, as of needles in a line: back to the plane before.
+        std::tie(out.normal, origin) = last;
+        settled = true;
+        for (const int t : found) of_[t] = -1;
+        continue;
+      }
+      if (settled || !any_beside || found.size() < kFewToFit || found.size() == before ||
+          round == kMostRounds)
         break;
+      last = {out.normal, origin};
       before = found.size();
       // Least squares over the areas, by their moments about the first triangle.
       Vec3 middle = Vec3::Zero();

@@ -372,11 +372,12 @@ void Recognizer::add_planes(Faces& faces) const {
         sagitta = std::min(sagitta, turn(int(t), u) * std::min(here, there) / 8);
     }
   }
-  // Whoever divides what is round into narrow strips there makes no turns that are much larger, nor
-  // chords that stand off much more than those of the faces that were found.
-  double most = std::numeric_limits<double>::infinity();
-  if (!faces_.empty()) most = 0;
-  for (const Growth& face : faces_) most = std::max(most, face.deviation);
+  // A program that divides a round surface into narrow strips makes no turns that are much larger,
+  // and no chords that stand off much more, than those of the faces that were found.
+  double most = -1;
+  for (const int face : of_)
+    if (face >= 0) most = std::max(most, faces_[face].deviation);
+  if (most < 0) most = std::numeric_limits<double>::infinity();
   for (std::size_t r = 0; r < count; ++r) {
     const auto& [narrow, alike, sagitta] = turns[r];
     const bool sharper = alike > kMuchSharper * narrow ||
