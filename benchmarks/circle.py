@@ -22,7 +22,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.machine import machine
 from sphshell_pin.study.report.timing import one_core
 

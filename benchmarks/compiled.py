@@ -16,7 +16,7 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin import robots
-from sphshell_pin.cache import CACHE
+from sphshell_pin.base.cache import CACHE
 
 STEPS, ROUNDS, RADIUS = 4000, 15, 0.012
 Q = np.array([0, 0.35, 0, -2.0, 0, 2.35, 0.8, 0.02, 0.02])

@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.processes import OwnProcess, resident
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import (
     TIME_COLUMNS,
     TIMES,

@@ -17,7 +17,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from benchmarks.peers.merged import text
 from sphshell_pin.adapters.mujoco import attach
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario import build
 
 STATES, ROUNDS, CALLS = 1000, 15, 2000

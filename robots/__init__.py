@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.mimic import shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
-from sphshell_pin.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.robots.description import Description, check_poses, check_size, parsed
 from sphshell_pin.robots.files import (
     RobotError,

@@ -14,7 +14,7 @@ from xml.parsers import expat
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.robots.packages import Folders
 

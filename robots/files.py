@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import ShellFileError, SphshellError
-from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.robots.plain_mesh import collada_unit, refused_reference

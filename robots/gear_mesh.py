@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell import Shell
 
 MODULE = 0.005

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_positive
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_positive
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.robots.description import Description

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_placement, check_type
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_placement, check_type
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import InvalidParameter

@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin._interrupts import interrupts_delayed
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import import_extra
 from sphshell_pin.robots.description import MOST_LINKS, Description, check_memory
 from sphshell_pin.robots.mjcf_compile import LEFT_OUT, Compiled, silent

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from sphshell_pin._interrupts import interrupts_delayed
-from sphshell_pin.regular_file import read_bytes
+from sphshell_pin.base.regular_file import read_bytes
 from sphshell_pin.robots.description import MOST_LINKS
 from sphshell_pin.robots.packages import Folders
 

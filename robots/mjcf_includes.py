@@ -6,7 +6,7 @@ import os
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from sphshell_pin.regular_file import read_bytes
+from sphshell_pin.base.regular_file import read_bytes
 from sphshell_pin.robots.description import DEEPEST, check_size, parsed
 
 MOST_FILES = 1000

@@ -12,7 +12,7 @@ from os import PathLike
 from pathlib import Path
 from urllib.parse import unquote
 
-from sphshell_pin.regular_file import MOST_TEXT, read_bytes
+from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
 
 # Folders one within another below one of ROS_PACKAGE_PATH; a workspace has three.
 _DEEPEST = 5

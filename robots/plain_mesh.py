@@ -15,8 +15,8 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.regular_file import MOST_TEXT, open_regular, read_bytes
 from sphshell_pin.robots.description import check_size
 from sphshell_pin.shell.readers.mesh import STL_RECORD, stl_corners
 from sphshell_pin.shell.readers.ply import parse_ply

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.regular_file import open_regular
 from sphshell_pin.robots.files import build_model, read
 from sphshell_pin.robots.inertia import mass_fault
 

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from sphshell_pin.limits import limit_memory
+from sphshell_pin.base.limits import limit_memory
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.robots.xacro_expressions import install
 

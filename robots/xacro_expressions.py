@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import count, islice
 from typing import Any
 
-from sphshell_pin.regular_file import read_bytes
+from sphshell_pin.base.regular_file import read_bytes
 
 MOST_STEPS = 300_000
 """Nodes that are evaluated for a file; a robot takes some thousands."""

@@ -15,9 +15,9 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from sphshell_pin.base.limits import child_command, last_line
+from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.errors import MissingExtra
-from sphshell_pin.limits import child_command, last_line
-from sphshell_pin.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.robots.packages import Folders
 
 TIME_LIMIT = 5.0

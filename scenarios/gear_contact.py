@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import Result, Scene
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import SceneContacts
 
 TEETH_1, TEETH_2 = 20, 40

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.testing.differences import _AHEAD as AHEAD
 from sphshell_pin.testing.differences import _PLACES as PLACES
 from sphshell_pin.testing.differences import differentiated as derivative

@@ -22,7 +22,7 @@ from sphshell_pin import (
     Simulation,
     Sphere,
 )
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.models import model_of

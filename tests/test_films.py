@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from sphshell_pin.base.films import write_film
 from sphshell_pin.errors import MissingExtra, ResultError
-from sphshell_pin.films import write_film
 
 COLORS = np.array([[200, 30, 40], [30, 180, 60], [40, 60, 210], [240, 240, 240]], np.uint8)
 

@@ -289,7 +289,7 @@ def test_no_two_layers_import_each_other(graph: dict[str, set[str]]) -> None:
 
 
 def test_what_a_value_offers_of_upper_layers_exists(graph: dict[str, set[str]]) -> None:
-    """Such functions are named and not imported: `sphshell_pin.offered`."""
+    """Such functions are named and not imported: `sphshell_pin.base.offered`."""
     named = {}
     for module, file in files_of(PACKAGE).items():
         for name in re.findall(r'offered\(\s*"([\w.]+:\w+)"', file.read_text(encoding="utf-8")):

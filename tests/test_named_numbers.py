@@ -8,10 +8,10 @@ import json
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.base.parameters import parameters_of
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError
-from sphshell_pin.parameters import parameters_of
 from sphshell_pin.scenario import build, live_parameters, rebuild
 from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.sweep.plan import plan_sweep

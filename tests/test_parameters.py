@@ -11,12 +11,12 @@ from pydantic import TypeAdapter, ValidationError
 
 import sphshell_pin as sp
 from sphshell_pin import _core
+from sphshell_pin.base.parameters import Component, parameter, parameters_of
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, parameter, parameters_of
 from sphshell_pin.scenario.format import shape_tables as primitives
 from sphshell_pin.scenario.format.shape_tables import Primitive
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from sphshell_pin.regular_file import open_regular, read_bytes, read_text
+from sphshell_pin.base.regular_file import open_regular, read_bytes, read_text
 
 PACKAGE = Path(__file__).parents[1]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from sphshell_pin import sandbox
-from sphshell_pin.limits import child_command
+from sphshell_pin.base import sandbox
+from sphshell_pin.base.limits import child_command
 
 CHILD = """
 import ctypes, json, os, resource, signal, socket, threading

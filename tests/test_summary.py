@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized, names, show_value
 from sphshell_pin.study.fit.report import Fitted
-from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized, names, show_value
 from tests.models import ball
 
 RADIUS = 0.01

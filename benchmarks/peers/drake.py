@@ -24,7 +24,7 @@ from benchmarks.peers.press import FRAME, PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
 from benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.swing import BOWL
 
 GUIDE = "Drake, Hydroelastic Contact User Guide"

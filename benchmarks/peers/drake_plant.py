@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.peers.engine import CannotDo, Params
 from benchmarks.peers.scenes import Scene
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 
 def empty(params: Params, gravity: Any) -> tuple[Any, Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, Protocol
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 if TYPE_CHECKING:
     from benchmarks.peers.scenes import Scene

@@ -13,7 +13,7 @@ from benchmarks.peers.press import FRAME, PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
 from benchmarks.peers.truths import BallScene, Bowl, Cylinder, Groove, Impact, Plate, Turntable
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 # A contact of impedance d answers the share d of a load by itself and leaves 1 - d to the spring:
 # at the least impedance that MuJoCo has it is the spring of the scene. Friction needs more of it.

@@ -15,7 +15,7 @@ from benchmarks.peers.press import FRAME, PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
 from benchmarks.peers.truths import BallScene, Bowl, Impact
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.run.advance import advance, start_run
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
 from sphshell_pin.study.report.models import model_of

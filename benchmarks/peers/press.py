@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from benchmarks.peers import shapes
 from benchmarks.peers.engine import Trajectory
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.study.report import steps as panda
 from sphshell_pin.study.report.surfaces import height as wavy_height

@@ -15,7 +15,7 @@ from benchmarks.peers.press import PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
 from benchmarks.peers.truths import BallScene, Bowl, Impact
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 SCALE = 10.0  # of lengths; masses and times stay, forces grow as lengths do, torques as squares
 GUIDE = "PyBullet Quickstart Guide"

@@ -13,7 +13,7 @@ from benchmarks.peers.press import FRAME, PressScene, at_the_end
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
 from benchmarks.peers.truths import BallScene, Bowl
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.queries import coal_tree
 from sphshell_pin.study.report.steps import bare
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.surfaces import height as wavy_height
 from sphshell_pin.study.report.surfaces import random_grid, wavy_sheet

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from benchmarks.peers import shapes
 from benchmarks.peers.engine import Trajectory
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report import swing
 
 Vector = tuple[float, float, float]

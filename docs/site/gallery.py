@@ -17,7 +17,7 @@ from typing import Any
 
 from PIL import Image, ImageOps
 
-from sphshell_pin.atomic import write_whole
+from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.scenario import run_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.schema import Expected
 from sphshell_pin.scenario.running.run import RunReport

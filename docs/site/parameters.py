@@ -6,10 +6,10 @@ import dataclasses
 from typing import Any
 
 import sphshell_pin as sp
-from sphshell_pin.parameters import parameters_of
+from sphshell_pin.base.parameters import parameters_of
 from sphshell_pin.scenario.format import shape_tables as primitives
 
-# Annotations of parameters that are numbers; see sphshell_pin.parameters.
+# Annotations of parameters that are numbers; see sphshell_pin.base.parameters.
 NUMBERS = ("float",)
 
 

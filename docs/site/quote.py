@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from sphshell_pin.atomic import atomic_file
+from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.study.report.contents import Table, columns
 
 Data = dict[str, Any]

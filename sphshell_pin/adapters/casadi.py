@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin.adapters import imports_of
 from sphshell_pin.adapters.evaluator import check_fixed_step, check_without_history
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_names, check_type
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_names, check_type
+from sphshell_pin.base.named_numbers import find_name, names_of_pairs
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.dynamics.scene.variations import Variations
-from sphshell_pin.named_numbers import find_name, names_of_pairs
 
 with imports_of("casadi"):
     import casadi

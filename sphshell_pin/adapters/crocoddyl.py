@@ -29,8 +29,8 @@ from sphshell_pin.adapters.evaluator import (
     check_fixed_step,
     check_without_history,
 )
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_placement, check_type, check_vector
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_placement, check_type, check_vector
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.errors import InvalidParameter
 

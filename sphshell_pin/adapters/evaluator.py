@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_type
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_type
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.dynamics.run.advance import step_of
 from sphshell_pin.errors import InvalidParameter

@@ -24,8 +24,8 @@ import pinocchio as pin
 from sphshell_pin import _core
 from sphshell_pin.adapters import imports_of
 from sphshell_pin.adapters.mujoco_memory import layout, memory_of, reserve
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_names, check_placement, check_type
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_names, check_placement, check_type
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.contact.sphere import Sphere

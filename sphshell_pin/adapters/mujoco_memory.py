@@ -10,7 +10,7 @@ import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.adapters import imports_of
-from sphshell_pin.checks import check_type
+from sphshell_pin.base.checks import check_type
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.explain import has_state
 from sphshell_pin.errors import InvalidParameter, SphshellError

@@ -18,8 +18,8 @@ import typer
 
 from sphshell_pin import errors
 from sphshell_pin._interrupts import interrupts_heard
-from sphshell_pin.cache import CACHE
-from sphshell_pin.checks import stated_pairs
+from sphshell_pin.base.cache import CACHE
+from sphshell_pin.base.checks import stated_pairs
 from sphshell_pin.cli.printing import lossy_streams
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 

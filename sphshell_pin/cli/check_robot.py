@@ -87,7 +87,7 @@ def check_robot_(
 
     Example: sphshell-pin check-robot panda my_robot.urdf
     """
-    from sphshell_pin.atomic import write_whole
+    from sphshell_pin.base.atomic import write_whole
     from sphshell_pin.study import robot_check as study
     from sphshell_pin.study.robot_check import models, report
 

@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from sphshell_pin.base.tables import column
 from sphshell_pin.cli.app import argument, command, if_installed, option, print_table, say
 from sphshell_pin.cli.export import file_of, with_scene
-from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
     from sphshell_pin.study.compare import Difference
@@ -33,12 +33,12 @@ def compare(
 
     Example: sphshell-pin compare results/soft results/stiff
     """
-    from sphshell_pin.atomic.files import write_folder
+    from sphshell_pin.base.atomic.files import write_folder
+    from sphshell_pin.base.tables import csv_text
     from sphshell_pin.plot.compare import plot_compare
     from sphshell_pin.plot.figure import png
     from sphshell_pin.study.compare import compare as compare_runs
     from sphshell_pin.study.compare import measured, tables_of
-    from sphshell_pin.tables import csv_text
 
     labels = labels_of(runs)
     comparison = compare_runs(

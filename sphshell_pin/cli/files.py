@@ -115,7 +115,7 @@ def check(
     found = compare_shells(shell, other, length_of("--radius", radius), tolerance)
     _print_against(found, (file.name, against.name))
     if json is not None:
-        from sphshell_pin.atomic import write_whole
+        from sphshell_pin.base.atomic import write_whole
 
         text = dumps({"files": [str(file), str(against)], **found.to_dict()}, indent=1)
         write_whole(json, text.encode())

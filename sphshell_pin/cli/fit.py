@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.checks import stated_pairs
+from sphshell_pin.base.checks import stated_pairs
 from sphshell_pin.cli.app import (
     MISSED,
     CompiledOption,
@@ -143,7 +143,7 @@ def _deviations(stated: list[str] | None) -> dict[str, float]:
 def _write(
     found: Fit, path: Path, folder: Path, changes: dict[str, str], *, picture: bool
 ) -> list[Path]:
-    from sphshell_pin.atomic.files import write_folder
+    from sphshell_pin.base.atomic.files import write_folder
     from sphshell_pin.scenario.format.reading import read_scenario
     from sphshell_pin.scenario.format.sliders import check_knobs
 

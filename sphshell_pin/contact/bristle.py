@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import Any, Self
 
-from sphshell_pin.checks import check_not_negative, check_type
+from sphshell_pin.base.checks import check_not_negative, check_type
+from sphshell_pin.base.parameters import parameter, same_parameter
 from sphshell_pin.contact.friction import Coefficients
 from sphshell_pin.contact.materials import TwoMaterials, elastic_numbers
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import parameter, same_parameter
 
 # Bristles stick below this part of Stribeck's speed: almost nothing moves.
 STICKING_SHARE = 0.01

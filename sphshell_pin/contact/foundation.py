@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_positive, check_type, check_vector, read_only
+from sphshell_pin.base.checks import check_positive, check_type, check_vector, read_only
+from sphshell_pin.base.parameters import parameter
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import parameter
 from sphshell_pin.shell.contact_set import Method
 from sphshell_pin.shell.shell import Shell
 

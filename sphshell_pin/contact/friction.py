@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any, Self
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_not_negative, check_positive, check_type
+from sphshell_pin.base.checks import check_not_negative, check_positive, check_type
+from sphshell_pin.base.parameters import Component, parameter
 from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, parameter
 
 
 class Friction(Component):

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin import _core
+from sphshell_pin.base.parameters import Component, parameter
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.contact.own_functions import OwnFunctions
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, parameter
 
 _SLOW = 1e-6  # a slower slip bears a force in proportion [m/s]
 _SPEEDS = np.logspace(-6, 1, 71)  # [m/s]

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from sphshell_pin import _core
+from sphshell_pin.base.parameters import Component, parameter
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.contact.own_functions import OwnFunctions
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, parameter
 
 _RATE = 1e-6  # over which the damping at rest is a difference [m/s]
 

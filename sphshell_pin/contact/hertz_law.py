@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from sphshell_pin import _core
+from sphshell_pin.base.parameters import parameter
 from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw, dissipation_for
 from sphshell_pin.contact.materials import (
     TwoMaterials,
@@ -17,7 +18,6 @@ from sphshell_pin.contact.materials import (
 )
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import parameter
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from sphshell_pin.base.parameters import Component, parameter
 from sphshell_pin.contact.normal_law import NormalLaw, bisect
-from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.units import (
     adams_damping_to_si,
     adams_length_to_si,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from sphshell_pin import _core
+from sphshell_pin.base.parameters import parameter
 from sphshell_pin.errors import NameNotFound
-from sphshell_pin.parameters import parameter
 
 
 @dataclass(frozen=True)

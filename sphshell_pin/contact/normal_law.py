@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_finite, check_type
+from sphshell_pin.base.checks import check_finite, check_type
+from sphshell_pin.base.parameters import Component
 from sphshell_pin.errors import InvalidParameter, SphshellError
-from sphshell_pin.parameters import Component
 
 # Decay times that need as many steps as one period of an oscillation.
 DECAYS_PER_PERIOD = 20

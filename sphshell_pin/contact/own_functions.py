@@ -11,9 +11,9 @@ from _ctypes import CFuncPtr
 from collections.abc import Mapping
 from typing import Any, Self
 
-from sphshell_pin.checks import check_finite
+from sphshell_pin.base.checks import check_finite
+from sphshell_pin.base.parameters import Parameter
 from sphshell_pin.errors import InvalidParameter, NotPicklable, SlowLawWarning
-from sphshell_pin.parameters import Parameter
 
 
 class OwnFunctions:

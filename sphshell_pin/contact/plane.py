@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.checks import check_name, check_vector
+from sphshell_pin.base.checks import check_name, check_vector
 from sphshell_pin.errors import InvalidParameter
 
 

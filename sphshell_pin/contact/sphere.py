@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sphshell_pin.checks import check_name, check_positive, check_vector
+from sphshell_pin.base.checks import check_name, check_positive, check_vector
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from sphshell_pin.checks import check_vector
+from sphshell_pin.base.checks import check_vector
+from sphshell_pin.base.parameters import Component, parameter
+from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, parameter
-from sphshell_pin.regular_file import read_text
 
 
 @dataclass(frozen=True)

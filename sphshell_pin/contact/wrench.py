@@ -7,8 +7,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import (
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import (
     check_finite,
     check_not_negative,
     check_positive,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.export.frames import WORLD, Frames, Message, xyz

@@ -16,9 +16,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.atomic import atomic_file
-from sphshell_pin.checks import check_type
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.checks import check_type
+from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
@@ -36,7 +37,6 @@ from sphshell_pin.export.markers import (
     stamp_of,
 )
 from sphshell_pin.export.messages import full_name, schema_of
-from sphshell_pin.tables import quantity_of
 from sphshell_pin.view.arrows import ArrowScale, largest_force
 
 _ARROW = 8.0  # length of a usual force's arrow, in radii of the smallest sphere

@@ -8,10 +8,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-from sphshell_pin.atomic.files import write_folder
+from sphshell_pin.base.atomic.files import write_folder
+from sphshell_pin.base.tables import Table, csv_text, write_parquet
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.scene import Scene
-from sphshell_pin.tables import Table, csv_text, write_parquet
 
 Format = Literal["csv", "parquet"]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 
 def pressure(u: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result

@@ -11,17 +11,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.atomic import atomic_file
-from sphshell_pin.checks import check_name, check_positive, check_vector, read_only
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.checks import check_name, check_positive, check_vector, read_only
+from sphshell_pin.base.offered import offered
+from sphshell_pin.base.summary import Summarized
 from sphshell_pin.dynamics.result.result_scene import scene_of
 from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
-from sphshell_pin.offered import offered
 from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
 from sphshell_pin.patches.placed import Longs, PlacedPatches, patches_on
-from sphshell_pin.summary import Summarized
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result

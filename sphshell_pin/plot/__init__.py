@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sphshell_pin.checks import check_name
+from sphshell_pin.base.checks import check_name
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result_scene import find_scene
 from sphshell_pin.errors import NameNotFound

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sphshell_pin.atomic import write_whole
+from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.errors import import_extra
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.base.tables import column
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.plot.figure import finish_axis, new_figure, say
 from sphshell_pin.scenario.running.figures import PAIR_UNITS, RUN_FIGURES
-from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
     import pandas as pd

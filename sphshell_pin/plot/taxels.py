@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.checks import check_positive
+from sphshell_pin.base.checks import check_positive
+from sphshell_pin.base.films import check_film, write_film
 from sphshell_pin.errors import InvalidParameter, import_extra
-from sphshell_pin.films import check_film, write_film
 from sphshell_pin.plot.figure import new_figure, reading_unit
 
 if TYPE_CHECKING:

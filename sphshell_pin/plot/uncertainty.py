@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.base.tables import column
 from sphshell_pin.plot.figure import count, finish_axis, label_axis, new_figure, say
 from sphshell_pin.plot.sweep import figure_label, units_of
-from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
     import pandas as pd

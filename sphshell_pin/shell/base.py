@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin import _core
-from sphshell_pin.checks import read_only
+from sphshell_pin.base.checks import read_only
+from sphshell_pin.base.summary import Summarized
 from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.faces import Face, faces_of
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.options import SIDES, check_size
 from sphshell_pin.shell.raw import Bytes, Floats, Ints, Mask
-from sphshell_pin.summary import Summarized
 
 _ARRAYS: dict[str, npt.DTypeLike] = {
     **dict.fromkeys(("elements", "source_element", "element_face"), np.int32),

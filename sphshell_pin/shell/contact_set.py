@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import read_only
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import read_only
+from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized
 
 
 class Feature(IntEnum):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.atomic import atomic_path
+from sphshell_pin.base.atomic import atomic_path
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES

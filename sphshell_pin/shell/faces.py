@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sphshell_pin import _core
-from sphshell_pin.checks import read_only
+from sphshell_pin.base.checks import read_only
 from sphshell_pin.shell.raw import KINDS, Floats, Ints
 
 MOST_GROUPS = 5  # in words

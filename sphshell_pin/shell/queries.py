@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sphshell_pin.checks import (
+from sphshell_pin.base.checks import (
     check_each_positive,
     check_flag,
     check_points,
@@ -16,12 +16,12 @@ from sphshell_pin.checks import (
     check_vector,
     read_only,
 )
+from sphshell_pin.base.summary import Summarized
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.contact_set import ContactSet, Method
 from sphshell_pin.shell.options import thread_count
 from sphshell_pin.shell.raw import Floats, Ints
-from sphshell_pin.summary import Summarized
 
 
 @dataclass(frozen=True, repr=False)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from sphshell_pin.checks import as_floats
+from sphshell_pin.base.checks import as_floats
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.rounding import SCALES, rounding
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from sphshell_pin.checks import check_flag, check_positive, check_type
+from sphshell_pin.base.checks import check_flag, check_positive, check_type
+from sphshell_pin.base.summary import Fact
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.options import CREASE_ANGLE, check_options
 from sphshell_pin.shell.queries import Queries
-from sphshell_pin.summary import Fact
 
 # Readers, writers, cleaning and tessellation load with the first shell that needs them: importing
 # the package should cost little more than importing Pinocchio.

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.atomic import atomic_file
+from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.raw import Floats, Ints, Mask, area_vectors

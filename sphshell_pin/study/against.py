@@ -9,7 +9,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from sphshell_pin.checks import check_positive
+from sphshell_pin.base.checks import check_positive
 from sphshell_pin.contact import ImpactLaw
 from sphshell_pin.shell.raw import KINDS, Floats, Ints, Longs, area_vectors, random_places
 from sphshell_pin.shell.shell import Shell

@@ -10,7 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.tables import Table, column, quantity_of
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import state_titles
@@ -21,7 +22,6 @@ from sphshell_pin.scenario.running.figures import (
     NOT_REPEATABLE,
     recorded_figures,
 )
-from sphshell_pin.tables import Table, column, quantity_of
 
 
 @dataclass(frozen=True)

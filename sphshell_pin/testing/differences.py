@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.testing.finding import Finding, Optional, worst
 from sphshell_pin.testing.forces import accelerations, joint_jacobian, joint_names

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import InvalidParameter

@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_points, check_positive
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_points, check_positive
 from sphshell_pin.dynamics import Result, Scene
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.dynamics.scene.scene import ContactPair

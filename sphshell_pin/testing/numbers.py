@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.base.named_numbers import with_value
+from sphshell_pin.base.parameters import parameters_of
 from sphshell_pin.dynamics import ContactPair, Scene
-from sphshell_pin.named_numbers import with_value
-from sphshell_pin.parameters import parameters_of
 
 _AXES = {"offset": ("x", "y", "z"), "placement": ("vx", "vy", "vz", "wx", "wy", "wz")}
 

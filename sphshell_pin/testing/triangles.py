@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 Ints = NDArray[np.int64]
 

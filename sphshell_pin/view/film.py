@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Literal, TypedDict, TypeVar, get_args
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.atomic import write_whole
-from sphshell_pin.atomic.files import write_folder
-from sphshell_pin.checks import check_finite, check_vector
+from sphshell_pin.base.atomic import write_whole
+from sphshell_pin.base.atomic.files import write_folder
+from sphshell_pin.base.checks import check_finite, check_vector
+from sphshell_pin.base.films import Pixels, check_film, write_film
 from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
-from sphshell_pin.films import Pixels, check_film, write_film
 from sphshell_pin.view.contact_path import LARGEST
 from sphshell_pin.view.recording import Shown, check_pace
 

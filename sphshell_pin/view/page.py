@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.regular_file import read_text
+from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.view.meshes import pack_facets, take_out_numbers
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,

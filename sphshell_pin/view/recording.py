@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.atomic import write_whole
-from sphshell_pin.checks import check_positive
+from sphshell_pin.base.atomic import write_whole
+from sphshell_pin.base.checks import check_positive
 from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import (

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests import differences, meshes, models
 from tests.contact.smooth.surfaces import SURFACES, shell_of
 from tests.dynamics.test_external_forces import Case

@@ -11,7 +11,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.compiled import robot as compiled_robot
 from sphshell_pin.errors import InvalidParameter, SetupWarning, SphshellError
 from tests import meshes

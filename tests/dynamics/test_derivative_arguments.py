@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import CoulombFriction, Simulation
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import differences
 from tests.dynamics.scenes import (

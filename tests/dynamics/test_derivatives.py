@@ -12,7 +12,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests import differences, meshes, models
 from tests.contact.smooth.surfaces import SURFACES
 from tests.dynamics import scenes

@@ -10,7 +10,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import Mimic, mimics, with_mimics
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from tests import meshes

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import mimics, shortened
 from sphshell_pin.errors import SphshellError
 from tests import differences, meshes

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import Interrupted, InvalidParameter, ResultError
 from tests import differences, meshes, models
 from tests.dynamics.scenes import FRICTIONS

@@ -11,7 +11,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import DeepStart
 from tests import models
 from tests.dynamics.scenes import (

@@ -8,10 +8,10 @@ import pandas as pd
 import pyarrow.parquet
 import pytest
 
+from sphshell_pin.base.tables import column, csv_text, quantity_of
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.errors import MissingExtra, ResultError
 from sphshell_pin.export.tables import tables_of, write_tables
-from sphshell_pin.tables import column, csv_text, quantity_of
 from tests.export.runs import finger_run, turntable_run
 
 

@@ -15,20 +15,20 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from sphshell_pin.base.regular_file import read_bytes
+from sphshell_pin.base.tables import csv_text
 from sphshell_pin.cli.export import with_scene
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.export.mcap import write_mcap
 from sphshell_pin.export.tables import write_tables
 from sphshell_pin.patches import TaxelGrid
 from sphshell_pin.plot.compare import plot_compare
-from sphshell_pin.regular_file import read_bytes
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.study.compare import compare, measured, tables_of
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.sweep.journal import Journal
-from sphshell_pin.tables import csv_text
 from sphshell_pin.view.live.opening import player_of
 from sphshell_pin.view.recording import render_recording
 from tests.fuzz.folders import results_corpus, unpacked

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests import meshes, models
 from tests.hard_cases.targets import Target, all_targets, borders, sweep
 

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.surfaces import Mesh, icosphere
 from tests import models

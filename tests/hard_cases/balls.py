@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.swing import GRAVITY, MASS, RADIUS

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell.curved import curved_mesh
 from tests.hard_cases.aims import STOPPED_AT, ImpactTest, draw

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, shipped_scenarios
 from tests import meshes, models

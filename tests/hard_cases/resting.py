@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.normal_law import bisect
 from tests import meshes, models
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.surfaces import Mesh, icosphere
 from sphshell_pin.study.report.swing import any_turn
 from tests import meshes

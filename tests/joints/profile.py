@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 KNOTS = 4
 """Places of a piece between which the distance is monotonic: both ends and two places between."""

@@ -9,7 +9,7 @@ import numpy as np
 from OCP.STEPControl import STEPControl_Reader
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.joints.trimmed import Edge, Minima, TrimmedSolid
 from tests.joints.verdict import MM, Verdict, exact_elements
 from tests.joints.walk import BESIDE, DEPTHS

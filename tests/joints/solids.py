@@ -22,7 +22,7 @@ from OCP.Message import Message
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from OCP.StlAPI import StlAPI_Writer
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.joints.profile import Piece, Profile, outline
 from tests.parts.occ import Rng, Solid, checked
 

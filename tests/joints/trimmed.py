@@ -23,7 +23,7 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_IN, TopAbs_OUT, TopAb
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.parts.cad_mesh import Ints
 from tests.parts.occ import Solid, faces
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 MM = 1e-3
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.joints.solids import Part
 from tests.joints.verdict import MM, Verdict, exact_elements
 from tests.parts.occ import Rng

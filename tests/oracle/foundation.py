@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 
 def pressure(rho: Array, radius: float) -> Array:

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 # K^2 of a solid ball: a force moves its contact point 1 + 1 / K^2 times as much as its center.
 SOLID = 0.4

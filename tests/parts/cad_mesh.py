@@ -9,7 +9,7 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell import raw
 from sphshell_pin.shell.cad.face_mesh import FaceMesh, take_mesh
 from tests.parts.occ import OccFailed, Solid, faces

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.parts.cad_mesh import CadMesh, Ints, area_vectors
 from tests.parts.occ import Rng
 

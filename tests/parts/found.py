@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.parts.cad_mesh import KINDS, MM, CadMesh, Ints
 
 OFF, EXACT = np.cos(np.radians([1.0, 0.05]))

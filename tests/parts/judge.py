@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from sphshell_pin import ImpactLaw, Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.parts.cad_mesh import MM, CadMesh, Ints, coarse_enough, joined
 from tests.parts.files import KINDS_OF_FILE
 from tests.parts.found import Found, faces_found, share_recognized

@@ -17,7 +17,7 @@ from OCP.IntTools import IntTools_FClass2d
 from OCP.TopAbs import TopAbs_IN
 
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell.cad.face_mesh import FaceMesh
 from sphshell_pin.shell.cad.tessellation import Tessellation
 from tests.parts.cad_mesh import KINDS, CadMesh, Ints, area_vectors, joined, meshed_faces

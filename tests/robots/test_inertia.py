@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin import robots
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, RobotWarning
 from sphshell_pin.robots.mending import mended
 from sphshell_pin.study.robot_check import QUICK, check_robot

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sphshell_pin.atomic import AtomicFolder
+from sphshell_pin.base.atomic import AtomicFolder
 from tests.scenario.operations import visible
 
 MAIN = [sys.executable, "-c", "from sphshell_pin.cli import main; main()"]

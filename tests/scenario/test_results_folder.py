@@ -11,8 +11,8 @@ import time
 
 import pytest
 
-from sphshell_pin.atomic import AtomicFolder, FolderInUse, atomic_file
-from sphshell_pin.atomic.exchange import exchange
+from sphshell_pin.base.atomic import AtomicFolder, FolderInUse, atomic_file
+from sphshell_pin.base.atomic.exchange import exchange
 from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running import run
@@ -69,7 +69,7 @@ def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     # In the pictures, when the numbers are written already.
-    monkeypatch.setattr("sphshell_pin.atomic.file.atomic_file", full)
+    monkeypatch.setattr("sphshell_pin.base.atomic.file.atomic_file", full)
     told = call(*arguments)
     assert told.exit_code == 2
     assert told.stderr.splitlines()[-1].endswith("cannot be written: No space left on device")
@@ -119,7 +119,7 @@ def test_a_file_written_by_others_meanwhile_is_kept(tmp_path, monkeypatch):
         os.replace(out / "aside", out / "notes.txt")
         exchange(one, other)
 
-    monkeypatch.setattr("sphshell_pin.atomic.folder.exchange", late)
+    monkeypatch.setattr("sphshell_pin.base.atomic.folder.exchange", late)
     put(out, "new")
     assert (out / "late.txt").read_text() == "late"
     assert (out / "notes.txt").read_text() == "second"
@@ -127,7 +127,7 @@ def test_a_file_written_by_others_meanwhile_is_kept(tmp_path, monkeypatch):
 
 def never_exchanged(monkeypatch):
     monkeypatch.setattr(
-        "sphshell_pin.atomic.folder.exchange", lambda *_: pytest.fail("it was exchanged")
+        "sphshell_pin.base.atomic.folder.exchange", lambda *_: pytest.fail("it was exchanged")
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.atomic import AtomicFolder, write_whole
+from sphshell_pin.base.atomic import AtomicFolder, write_whole
 from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
@@ -180,7 +180,7 @@ def test_where_names_cannot_be_exchanged_the_next_run_goes_on(
     def missing(*_):
         raise OSError(errno.ENOSYS, "Function not implemented")
 
-    monkeypatch.setattr("sphshell_pin.atomic.folder.exchange", missing)
+    monkeypatch.setattr("sphshell_pin.base.atomic.folder.exchange", missing)
     keep, before, after = two_runs
     out = place / "out"
     for n in ends(place, keep, lambda: results("new"), act, once=False):

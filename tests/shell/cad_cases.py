@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.shell import cad_shapes as shapes
 
 REAL_FILES = {

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sphshell_pin.cache import CACHE, keep_newest
+from sphshell_pin.base.cache import CACHE, keep_newest
 from sphshell_pin.errors import UnitWarning
 from sphshell_pin.shell import loading
 from sphshell_pin.shell.cad import CadOptions

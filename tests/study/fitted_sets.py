@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario import build
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.quantities import quantities_of

@@ -12,11 +12,11 @@ pytest.importorskip("scipy")
 pytest.importorskip("matplotlib")
 
 import sphshell_pin as sp
-from sphshell_pin.atomic import folder
+from sphshell_pin.base.atomic import folder
+from sphshell_pin.base.tables import csv_text
 from sphshell_pin.cli import fit
 from sphshell_pin.scenario import read_scenario
 from sphshell_pin.study.fit.parameters import parse_wanted
-from sphshell_pin.tables import csv_text
 from tests.command import call
 from tests.study.fitted_sets import SCENARIO
 from tests.study.test_fit import DISSIPATION, FORCE, FRICTION, HEIGHT, STIFFNESS, columns_of, noisy

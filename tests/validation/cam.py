@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.models import model_of
 from tests.validation.balls import plane
 from tests.validation.cases import Outcome, case, read, within

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import Finding, Table, columns
 from sphshell_pin.study.report.models import model_of
 from sphshell_pin.study.report.swing import GRAVITY

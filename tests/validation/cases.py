@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.errors import NameNotFound
-from sphshell_pin.regular_file import read_text
 from sphshell_pin.study.report.contents import Finding, Picture, Table
 from tests.register import Register
 

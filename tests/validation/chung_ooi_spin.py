@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import Finding
 from tests.validation import maw
 from tests.validation.balls import Ball, head_on

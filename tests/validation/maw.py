@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 STEPS, SPRINGS = 4000, 200  # error about 1e-3
 MOBILITY = 3.5  # of the patch of a solid ball, times its mass: 1 + 5/2

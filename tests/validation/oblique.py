@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.friction import Friction
 from tests.validation.balls import Ball, Impact, head_on, on_plane
 

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import UnitWarning
 from sphshell_pin.study.report.contents import Finding
 from sphshell_pin.study.report.models import model_of

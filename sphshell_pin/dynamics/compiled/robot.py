@@ -16,8 +16,9 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from sphshell_pin import _core, regular_file
-from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used, write_own
+from sphshell_pin import _core
+from sphshell_pin.base import regular_file
+from sphshell_pin.base.cache import cache_folder, is_own, keep_newest, mark_used, write_own
 from sphshell_pin.dynamics.compiled.source import c_source
 from sphshell_pin.errors import InvalidParameter, SetupWarning, SphshellError
 

@@ -13,19 +13,19 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import (
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import (
     check_configuration,
     check_names,
     check_not_negative,
     check_vector,
 )
+from sphshell_pin.base.parameters import Component, flat_fields, parameter
 from sphshell_pin.dynamics.control.callables import check_callable
 from sphshell_pin.dynamics.scene.models import find_joint, set_joint
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import Readings
 from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
-from sphshell_pin.parameters import Component, flat_fields, parameter
 from sphshell_pin.shell import Shell
 
 if TYPE_CHECKING:

@@ -11,20 +11,20 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import (
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import (
     check_name,
     check_placement,
     check_points,
     check_type,
     check_vector,
 )
+from sphshell_pin.base.parameters import parameter
 from sphshell_pin.dynamics.control.controllers import Controller, Gain, Posture, ShellPlace
 from sphshell_pin.dynamics.control.target_path import Curve, Timing, path_fields
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import parameter
 from sphshell_pin.shell import Shell
 
 if TYPE_CHECKING:

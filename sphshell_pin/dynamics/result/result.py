@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Unpack, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_finite, read_only
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_finite, read_only
+from sphshell_pin.base.offered import offered
+from sphshell_pin.base.summary import Detail, Fact, Summarized
 from sphshell_pin.dynamics.result import result_columns
 from sphshell_pin.dynamics.result.contact_patches import PATCH, Patches
 from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event, Origin
@@ -23,8 +25,6 @@ from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import Columns, columns
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog, sensor_columns
 from sphshell_pin.errors import InvalidParameter, ResultError, import_extra
-from sphshell_pin.offered import offered
-from sphshell_pin.summary import Detail, Fact, Summarized
 
 if TYPE_CHECKING:
     import pandas as pd

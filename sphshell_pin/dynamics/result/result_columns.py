@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.tables import column
 from sphshell_pin.dynamics.result.contact_patches import patch_columns
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
-from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result

@@ -23,8 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from sphshell_pin.atomic import atomic_file
-from sphshell_pin.checks import read_only
+from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.checks import read_only
+from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.dynamics.result.contact_patches import PATCH
 from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event, Kept, Origin
 from sphshell_pin.dynamics.result.run_state import split_states
@@ -33,7 +34,6 @@ from sphshell_pin.dynamics.run.sensitivities import Sensitivities
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, Columns
 from sphshell_pin.dynamics.sensing.sensor_log import joined_logs, split_logs
 from sphshell_pin.errors import ResultError
-from sphshell_pin.regular_file import open_regular
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result

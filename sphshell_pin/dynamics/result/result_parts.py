@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
-from sphshell_pin.summary import Fact, Summarized
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.base.offered import offered
 from sphshell_pin.errors import InvalidParameter, ResultError
-from sphshell_pin.offered import offered
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import read_only
-from sphshell_pin.summary import Fact, Summarized
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import read_only
+from sphshell_pin.base.summary import Fact, Summarized
 
 _TIME, _STATE = 5, 17  # where a run's numbers have t, and q: see dynamics/run/simulation.cpp
 

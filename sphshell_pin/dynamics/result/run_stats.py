@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-from sphshell_pin.summary import Detail, Fact, Summarized
+from sphshell_pin.base.summary import Detail, Fact, Summarized
 
 # Kinds of events in the order of the compiled core; from "stop" on, of joints.
 EventKind = Literal[

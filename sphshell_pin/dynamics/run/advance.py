@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import (
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import (
     check_finite,
     check_moved_mass,
     check_not_negative,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sphshell_pin.parameters import Component, parameter, same_parameter
+from sphshell_pin.base.parameters import Component, parameter, same_parameter
 
 __all__ = [
     "Adaptive",

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_floats
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_floats
 from sphshell_pin.dynamics.run.advance import GLANCE, AnyController, CtrlC, bind_controller
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.scene.scene import Scene

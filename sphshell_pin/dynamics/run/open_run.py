@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_not_negative, check_vector
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_not_negative, check_vector
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.run_stats import RunStats
 from sphshell_pin.dynamics.run.advance import (

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, NoReturn, overload
 import numpy as np
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import read_only
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import read_only
+from sphshell_pin.base.summary import Detail, Fact, Summarized, names
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.run_stats import PairFigures
 from sphshell_pin.dynamics.run.advance import deep_start, result_of, why_ended
@@ -30,7 +31,6 @@ from sphshell_pin.errors import (
     WeakLawWarning,
     import_extra,
 )
-from sphshell_pin.summary import Detail, Fact, Summarized, names
 
 if TYPE_CHECKING:
     import pandas as pd

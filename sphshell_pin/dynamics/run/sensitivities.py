@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import read_only
-from sphshell_pin.dynamics.control.callables import reads_sensors
-from sphshell_pin.dynamics.scene.derivatives import core_parameters
-from sphshell_pin.errors import InvalidParameter, ResultError
-from sphshell_pin.named_numbers import (
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import read_only
+from sphshell_pin.base.named_numbers import (
     START,
     columns_of,
     every_column,
     names_of_pairs,
     names_of_start,
 )
-from sphshell_pin.summary import Fact, Summarized, names
+from sphshell_pin.base.summary import Fact, Summarized, names
+from sphshell_pin.dynamics.control.callables import reads_sensors
+from sphshell_pin.dynamics.scene.derivatives import core_parameters
+from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
     from sphshell_pin import _core

@@ -9,7 +9,8 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_not_negative
+from sphshell_pin.base.checks import check_not_negative
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.run_state import RunState
 from sphshell_pin.dynamics.run.advance import (
@@ -46,7 +47,6 @@ from sphshell_pin.errors import (
     RolloutInterrupted,
     SimulationDiverged,
 )
-from sphshell_pin.summary import Fact, Summarized
 
 
 class Simulation(Summarized):

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
-from sphshell_pin.summary import Fact, Summarized
 
 
 @dataclass(frozen=True, repr=False)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.named_numbers import NamedNumber, every_column, names_of_pairs, with_value
+from sphshell_pin.base.summary import Summarized
 from sphshell_pin.dynamics.scene.explain import explain_pairs, relaxation_time
 from sphshell_pin.dynamics.scene.scene_contacts import Rows, SceneContacts
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.named_numbers import NamedNumber, every_column, names_of_pairs, with_value
-from sphshell_pin.summary import Summarized
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_moved_mass
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning

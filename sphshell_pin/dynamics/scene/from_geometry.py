@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import coal
 import pinocchio as pin
 
-from sphshell_pin.checks import check_type
+from sphshell_pin.base.checks import check_type
 from sphshell_pin.contact import Friction, NormalLaw, Sphere
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import InvalidParameter

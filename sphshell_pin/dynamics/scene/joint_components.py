@@ -11,8 +11,8 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import (
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import (
     as_floats,
     check_not_negative,
     check_positive,

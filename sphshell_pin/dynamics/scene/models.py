@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_name
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_name
 from sphshell_pin.dynamics.scene.mimic import group_of, mimics
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.units import size_warning

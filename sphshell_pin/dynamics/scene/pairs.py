@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.contact import (
     FoundationLaw,
     Friction,
@@ -26,7 +27,6 @@ from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.scene.sources import Find, checked_source
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
-from sphshell_pin.summary import Fact, Summarized
 
 
 class PlacedSphere(NamedTuple):

@@ -8,8 +8,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_positive, check_type
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_positive, check_type
+from sphshell_pin.base.named_numbers import columns_of, names_of_pairs
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.scene.constraints import ContactConstraints, constraints_of
 from sphshell_pin.dynamics.scene.derivatives import (
@@ -23,7 +24,6 @@ from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.scene.scene_parts import SceneParts
 from sphshell_pin.dynamics.scene.scene_state import SceneState
-from sphshell_pin.named_numbers import columns_of, names_of_pairs
 
 __all__ = ["ContactPair", "Scene", "SceneContacts", "SceneState"]
 

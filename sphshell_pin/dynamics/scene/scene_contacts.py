@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import read_only
-from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import read_only
+from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized
 
 Columns = dict[str, NDArray[Any]]  # of numbers of several kinds
 Rows = bytes | bytearray | NDArray[np.uint8]

@@ -15,13 +15,14 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import (
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import (
     check_configuration,
     check_name,
     check_names,
     check_vector,
 )
+from sphshell_pin.base.summary import Detail, Fact, Summarized, names
 from sphshell_pin.contact import Friction, FunctionFriction, ImpactLaw, NormalLaw, Plane, Sphere
 from sphshell_pin.dynamics.compiled.robot import load_compiled
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
@@ -41,7 +42,6 @@ from sphshell_pin.dynamics.scene.sphere_arguments import (
 )
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SetupWarning, SphshellError
 from sphshell_pin.shell import Shell
-from sphshell_pin.summary import Detail, Fact, Summarized, names
 
 C = TypeVar("C", _core.Scene, _core.SceneState)
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_floats, check_not_negative, read_only
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_floats, check_not_negative, read_only
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.explain import core_pairs, explain_pairs, has_state
 from sphshell_pin.errors import InvalidParameter, NotPicklable
-from sphshell_pin.summary import Fact, Summarized
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import Scene

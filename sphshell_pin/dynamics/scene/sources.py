@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import as_floats
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import as_floats
 from sphshell_pin.errors import InvalidParameter, add_origin
 
 Find = Callable[[pin.SE3, pin.SE3], tuple[ArrayLike, ArrayLike, ArrayLike]]

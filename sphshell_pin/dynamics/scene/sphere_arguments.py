@@ -10,7 +10,7 @@ from typing import TypedDict
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.checks import check_name, check_placement, check_type
+from sphshell_pin.base.checks import check_name, check_placement, check_type
 from sphshell_pin.contact import FoundationLaw, Plane, Sphere
 from sphshell_pin.dynamics.scene.models import unit_warning
 from sphshell_pin.dynamics.scene.pairs import ContactPair

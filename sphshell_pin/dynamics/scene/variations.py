@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, TypeGuard, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.checks import check_floats, check_placement, check_type
-from sphshell_pin.dynamics.scene.pairs import ContactPair
-from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.named_numbers import (
+from sphshell_pin.base.checks import check_floats, check_placement, check_type
+from sphshell_pin.base.named_numbers import (
     Names,
     find_name,
     names_of_pairs,
     names_of_sensors,
     with_value,
 )
+from sphshell_pin.dynamics.scene.pairs import ContactPair
+from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import Scene

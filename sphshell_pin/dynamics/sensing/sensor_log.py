@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import read_only
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import read_only
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.errors import NameNotFound, import_extra
-from sphshell_pin.summary import Fact, Summarized
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,7 +12,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_name, check_type
+from sphshell_pin.base.checks import check_name, check_type
+from sphshell_pin.base.parameters import Component, flat_fields, parameter
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
 from sphshell_pin.dynamics.scene.models import find_frame, find_joint
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -20,7 +21,6 @@ from sphshell_pin.dynamics.scene.scene_contacts import Columns
 from sphshell_pin.dynamics.sensing.sensor_log import Readings, SensorLog, split_logs
 from sphshell_pin.dynamics.sensing.subtree_inertia import frames_of_subtree, subtree_of
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, flat_fields, parameter
 
 __all__ = ["ContactSwitch", "ForceTorqueSensor", "JointTorqueSensor"]
 

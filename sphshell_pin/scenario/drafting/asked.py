@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_points, check_positive, check_vector
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_points, check_positive, check_vector
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 

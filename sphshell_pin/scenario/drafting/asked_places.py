@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, come_down

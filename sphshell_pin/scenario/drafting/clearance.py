@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, held_joints
 from sphshell_pin.scenario.drafting.fingertips import AT_TIP, Tip
 from sphshell_pin.shell.shell import Shell

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats

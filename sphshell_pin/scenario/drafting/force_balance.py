@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 # Sides of the pyramid that stands for a friction cone, inscribed in it.
 _SIDES = 8

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import SphshellError

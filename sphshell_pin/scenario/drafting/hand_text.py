@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import Material, friction_between
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.dynamics.scene.models import mass_matrix

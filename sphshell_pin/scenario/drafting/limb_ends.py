@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.robots import LoadedRobot

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin._interrupts import interrupts_delayed
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, load_file

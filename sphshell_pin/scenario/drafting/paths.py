@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.placing import Place, nearer

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix, model_reach

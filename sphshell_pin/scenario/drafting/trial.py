@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.draft_text import HELD

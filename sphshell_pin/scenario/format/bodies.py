@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import off_unit_length
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import off_unit_length
 from sphshell_pin.dynamics.scene.mimic import check_follows, count_of_all, mimics, shortened
 from sphshell_pin.dynamics.scene.models import (
     find_frame,

@@ -14,7 +14,9 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.parameters import Component, parameters_of
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.function_friction import FunctionFrictionFile
 from sphshell_pin.contact.function_law import FunctionFile
@@ -36,7 +38,6 @@ from sphshell_pin.errors import (
     SphshellError,
     UnitWarning,
 )
-from sphshell_pin.parameters import Component, parameters_of
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.format import schema
 from sphshell_pin.scenario.format.bodies import (
@@ -59,7 +60,6 @@ from sphshell_pin.scenario.format.reading import (
 )
 from sphshell_pin.scenario.format.sliders import check_knobs
 from sphshell_pin.scenario.format.sphere_tables import spheres_of, to_end, to_sphere
-from sphshell_pin.summary import Fact, Summarized
 
 # A user's own; what it takes depends on where the scenario names it.
 Function = Callable[..., Any]

@@ -16,11 +16,11 @@ from typing import Any, NamedTuple, TypeAlias
 
 from pydantic import ValidationError
 
+from sphshell_pin.base.parameters import parameters_of
+from sphshell_pin.base.regular_file import MOST_TEXT, read_text
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError, did_you_mean
-from sphshell_pin.parameters import parameters_of
-from sphshell_pin.regular_file import MOST_TEXT, read_text
 from sphshell_pin.scenario.format.schema import LISTS, STEPPING, RunSection, Scenario
 from sphshell_pin.shell.readers import SUFFIXES
 

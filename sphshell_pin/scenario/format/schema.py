@@ -21,6 +21,7 @@ from pydantic import (
     model_validator,
 )
 
+from sphshell_pin.base.parameters import Component, Parameter, parameters_of
 from sphshell_pin.contact import Friction as FrictionLaw
 from sphshell_pin.contact import NormalLaw
 from sphshell_pin.contact.friction import NoFriction
@@ -28,7 +29,6 @@ from sphshell_pin.dynamics.control import controllers
 from sphshell_pin.dynamics.control.controllers import NoController
 from sphshell_pin.dynamics.run.integrators import Adaptive, Integrator, SemiImplicitEuler
 from sphshell_pin.dynamics.sensing import sensors
-from sphshell_pin.parameters import Component, Parameter, parameters_of
 from sphshell_pin.scenario.format.shape_tables import Primitive
 from sphshell_pin.scenario.format.typed_tables import OneOf, Positive, Vector3, refuse_unknown_keys
 

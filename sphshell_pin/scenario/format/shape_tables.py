@@ -8,7 +8,7 @@ from typing import TypedDict, Unpack
 import coal
 import numpy as np
 
-from sphshell_pin.parameters import Component, parameter
+from sphshell_pin.base.parameters import Component, parameter
 from sphshell_pin.scenario.format.typed_tables import Lengths3
 from sphshell_pin.shell import Shell
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 
+from sphshell_pin.base.parameters import Component, Parameter, parameters_of
 from sphshell_pin.errors import ScenarioError
-from sphshell_pin.parameters import Component, Parameter, parameters_of
 from sphshell_pin.scenario.format.reading import Found, child_of, look_up, owner_of
 from sphshell_pin.scenario.format.schema import KnobSection, Scenario
 

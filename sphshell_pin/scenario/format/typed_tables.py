@@ -20,8 +20,8 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, PydanticCustomError
 
+from sphshell_pin.base.parameters import Component, parameters_of
 from sphshell_pin.errors import did_you_mean
-from sphshell_pin.parameters import Component, parameters_of
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.dynamics.scene.joint_components import joint_slides

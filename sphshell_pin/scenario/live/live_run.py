@@ -11,8 +11,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.arrays import Array
-from sphshell_pin.checks import check_finite, check_not_negative, check_positive, check_vector
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import check_finite, check_not_negative, check_positive, check_vector
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.run.advance import AnyController, step_of

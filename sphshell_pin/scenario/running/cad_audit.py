@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError, UnitWarning
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions

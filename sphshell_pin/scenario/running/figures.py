@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import coordinates, state_titles
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import ScenarioError, add_origin
 from sphshell_pin.scenario.format.build import Built
-from sphshell_pin.tables import quantity_of
 
 PAIR_FIGURES = {
     "contact_time": "s",

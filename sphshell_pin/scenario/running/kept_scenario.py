@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from sphshell_pin.atomic import atomic_file
+from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.parameters import Component
+from sphshell_pin.base.regular_file import read_bytes
 from sphshell_pin.dynamics.result.result_parts import Kept
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.parameters import Component
-from sphshell_pin.regular_file import read_bytes
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.robots.kept_robot import load_kept, meshes_of, text_of
 from sphshell_pin.robots.plain_mesh import FORMATS, plain_mesh

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import SceneContacts

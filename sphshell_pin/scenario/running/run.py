@@ -14,7 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.base.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.base.json_text import json_text, plain
+from sphshell_pin.base.regular_file import open_regular, read_text
+from sphshell_pin.base.tables import csv_text
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
@@ -27,15 +30,12 @@ from sphshell_pin.errors import (
     SphshellError,
     WeakLawWarning,
 )
-from sphshell_pin.json_text import json_text, plain
-from sphshell_pin.regular_file import open_regular, read_text
 from sphshell_pin.scenario.format.build import Built, build
 from sphshell_pin.scenario.format.reading import shipped_scenarios
 from sphshell_pin.scenario.running.cad_audit import CadAudit, check_audit
 from sphshell_pin.scenario.running.cad_audit import audit_cad as compare_with_cad
 from sphshell_pin.scenario.running.figures import Verdict, check_expectations, judge, measure_energy
 from sphshell_pin.scenario.running.kept_scenario import keep
-from sphshell_pin.tables import csv_text
 
 RECORDING = "recording.html"
 SUMMARY = "summary.json"
@@ -92,7 +92,7 @@ def run_scenario(
     `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
     interrupted or diverged run is written like any other, and `stopped` says so; where the folder
     has the results of a complete run, it is written to the subfolder `stopped`. Files take the
-    place of an earlier run's all at once, when all are on disk (see `sphshell_pin.atomic`). Without
+    place of an earlier run's all at once, when all are on disk (`base.atomic`). Without
     `recording` or `figures` no recording.html or no pictures are made, which take most of the time
     of a short run. With
     `audit_cad` each contact with a CAD surface is compared with that on the exact faces (see

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.scenario.running.player import Rows
-from sphshell_pin.tables import quantity_of
 
 if TYPE_CHECKING:
     import pinocchio as pin

@@ -18,8 +18,8 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from sphshell_pin.base.limits import limit_memory
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.limits import limit_memory
 from sphshell_pin.shell.cad.messages import ALIVE, WRITE, Parent, pack
 from sphshell_pin.shell.cad.options import require_kernel
 

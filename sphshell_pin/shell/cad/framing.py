@@ -6,8 +6,8 @@ import os
 import re
 from pathlib import Path
 
+from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import ShellFileError
-from sphshell_pin.regular_file import open_regular
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES
 
 LOOKED_AT = 4096

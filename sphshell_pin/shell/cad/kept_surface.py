@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import itertools
 import json
 import os
 from collections.abc import Sequence
@@ -13,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin import _core, regular_file
-from sphshell_pin.cache import cache_folder, is_own, keep_newest, mark_used, write_own
+from sphshell_pin import _core
+from sphshell_pin.base import regular_file
+from sphshell_pin.base.cache import cache_folder, is_own, keep_newest, mark_used, write_own
 from sphshell_pin.errors import UnitWarning
 from sphshell_pin.shell.cad.options import PACKAGE, CadOptions
 from sphshell_pin.shell.cleaned import ARRAYS, Array, CleanedSurface, check_arrays
@@ -123,7 +125,8 @@ def _health(values: dict[str, object]) -> ShellHealth:
 def _versions() -> tuple[object, ...]:
     """Return what the surface of a file depends on besides: the code that reads and cleans it."""
     folder = Path(__file__).parents[2]
-    code = [*folder.glob("*.py"), *(folder / "shell").rglob("*.py"), Path(_core.__file__)]
+    parts = folder.glob("*.py"), (folder / "base").rglob("*.py"), (folder / "shell").rglob("*.py")
+    code = [*itertools.chain(*parts), Path(_core.__file__)]
     about = [
         (path.name, found.st_size, found.st_mtime_ns)
         for path in sorted(code)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from sphshell_pin.checks import check_not_negative, check_positive
+from sphshell_pin.base.checks import check_not_negative, check_positive
 from sphshell_pin.errors import InvalidParameter, MissingExtra, UnusableExtra
 
 Occ: TypeAlias = Any

@@ -21,8 +21,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from sphshell_pin.base.limits import child_command, last_line
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError, SphshellError
-from sphshell_pin.limits import child_command, last_line
 from sphshell_pin.shell.cad.messages import ALIVE, WRITE, unpack
 from sphshell_pin.shell.cad.options import CadOptions
 

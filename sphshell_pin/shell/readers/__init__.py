@@ -7,7 +7,7 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
-from sphshell_pin.checks import check_type
+from sphshell_pin.base.checks import check_type
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.options import CAD_SUFFIXES
 from sphshell_pin.shell.raw import RawSurface

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin import regular_file
+from sphshell_pin.base import regular_file
 from sphshell_pin.errors import InvalidShell, ShellFileError
 from sphshell_pin.shell.raw import (
     LARGEST_COUNT,

@@ -14,9 +14,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound
-from sphshell_pin.regular_file import read_text
 from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.quantities import Quantity
 

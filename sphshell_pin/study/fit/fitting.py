@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
-from sphshell_pin.checks import check_positive
+from sphshell_pin.base.checks import check_positive
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.reading import (

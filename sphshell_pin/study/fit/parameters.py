@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.parameters import Parameter
 from sphshell_pin.errors import InvalidParameter, ScenarioError
-from sphshell_pin.parameters import Parameter
 from sphshell_pin.scenario.format.reading import change_scenario, look_up
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import meaning

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
-from sphshell_pin.atomic import write_whole
-from sphshell_pin.json_text import json_text
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.atomic import write_whole
+from sphshell_pin.base.json_text import json_text
+from sphshell_pin.base.summary import Detail, Fact, Summarized
 from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.study.fit.parameters import TIE
 from sphshell_pin.study.fit.writing import scenario_text
-from sphshell_pin.summary import Detail, Fact, Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import (
     DataError,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.remarks import remarks_on
 from sphshell_pin.study.fit.report import Fit, Fitted, Series

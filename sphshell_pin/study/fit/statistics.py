@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 # Of a residual that is noise, a test says in so many cases that it is not.
 FALSE_ALARM = 0.01

@@ -9,8 +9,8 @@ from typing import Any
 
 import tomlkit
 
+from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.errors import ScenarioError
-from sphshell_pin.regular_file import read_text
 from sphshell_pin.scenario.format.reading import change_data, change_scenario, parse_scenario
 from sphshell_pin.study.sweep.job import files_of
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.study.report.models import model_of
 from sphshell_pin.study.report.motions import Case, decades, rectangle, steps

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 Progress = Callable[[float], None]
 """Called with the share of a section that is done, 0 to 1."""

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sphshell_pin.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.base.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.base.json_text import json_text
+from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
-from sphshell_pin.json_text import json_text
 from sphshell_pin.plot.figure import new_figure
-from sphshell_pin.regular_file import read_text
 from sphshell_pin.study.report import convergence, integrators, queries, steps, timing
 from sphshell_pin.study.report.contents import Column, Progress, Section, Table, findings_table
 from sphshell_pin.study.report.machine import OtherWork, caution_of, describe

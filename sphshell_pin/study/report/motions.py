@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.dynamics.run.integrators import Integrator

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import (
     TIME_COLUMNS,
     Finding,

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin import robots
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.study.report.contents import (
     TIME_COLUMNS,

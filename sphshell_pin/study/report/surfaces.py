@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 
 AMPLITUDE, WAVE_X, WAVE_Y = 0.03, 9.0, 7.0
 

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.models import model_of
 from sphshell_pin.study.report.surfaces import Mesh, icosphere

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import Progress
 
 K = TypeVar("K")

@@ -12,7 +12,7 @@ from os import PathLike
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.checks import check_finite, check_positive
+from sphshell_pin.base.checks import check_finite, check_positive
 from sphshell_pin.errors import FrameNotFound, MissingExtra, NameNotFound, SphshellError
 from sphshell_pin.robots import RobotError
 from sphshell_pin.study.robot_check.checks import QUICK, SPEED, Sizes, run_checks

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Adaptive, Result, Scene, SemiImplicitEuler, Simulation
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.errors import SimulationDiverged, SphshellError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact import Sphere
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.errors import SphshellError

@@ -10,9 +10,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.checks import stated_pairs
+from sphshell_pin.base.checks import stated_pairs
+from sphshell_pin.base.parameters import Component, parameter
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.study.sweep.job import need
 
 FloatArray = NDArray[np.float64]

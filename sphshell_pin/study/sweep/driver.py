@@ -12,6 +12,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized, names
+from sphshell_pin.base.tables import column
 from sphshell_pin.errors import InvalidParameter, ResultError, SweepError
 from sphshell_pin.study.sweep.cluster import run_on_cluster
 from sphshell_pin.study.sweep.curves import columns_of_curves
@@ -31,8 +33,6 @@ from sphshell_pin.study.sweep.table import (
     write_table,
 )
 from sphshell_pin.study.sweep.worker import run_one
-from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized, names
-from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
     import pandas as pd

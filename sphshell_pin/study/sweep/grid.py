@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sphshell_pin.checks import stated_pairs
+from sphshell_pin.base.checks import stated_pairs
 from sphshell_pin.errors import InvalidParameter
 
 Value = bool | int | float | str

@@ -11,8 +11,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import import_extra
-from sphshell_pin.regular_file import open_regular
 from sphshell_pin.scenario.format.schema import Scenario
 
 if TYPE_CHECKING:

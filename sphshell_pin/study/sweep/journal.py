@@ -14,9 +14,9 @@ import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from sphshell_pin import regular_file
-from sphshell_pin.atomic.file import sync_folder
-from sphshell_pin.atomic.lock import lock_file
+from sphshell_pin.base import regular_file
+from sphshell_pin.base.atomic.file import sync_folder
+from sphshell_pin.base.atomic.lock import lock_file
 from sphshell_pin.errors import ResultError, SweepError
 from sphshell_pin.study.sweep.job import JsonObject, Outcome
 

@@ -11,11 +11,11 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.atomic import atomic_file
+from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.tables import write_parquet
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.study.sweep.grid import Axis, Value
 from sphshell_pin.study.sweep.job import Outcome, need
-from sphshell_pin.tables import write_parquet
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from typing import TYPE_CHECKING
 
-from sphshell_pin.checks import check_finite
+from sphshell_pin.base.checks import check_finite
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR
 from sphshell_pin.view.distance import RAMP

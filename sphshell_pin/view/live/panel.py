@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.json_text import plain
+from sphshell_pin.base.json_text import plain
 from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:

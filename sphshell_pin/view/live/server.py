@@ -14,8 +14,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sphshell_pin.base.regular_file import read_bytes
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
-from sphshell_pin.regular_file import read_bytes
 from sphshell_pin.view.live.access import Access
 from sphshell_pin.view.live.events import LARGEST_MESSAGE, BadMessage, Client, Event, read_event
 from sphshell_pin.view.nodes import viewer_script

@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.measured import Measured, write
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import jittered_grid
 from tests.contact.smooth.test_real_surfaces import faults, jump

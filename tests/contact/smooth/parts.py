@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from tests import meshes
 
 Ints = NDArray[np.int64]

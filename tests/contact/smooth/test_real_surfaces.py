@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 from sphshell_pin.shell.faces import Face

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import RungeKutta4, Scene, Simulation
-from sphshell_pin.arrays import Array
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.surfaces import Mesh, icosphere

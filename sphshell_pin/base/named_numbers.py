@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from sphshell_pin.base.parameters import Component, parameters_of
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-from sphshell_pin.parameters import Component, parameters_of
 
 AXES = ("x", "y", "z")
 TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")

@@ -9,7 +9,7 @@ import socket
 import time
 from pathlib import Path
 
-from sphshell_pin.regular_file import read_text
+from sphshell_pin.base.regular_file import read_text
 
 # Of file systems without locks, such as Lustre as it is often mounted.
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF}

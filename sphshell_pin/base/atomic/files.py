@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
-from sphshell_pin.atomic.folder import AtomicFolder, FolderInUse
+from sphshell_pin.base.atomic.folder import AtomicFolder, FolderInUse
 from sphshell_pin.errors import ResultError
 
 

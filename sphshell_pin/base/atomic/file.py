@@ -11,9 +11,9 @@ from os import PathLike
 from pathlib import Path
 from typing import IO
 
-from sphshell_pin.atomic.lock import lock_file
+from sphshell_pin.base.atomic.lock import lock_file
+from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import ResultError
-from sphshell_pin.regular_file import open_regular
 
 
 @contextlib.contextmanager

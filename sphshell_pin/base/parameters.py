@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin.checks import check_finite, check_type
+from sphshell_pin.base.checks import check_finite, check_type
 from sphshell_pin.errors import InvalidParameter
 
 _KEY = "parameter"

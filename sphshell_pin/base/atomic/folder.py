@@ -21,10 +21,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from sphshell_pin.atomic.exchange import exchange
-from sphshell_pin.atomic.file import sync_file, sync_folder
-from sphshell_pin.atomic.lock import holder, lock_file, sign
-from sphshell_pin.regular_file import read_text
+from sphshell_pin.base.atomic.exchange import exchange
+from sphshell_pin.base.atomic.file import sync_file, sync_folder
+from sphshell_pin.base.atomic.lock import holder, lock_file, sign
+from sphshell_pin.base.regular_file import read_text
 
 # Another process can remove the parent that long between two steps of this one.
 _MOST_TRIES = 100

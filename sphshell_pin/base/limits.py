@@ -9,7 +9,7 @@ from contextlib import suppress
 from multiprocessing import spawn
 from pathlib import Path
 
-from sphshell_pin import sandbox
+from sphshell_pin.base import sandbox
 
 
 def child_command(module: str) -> list[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.atomic import atomic_file, atomic_path
+from sphshell_pin.base.atomic import atomic_file, atomic_path
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError, import_extra
 
 SUFFIXES = (".gif", ".mp4")

@@ -1,0 +1,1 @@
+"""What all folders use and no user calls: checks, parameters, files, text."""
