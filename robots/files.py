@@ -261,7 +261,7 @@ def _with_meshes(
 
     With `meters` Collada meshes are scaled by their unit, which Coal ignores.
     """
-    root = ET.fromstring(ET.tostring(description.root))
+    root = copy.deepcopy(description.root)
     missing: dict[str, None] = {}
     if description.is_mjcf:
         assets = {one.get("name"): one for one in root.iter("mesh")}

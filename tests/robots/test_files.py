@@ -87,6 +87,14 @@ def test_other_names_of_meshes(tmp_path):
         assert robots.load_file(arm(tmp_path, collision=uri)).collision_model.ngeoms == 1
 
 
+def test_tags_may_have_letters_of_any_language(tmp_path):
+    """An element that nobody knows is left alone, whatever its name."""
+    text = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
+    path = tmp_path / "finger.urdf"
+    path.write_text(text.replace("</robot>", "<größe/></robot>"), encoding="utf-8")
+    assert robots.load_file(path).model.nq == 3
+
+
 def test_a_visual_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
     file = arm(tmp_path, visual=URI)
     text = file.read_text()
