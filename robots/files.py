@@ -24,7 +24,7 @@ from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.robots.plain_mesh import collada_unit, refused_reference
-from sphshell_pin.shell.readers.ply import read_ply
+from sphshell_pin.shell.readers import READERS
 
 
 class RobotError(SphshellError, ValueError):
@@ -306,7 +306,8 @@ def _with_meshes(
 def _mesh_reason(path: Path) -> str:
     """Say why a mesh is not given to the reader that Pinocchio has, which may crash at it.
 
-    It knows 40 formats; those of robots have been tried, damaged .ply files alone made it crash.
+    It knows 40 formats; those of robots have been tried: damaged .ply files made it crash, damaged
+    .off files go on for ever.
     """
     suffix = path.suffix.lower()
     try:
@@ -315,9 +316,9 @@ def _mesh_reason(path: Path) -> str:
         return f"{path}: {error.strerror}"
     if suffix not in MESHES:
         return f"{path}: not one of the formats {', '.join(MESHES)}"
-    if suffix == ".ply":
+    if suffix in (".ply", ".off"):
         try:
-            read_ply(path)
+            READERS[suffix](path)
         except ShellFileError as error:
             return str(error)
     return refused_reference(path)

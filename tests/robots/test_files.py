@@ -87,6 +87,14 @@ def test_other_names_of_meshes(tmp_path):
         assert robots.load_file(arm(tmp_path, collision=uri)).collision_model.ngeoms == 1
 
 
+def test_a_damaged_off_file_is_refused_at_once(tmp_path):
+    """The reader that Pinocchio has goes on for ever at this one."""
+    mesh = tmp_path / "mesh.off"
+    mesh.write_bytes(b"OFF#% 7 0\n0 0 1e-30\n1 4 0\n0 0 1\xff")
+    with pytest.raises(robots.RobotError, match=r"mesh\.off"):
+        robots.load_file(arm(tmp_path, collision=str(mesh)))
+
+
 def test_tags_may_have_letters_of_any_language(tmp_path):
     """An element that nobody knows is left alone, whatever its name."""
     text = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
