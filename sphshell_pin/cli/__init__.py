@@ -9,9 +9,4 @@ from sphshell_pin.cli import check_robot, listing  # noqa: F401
 # isort: on
 from sphshell_pin.cli.app import app, main
 
-# Typer keeps the line ends of all paragraphs but the first: the help would break at two widths.
-for _command in app.registered_commands:
-    _paragraphs = (getattr(_command.callback, "__doc__", None) or "").split("\n\n")
-    _command.help = "\n\n".join(" ".join(one.split()) for one in _paragraphs)
-
 __all__ = ["app", "main"]

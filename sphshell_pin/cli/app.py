@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import contextvars
 import functools
+import inspect
 import logging
 import os
 import re
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 _debug = contextvars.ContextVar("debug", default=False)
+# The section of a docstring that describes a command's options, and an entry of it.
+_OPTIONS = "\n\nOptions\n-------\n"
+_ENTRY = re.compile(r"^(\w+)(.*?) : (.*(?:\n +.*)*)", re.MULTILINE)
 
 app = typer.Typer(
     name="sphshell-pin",
@@ -160,17 +164,49 @@ def main() -> None:
 
 
 def command(name: str | None = None) -> Callable[[Callable[P, None]], Callable[P, None]]:
-    """Add a command to the application, with its faults as `_faults` reports them."""
+    """Add a command to the application, with its faults as `_faults` reports them.
+
+    Parameters before `*` are arguments, those behind it options. The section "Options" at the end
+    of the docstring describes each that is not annotated with its description: "name : help",
+    where the name may be followed by other names of the option ("--all") and by what stands for its
+    value in the help ("FILE"). The rest of the docstring is the help of the command.
+    """
 
     def add(function: Callable[P, None]) -> Callable[P, None]:
+        text, _, options = inspect.cleandoc(function.__doc__ or "").partition(_OPTIONS)
+        stated = {name: (words, help) for name, words, help in _ENTRY.findall(options)}
+        signature = inspect.signature(function, eval_str=True)
+        parameters = [
+            _described(one, *stated[one.name]) if one.name in stated else one
+            for one in signature.parameters.values()
+        ]
+
         @functools.wraps(function)
         def called(*args: P.args, **options: P.kwargs) -> None:
             with _faults():
                 function(*args, **options)
 
-        return app.command(name)(called)
+        called.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        called.__annotations__ = {one.name: one.annotation for one in parameters}
+        # Typer keeps the line ends of all paragraphs but the first: they break at two widths.
+        paragraphs = (" ".join(one.split()) for one in text.split("\n\n"))
+        return app.command(name, help="\n\n".join(paragraphs))(called)
 
     return add
+
+
+def _described(parameter: inspect.Parameter, words: str, help: str) -> inspect.Parameter:
+    """Return a parameter annotated with its description: an argument, or an option."""
+    names = [one for one in words.split() if one.startswith("--")]
+    metavar = " ".join(one for one in words.split() if one not in names) or None
+    help = " ".join(help.split()).replace("[", "\\[")
+    if parameter.kind is not parameter.KEYWORD_ONLY:
+        made = argument(help, metavar=metavar)
+    else:
+        own = parameter.name.strip("_").replace("_", "-")
+        usual = f"--{own}/--no-{own}" if parameter.default is True else f"--{own}"
+        made = option(help, *(names or [usual]), metavar=metavar)
+    return parameter.replace(annotation=Annotated[parameter.annotation, made])
 
 
 @contextlib.contextmanager

@@ -20,7 +20,6 @@ from sphshell_pin.cli.app import (
     PackageDirOption,
     RadiusOption,
     XacroArgOption,
-    argument,
     colored,
     command,
     length_of,
@@ -43,41 +42,21 @@ _PIPE_WIDTH, _WIDE = 170, 125
 
 @command("check-robot")
 def check_robot_(
-    robot: Annotated[
-        list[str] | None,
-        argument(
-            "Names of shipped robots (sphshell-pin list), or URDF, xacro (which is code) or "
-            "MJCF files."
-        ),
-    ] = None,
-    every: Annotated[bool, option("Check every robot there is.", "--all")] = False,
-    frame: Annotated[
-        str | None,
-        option(
-            "Frame that carries the sphere; by default a known tip, or the end of the "
-            "longest limb and the outermost sphere inside its collision mesh."
-        ),
-    ] = None,
+    robot: list[str] | None = None,
+    *,
+    every: bool = False,
+    frame: str | None = None,
     radius: RadiusOption = None,
-    free_flyer: Annotated[
-        bool, option("The root link of the URDF floats.", "--free-flyer")
-    ] = False,
+    free_flyer: bool = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
     density: DensityOption = None,
     no_mimic: MimicOption = False,
-    mend: Annotated[
-        Path | None,
-        option("Write a URDF of the robot that needs none of these options.", metavar="OUT.urdf"),
-    ] = None,
-    quick: Annotated[bool, option("Fewer postures and runs.", "--quick")] = False,
+    mend: Path | None = None,
+    quick: bool = False,
     seed: Annotated[int, option("Seed of the random postures.", min=0)] = 0,
-    json: Annotated[
-        Path | None, option("Write all figures to this file.", "--json", metavar="FILE")
-    ] = None,
-    write: Annotated[
-        Path | None, option("Write the table as Markdown.", "--write", metavar="FILE")
-    ] = None,
+    json: Path | None = None,
+    write: Path | None = None,
 ) -> None:
     """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.
 
@@ -86,6 +65,19 @@ def check_robot_(
     be checked.
 
     Example: sphshell-pin check-robot panda my_robot.urdf
+
+    Options
+    -------
+    robot : Names of shipped robots (sphshell-pin list), or URDF, xacro (which is code) or MJCF
+        files.
+    every --all : Check every robot there is.
+    frame : Frame that carries the sphere; by default a known tip, or the end of the longest limb
+        and the outermost sphere inside its collision mesh.
+    free_flyer : The root link of the URDF floats.
+    mend OUT.urdf : Write a URDF of the robot that needs none of these options.
+    quick : Fewer postures and runs.
+    json FILE : Write all figures to this file.
+    write FILE : Write the table as Markdown.
     """
     from sphshell_pin.base.atomic import write_whole
     from sphshell_pin.study import robot_check as study

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from sphshell_pin.base.tables import column
-from sphshell_pin.cli.app import argument, command, if_installed, option, print_table, say
+from sphshell_pin.cli.app import command, if_installed, print_table, say
 from sphshell_pin.cli.export import file_of, with_scene
 
 if TYPE_CHECKING:
@@ -18,20 +18,19 @@ MOST_ROWS = 24
 
 
 @command()
-def compare(
-    *,
-    runs: Annotated[list[Path], argument("Two or more finished runs: run.npz or results folders.")],
-    out: Annotated[Path, option("Folder of figures.csv, curves.csv and compare.png.")] = Path(
-        "results/compare"
-    ),
-    picture: Annotated[bool, option("Draw compare.png.", "--picture/--no-picture")] = True,
-) -> None:
+def compare(runs: list[Path], *, out: Path = Path("results/compare"), picture: bool = True) -> None:
     """Lay finished runs over each other: figures and curves, with their differences from the first.
 
     Contacts, joints and sensors are matched by name. Curves are compared within the time that both
     runs have, as lines between their recorded rows. Printed is what differs; the tables have all.
 
     Example: sphshell-pin compare results/soft results/stiff
+
+    Options
+    -------
+    runs : Two or more finished runs: run.npz or results folders.
+    out : Folder of figures.csv, curves.csv and compare.png.
+    picture : Draw compare.png.
     """
     from sphshell_pin.base.atomic.files import write_folder
     from sphshell_pin.base.tables import csv_text

@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from sphshell_pin.cli.app import OfOption, RunArgument, command, option, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, progress_bar
 from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
@@ -24,27 +24,9 @@ FORMATS = ("mcap", "csv", "parquet")
 def export(
     *,
     run: RunArgument,
-    to: Annotated[
-        str | None,
-        option(
-            "mcap (ROS 2 messages), csv or parquet (tables); by default as --out ends.",
-            metavar="FORMAT",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        option(
-            "The .mcap file, or the folder of the tables; by default beside the run: "
-            "RUN.mcap, RUN_csv, RUN_parquet."
-        ),
-    ] = None,
-    start: Annotated[
-        str,
-        option(
-            "Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.",
-            metavar="TIME",
-        ),
-    ] = "0",
+    to: str | None = None,
+    out: Path | None = None,
+    start: str = "0",
     of: OfOption = None,
 ) -> None:
     """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.
@@ -53,6 +35,13 @@ def export(
     messages, and needs no ROS. Tables are rows, contacts, events, energy and sensors.
 
     Example: sphshell-pin export results/fingertip_on_blade --to mcap
+
+    Options
+    -------
+    to FORMAT : mcap (ROS 2 messages), csv or parquet (tables); by default as --out ends.
+    out : The .mcap file, or the folder of the tables; by default beside the run: RUN.mcap, RUN_csv,
+        RUN_parquet.
+    start TIME : Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.
     """
     from sphshell_pin.scenario.running.replay import Replay
 

@@ -10,7 +10,6 @@ import typer
 
 from sphshell_pin.cli.app import (
     MISSED,
-    argument,
     command,
     length_of,
     option,
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     from sphshell_pin.study.against import Against
 
 MOST_ROWS = 16  # of the printed table
-
-FORMATS = ".stl .obj .ply .off .shl, .step .iges .brep"
 
 ChordErrorOption = Annotated[
     float | None, option("Of CAD: largest distance of the elements from the exact surface \\[m].")
@@ -49,32 +46,22 @@ MemoryLimitOption = Annotated[
 
 @command()
 def check(
-    file: Annotated[Path, argument(f"A surface file: {FORMATS}")],
-    unit: Annotated[str | None, option("Length unit of the file: mm, cm, m, inch, ...")] = None,
-    side: Annotated[str, option("Where spheres may be: both, outside, inside.")] = "both",
-    scale: Annotated[
-        str | None, option("Use of the SCALE of a .shl file: apply, ignore, or a number instead.")
-    ] = None,
+    file: Path,
+    *,
+    unit: str | None = None,
+    side: str = "both",
+    scale: str | None = None,
     chord_error: ChordErrorOption = None,
     body: BodyOption = None,
     face: FaceOption = None,
     time_limit: TimeLimitOption = None,
     memory_limit: MemoryLimitOption = None,
-    against: Annotated[
-        Path | None, option("Another file of the same part: compare contact on all faces of both.")
-    ] = None,
-    against_unit: Annotated[str | None, option("Length unit of that file.")] = None,
-    radius: Annotated[
-        str | None, option("With --against: radius of the spheres, 2 % of the size unless given.")
-    ] = None,
-    tolerance: Annotated[float, option("With --against: share by which forces may differ.")] = 0.01,
-    json: Annotated[
-        Path | None, option("With --against: write all figures to this file.", "--json")
-    ] = None,
-    map_: Annotated[
-        Path | None,
-        option("With --against: draw both parts to this .png, by what differs.", "--map"),
-    ] = None,
+    against: Path | None = None,
+    against_unit: str | None = None,
+    radius: str | None = None,
+    tolerance: float = 0.01,
+    json: Path | None = None,
+    map_: Path | None = None,
 ) -> None:
     """Print the health of a surface file: what was found, what was repaired, how far it is curved.
 
@@ -82,6 +69,19 @@ def check(
     which contact differs. Exit code 1: it does.
 
     Example: sphshell-pin check blade.stl --unit mm
+
+    Options
+    -------
+    file : A surface file: .stl .obj .ply .off .shl, .step .iges .brep
+    unit : Length unit of the file: mm, cm, m, inch, ...
+    side : Where spheres may be: both, outside, inside.
+    scale : Use of the SCALE of a .shl file: apply, ignore, or a number instead.
+    against : Another file of the same part: compare contact on all faces of both.
+    against_unit : Length unit of that file.
+    radius : With --against: radius of the spheres, 2 % of the size unless given.
+    tolerance : With --against: share by which forces may differ.
+    json : With --against: write all figures to this file.
+    map_ : With --against: draw both parts to this .png, by what differs.
     """
     from sphshell_pin import Shell
     from sphshell_pin.shell.cad import CAD_SUFFIXES
@@ -164,14 +164,11 @@ def _print_against(found: Against, names: tuple[str, str]) -> None:
 
 @command()
 def convert(
-    source: Annotated[Path, argument(f"The file to read: {FORMATS}")],
-    target: Annotated[Path, argument("The file to write; its suffix names the format.")],
-    unit_in: Annotated[
-        str | None, option("Length unit of the file to read; STEP and IGES state it.")
-    ] = None,
-    unit_out: Annotated[
-        str | None, option("Length unit of the file to write; the same unless given.")
-    ] = None,
+    source: Path,
+    target: Path,
+    *,
+    unit_in: str | None = None,
+    unit_out: str | None = None,
     chord_error: ChordErrorOption = None,
     body: BodyOption = None,
     face: FaceOption = None,
@@ -184,6 +181,13 @@ def convert(
     planar CAD faces.
 
     Example: sphshell-pin convert blade.step blade.stl --chord-error 1e-4
+
+    Options
+    -------
+    source : The file to read: .stl .obj .ply .off .shl, .step .iges .brep
+    target : The file to write; its suffix names the format.
+    unit_in : Length unit of the file to read; STEP and IGES state it.
+    unit_out : Length unit of the file to write; the same unless given.
     """
     from sphshell_pin.shell.converting import convert as convert_file
 

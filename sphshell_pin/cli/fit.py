@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -16,11 +16,9 @@ from sphshell_pin.cli.app import (
     PackageDirOption,
     ScenarioArgument,
     SetOption,
-    argument,
     changes_of,
     command,
     if_installed,
-    option,
     print_table,
     progress_bar,
     say,
@@ -33,40 +31,15 @@ if TYPE_CHECKING:
 
 @command()
 def fit(
+    data: list[Path] | None = None,
     *,
-    data: Annotated[
-        list[Path] | None, argument("Measured data: columns by name and unit.", metavar="DATA.csv")
-    ] = None,
     scenario: ScenarioArgument,
-    param: Annotated[
-        list[str],
-        option(
-            "What is fitted, in this range if it is given; may be given several times. "
-            "KEY+KEY: one value for both.",
-            "--param",
-            metavar="KEY[=LO:HI]",
-        ),
-    ],
-    experiment: Annotated[
-        list[str] | None,
-        option(
-            "Data of an experiment with other values than the scenario; may be given several "
-            "times.",
-            metavar="'DATA.csv KEY=VALUE...'",
-        ),
-    ] = None,
-    column: Annotated[
-        list[str] | None, option("Use this column; by default all; several times.", metavar="NAME")
-    ] = None,
-    sigma: Annotated[
-        list[str] | None,
-        option(
-            "Standard deviation of a column, in SI; by default from the residuals.",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
-    out: Annotated[Path | None, option("Folder of the files; by default results/SCENARIO.")] = None,
-    picture: Annotated[bool, option("Draw fit and residuals.", "--picture/--no-picture")] = True,
+    param: list[str],
+    experiment: list[str] | None = None,
+    column: list[str] | None = None,
+    sigma: list[str] | None = None,
+    out: Path | None = None,
+    picture: bool = True,
     compiled: CompiledOption = False,
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
@@ -77,6 +50,18 @@ def fit(
     determine a value.
 
     Example: sphshell-pin fit drop.csv ball.toml --param contact.tip.law.stiffness
+
+    Options
+    -------
+    data DATA.csv : Measured data: columns by name and unit.
+    param KEY[=LO:HI] : What is fitted, in this range if it is given; may be given several times.
+        KEY+KEY: one value for both.
+    experiment 'DATA.csv KEY=VALUE...' : Data of an experiment with other values than the scenario;
+        may be given several times.
+    column NAME : Use this column; by default all; several times.
+    sigma NAME=VALUE : Standard deviation of a column, in SI; by default from the residuals.
+    out : Folder of the files; by default results/SCENARIO.
+    picture : Draw fit and residuals.
     """
     from sphshell_pin.scenario.format.reading import find_scenario, read_scenario
     from sphshell_pin.study.fit import Experiment

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
+from typing import TYPE_CHECKING, Literal, NoReturn
 
 import typer
 
@@ -16,7 +16,6 @@ from sphshell_pin.cli.app import (
     XacroArgOption,
     command,
     length_of,
-    option,
     progress_bar,
     say,
     xacro_args_of,
@@ -33,81 +32,31 @@ _FRAMES = 8  # of a robot in a list
 
 @command()
 def new(
-    robot: Annotated[
-        str,
-        option(
-            "A shipped robot (sphshell-pin list), a URDF, xacro (which is code) or MJCF file, a "
-            "name of robot_descriptions, or a folder: its robots are listed."
-        ),
-    ],
-    surface: Annotated[
-        str, option("A surface file, or one of: plane, box, sphere, cylinder, bowl.")
-    ] = "plane",
-    frame: Annotated[
-        str | None,
-        option("Frame that carries the sphere; by default a known tip or the end of a limb."),
-    ] = None,
+    *,
+    robot: str,
+    surface: str = "plane",
+    frame: str | None = None,
     radius: RadiusOption = None,
-    offset: Annotated[
-        tuple[float, float, float] | None,
-        option(
-            "Center of the sphere in the frame \\[m]; by default the end of its link.",
-            metavar="X Y Z",
-        ),
-    ] = None,
-    unit: Annotated[
-        str | None, option("Length unit of the surface file: mm, cm, m, inch, ...")
-    ] = None,
+    offset: tuple[float, float, float] | None = None,
+    unit: str | None = None,
     body: BodyOption = None,
     face: FaceOption = None,
-    law: Annotated[
-        str | None,
-        option("Material of the sphere: steel, aluminium, plastic, wood, rubber, silicone."),
-    ] = None,
-    against: Annotated[str, option("Material of the surface.")] = "steel",
-    press: Annotated[float | None, option("Normal force \\[N].", metavar="N")] = None,
-    place: Annotated[
-        str | None,
-        option(
-            "Where the surface is, seen from the tip: below, above, +x, -x, +y, -y; by "
-            "default below, if the joints allow it."
-        ),
-    ] = None,
-    at: Annotated[
-        str | None,
-        option(
-            "Where to touch: a point of the part \\[m], or a face as check lists them: plane, "
-            "'cylinder 5.5 mm'; the largest one.",
-            metavar="X,Y,Z|FACE",
-        ),
-    ] = None,
-    path: Annotated[
-        str | None,
-        option(
-            "Of the tip: points of the part \\[m], 'x,y,z; x,y,z', or line, circle, raster.",
-            metavar="POINTS|SHAPE",
-        ),
-    ] = None,
-    length: Annotated[
-        str | None, option("Of a path: 0.06 \\[m] or 60mm.", metavar="LENGTH")
-    ] = None,
-    tips: Annotated[
-        Literal["one", "all"],
-        option("all: the fingertips of a hand hold the surface, as a free part."),
-    ] = "one",
-    base: Annotated[
-        Literal["fixed", "floating"] | None,
-        option("Of the robot; by default as its file and its shape say."),
-    ] = None,
-    free_flyer: Annotated[bool, option("The same as --base floating.", "--free-flyer")] = False,
+    law: str | None = None,
+    against: str = "steel",
+    press: float | None = None,
+    place: str | None = None,
+    at: str | None = None,
+    path: str | None = None,
+    length: str | None = None,
+    tips: Literal["one", "all"] = "one",
+    base: Literal["fixed", "floating"] | None = None,
+    free_flyer: bool = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
     density: DensityOption = None,
     no_mimic: MimicOption = False,
-    out: Annotated[
-        Path | None, option("The file to write; default: ROBOT_on_SURFACE.toml.")
-    ] = None,
-    force: Annotated[bool, option("Replace the file if it is there already.", "--force")] = False,
+    out: Path | None = None,
+    force: bool = False,
 ) -> None:
     """Write a scenario: this robot, this surface, and values that work for their size.
 
@@ -115,6 +64,29 @@ def new(
     robot's links out of the part; else the message says what fails and what to change.
 
     Example: sphshell-pin new --robot panda --surface blade.stl --unit mm
+
+    Options
+    -------
+    robot : A shipped robot (sphshell-pin list), a URDF, xacro (which is code) or MJCF file, a name
+        of robot_descriptions, or a folder: its robots are listed.
+    surface : A surface file, or one of: plane, box, sphere, cylinder, bowl.
+    frame : Frame that carries the sphere; by default a known tip or the end of a limb.
+    offset X Y Z : Center of the sphere in the frame [m]; by default the end of its link.
+    unit : Length unit of the surface file: mm, cm, m, inch, ...
+    law : Material of the sphere: steel, aluminium, plastic, wood, rubber, silicone.
+    against : Material of the surface.
+    press N : Normal force [N].
+    place : Where the surface is, seen from the tip: below, above, +x, -x, +y, -y; by default below,
+        if the joints allow it.
+    at X,Y,Z|FACE : Where to touch: a point of the part [m], or a face as check lists them: plane,
+        'cylinder 5.5 mm'; the largest one.
+    path POINTS|SHAPE : Of the tip: points of the part [m], 'x,y,z; x,y,z', or line, circle, raster.
+    length LENGTH : Of a path: 0.06 [m] or 60mm.
+    tips : all: the fingertips of a hand hold the surface, as a free part.
+    base : Of the robot; by default as its file and its shape say.
+    free_flyer : The same as --base floating.
+    out : The file to write; default: ROBOT_on_SURFACE.toml.
+    force : Replace the file if it is there already.
     """
     if Path(robot).is_dir():
         _list_robots(robot)

@@ -4,39 +4,27 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import OfOption, RunArgument, command, option, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, progress_bar
 from sphshell_pin.errors import InvalidParameter, SphshellError
 
 
 @command()
 def render(
     run: RunArgument,
-    out: Annotated[
-        Path, option("A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures.")
-    ],
-    time: Annotated[
-        float | None, option("Of a picture: time of the run \\[s]; by default its end.")
-    ] = None,
-    from_: Annotated[
-        float | None, option("Of a film: time at which it begins \\[s].", "--from")
-    ] = None,
-    to: Annotated[float | None, option("Of a film: time at which it ends \\[s].", "--to")] = None,
-    size: Annotated[str, option("Width and height in pixels.")] = "1280x720",
-    fps: Annotated[
-        float | None, option("Pictures per second; by default 30, of a .gif 20.")
-    ] = None,
-    speed: Annotated[
-        float | None, option("Simulated seconds per second; by default as the scenario has it.")
-    ] = None,
-    camera: Annotated[str, option("From where: fit, front, side, top, follow, contact.")] = "fit",
-    chart: Annotated[
-        bool, option("Forces and depth under the scene.", "--chart/--no-chart")
-    ] = True,
-    dark: Annotated[bool, option("Dark background.", "--dark")] = False,
+    *,
+    out: Path,
+    time: float | None = None,
+    from_: float | None = None,
+    to: float | None = None,
+    size: str = "1280x720",
+    fps: float | None = None,
+    speed: float | None = None,
+    camera: str = "fit",
+    chart: bool = True,
+    dark: bool = False,
     of: OfOption = None,
 ) -> None:
     """Draw a finished run: one picture, a film, or a folder of pictures for slides.
@@ -44,6 +32,19 @@ def render(
     It needs the extra video, and Chromium.
 
     Example: sphshell-pin render results/fingertip_on_blade --out blade.mp4 --camera follow
+
+    Options
+    -------
+    out : A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures.
+    time : Of a picture: time of the run [s]; by default its end.
+    from_ : Of a film: time at which it begins [s].
+    to : Of a film: time at which it ends [s].
+    size : Width and height in pixels.
+    fps : Pictures per second; by default 30, of a .gif 20.
+    speed : Simulated seconds per second; by default as the scenario has it.
+    camera : From where: fit, front, side, top, follow, contact.
+    chart : Forces and depth under the scene.
+    dark : Dark background.
     """
     from sphshell_pin.scenario.running.replay import Replay
     from sphshell_pin.view.film import render_film

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -12,7 +12,6 @@ from sphshell_pin.cli.app import (
     PERCENT,
     colored,
     command,
-    option,
     print_table,
     progress_bar,
     say,
@@ -23,10 +22,7 @@ if TYPE_CHECKING:
 
 
 @command()
-def report(
-    quick: Annotated[bool, option("Some two minutes: fewer rounds and sizes.", "--quick")] = False,
-    out: Annotated[Path, option("Folder of the page and its tables.")] = Path("results/report"),
-) -> None:
+def report(*, quick: bool = False, out: Path = Path("results/report")) -> None:
     """Measure speed against error on this machine and write a page of it.
 
     Contact forces, queries, integrators and steps, each against its aim. The machine should have
@@ -34,6 +30,11 @@ def report(
     no error.
 
     Example: sphshell-pin report --quick
+
+    Options
+    -------
+    quick : Some two minutes: fewer rounds and sizes.
+    out : Folder of the page and its tables.
     """
     from sphshell_pin.study.report import PAGE, make_report
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -22,7 +22,6 @@ from sphshell_pin.cli.app import (
     changes_of,
     colored,
     command,
-    option,
     print_table,
     progress_bar,
     say,
@@ -42,19 +41,12 @@ MOST_PAIRS = 16
 def run(
     *,
     scenario: ScenarioArgument,
-    out: Annotated[Path | None, option("Results folder; by default results/SCENARIO.")] = None,
+    out: Path | None = None,
     dt: DtOption = None,
     duration: DurationOption = None,
-    recording: Annotated[
-        bool, option("Write recording.html.", "--recording/--no-recording")
-    ] = True,
-    figures: Annotated[bool, option("Draw the figures.", "--figures/--no-figures")] = True,
-    audit_cad: Annotated[
-        bool,
-        option(
-            "Compare every contact with that on the exact faces of the CAD file.", "--audit-cad"
-        ),
-    ] = False,
+    recording: bool = True,
+    figures: bool = True,
+    audit_cad: bool = False,
     compiled: CompiledOption = False,
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
@@ -62,6 +54,13 @@ def run(
     """Run a scenario and write its results folder.
 
     Example: sphshell-pin run fingertip_on_blade --duration 2 --set controller.normal_force=8
+
+    Options
+    -------
+    out : Results folder; by default results/SCENARIO.
+    recording : Write recording.html.
+    figures : Draw the figures.
+    audit_cad : Compare every contact with that on the exact faces of the CAD file.
     """
     from sphshell_pin.scenario import build, explain_built, run_built
 

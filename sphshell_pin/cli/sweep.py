@@ -6,7 +6,7 @@ import shlex
 import sys
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -20,7 +20,6 @@ from sphshell_pin.cli.app import (
     SetOption,
     changes_of,
     command,
-    option,
     print_table,
     progress_bar,
     say,
@@ -39,62 +38,23 @@ _MOST_FAILURES = 5
 def sweep(
     *,
     scenario: ScenarioArgument,
-    vary: Annotated[
-        list[str] | None,
-        option(
-            "What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.",
-            metavar="KEY=VALUES",
-        ),
-    ] = None,
-    together: Annotated[
-        bool, option("Take the values of all keys in step: no grid.", "--together")
-    ] = False,
-    dist: Annotated[
-        list[str] | None,
-        option(
-            "An uncertain input: normal(mean, deviation), uniform(low, high) or "
-            "lognormal(median, factor): 68 % from median / factor to median * factor.",
-            metavar="'KEY=DISTRIBUTION'",
-        ),
-    ] = None,
-    sample: Annotated[
-        str | None,
-        option("Points: sobol (a Sobol sequence) or lhs (a Latin hypercube).", metavar="KIND"),
-    ] = None,
-    n: Annotated[int | None, option("Number of points; a power of 2 for sobol.", "--n")] = None,
-    seed: Annotated[int, option("Seed of the points.")] = 0,
-    indices: Annotated[
-        bool, option("Sobol indices: n (d + 2) runs for d uncertain inputs.", "--indices")
-    ] = False,
-    tornado: Annotated[
-        bool, option("2 d + 1 runs more: each input alone at 5 and at 95 %.", "--tornado")
-    ] = False,
-    bands: Annotated[
-        list[str] | None,
-        option("Record a curve of each run; draw quantiles over time.", metavar="CURVE"),
-    ] = None,
-    band_steps: Annotated[int | None, option("Equal steps of the curves; by default 200.")] = None,
-    out: Annotated[
-        Path | None, option("Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO.")
-    ] = None,
-    workers: Annotated[
-        int | None, option("Processes; by default one per processor; 0: this one alone.")
-    ] = None,
-    scheduler: Annotated[
-        str | None, option("Address of a Dask scheduler whose workers do the runs.")
-    ] = None,
-    plot: Annotated[
-        list[str] | None, option("Figure to draw; may be given several times.", metavar="FIGURE")
-    ] = None,
-    pictures: Annotated[
-        bool, option("Draw curves or maps of the table.", "--pictures/--no-pictures")
-    ] = True,
-    verdicts: Annotated[
-        bool, option("A column for each expectation: met or not.", "--verdicts")
-    ] = False,
-    retry_failed: Annotated[
-        bool, option("Do failed runs of an earlier call again.", "--retry-failed")
-    ] = False,
+    vary: list[str] | None = None,
+    together: bool = False,
+    dist: list[str] | None = None,
+    sample: str | None = None,
+    n: int | None = None,
+    seed: int = 0,
+    indices: bool = False,
+    tornado: bool = False,
+    bands: list[str] | None = None,
+    band_steps: int | None = None,
+    out: Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    plot: list[str] | None = None,
+    pictures: bool = True,
+    verdicts: bool = False,
+    retry_failed: bool = False,
     dt: DtOption = None,
     duration: DurationOption = None,
     compiled: CompiledOption = False,
@@ -108,6 +68,27 @@ def sweep(
     The same command resumes where an earlier one was stopped.
 
     Example: sphshell-pin sweep sphere_on_shell --vary contact.law.k=1e3:1e5:log:20
+
+    Options
+    -------
+    vary KEY=VALUES : What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.
+    together : Take the values of all keys in step: no grid.
+    dist 'KEY=DISTRIBUTION' : An uncertain input: normal(mean, deviation), uniform(low, high) or
+        lognormal(median, factor): 68 % from median / factor to median * factor.
+    sample KIND : Points: sobol (a Sobol sequence) or lhs (a Latin hypercube).
+    n : Number of points; a power of 2 for sobol.
+    seed : Seed of the points.
+    indices : Sobol indices: n (d + 2) runs for d uncertain inputs.
+    tornado : 2 d + 1 runs more: each input alone at 5 and at 95 %.
+    bands CURVE : Record a curve of each run; draw quantiles over time.
+    band_steps : Equal steps of the curves; by default 200.
+    out : Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO.
+    workers : Processes; by default one per processor; 0: this one alone.
+    scheduler : Address of a Dask scheduler whose workers do the runs.
+    plot FIGURE : Figure to draw; may be given several times.
+    pictures : Draw curves or maps of the table.
+    verdicts : A column for each expectation: met or not.
+    retry_failed : Do failed runs of an earlier call again.
     """
     from sphshell_pin.plot.sweep import plot_sweep
     from sphshell_pin.study.sweep import plan_sweep, run_plan

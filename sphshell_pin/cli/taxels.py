@@ -4,38 +4,40 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import RunArgument, command, if_installed, option
+from sphshell_pin.cli.app import RunArgument, command, if_installed
 from sphshell_pin.cli.export import file_of
 
 
 @command()
 def taxels(
     run: RunArgument,
-    contact: Annotated[str, option("Contact whose sphere has the taxels.")],
-    shape: Annotated[tuple[int, int], option("Numbers of taxels: rows and columns.")] = (16, 16),
-    axis: Annotated[
-        tuple[float, float, float],
-        option("From the sphere's center to the middle of the grid, in its frame."),
-    ] = (0.0, 0.0, 1.0),
-    up: Annotated[
-        tuple[float, float, float] | None,
-        option("Direction of the columns, in the same frame; by default any."),
-    ] = None,
-    extent_deg: Annotated[
-        tuple[float, float], option("Angles over which rows and columns reach.")
-    ] = (90.0, 90.0),
-    speed: Annotated[float, option("Simulated seconds in a second of the film.")] = 1.0,
-    out: Annotated[Path | None, option("Folder to write into; by default that of the run.")] = None,
+    *,
+    contact: str,
+    shape: tuple[int, int] = (16, 16),
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    up: tuple[float, float, float] | None = None,
+    extent_deg: tuple[float, float] = (90.0, 90.0),
+    speed: float = 1.0,
+    out: Path | None = None,
 ) -> None:
     """Write what a grid of tactile sensors on a sphere felt: taxels.npz, and a film of it.
 
     The run must have recorded patches (record in its table run).
 
     Example: sphshell-pin taxels results/polished_valve --contact tool --axis 0 0 1
+
+    Options
+    -------
+    contact : Contact whose sphere has the taxels.
+    shape : Numbers of taxels: rows and columns.
+    axis : From the sphere's center to the middle of the grid, in its frame.
+    up : Direction of the columns, in the same frame; by default any.
+    extent_deg : Angles over which rows and columns reach.
+    speed : Simulated seconds in a second of the film.
+    out : Folder to write into; by default that of the run.
     """
     from sphshell_pin.patches import TaxelGrid
     from sphshell_pin.scenario.running.replay import Replay

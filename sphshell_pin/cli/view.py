@@ -2,52 +2,46 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import typer
 
 from sphshell_pin.cli.app import (
     OfOption,
     PackageDirOption,
     SetOption,
-    argument,
     changes_of,
     command,
-    option,
 )
 
 
 @command()
 def view(
+    scenario: str,
     *,
-    scenario: Annotated[
-        str,
-        argument(
-            "Name of a shipped scenario, path of a .toml file, or a finished run: its "
-            "run.npz or results folder."
-        ),
-    ],
     set_: SetOption = None,
     package_dir: PackageDirOption = None,
-    speed: Annotated[float, option("Simulated seconds per second.")] = 1.0,
-    paused: Annotated[bool, option("Wait for the button Run.", "--paused")] = False,
-    host: Annotated[
-        str, option("Address to serve the page at; 0.0.0.0 lets other machines in.")
-    ] = "127.0.0.1",
-    port: Annotated[int, option("Port of the page; 0 takes any that is free.")] = 0,
-    open_: Annotated[bool, option("Open the page in the web browser.", "--open/--no-open")] = True,
-    color: Annotated[
-        str,
-        option(
-            "Colors of the shells: surface, patches, faces (by kind), or distance (of curved "
-            "elements from the flat ones)."
-        ),
-    ] = "surface",
+    speed: float = 1.0,
+    paused: bool = False,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    open_: bool = True,
+    color: str = "surface",
     of: OfOption = None,
 ) -> None:
     """Run a scenario in a page: pause, push, change parameters; or play a finished run.
 
     Example: sphshell-pin view fingertip_on_blade --speed 0.5
+
+    Options
+    -------
+    scenario : Name of a shipped scenario, path of a .toml file, or a finished run: its run.npz or
+        results folder.
+    speed : Simulated seconds per second.
+    paused : Wait for the button Run.
+    host : Address to serve the page at; 0.0.0.0 lets other machines in.
+    port : Port of the page; 0 takes any that is free.
+    open_ : Open the page in the web browser.
+    color : Colors of the shells: surface, patches, faces (by kind), or distance (of curved elements
+        from the flat ones).
     """
     from sphshell_pin.view import preview
 

@@ -56,8 +56,8 @@ def shell_of(
         (np.array_equal(surface.elements, given["elements"]), "elements"),
         (triangles.shape == surface.triangles.shape, "triangles"),
         (_are_corners(triangles, owners), "triangles"),
-        (_are_units(given.get("normals")), "normals"),
-        (of_face is None or _within(of_face, faces), "element_face"),
+        ("normals" not in given or _are_units(given["normals"]), "normals"),
+        (of_face is None or bool(((of_face >= -1) & (of_face < faces)).all()), "element_face"),
         (of_face is not None or kinds is None, "element_face"),
         (len(face_names) in (0, faces), "face_names"),
         (kinds is None or _are_faces(kinds), "face_shapes"),
@@ -85,14 +85,8 @@ def _are_corners(triangles: Array, owners: Array) -> bool:
     return bool(of_element and ((a != b) & (b != c) & (c != a) & (triangles >= 0).all(1)).all())
 
 
-def _are_units(normals: Array | None) -> bool:
-    if normals is None:
-        return True
+def _are_units(normals: Array) -> bool:
     return bool((np.abs(np.linalg.norm(normals.astype(float), axis=2) - 1.0) < 1e-6).all())
-
-
-def _within(indices: Array, count: int) -> bool:
-    return bool(((indices >= -1) & (indices < count)).all())
 
 
 def _are_faces(shapes: Array) -> bool:

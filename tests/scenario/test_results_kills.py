@@ -15,6 +15,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.atomic import AtomicFolder, write_whole
+from sphshell_pin.base.atomic.files import held_folder
 from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
@@ -230,7 +231,7 @@ def of_report(title):
     report = making.Report([Section("x", title, tables=[table])], {})
 
     def write_report(place):
-        with making._report_folder(place / "report") as folder:
+        with held_folder(place / "report", making.DATA) as folder:
             making._write(report, place / "report", folder)
 
     return write_report

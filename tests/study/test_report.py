@@ -337,5 +337,5 @@ def test_a_folder_that_cannot_be(stubs, tmp_path):
     (tmp_path / "file").write_text("mine")
     ran = call("report", "--out", tmp_path / "file")
     assert ran.exit_code == 2
-    assert "cannot hold a report" in ran.stderr
+    assert "the folder cannot be written" in ran.stderr
     assert (tmp_path / "file").read_text() == "mine"

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import contextlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
 from sphshell_pin.base.atomic.folder import AtomicFolder, FolderInUse
 from sphshell_pin.errors import ResultError
+
+
+@contextlib.contextmanager
+def held_folder(folder: Path, last: str, inner: Sequence[str] = ()) -> Iterator[AtomicFolder]:
+    """Hold a folder, see `AtomicFolder`; ResultError where it cannot be, or another has it."""
+    with contextlib.ExitStack() as held:
+        try:
+            place = held.enter_context(AtomicFolder(folder, last=last, inner=inner))
+        except FolderInUse as busy:
+            advice = "wait until it ends, or give another folder with --out"
+            raise ResultError(folder, f"{busy}: {advice}") from None
+        except OSError as error:
+            reason = f"the folder cannot be written: {error.strerror}; give another with --out"
+            raise ResultError(folder, reason) from error
+        yield place
 
 
 def write_folder(
@@ -21,15 +37,13 @@ def write_folder(
     first of them is written in any case. ResultError where the folder cannot be written.
     """
     folder = Path(folder)
-    try:
-        with AtomicFolder(folder, last=every[0]) as place:
+    with held_folder(folder, every[0]) as place:
+        try:
             staging, names = place.staging(), []
             for name, content in files.items() if isinstance(files, Mapping) else files:
                 (staging / name).write_bytes(content)
                 names.append(name)
             place.replace(staging, every)
-    except FolderInUse as busy:
-        raise ResultError(folder, f"{busy}: wait until it ends, or give another folder") from None
-    except OSError as error:
-        raise ResultError(folder, f"cannot be written: {error.strerror or error}") from error
+        except OSError as error:
+            raise ResultError(folder, f"cannot be written: {error.strerror or error}") from error
     return [folder / name for name in names]

@@ -112,14 +112,12 @@ class Replay:
     @property
     def q(self) -> Array:
         """Configuration (nq,)."""
-        q: Array = self.result.q[self._row]
-        return q
+        return np.asarray(self.result.q[self._row])
 
     @property
     def v(self) -> Array:
         """Velocity (nv,)."""
-        v: Array = self.result.v[self._row]
-        return v
+        return np.asarray(self.result.v[self._row])
 
     @property
     def contacts(self) -> SceneContacts:
@@ -199,8 +197,7 @@ class Replay:
         self._row = max(0, int(after) - 1)
 
     def _all_rows(self) -> Rows:
-        log = self.result.contacts
-        result = self.result
+        result, log = self.result, self.result.contacts
         more = {"q": result.q, "v": result.v, "residual": result.energy.residual[:, None]}
         if result.torque is not None:
             more["torque"] = result.torque

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from os import PathLike
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.base.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.base.atomic.files import held_folder
 from sphshell_pin.base.json_text import json_text, plain
 from sphshell_pin.base.regular_file import open_regular, read_text
 from sphshell_pin.base.tables import csv_text
@@ -130,14 +130,14 @@ def run_built(
         check_audit(built)
     folder = Path("results") / built.name if out is None else Path(out)
     with contextlib.ExitStack() as held:
-        place = held.enter_context(_results_folder(folder))
+        place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
         result, stopped = simulate(built, progress)
         verdicts, fault = _judge(built, result) if stopped is None else ((), None)
         notes: list[str] = []
         if stopped is not None and _holds_complete(folder):
             notes.append(f"the complete results of an earlier run stay in {folder}")
             folder = folder / STOPPED
-            place = held.enter_context(_results_folder(folder))
+            place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
         audit = compare_with_cad(built, result) if audit_cad else None
         try:
             staging = place.staging()
@@ -220,24 +220,6 @@ def origin_of(built: Built) -> Origin:
     )
 
 
-@contextlib.contextmanager
-def _results_folder(folder: Path) -> Iterator[AtomicFolder]:
-    """Hold the results folder; ResultError where it cannot be made, or another run has it."""
-    with contextlib.ExitStack() as held:
-        try:
-            place = held.enter_context(AtomicFolder(folder, last=SUMMARY, inner=[STOPPED]))
-        except FolderInUse as busy:
-            raise ResultError(
-                folder, f"{busy}: wait until it ends, or give another folder with --out"
-            ) from None
-        except OSError as error:
-            raise ResultError(
-                folder,
-                f"the results folder cannot be written: {error.strerror}; give another with --out",
-            ) from None
-        yield place
-
-
 def _not_written(folder: Path, error: OSError) -> ResultError:
     cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
     return ResultError(folder, f"the results cannot be written: {cause.strerror or cause}")
@@ -293,17 +275,15 @@ def _draw(
     return False
 
 
-def write_contacts(
-    path: str | PathLike[str], result: Result, audit: CadAudit | None = None
-) -> None:
+def write_contacts(path: Path, result: Result, audit: CadAudit | None = None) -> None:
     """Write the contact log of `result` as comma-separated values, one row for each contact."""
     columns = result.contact_columns() | ({} if audit is None else audit.columns())
-    Path(path).write_text(csv_text(columns), encoding="utf-8", newline="")
+    path.write_text(csv_text(columns), encoding="utf-8", newline="")
 
 
-def write_sensors(path: str | PathLike[str], result: Result) -> None:
+def write_sensors(path: Path, result: Result) -> None:
     """Write the readings of the sensors as comma-separated values, one row for each time."""
-    Path(path).write_text(csv_text(result.sensor_columns()), encoding="utf-8", newline="")
+    path.write_text(csv_text(result.sensor_columns()), encoding="utf-8", newline="")
 
 
 def _write_summary(

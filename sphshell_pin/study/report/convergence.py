@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -32,19 +33,12 @@ from sphshell_pin.study.report.contents import (
     columns,
     number,
 )
-from sphshell_pin.study.report.surfaces import (
-    DEPTH,
-    RADIUS,
-    SURFACES,
-    Mesh,
-    Surface,
-)
+from sphshell_pin.study.report.surfaces import DEPTH, RADIUS, SURFACES, Mesh, Surface
 from sphshell_pin.study.report.timing import part, per_center, silent, take_turns
 
 PLACES = 300
 EXPONENT = 1.5
 TIMED_PLACES = 2000
-
 
 UNTIMED = Spread(math.nan, math.nan, math.nan)
 
@@ -155,25 +149,18 @@ TEXT = about(__doc__)
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
-    names = REPORTED
     rows: list[Row] = []
-    for k, name in enumerate(names):
-        share = part(progress, k / len(names), (k + 1) / len(names))
-        surface, rounds, finest = SURFACES[name], 3 if quick else 7, 4 if quick else 5
-        rows += measure(name, surface, rounds, share, finest)
-    return assemble(names, rows)
+    rounds, finest = (3, 4) if quick else (7, 5)
+    for k, name in enumerate(REPORTED):
+        share = part(progress, k / len(REPORTED), (k + 1) / len(REPORTED))
+        rows += measure(name, SURFACES[name], rounds, share, finest)
+    return assemble(REPORTED, rows)
 
 
 def assemble(names: tuple[str, ...], rows: list[Row]) -> Section:
     """Return the section of measured rows."""
-    return Section(
-        KEY,
-        TITLE,
-        TEXT,
-        findings=findings_of(rows),
-        pictures=[picture(names, rows)],
-        tables=[orders_table(names, rows), errors_table(rows)],
-    )
+    tables = [orders_table(names, rows), errors_table(rows)]
+    return Section(KEY, TITLE, TEXT, findings_of(rows), [picture(names, rows)], tables)
 
 
 def of(rows: list[Row], surface: str, rule: str) -> list[Row]:
@@ -197,50 +184,37 @@ def error_at(line: list[Row], which: str = "mean", side: float = AT) -> float:
 def findings_of(rows: list[Row]) -> list[Finding]:
     """Return the figures that have aims."""
     lines = [of(rows, name, SMOOTH) for name in CURVED]
-    estimated = [of(rows, name, ESTIMATED) for name in CURVED]
+    estimated = min(order(of(rows, name, ESTIMATED)) for name in CURVED)
+    flat = max(row.largest for row in of(rows, "flat plate", SMOOTH))
     error = (
         f"force error, mean: elements of {AT} sphere radii (h / r = {AT}), exact normals; "
         "worst of bowl, dome, torus"
     )
+    largest = "the same, the largest error at any place"
     lowest = "order of the force error in h, exact normals: lowest of bowl, dome, torus"
-    flat = "force error on a flat plate, any refinement, side force included"
+    by_mesh = "the same with normals estimated from the mesh"
+    on_flat = "force error on a flat plate, any refinement, side force included"
+    worst = max(error_at(line, "largest") for line in lines)
     return [
         Finding("force_error", error, max(map(error_at, lines)), aim=1e-4, headline=True),
-        Finding(
-            "force_error_largest",
-            "the same, the largest error at any place",
-            max(error_at(line, "largest") for line in lines),
-        ),
+        Finding("force_error_largest", largest, worst),
         Finding("force_order", lowest, min(map(order, lines)), aim=3.5, sense=">="),
-        Finding(
-            "force_order_estimated",
-            "the same with normals estimated from the mesh",
-            min(map(order, estimated)),
-            aim=2.0,
-            sense=">=",
-        ),
-        Finding(
-            "flat_error",
-            flat,
-            max(row.largest for row in of(rows, "flat plate", SMOOTH)),
-            aim=1e-12,
-            headline=True,
-        ),
+        Finding("force_order_estimated", by_mesh, estimated, aim=2.0, sense=">="),
+        Finding("flat_error", on_flat, flat, aim=1e-12, headline=True),
     ]
 
 
 def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
     """Return order and error at h / r = AT of every method on every surface."""
     cells = []
-    for name in names:
-        for rule in LOOKS:
-            line = of(rows, name, rule)
-            fine = line[-1]
-            exact = max(row.largest for row in line) < 1e-12
-            cells.append(
-                (name, rule, None if exact else order(line), error_at(line))
-                + (error_at(line, "largest"), fine.triangles, fine.mean, fine.time.median)
-            )
+    for name, rule in product(names, LOOKS):
+        line = of(rows, name, rule)
+        fine, exact = line[-1], max(row.largest for row in line) < 1e-12
+        errors = error_at(line), error_at(line, "largest")
+        cells.append(
+            (name, rule, None if exact else order(line), *errors)
+            + (fine.triangles, fine.mean, fine.time.median)
+        )
     return Table(
         "forces_orders",
         "Orders by a fit over all meshes; none where the force is exact at any size.",
@@ -264,11 +238,7 @@ def errors_table(rows: list[Row]) -> Table:
             "direction [deg]; query_s: query [us]; query_low_s: lower quartile; query_high_s: "
             "upper quartile"
         ),
-        [
-            (row.surface, row.rule, row.triangles, row.side, row.mean, row.largest)
-            + (row.magnitude, row.direction, row.time.median, row.time.low, row.time.high)
-            for row in rows
-        ],
+        [(*astuple(row)[:-1], row.time.median, row.time.low, row.time.high) for row in rows],
         folded=True,
     )
 

@@ -145,58 +145,30 @@ def assemble(
     cases: list[Case], rows: list[Row], swings: swing.Row, notes: list[str] | None = None
 ) -> Section:
     """Return the section of what was measured."""
-    return Section(
-        KEY,
-        TITLE,
-        TEXT,
-        findings=findings_of(rows, swings),
-        pictures=[picture(cases, rows)],
-        tables=[costs_table(cases, rows), rows_table(rows)],
-        notes=notes or [],
-    )
+    tables = [costs_table(cases, rows), rows_table(rows)]
+    drawn_now = [picture(cases, rows)]
+    return Section(KEY, TITLE, TEXT, findings_of(rows, swings), drawn_now, tables, notes or [])
 
 
 def cheapest(rows: list[Row], case: str, integrators: tuple[str, ...], error: float) -> float:
     """Return the least CPU time per simulated second of a setting with at most this error."""
-    return min(
-        (
-            r.cpu
-            for r in rows
-            if r.case == case and r.integrator in integrators and r.error <= error
-        ),
-        default=math.nan,
-    )
+    fit = (r for r in rows if r.case == case and r.integrator in integrators)
+    return min((r.cpu for r in fit if r.error <= error), default=math.nan)
 
 
 def findings_of(rows: list[Row], swings: swing.Row) -> list[Finding]:
     """Return the figures of the section."""
     stiff = cheapest(rows, "glide", EXPLICIT, 1e-4) / cheapest(rows, "glide", ("Implicit",), 1e-4)
-    bounce = min(
-        (r.error for r in rows if (r.case, r.integrator) == ("bounces", "Implicit")),
-        default=math.nan,
-    )
+    bounce = [r.error for r in rows if (r.case, r.integrator) == ("bounces", "Implicit")]
+    period = "frictionless bowl swing, h / r = 0.15, 8 azimuths, 4 periods: error of the period"
+    energy = "the same: largest change of energy / energy of the swing"
+    cost = "stiff contact, error 1e-4: CPU time of the best explicit method / Implicit"
+    least = "five bounces on a spring: least error reached"
     return [
-        Finding(
-            "swing_period",
-            "frictionless bowl swing, h / r = 0.15, 8 azimuths, 4 periods: error of the period",
-            swings.rms,
-            aim=5e-7,
-            headline=True,
-        ),
-        Finding(
-            "swing_energy",
-            "the same: largest change of energy / energy of the swing",
-            swings.energy,
-            aim=1e-6,
-        ),
-        Finding(
-            "stiff_cost",
-            "stiff contact, error 1e-4: CPU time of the best explicit method / Implicit",
-            stiff,
-            TIMES,
-            headline=True,
-        ),
-        Finding("bounces_error", "five bounces on a spring: least error reached", bounce),
+        Finding("swing_period", period, swings.rms, aim=5e-7, headline=True),
+        Finding("swing_energy", energy, swings.energy, aim=1e-6),
+        Finding("stiff_cost", cost, stiff, TIMES, headline=True),
+        Finding("bounces_error", least, min(bounce, default=math.nan)),
     ]
 
 

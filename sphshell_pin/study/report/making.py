@@ -7,11 +7,13 @@ import dataclasses
 import json
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from sphshell_pin.base.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.base.atomic import AtomicFolder
+from sphshell_pin.base.atomic.files import held_folder
 from sphshell_pin.base.json_text import json_text
 from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
@@ -23,6 +25,7 @@ from sphshell_pin.study.report.page import SPEED, Heading, render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
 _OWN = (".csv", ".png")
+_STATED = ("key", "title", "error", "seconds", "notes", "unmeasured")
 Tell = Callable[[str, float], None]
 """Called with the section's title and the share of all that is done."""
 
@@ -88,24 +91,11 @@ def make_report(
         Where the folder cannot be written.
     """
     new_figure(1.0, 1.0)  # raises now what would be raised at the end
-    with _report_folder(out) as place:
+    with held_folder(out, DATA) as place:
         measured_now = _measure(parts or PARTS, quick, command, tell)
         report = dataclasses.replace(measured_now, heading=heading)
         _write(report, out, place)
     return report
-
-
-@contextlib.contextmanager
-def _report_folder(out: Path) -> Iterator[AtomicFolder]:
-    """Hold the folder of a report; ResultError where it cannot be made, or another has it."""
-    with contextlib.ExitStack() as held:
-        try:
-            place = held.enter_context(AtomicFolder(out, last=DATA))
-        except FolderInUse as busy:
-            raise ResultError(out, f"{busy}: wait until it ends, or give another --out") from None
-        except OSError as error:
-            raise ResultError(out, f"cannot hold a report: {error.strerror}") from None
-        yield place
 
 
 def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None) -> Report:
@@ -115,13 +105,7 @@ def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None
     sections, done = [], 0.0
     for part in parts:
         share = part.seconds[not quick] / whole
-
-        def progress(
-            of_part: float, part: Part = part, base: float = done, all_: float = share
-        ) -> None:
-            if tell is not None:
-                tell(part.title, base + all_ * of_part)
-
+        progress = partial(_tell, tell, part.title, done, share)
         progress(0.0)
         sections.append(measured(part, quick=quick, progress=progress))
         done += share
@@ -130,6 +114,11 @@ def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None
     if cores is not None:
         machine["other processes"] = f"used {cores:.2f} cores on average"
     return Report(sections, machine, caution=caution_of(cores))
+
+
+def _tell(tell: Tell | None, title: str, base: float, share: float, of_part: float) -> None:
+    if tell is not None:
+        tell(title, base + share * of_part)
 
 
 def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
@@ -141,7 +130,7 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
             warnings.simplefilter("ignore", WeakLawWarning)
             with timing.on_one_core() if part.pinned else contextlib.nullcontext():
                 section = part.measure(quick=quick, progress=progress)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt:  # Interrupted is an Exception, too
         raise
     except Exception as error:
         known = isinstance(error, SphshellError)
@@ -153,10 +142,8 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
 def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     """Write page, tables and data; all of them take the place of an earlier report's at once."""
     tables = [table for section in report.sections for table in section.tables]
-    texts = {f"{table.name}.csv": table.csv() for table in [*tables, _findings(report.sections)]}
-    pictures = [picture for section in report.sections for picture in section.pictures]
-    files = {name: text.encode() for name, text in texts.items()}
-    files |= {f"{picture.name}.png": picture.png for picture in pictures}
+    files = {f"{t.name}.csv": t.csv().encode() for t in [*tables, _findings(report.sections)]}
+    files |= {f"{one.name}.png": one.png for s in report.sections for one in s.pictures}
     files[DATA] = report_json(report, sorted(files)).encode()
     files[PAGE] = render(report.sections, report.machine, report.heading, report.caution).encode()
     try:
@@ -200,13 +187,8 @@ def report_json(report: Report, files: list[str]) -> str:
         "caution": report.caution,
         "files": files,
         "sections": [
-            {
-                "key": section.key,
-                "title": section.title,
-                "error": section.error,
-                "seconds": section.seconds,
-                "notes": section.notes,
-                "unmeasured": section.unmeasured,
+            {key: getattr(section, key) for key in _STATED}
+            | {
                 "findings": [
                     dataclasses.asdict(f) | {"met": f.met, "row": row}
                     for f, row in zip(

@@ -98,29 +98,15 @@ def assemble(times: Times) -> Section:
     ours, flat, theirs = (times[name, compared] for name in (OURS, FLAT, COAL))
     grown = times[OURS, sizes[-1]] / np.median(times[OURS, sizes[0]])
     what = "query, 200 k triangles: "
+    coal_collide = f"{what}time of coal::collide with all contacts / ours"
+    facets = 'the same with the method "facets" in place of "smooth", the default'
+    growth = f"query at equal contact patch: {number(sizes[-1])} / {number(sizes[0])} triangles"
+    ratio = Finding.of_rounds
     findings = [
-        Finding.of_rounds(
-            "query_coal",
-            f"{what}time of coal::collide with all contacts / ours",
-            theirs / ours,
-            aim=15.0,
-            sense=">=",
-            headline=True,
-        ),
-        Finding.of_rounds(
-            "query_coal_facets",
-            'the same with the method "facets" in place of "smooth", the default',
-            theirs / flat,
-        ),
-        Finding.of_rounds(
-            "query_growth",
-            f"query at equal contact patch: {number(sizes[-1])} / {number(sizes[0])} triangles",
-            grown,
-            aim=4.0,
-        ),
-        Finding.of_rounds(
-            "query_smooth", f"{what}curved elements / flat ones", ours / flat, aim=1.5
-        ),
+        ratio("query_coal", coal_collide, theirs / ours, 15.0, ">=", headline=True),
+        ratio("query_coal_facets", facets, theirs / flat),
+        ratio("query_growth", growth, grown, aim=4.0),
+        ratio("query_smooth", f"{what}curved elements / flat ones", ours / flat, aim=1.5),
     ]
     table = Table(
         "queries",

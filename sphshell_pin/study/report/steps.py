@@ -68,14 +68,9 @@ def with_sheet(
 ) -> sp.Scene:
     """Put the sheet under the fingertip, `rise` [m] above the height at which it just touches."""
     q = start_of(scene)
-    place = tip_position(scene, q) + [0, 0, rise - RADIUS]
-    scene.add_contact(
-        sphere=sp.Sphere(RADIUS, "panda_hand_tcp"),
-        shell=shell,
-        placement=pin.SE3(np.eye(3), place),
-        law=law,
-        friction=friction,
-    )
+    placement = pin.SE3(np.eye(3), tip_position(scene, q) + [0, 0, rise - RADIUS])
+    ball = sp.Sphere(RADIUS, "panda_hand_tcp")
+    scene.add_contact(ball, shell, placement=placement, law=law, friction=friction)
     return scene
 
 
@@ -188,54 +183,29 @@ TEXT = about(__doc__)
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
-    rounds = 8 if quick else 50
-    steps = measure(rounds, part(progress, 0.0, 0.9))
+    steps = measure(8 if quick else 50, part(progress, 0.0, 0.9))
     imports = measure_import(5 if quick else 15, part(progress, 0.9, 1.0))
     return assemble(steps, imports)
 
 
 def assemble(steps: Times, imports: Times) -> Section:
     """Return the section of what was measured."""
-    bare, control = steps[BARE], steps[CONTROL_TOUCHING]
-    return Section(
-        KEY,
-        TITLE,
-        TEXT,
-        findings=[
-            Finding.of_rounds(
-                "step_touching",
-                "Panda and fingertip touching 200 k triangles: whole step / bare ABA + integrate",
-                steps[TOUCHING] / bare,
-                aim=1.8,
-                headline=True,
-            ),
-            Finding.of_rounds("step_far", "the same with the sphere far away", steps[FAR] / bare),
-            Finding.of_rounds(
-                "step_control",
-                "Panda with joint PD and gravity compensation: step touching / without any contact",
-                control / steps[CONTROL_FREE],
-                aim=1.35,
-                headline=True,
-            ),
-            Finding.of_rounds(
-                "import",
-                "import sphshell_pin / import pinocchio, whole interpreter",
-                imports["sphshell_pin"] / imports["pinocchio"],
-                aim=1.2,
-            ),
-        ],
-        tables=[
-            times_table(
-                "steps",
-                "Whole steps, in turn in one process.",
-                "scene",
-                {name: steps[name] for name in WHOLE},
-                BARE,
-                "over_bare: over ABA + integrate",
-            ),
-            components_table(steps),
-        ],
-    )
+    bare, ratio = steps[BARE], Finding.of_rounds
+    touching = "Panda and fingertip touching 200 k triangles: whole step / bare ABA + integrate"
+    control = "Panda with joint PD and gravity compensation: step touching / without any contact"
+    importing = "import sphshell_pin / import pinocchio, whole interpreter"
+    controlled = steps[CONTROL_TOUCHING] / steps[CONTROL_FREE]
+    imported = imports["sphshell_pin"] / imports["pinocchio"]
+    findings = [
+        ratio("step_touching", touching, steps[TOUCHING] / bare, aim=1.8, headline=True),
+        ratio("step_far", "the same with the sphere far away", steps[FAR] / bare),
+        ratio("step_control", control, controlled, aim=1.35, headline=True),
+        ratio("import", importing, imported, aim=1.2),
+    ]
+    whole, over = {name: steps[name] for name in WHOLE}, "over_bare: over ABA + integrate"
+    caption = "Whole steps, in turn in one process."
+    table = times_table("steps", caption, "scene", whole, BARE, over)
+    return Section(KEY, TITLE, TEXT, findings, tables=[table, components_table(steps)])
 
 
 def components_table(steps: Times) -> Table:

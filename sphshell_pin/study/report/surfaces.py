@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -160,14 +161,6 @@ class Surface:
         return points + (RADIUS - DEPTH) * normals, normals
 
 
-def _on_ball(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    return ball_places(BALL, rng, count)
-
-
-def _on_torus(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, count)))
-
-
 def _on_plate(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     clear = PLATE - 1.3 * RADIUS
     xy = rng.uniform(-clear, clear, (count, 2))
@@ -180,8 +173,12 @@ def _balls() -> list[Mesh]:
 
 _SIDES = tuple(side * RADIUS for side in (1.0, 0.5, 0.25, 0.125, 0.0625))
 SURFACES = {
-    "bowl": Surface(_balls, _on_ball, inside=True),
-    "dome": Surface(_balls, _on_ball, inside=False),
-    "torus": Surface(lambda: [torus(RING, TUBE, side) for side in _SIDES], _on_torus, inside=True),
+    "bowl": Surface(_balls, partial(ball_places, BALL), inside=True),
+    "dome": Surface(_balls, partial(ball_places, BALL), inside=False),
+    "torus": Surface(
+        lambda: [torus(RING, TUBE, side) for side in _SIDES],
+        lambda rng, count: on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, count))),
+        inside=True,
+    ),
     "flat plate": Surface(lambda: [plate(side, PLATE) for side in _SIDES], _on_plate, inside=False),
 }
