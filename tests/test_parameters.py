@@ -45,10 +45,16 @@ MARK = re.compile(r"^<!-- (parameters|kinds): (\w+) -->$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Spring(Component):
-    """A component of every kind of bounds."""
+    """A component of every kind of bounds.
 
-    stiffness: float = parameter(above=0, unit="N/m^{0.exponent:g}", help="k")
-    exponent: float = parameter(1.5, above=1, help="e")
+    Parameters
+    ----------
+    stiffness : k
+    exponent : e
+    """
+
+    stiffness: float = parameter(above=0, unit="N/m^{0.exponent:g}")
+    exponent: float = parameter(1.5, above=1)
     damping: float = parameter(0.0, at_least=0, unit="N s/m", help="c")
     share: float | None = parameter(None, above=0, at_most=1, help="s")
     twist: bool = parameter(False, help="t")

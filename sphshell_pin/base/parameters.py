@@ -9,11 +9,13 @@ of the documentation.
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -25,6 +27,7 @@ from sphshell_pin.errors import InvalidParameter
 _KEY = "parameter"
 # A field of the object in a unit, as in "N/m^{0.exponent:g}".
 _IN_UNIT = re.compile(r"\{0\.(\w+)[^}]*\}")
+_ENTRY = re.compile(r"^(\w+)(.*?) : (.*(?:\n +.*)*)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ def parameter(
     default: object = MISSING,
     *,
     unit: str = "",
-    help: str,
+    help: str = "",
     label: str = "",
     above: float | None = None,
     at_least: float | None = None,
@@ -93,12 +96,32 @@ def parameter(
     """Return the field of a dataclass that is a parameter.
 
     The bounds hold for numbers; `more` is what pydantic takes for the field in a file
-    (`min_length`). A field that is not made by this function cannot be stated in a file.
+    (`min_length`). A field that is not made by this function cannot be stated in a file. Without
+    `help` its meaning stands in the section "Parameters" of the docstring of a Component.
     """
     about = Parameter(unit, label, help, above, at_least, at_most, log)
-    # Pydantic reads the bounds and the description in a field's metadata.
-    metadata = {_KEY: about, "description": help, **about.bounds, **more}
-    return field(default=default, metadata=metadata)
+    return field(default=default, metadata=_metadata(about) | about.bounds | more)
+
+
+def _metadata(about: Parameter) -> dict[str, object]:
+    """Return what a field holds; pydantic reads the description there, too, and the bounds."""
+    return {_KEY: about, "description": about.help}
+
+
+def described(doc: str | None, section: str) -> tuple[str, dict[str, tuple[str, str]]]:
+    """Return a docstring without a section, its last one, and what is described there, by name.
+
+    An entry is "name : its meaning", in one line or several; further words may follow the name:
+    they come before the meaning.
+    """
+    text, _, entries = inspect.cleandoc(doc or "").partition(
+        f"\n\n{section}\n{'-' * len(section)}\n"
+    )
+    found = {
+        name: (words.strip(), " ".join(help.split()))
+        for name, words, help in _ENTRY.findall(entries)
+    }
+    return text, found
 
 
 def flat_fields(fields: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
@@ -147,6 +170,11 @@ class Component:
     def __init_subclass__(cls, *, kind: str = "", of: type[Component] | None = None) -> None:
         """Register the class under its type name."""
         super().__init_subclass__()
+        for name, (_, help) in described(vars(cls).get("__doc__"), "Parameters")[1].items():
+            made = vars(cls).get(name)
+            if isinstance(made, dataclasses.Field) and _KEY in made.metadata:
+                about = dataclasses.replace(made.metadata[_KEY], help=help)
+                made.metadata = MappingProxyType({**made.metadata, **_metadata(about)})
         if Component in cls.__bases__ and of is None:
             cls.kinds = {}
         if kind:

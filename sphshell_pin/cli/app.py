@@ -21,6 +21,7 @@ from sphshell_pin import errors
 from sphshell_pin._interrupts import interrupts_heard
 from sphshell_pin.base.cache import CACHE
 from sphshell_pin.base.checks import stated_pairs
+from sphshell_pin.base.parameters import described
 from sphshell_pin.cli.printing import lossy_streams
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 _debug = contextvars.ContextVar("debug", default=False)
-# The section of a docstring that describes a command's options, and an entry of it.
-_OPTIONS = "\n\nOptions\n-------\n"
-_ENTRY = re.compile(r"^(\w+)(.*?) : (.*(?:\n +.*)*)", re.MULTILINE)
 
 app = typer.Typer(
     name="sphshell-pin",
@@ -173,8 +171,7 @@ def command(name: str | None = None) -> Callable[[Callable[P, None]], Callable[P
     """
 
     def add(function: Callable[P, None]) -> Callable[P, None]:
-        text, _, options = inspect.cleandoc(function.__doc__ or "").partition(_OPTIONS)
-        stated = {name: (words, help) for name, words, help in _ENTRY.findall(options)}
+        text, stated = described(function.__doc__, "Options")
         signature = inspect.signature(function, eval_str=True)
         parameters = [
             _described(one, *stated[one.name]) if one.name in stated else one
@@ -199,7 +196,7 @@ def _described(parameter: inspect.Parameter, words: str, help: str) -> inspect.P
     """Return a parameter annotated with its description: an argument, or an option."""
     names = [one for one in words.split() if one.startswith("--")]
     metavar = " ".join(one for one in words.split() if one not in names) or None
-    help = " ".join(help.split()).replace("[", "\\[")
+    help = help.replace("[", "\\[")
     if parameter.kind is not parameter.KEYWORD_ONLY:
         made = argument(help, metavar=metavar)
     else:

@@ -34,32 +34,20 @@ class BristleFriction(Coefficients, kind="bristle"):
 
     Sources: Dupont, Hayward, Armstrong, Altpeter, IEEE Trans. Automatic Control 47 (2002) 787;
     Howe and Cutkosky, Int. J. Robotics Research 15 (1996) 557; Johnson, Contact Mechanics, 1985.
+
+    Parameters
+    ----------
+    stiffness : k of the spring: at the limit it has given way by mu_static N / k
+    damping : c beside the spring: about `sqrt(k m)`, with the mass m along the surface
+    v_stribeck : slip speed at which mu has come down from `mu_static` by 63 % of the way to
+        `mu_dynamic`
+    torsional : True: also against spin about the normal, as a soft finger
     """
 
-    stiffness: float = parameter(
-        above=0,
-        unit="N/m",
-        label="bristle stiffness",
-        help="k of the spring: at the limit it has given way by mu_static N / k",
-    )
-    damping: float = parameter(
-        0.0,
-        at_least=0,
-        unit="N s/m",
-        label="bristle damping",
-        help="c beside the spring: about `sqrt(k m)`, with the mass m along the surface",
-    )
-    v_stribeck: float = parameter(
-        0.01,
-        above=0,
-        unit="m/s",
-        label="Stribeck speed",
-        help="slip speed at which mu has come down from `mu_static` by 63 % of the way to "
-        "`mu_dynamic`",
-    )
-    torsional: bool = parameter(
-        False, help="True: also against spin about the normal, as a soft finger"
-    )
+    stiffness: float = parameter(above=0, unit="N/m", label="bristle stiffness")
+    damping: float = parameter(0.0, at_least=0, unit="N s/m", label="bristle damping")
+    v_stribeck: float = parameter(0.01, above=0, unit="m/s", label="Stribeck speed")
+    torsional: bool = parameter(False)
 
     @property
     def text(self) -> str:
@@ -99,37 +87,23 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
     Sources: Mindlin, J. Appl. Mech. 16 (1949) 259; Johnson, Contact Mechanics (1985), ch. 7;
     Thornton, Cummins, Cleary, Powder Technology 233 (2013) 30; Elata and Berryman, Mechanics of
     Materials 24 (1996) 229.
+
+    Parameters
+    ----------
+    damping_time : of a damper beside the spring, `damping_time` times as large as the spring is
+        stiff: 2 / omega damps a motion at omega [rad/s] critically
+    rolling : moment against rolling, over the sphere's radius and the normal force
+    rolling_speed : speed of rolling, radius times rad/s, from which on it is whole; below, it
+        creeps
+    rings : 1 to 8: of the disc, each with a state; for micro-slip
     """
 
     v_stribeck: float = same_parameter(BristleFriction, "v_stribeck")
-    damping_time: float = parameter(
-        0.0,
-        at_least=0,
-        unit="s",
-        label="damping time",
-        help="of a damper beside the spring, `damping_time` times as large as the spring is stiff: "
-        "2 / omega damps a motion at omega [rad/s] critically",
-    )
+    damping_time: float = parameter(0.0, at_least=0, unit="s", label="damping time")
     torsional: bool = same_parameter(BristleFriction, "torsional")
-    rolling: float = parameter(
-        0.0,
-        at_least=0,
-        label="rolling friction",
-        help="moment against rolling, over the sphere's radius and the normal force",
-    )
-    rolling_speed: float = parameter(
-        1e-3,
-        above=0,
-        unit="m/s",
-        label="rolling friction speed",
-        help="speed of rolling, radius times rad/s, from which on it is whole; below, it creeps",
-    )
-    rings: int = parameter(
-        1,
-        at_least=1,
-        at_most=MOST_RINGS,
-        help="1 to 8: of the disc, each with a state; for micro-slip",
-    )
+    rolling: float = parameter(0.0, at_least=0, label="rolling friction")
+    rolling_speed: float = parameter(1e-3, above=0, unit="m/s", label="rolling friction speed")
+    rings: int = parameter(1, at_least=1, at_most=MOST_RINGS)
 
     @classmethod
     def of(cls, sphere: str, shell: str, **more: Any) -> Self:

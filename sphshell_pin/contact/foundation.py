@@ -38,20 +38,18 @@ class FoundationLaw(NormalLaw, kind="foundation"):
     Beside a Plane the layer is on the plane, and the pressure is modulus / thickness times the
     depth below it: the force is modulus / thickness times the volume below the plane, at its
     centroid.
+
+    Parameters
+    ----------
+    modulus : E of the layer where it may flow aside; where it may not, `E (1 - nu) / ((1 + nu) (1 -
+        2 nu))`
+    thickness : of the elastic layer, for a solid sphere about its radius
+    dissipation : b: 0 gives back all energy, as of `HuntCrossleyLaw`
     """
 
-    modulus: float = parameter(
-        above=0,
-        unit="Pa",
-        help="E of the layer where it may flow aside; where it may not, "
-        "`E (1 - nu) / ((1 + nu) (1 - 2 nu))`",
-    )
-    thickness: float = parameter(
-        above=0, unit="m", help="of the elastic layer, for a solid sphere about its radius"
-    )
-    dissipation: float = parameter(
-        0.0, at_least=0, unit="s/m", help="b: 0 gives back all energy, as of `HuntCrossleyLaw`"
-    )
+    modulus: float = parameter(above=0, unit="Pa")
+    thickness: float = parameter(above=0, unit="m")
+    dissipation: float = parameter(0.0, at_least=0, unit="s/m")
 
     needs_shape = True
 

@@ -78,16 +78,16 @@ class Friction(Component):
 
 @dataclass(frozen=True)
 class Coefficients(Friction):
-    """What the laws share that have two coefficients."""
+    """What the laws share that have two coefficients.
 
-    mu_static: float = parameter(
-        at_least=0, label="static friction", help="coefficient at rest or nearly so"
-    )
-    mu_dynamic: float = parameter(
-        at_least=0,
-        label="dynamic friction",
-        help="coefficient of fast sliding; not above `mu_static`",
-    )
+    Parameters
+    ----------
+    mu_static : coefficient at rest or nearly so
+    mu_dynamic : coefficient of fast sliding; not above `mu_static`
+    """
+
+    mu_static: float = parameter(at_least=0, label="static friction")
+    mu_dynamic: float = parameter(at_least=0, label="dynamic friction")
 
     @property
     def largest_coefficient(self) -> float:
@@ -125,32 +125,20 @@ class CoulombFriction(Coefficients, kind="coulomb"):
     slip speed `v_static` [m/s], falls to `mu_dynamic` at `v_dynamic` [m/s] and stays there; both
     pieces are the cubic STEP. At rest there is no force, so a loaded contact always creeps.
     Source: ADAMS/View help, contact friction force.
+
+    Parameters
+    ----------
+    mu_static : coefficient at the slip speed `v_static`
+    mu_dynamic : coefficient from `v_dynamic` on; not above `mu_static`
+    v_static : the slip you can bear where it should stick: small enough for the creep, large enough
+        for dt (below)
+    v_dynamic : more than `v_static`; ADAMS takes 10 times as much
     """
 
-    mu_static: float = parameter(
-        0.3, at_least=0, label="static friction", help="coefficient at the slip speed `v_static`"
-    )
-    mu_dynamic: float = parameter(
-        0.1,
-        at_least=0,
-        label="dynamic friction",
-        help="coefficient from `v_dynamic` on; not above `mu_static`",
-    )
-    v_static: float = parameter(
-        0.1,
-        above=0,
-        unit="m/s",
-        label="static friction speed",
-        help="the slip you can bear where it should stick: small enough for the creep, large "
-        "enough for dt (below)",
-    )
-    v_dynamic: float = parameter(
-        1.0,
-        above=0,
-        unit="m/s",
-        label="dynamic friction speed",
-        help="more than `v_static`; ADAMS takes 10 times as much",
-    )
+    mu_static: float = parameter(0.3, at_least=0, label="static friction")
+    mu_dynamic: float = parameter(0.1, at_least=0, label="dynamic friction")
+    v_static: float = parameter(0.1, above=0, unit="m/s", label="static friction speed")
+    v_dynamic: float = parameter(1.0, above=0, unit="m/s", label="dynamic friction speed")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter unless mu_dynamic <= mu_static and v_static < v_dynamic."""

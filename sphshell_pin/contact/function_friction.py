@@ -87,10 +87,16 @@ class FunctionFriction(OwnFunctions, Friction, kind="function"):
 
 @dataclass(frozen=True)
 class FunctionFrictionFile(Component, kind="function", of=Friction):
-    """Friction of one's own as a scenario states it."""
+    """Friction of one's own as a scenario states it.
 
-    function: str = parameter(help='"file.py:name" of the force')
-    parameters: Mapping[str, float] | None = parameter(None, help="numbers by name")
+    Parameters
+    ----------
+    function : "file.py:name" of the force
+    parameters : numbers by name
+    """
+
+    function: str = parameter()
+    parameters: Mapping[str, float] | None = parameter(None)
 
     @property
     def files(self) -> tuple[str, ...]:

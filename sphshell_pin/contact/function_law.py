@@ -82,11 +82,18 @@ class FunctionLaw(OwnFunctions, NormalLaw, kind="function"):
 
 @dataclass(frozen=True)
 class FunctionFile(Component, kind="function", of=NormalLaw):
-    """A law of one's own as a scenario states it."""
+    """A law of one's own as a scenario states it.
 
-    function: str = parameter(help='"file.py:name" of the force')
-    energy: str | None = parameter(None, help='"file.py:name" of the energy')
-    parameters: Mapping[str, float] | None = parameter(None, help="numbers by name")
+    Parameters
+    ----------
+    function : "file.py:name" of the force
+    energy : "file.py:name" of the energy
+    parameters : numbers by name
+    """
+
+    function: str = parameter()
+    energy: str | None = parameter(None)
+    parameters: Mapping[str, float] | None = parameter(None)
 
     @property
     def files(self) -> tuple[str, ...]:

@@ -38,31 +38,22 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
     closing speed, tau = loss_tangent / (2 pi frequency). By default none.
 
     `radius` [m]: gives the constant stiffness of a sphere on a plane; see on_plane.
+
+    Parameters
+    ----------
+    restitution : speed of rebound over `speed`; without it no damping
+    speed : impact speed at which the restitution holds
+    loss_tangent : tangent of the loss angle at `frequency`, in place of a restitution
+    frequency : frequency at which the loss tangent holds
+    radius : radius of the sphere, for the constant stiffness of a sphere on a plane; without it the
+        stiffness follows the curvature of the surface at the contact
     """
 
-    restitution: float | None = parameter(
-        None, above=0, at_most=1, help="speed of rebound over `speed`; without it no damping"
-    )
-    speed: float | None = parameter(
-        None,
-        above=0,
-        unit="m/s",
-        label="speed of the restitution",
-        help="impact speed at which the restitution holds",
-    )
-    loss_tangent: float | None = parameter(
-        None, above=0, help="tangent of the loss angle at `frequency`, in place of a restitution"
-    )
-    frequency: float | None = parameter(
-        None, above=0, unit="Hz", help="frequency at which the loss tangent holds"
-    )
-    radius: float | None = parameter(
-        None,
-        above=0,
-        unit="m",
-        help="radius of the sphere, for the constant stiffness of a sphere on a plane; without it "
-        "the stiffness follows the curvature of the surface at the contact",
-    )
+    restitution: float | None = parameter(None, above=0, at_most=1)
+    speed: float | None = parameter(None, above=0, unit="m/s", label="speed of the restitution")
+    loss_tangent: float | None = parameter(None, above=0)
+    frequency: float | None = parameter(None, above=0, unit="Hz")
+    radius: float | None = parameter(None, above=0, unit="m")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value outside its bounds, and for one of a pair."""
@@ -160,23 +151,17 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
 
 @dataclass(frozen=True)
 class Hertz(HertzLaw, kind="hertz", of=NormalLaw):
-    """Hertz's law as a scenario states it, see HertzLaw; with a radius see ImpactLaw.hertz."""
+    """Hertz's law as a scenario states it, see HertzLaw; with a radius see ImpactLaw.hertz.
 
-    radius: float | None = parameter(
-        None,
-        above=0,
-        unit="m",
-        label="Hertz radius",
-        help="of a constant stiffness: radius of the ball, or the effective one; without it the "
-        "stiffness follows from the sphere and the curvature of what it touches",
-    )
-    radius_2: float | None = parameter(
-        None,
-        above=0,
-        unit="m",
-        label="Hertz radius 2",
-        help="radius of the second body where it is a ball, too; without it a half-space",
-    )
+    Parameters
+    ----------
+    radius : of a constant stiffness: radius of the ball, or the effective one; without it the
+        stiffness follows from the sphere and the curvature of what it touches
+    radius_2 : radius of the second body where it is a ball, too; without it a half-space
+    """
+
+    radius: float | None = parameter(None, above=0, unit="m", label="Hertz radius")
+    radius_2: float | None = parameter(None, above=0, unit="m", label="Hertz radius 2")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value outside its bounds, and for one of a pair."""

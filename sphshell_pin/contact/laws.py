@@ -24,20 +24,18 @@ __all__ = ["HuntCrossleyLaw", "ImpactLaw"]
 
 @dataclass(frozen=True)
 class _PowerLaw(NormalLaw):
-    """A law whose elastic part is stiffness depth^exponent."""
+    """A law whose elastic part is stiffness depth^exponent.
 
-    stiffness: float = parameter(
-        above=0,
-        unit="N/m^{0.exponent:g}",
-        help="k, from a load F and the depth you accept under it: `k = F / depth^exponent`; a few "
-        "percent of the radius is much",
-    )
-    exponent: float = parameter(
-        1.5,
-        above=0,
-        help="e: 1.5 for a ball on an elastic surface (Hertz), 1 for a linear spring; ADAMS's "
-        "default is 2.2 (`from_adams`)",
-    )
+    Parameters
+    ----------
+    stiffness : k, from a load F and the depth you accept under it: `k = F / depth^exponent`; a few
+        percent of the radius is much
+    exponent : e: 1.5 for a ball on an elastic surface (Hertz), 1 for a linear spring; ADAMS's
+        default is 2.2 (`from_adams`)
+    """
+
+    stiffness: float = parameter(above=0, unit="N/m^{0.exponent:g}")
+    exponent: float = parameter(1.5, above=0)
 
     def depth_at(self, force: float) -> float:
         """Return the depth [m] at which the elastic part alone carries `force` [N]."""
@@ -66,22 +64,17 @@ class ImpactLaw(_PowerLaw, kind="impact"):
 
     `stiffness` k > 0 [N/m^e], `exponent` e > 0, `damping` c >= 0 [N s/m], which is reached at
     `full_damping_depth` d > 0 [m]. Source: ADAMS/Solver help, IMPACT.
+
+    Parameters
+    ----------
+    damping : c: 0 gives back all energy. Restitution depends on speed and mass: find c by a drop
+        test
+    full_damping_depth : d: about the depth under load; damping comes on gradually up to it, so that
+        the force starts from zero
     """
 
-    damping: float = parameter(
-        0.0,
-        at_least=0,
-        unit="N s/m",
-        help="c: 0 gives back all energy. Restitution depends on speed and mass: find c by a drop "
-        "test",
-    )
-    full_damping_depth: float = parameter(
-        1e-4,
-        above=0,
-        unit="m",
-        help="d: about the depth under load; damping comes on gradually up to it, so that the "
-        "force starts from zero",
-    )
+    damping: float = parameter(0.0, at_least=0, unit="N s/m")
+    full_damping_depth: float = parameter(1e-4, above=0, unit="m")
 
     @classmethod
     def from_adams(
@@ -151,15 +144,14 @@ class HuntCrossleyLaw(_PowerLaw, kind="hunt-crossley"):
 
     `stiffness` k > 0 [N/m^e], `exponent` e > 0, `dissipation` b >= 0 [s/m]. The restitution at
     impact speed v depends on b v alone. Source: Hunt and Crossley, J. Appl. Mech. 42 (1975) 440.
+
+    Parameters
+    ----------
+    dissipation : b, from the restitution wanted at an impact speed: `ImpactLaw.hertz(...,
+        restitution=, speed=)` computes it
     """
 
-    dissipation: float = parameter(
-        0.0,
-        at_least=0,
-        unit="s/m",
-        help="b, from the restitution wanted at an impact speed: "
-        "`ImpactLaw.hertz(..., restitution=, speed=)` computes it",
-    )
+    dissipation: float = parameter(0.0, at_least=0, unit="s/m")
 
     @classmethod
     def with_restitution(
@@ -184,31 +176,29 @@ class HuntCrossleyLaw(_PowerLaw, kind="hunt-crossley"):
 
 @dataclass(frozen=True)
 class AdamsImpact(Component, kind="adams", of=NormalLaw):
-    """IMPACT as an ADAMS model states it; the defaults are ADAMS's own."""
+    """IMPACT as an ADAMS model states it; the defaults are ADAMS's own.
+
+    Parameters
+    ----------
+    k : stiffness
+    e : exponent
+    c : damping
+    d : penetration for full damping
+    units : ADAMS's unit system: length, force, time
+    """
 
     k: float = parameter(
-        1e5,
-        above=0,
-        unit="{0.symbols[force]}/{0.symbols[length]}^{0.e:g}",
-        label="stiffness",
-        help="stiffness",
+        1e5, above=0, unit="{0.symbols[force]}/{0.symbols[length]}^{0.e:g}", label="stiffness"
     )
-    e: float = parameter(2.2, above=0, label="exponent", help="exponent")
+    e: float = parameter(2.2, above=0, label="exponent")
     c: float = parameter(
         10.0,
         at_least=0,
         unit="{0.symbols[force]} {0.symbols[time]}/{0.symbols[length]}",
         label="damping",
-        help="damping",
     )
-    d: float = parameter(
-        0.1,
-        above=0,
-        unit="{0.symbols[length]}",
-        label="full damping depth",
-        help="penetration for full damping",
-    )
-    units: str = parameter("mm-N-s", help="ADAMS's unit system: length, force, time")
+    d: float = parameter(0.1, above=0, unit="{0.symbols[length]}", label="full damping depth")
+    units: str = parameter("mm-N-s")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value outside its bounds or an unknown unit system."""

@@ -23,10 +23,15 @@ class TableLaw(NormalLaw, kind="table"):
     monotone cubic Hermite interpolant (Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238),
     with a continuous slope; beyond the last row it is linear, with the last slope. The energy is
     its exact integral.
+
+    Parameters
+    ----------
+    depth : depths, from 0, increasing
+    force : elastic force at each of them, from 0
     """
 
-    depth: tuple[float, ...] = parameter(unit="m", help="depths, from 0, increasing")
-    force: tuple[float, ...] = parameter(unit="N", help="elastic force at each of them, from 0")
+    depth: tuple[float, ...] = parameter(unit="m")
+    force: tuple[float, ...] = parameter(unit="N")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter unless the columns start at zero and increase."""
@@ -93,9 +98,14 @@ class TableLaw(NormalLaw, kind="table"):
 
 @dataclass(frozen=True)
 class TableFile(Component, kind="table", of=NormalLaw):
-    """A table law as a scenario states it."""
+    """A table law as a scenario states it.
 
-    file: str = parameter(help="csv file of depth [m] and force [N], relative to the scenario")
+    Parameters
+    ----------
+    file : csv file of depth [m] and force [N], relative to the scenario
+    """
+
+    file: str = parameter()
 
     @property
     def files(self) -> tuple[str, ...]:

@@ -135,9 +135,14 @@ class NoController(Component, kind="none", of=Controller):
 
 @dataclass(frozen=True)
 class PythonFunction(Component, kind="python", of=Controller):
-    """The user's own tau(t, q, v, contacts)."""
+    """The user's own tau(t, q, v, contacts).
 
-    function: str = parameter(help='"file.py:function"')
+    Parameters
+    ----------
+    function : "file.py:function"
+    """
+
+    function: str = parameter()
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -162,13 +167,20 @@ class JointPD(Controller, kind="joint-pd"):
     `kp` [N m/rad or N/m] and `kd` [N m s/rad or N s/m] are one number, (nv,), or a mapping from
     joints; `q_ref`, (nq,) or a mapping from joints, is the start of the run where it is None or
     leaves a joint out; the difference is pinocchio.difference's.
+
+    Parameters
+    ----------
+    kp : stiffness of the joints
+    kd : damping of the joints
+    q_ref : posture; by default that of the start
+    gravity_compensation : add the torques that carry the weight
     """
 
     posture_gain: ClassVar[str | None] = "kp"
-    kp: Gain = parameter(unit="N m/rad", label="joint stiffness", help="stiffness of the joints")
-    kd: Gain = parameter(unit="N m s/rad", label="joint damping", help="damping of the joints")
-    q_ref: Posture | None = parameter(None, help="posture; by default that of the start")
-    gravity_compensation: bool = parameter(True, help="add the torques that carry the weight")
+    kp: Gain = parameter(unit="N m/rad", label="joint stiffness")
+    kd: Gain = parameter(unit="N m s/rad", label="joint damping")
+    q_ref: Posture | None = parameter(None)
+    gravity_compensation: bool = parameter(True)
     joints: Iterable[str] | None = None
 
     def _fields(self, scene: Scene, q0: Array) -> dict[str, ArrayLike]:

@@ -79,65 +79,55 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     The shell is at `placement` in `shell_frame`; if neither is given, where the contacts of the
     scene have it, and if none has it, in the universe. If they have it in several places,
     InvalidParameter asks for `shell_frame`.
+
+    Parameters
+    ----------
+    frame : the frame that is moved
+    path : points of the path (k, 3)
+    stiffness : pull towards the target
+    damping : damping relative to the target
+    normal_force : push against the normal of the shell
+    shell : the surface to press on
+    speed : speed of the target
+    lead_in : time before the target moves
+    rotational_stiffness : holds the orientation of the start
+    rotational_damping : damps the rotation of the frame
+    posture_stiffness : pull towards `q_ref`
+    joint_damping : damping of the joints
+    q_ref : posture; by default that of the start
+    offset : of the point that is moved, in the frame
+    spline : a smooth curve through the points of the path
+    acceleration : limit of the target's
+    jerk : limit of the target's along the path
+    decoupled : the robot's inertia, posture and joint damping do not act on the frame
+    force_rise : time in which the normal force comes on, smoothly
     """
 
     posture_gain: ClassVar[str | None] = "posture_stiffness"
-    frame: str = parameter(help="the frame that is moved")
-    path: Sequence[tuple[float, float, float]] | Array = parameter(
-        unit="m", help="points of the path (k, 3)", min_length=1
-    )
-    stiffness: float = parameter(
-        at_least=0, unit="N/m", label="tip stiffness", help="pull towards the target"
-    )
-    damping: float = parameter(
-        at_least=0, unit="N s/m", label="tip damping", help="damping relative to the target"
-    )
-    normal_force: float = parameter(
-        0.0, at_least=0, unit="N", help="push against the normal of the shell"
-    )
-    shell: Shell | str | None = parameter(None, help="the surface to press on")
+    frame: str = parameter()
+    path: Sequence[tuple[float, float, float]] | Array = parameter(unit="m", min_length=1)
+    stiffness: float = parameter(at_least=0, unit="N/m", label="tip stiffness")
+    damping: float = parameter(at_least=0, unit="N s/m", label="tip damping")
+    normal_force: float = parameter(0.0, at_least=0, unit="N")
+    shell: Shell | str | None = parameter(None)
     shell_frame: str | None = None
     placement: pin.SE3 | None = None
-    speed: float = parameter(
-        0.05, above=0, unit="m/s", label="path speed", help="speed of the target"
-    )
-    lead_in: float = parameter(
-        0.0, at_least=0, unit="s", label="lead-in", help="time before the target moves"
-    )
-    rotational_stiffness: float = parameter(
-        0.0, at_least=0, unit="N m/rad", help="holds the orientation of the start"
-    )
-    rotational_damping: float = parameter(
-        0.0, at_least=0, unit="N m s/rad", help="damps the rotation of the frame"
-    )
-    posture_stiffness: Gain = parameter(0.0, unit="N m/rad", help="pull towards `q_ref`")
-    joint_damping: Gain = parameter(0.0, unit="N m s/rad", help="damping of the joints")
-    q_ref: Posture | None = parameter(None, help="posture; by default that of the start")
+    speed: float = parameter(0.05, above=0, unit="m/s", label="path speed")
+    lead_in: float = parameter(0.0, at_least=0, unit="s", label="lead-in")
+    rotational_stiffness: float = parameter(0.0, at_least=0, unit="N m/rad")
+    rotational_damping: float = parameter(0.0, at_least=0, unit="N m s/rad")
+    posture_stiffness: Gain = parameter(0.0, unit="N m/rad")
+    joint_damping: Gain = parameter(0.0, unit="N m s/rad")
+    q_ref: Posture | None = parameter(None)
     joints: Iterable[str] | None = None
     offset: Sequence[float] | Array = parameter(
-        (0.0, 0.0, 0.0),
-        unit="m",
-        help="of the point that is moved, in the frame",
-        min_length=3,
-        max_length=3,
+        (0.0, 0.0, 0.0), unit="m", min_length=3, max_length=3
     )
-    spline: bool = parameter(False, help="a smooth curve through the points of the path")
-    acceleration: float | None = parameter(
-        None, above=0, unit="m/s2", label="path acceleration", help="limit of the target's"
-    )
-    jerk: float | None = parameter(
-        None, above=0, unit="m/s3", label="path jerk", help="limit of the target's along the path"
-    )
-    decoupled: bool = parameter(
-        False, help="the robot's inertia, posture and joint damping do not act on the frame"
-    )
-    force_rise: float = parameter(
-        0.0,
-        at_least=0,
-        unit="s",
-        label="force rise",
-        help="time in which the normal force comes on, smoothly",
-    )
+    spline: bool = parameter(False)
+    acceleration: float | None = parameter(None, above=0, unit="m/s2", label="path acceleration")
+    jerk: float | None = parameter(None, above=0, unit="m/s3", label="path jerk")
+    decoupled: bool = parameter(False)
+    force_rise: float = parameter(0.0, at_least=0, unit="s", label="force rise")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for wrong types, and for a shell's place without a shell."""

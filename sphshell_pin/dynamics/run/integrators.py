@@ -26,7 +26,14 @@ class Integrator(Component):
 
 @dataclass(frozen=True)
 class _FixedStep(Integrator):
-    dt: float = parameter(1e-4, above=0, unit="s", label="time step", help="step")
+    """What all of them have.
+
+    Parameters
+    ----------
+    dt : step
+    """
+
+    dt: float = parameter(1e-4, above=0, unit="s", label="time step")
 
 
 @dataclass(frozen=True)
@@ -62,19 +69,16 @@ class LinearlyImplicitEuler(_FixedStep, kind="linearly-implicit-euler"):
 
 @dataclass(frozen=True)
 class _ErrorControlled(Integrator):
-    rtol: float = parameter(
-        1e-6,
-        at_least=1e-13,
-        at_most=0.1,
-        label="relative tolerance",
-        help="error of a step over the size of the state",
-    )
-    atol: float | None = parameter(
-        None,
-        above=0,
-        label="absolute tolerance",
-        help="error of a step (m, rad, m/s, rad/s); by default `rtol` / 100",
-    )
+    """What all of them have.
+
+    Parameters
+    ----------
+    rtol : error of a step over the size of the state
+    atol : error of a step (m, rad, m/s, rad/s); by default `rtol` / 100
+    """
+
+    rtol: float = parameter(1e-6, at_least=1e-13, at_most=0.1, label="relative tolerance")
+    atol: float | None = parameter(None, above=0, label="absolute tolerance")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a tolerance that is not positive or out of reach."""

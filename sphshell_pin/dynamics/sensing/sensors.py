@@ -32,15 +32,17 @@ class Sensor(Component):
     """Base of the sensors of a simulation.
 
     The reading k is taken at the start of the run plus k / `rate` and arrives `delay` later.
+
+    Parameters
+    ----------
+    name : of the sensor in results and for controllers
+    rate : readings in a second
+    delay : from taking a reading to its arrival at the controller
     """
 
-    name: str = parameter(help="of the sensor in results and for controllers")
-    rate: float = parameter(
-        1000.0, above=0, at_most=_FASTEST, unit="Hz", help="readings in a second"
-    )
-    delay: float = parameter(
-        0.0, at_least=0, unit="s", help="from taking a reading to its arrival at the controller"
-    )
+    name: str = parameter()
+    rate: float = parameter(1000.0, above=0, at_most=_FASTEST, unit="Hz")
+    delay: float = parameter(0.0, at_least=0, unit="s")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value of a wrong type or outside its bounds."""
@@ -71,16 +73,16 @@ class Sensor(Component):
 
 @dataclass(frozen=True, kw_only=True)
 class _Analog(Sensor):
-    """A signal, filtered before it is sampled, with noise and a range."""
+    """A signal, filtered before it is sampled, with noise and a range.
 
-    cutoff: float | None = parameter(
-        None,
-        above=0,
-        at_most=_FASTEST,
-        unit="Hz",
-        help="of the first-order low-pass filter before the sampling; none by default",
-    )
-    seed: int = parameter(0, help="of the noise; other names have other noise")
+    Parameters
+    ----------
+    cutoff : of the first-order low-pass filter before the sampling; none by default
+    seed : of the noise; other names have other noise
+    """
+
+    cutoff: float | None = parameter(None, above=0, at_most=_FASTEST, unit="Hz")
+    seed: int = parameter(0)
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value of a wrong type or outside its bounds."""
@@ -110,21 +112,21 @@ class ForceTorqueSensor(_Analog, kind="force-torque"):
     their contacts are included. A tool at rest that nothing touches reads its weight, upwards; a
     tip pressed on a surface reads the opposite of what the surface exerts on it, less the tool's
     weight.
+
+    Parameters
+    ----------
+    frame : the link or joint beyond which it measures
+    force_range : largest force along each axis
+    torque_range : largest torque about each axis
+    force_noise : standard deviation of each force reading
+    torque_noise : standard deviation of each torque reading
     """
 
-    frame: str = parameter(help="the link or joint beyond which it measures")
-    force_range: float | None = parameter(
-        None, above=0, unit="N", help="largest force along each axis"
-    )
-    torque_range: float | None = parameter(
-        None, above=0, unit="N m", help="largest torque about each axis"
-    )
-    force_noise: float = parameter(
-        0.0, at_least=0, unit="N", help="standard deviation of each force reading"
-    )
-    torque_noise: float = parameter(
-        0.0, at_least=0, unit="N m", help="standard deviation of each torque reading"
-    )
+    frame: str = parameter()
+    force_range: float | None = parameter(None, above=0, unit="N")
+    torque_range: float | None = parameter(None, above=0, unit="N m")
+    force_noise: float = parameter(0.0, at_least=0, unit="N")
+    torque_noise: float = parameter(0.0, at_least=0, unit="N m")
 
     def columns(self, scene: Scene) -> tuple[str, ...]:
         """Return the names of the values of a reading, with their units."""
@@ -174,11 +176,17 @@ class JointTorqueSensor(_Analog, kind="joint-torque"):
     It is the controller's torque with what stops, friction and damping of the joint add, less what
     the rotor's inertia (the model's armature) takes. A sliding joint has a force [N]. Where other
     joints follow this one, what they transmit counts as seen from it.
+
+    Parameters
+    ----------
+    joint : a joint with one degree of freedom
+    range : largest torque
+    noise : standard deviation of each reading
     """
 
-    joint: str = parameter(help="a joint with one degree of freedom")
-    range: float | None = parameter(None, above=0, unit="N m", help="largest torque")
-    noise: float = parameter(0.0, at_least=0, unit="N m", help="standard deviation of each reading")
+    joint: str = parameter()
+    range: float | None = parameter(None, above=0, unit="N m")
+    noise: float = parameter(0.0, at_least=0, unit="N m")
 
     def columns(self, scene: Scene) -> tuple[str, ...]:
         """Return the names of the values of a reading, with their units."""
@@ -210,12 +218,19 @@ class ContactSwitch(Sensor, kind="contact-switch"):
     """Whether the normal forces of a contact, or of all on a link, sum to more than a threshold.
 
     It closes above `threshold` and opens below `release`, by default the same.
+
+    Parameters
+    ----------
+    contact : name of the contact
+    frame : or the link whose contacts it feels
+    threshold : closes above this force
+    release : opens below this force
     """
 
-    contact: str | None = parameter(None, help="name of the contact")
-    frame: str | None = parameter(None, help="or the link whose contacts it feels")
-    threshold: float = parameter(at_least=0, unit="N", help="closes above this force")
-    release: float | None = parameter(None, at_least=0, unit="N", help="opens below this force")
+    contact: str | None = parameter(None)
+    frame: str | None = parameter(None)
+    threshold: float = parameter(at_least=0, unit="N")
+    release: float | None = parameter(None, at_least=0, unit="N")
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter unless there is one of contact and frame, and release fits."""

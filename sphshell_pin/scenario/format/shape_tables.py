@@ -38,16 +38,26 @@ class Primitive(Component):
 
 @dataclass(frozen=True)
 class Box(Primitive, kind="box"):
-    """A box."""
+    """A box.
 
-    size: Lengths3 = parameter(unit="m", help="edge lengths along x, y, z")
+    Parameters
+    ----------
+    size : edge lengths along x, y, z
+    """
+
+    size: Lengths3 = parameter(unit="m")
 
 
 @dataclass(frozen=True)
 class Ball(Primitive, kind="sphere"):
-    """A ball."""
+    """A ball.
 
-    radius: float = parameter(above=0, unit="m", help="radius")
+    Parameters
+    ----------
+    radius : radius
+    """
+
+    radius: float = parameter(above=0, unit="m")
 
     def geometry(self) -> coal.Sphere:
         """Return it as Coal has it."""
@@ -56,8 +66,16 @@ class Ball(Primitive, kind="sphere"):
 
 @dataclass(frozen=True)
 class _Round(Primitive):
-    radius: float = parameter(above=0, unit="m", help="radius")
-    length: float = parameter(above=0, unit="m", help="length along z, of a capsule without caps")
+    """What all of them have.
+
+    Parameters
+    ----------
+    radius : radius
+    length : length along z, of a capsule without caps
+    """
+
+    radius: float = parameter(above=0, unit="m")
+    length: float = parameter(above=0, unit="m")
 
 
 @dataclass(frozen=True)
@@ -77,16 +95,26 @@ class Cone(_Round, kind="cone"):
 
 @dataclass(frozen=True)
 class Ellipsoid(Primitive, kind="ellipsoid"):
-    """An ellipsoid."""
+    """An ellipsoid.
 
-    radii: Lengths3 = parameter(unit="m", help="half axes along x, y, z")
+    Parameters
+    ----------
+    radii : half axes along x, y, z
+    """
+
+    radii: Lengths3 = parameter(unit="m")
 
 
 @dataclass(frozen=True)
 class HalfSpace(Primitive, kind="half-space"):
-    """A square in the plane z = 0, facing +z."""
+    """A square in the plane z = 0, facing +z.
 
-    extent: float = parameter(10.0, above=0, unit="m", help="edge length")
+    Parameters
+    ----------
+    extent : edge length
+    """
+
+    extent: float = parameter(10.0, above=0, unit="m")
 
     def shell(self, **options: Unpack[ShellOptions]) -> Shell:
         """Return its surface."""

@@ -38,10 +38,16 @@ class Distribution(Component):
 
 @dataclass(frozen=True)
 class Normal(Distribution, kind="normal"):
-    """The normal distribution; 68 % of the values lie within mean ± deviation."""
+    """The normal distribution; 68 % of the values lie within mean ± deviation.
 
-    mean: float = parameter(help="mean")
-    deviation: float = parameter(above=0, help="standard deviation")
+    Parameters
+    ----------
+    mean : mean
+    deviation : standard deviation
+    """
+
+    mean: float = parameter()
+    deviation: float = parameter(above=0)
 
     def quantile(self, share: FloatArray) -> FloatArray:
         """Return the values that `share` (n,) of the distribution lies below."""
@@ -50,10 +56,16 @@ class Normal(Distribution, kind="normal"):
 
 @dataclass(frozen=True)
 class Uniform(Distribution, kind="uniform"):
-    """Every value from low to high is as likely as any other."""
+    """Every value from low to high is as likely as any other.
 
-    low: float = parameter(help="smallest value")
-    high: float = parameter(help="largest value")
+    Parameters
+    ----------
+    low : smallest value
+    high : largest value
+    """
+
+    low: float = parameter()
+    high: float = parameter()
 
     def __post_init__(self) -> None:
         """Check the values; InvalidParameter where they enclose nothing."""
@@ -72,12 +84,15 @@ class LogNormal(Distribution, kind="lognormal"):
     """The logarithm is normal; 68 % of the values lie from median / factor to median * factor.
 
     The logarithm has mean log(median) and standard deviation log(factor).
+
+    Parameters
+    ----------
+    median : half of the values lie below it
+    factor : 68 % of the values lie from median / factor to median * factor
     """
 
-    median: float = parameter(above=0, help="half of the values lie below it")
-    factor: float = parameter(
-        above=1, help="68 % of the values lie from median / factor to median * factor"
-    )
+    median: float = parameter(above=0)
+    factor: float = parameter(above=1)
 
     def __post_init__(self) -> None:
         """Check the values; InvalidParameter where they look like those of the logarithm."""
