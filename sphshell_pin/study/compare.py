@@ -18,10 +18,7 @@ from sphshell_pin.dynamics.result.result_columns import state_titles
 from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
-from sphshell_pin.scenario.running.figures import (
-    NOT_REPEATABLE,
-    recorded_figures,
-)
+from sphshell_pin.scenario.running.figures import NOT_REPEATABLE, recorded_figures
 
 
 @dataclass(frozen=True)
@@ -255,15 +252,9 @@ def _curve_difference(
     t = np.union1d(first.t, other.t)
     t = np.unique(np.clip(t, *span))
     a, b = (np.interp(t, one.t, one.values) for one in (first, other))
-    extent = float(np.ptp(a))
-    values = b - a
-    return CurveDifference(
-        name,
-        first.unit,
-        t,
-        values,
-        float(np.abs(values).max()) / extent if extent else float("nan"),
-    )
+    extent, values = float(np.ptp(a)), b - a
+    of_range = float(np.abs(values).max()) / extent if extent else math.nan
+    return CurveDifference(name, first.unit, t, values, of_range)
 
 
 def _curves(result: Result, titles: list[str], scene: Scene | None, count: int) -> dict[str, Curve]:

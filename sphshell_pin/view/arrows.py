@@ -152,18 +152,18 @@ class ArrowPool:
         self._parts = len(colors)
         self._arrows: list[tuple[Move, Move]] = []
         self._points: list[Move] = []
-        self._arrow_nodes, self._point_nodes = [], []
+        self._nodes: dict[str, list[Visualizer]] = {"arrows": [], "points": []}
         for index in range(size):
             for name, color in colors.items():
                 node = visualizer[f"{name}_{index}"]
                 set_object(node["shaft"], rod(1.0, 1.0), on_top(color), order=10)
                 set_object(node["head"], rod(2.6, 0.0), on_top(color), order=10)
                 self._arrows.append((mover(node["shaft"]), mover(node["head"])))
-                self._arrow_nodes.append(node)
+                self._nodes["arrows"].append(node)
             point = visualizer[f"point_{index}"]
             set_object(point, sphere(1.0, 20), on_top(POINT_COLOR), order=11)
             self._points.append(mover(point))
-            self._point_nodes.append(point)
+            self._nodes["points"].append(point)
         self._where = np.zeros((size, 3))
         # Where a hidden arrow waits: most of a pool does, in most frames.
         self._waiting: list[FloatArray | None] = [None] * len(self._arrows)
@@ -192,14 +192,9 @@ class ArrowPool:
                 self._place_arrow(self._parts * slot + part, slot, force, scale)
         self._shown = set(rows)
 
-    def show_arrows(self, on: bool) -> None:
-        """Show or hide the arrows, whatever forces there are."""
-        for node in self._arrow_nodes:
-            show(node, on)
-
-    def show_points(self, on: bool) -> None:
-        """Show or hide the contact points."""
-        for node in self._point_nodes:
+    def show(self, part: Literal["arrows", "points"], on: bool) -> None:
+        """Show or hide the arrows, or the contact points, whatever forces there are."""
+        for node in self._nodes[part]:
             show(node, on)
 
     def _slots(self, points: FloatArray, rows: IntArray) -> dict[int, int]:

@@ -241,7 +241,7 @@ class Display:
             raise InvalidParameter("part", part, f"must be one of {', '.join(PARTS)}")
         self._hidden = self._hidden - {part} if on else self._hidden | {part}
         if part == "arrows":
-            self._arrows.show_arrows(on)
+            self._arrows.show("arrows", on)
         elif part == "points":
             self._show_points()
         elif part in ("robot", "spheres", "grid"):
@@ -269,7 +269,7 @@ class Display:
     def _show_points(self) -> None:
         on = "points" not in self._hidden
         in_place = self._patches is not None and self._patches_on
-        self._arrows.show_points(on and not in_place)
+        self._arrows.show("points", on and not in_place)
         if self._patches is not None:
             show(self.visualizer["pressure"], on and in_place)
 

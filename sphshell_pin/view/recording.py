@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import numpy as np
 import pinocchio as pin
@@ -54,17 +54,23 @@ MOST_PIECES = 80  # of a trail
 MOST_FRAMES = 1_000_000
 
 
+class RecordingOptions(TypedDict, total=False):
+    """Options of `render_recording` that `write_recording` takes, too."""
+
+    fps: float
+    speed: float
+    arrows: ArrowKind
+    color: Coloring
+
+
 def write_recording(
     path: str | PathLike[str],
     result: Result,
     scene: Scene,
     visual_model: pin.GeometryModel | None = None,
     *,
-    fps: float = 30,
-    speed: float = 1.0,
     title: str | None = None,
-    arrows: ArrowKind = "components",
-    color: Coloring = "surface",
+    **options: Unpack[RecordingOptions],
 ) -> Path:
     """Write `result` as one self-contained HTML file at `path`, and return the path.
 
@@ -72,16 +78,8 @@ def write_recording(
 
     Raises what `render_recording` does, ResultError if the file cannot be written.
     """
-    page = render_recording(
-        result,
-        scene,
-        visual_model,
-        fps=fps,
-        speed=speed,
-        title=title or Path(path).stem,
-        arrows=arrows,
-        color=color,
-    )
+    title = title or Path(path).stem
+    page = render_recording(result, scene, visual_model, title=title, **options)
     return write_whole(path, page.encode())
 
 
@@ -172,7 +170,7 @@ def render_recording(
         "duration": float(t[-1] - t[0]),  # of the whole run
         "speed": float(speed),
         "frames": len(times),
-        "digits": _digits(speed, fps),
+        "digits": max(2, int(np.ceil(-np.log10(speed / fps)))),  # in which two frames differ
     }
     return render_page(
         [*window.commands(times), {**panel, "clock": clock}],
@@ -390,8 +388,3 @@ def _color_keys(display: Display, shown: ContactRows) -> list[tuple[str, str]]:
         keys.append((PRESSURE_RAMP, str(display.patch_scale)))
     found = [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
     return [*found, *display.face_keys, (css(GRID_COLOR), str(display.grid))]
-
-
-def _digits(speed: float, fps: float) -> int:
-    """Return the decimals in which two frames differ, two at least."""
-    return max(2, int(np.ceil(-np.log10(speed / fps))))

@@ -116,16 +116,11 @@ class Search:
         if held.any():
             spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held]), held)
         self._leave_unfelt(spread, still)
+        halves = factor * spread.deviations
+        columns = self.free, self.x.tolist(), middle - halves, middle + halves, held.tolist()
         fitted = tuple(
-            _fitted(one, x, (center - half, center + half), held=bool(bound))
-            for one, x, center, half, bound in zip(
-                self.free,
-                self.x.tolist(),
-                middle.tolist(),
-                (factor * spread.deviations).tolist(),
-                held,
-                strict=True,
-            )
+            _fitted(one, x, (float(low), float(high)), held=bound)
+            for one, x, low, high, bound in zip(*columns, strict=True)
         )
         series = self._series()
         remarks = remarks_on(

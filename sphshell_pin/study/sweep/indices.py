@@ -123,20 +123,17 @@ def sobol_indices(
             figure,
             f"is {values.flat[0]:.6g} in all runs: without a variance it has no Sobol indices",
         )
-    low, high = (
-        need("scipy.stats")
-        .bootstrap(
-            (np.arange(n),),
-            lambda points, axis: _estimate(values[:, points]),
-            vectorized=True,
-            n_resamples=RESAMPLES,
-            batch=_BATCH,
-            confidence_level=confidence,
-            method="percentile",
-            rng=seed,
-        )
-        .confidence_interval
+    found = need("scipy.stats").bootstrap(
+        (np.arange(n),),
+        lambda points, axis: _estimate(values[:, points]),
+        vectorized=True,
+        n_resamples=RESAMPLES,
+        batch=_BATCH,
+        confidence_level=confidence,
+        method="percentile",
+        rng=seed,
     )
+    low, high = found.confidence_interval
     columns: dict[str, FloatArray] = {}
     for kind, *three in zip(("first", "total"), _estimate(values), low, high, strict=True):
         columns |= dict(zip((kind, f"{kind}_low", f"{kind}_high"), three, strict=True))
@@ -170,19 +167,13 @@ def tornado(table: pd.DataFrame, figure: str) -> pd.DataFrame:
     _check_complete(rows, figure, "a tornado")
     values = dict(zip(rows[DESIGN], rows[figure].to_numpy(float), strict=True))
     inputs = rows.set_index(DESIGN)
-    found = need("pandas").DataFrame(
-        [
-            [
-                *(inputs.loc[at_quantile(key, one), key] for one in (LOW, HIGH)),
-                values[at_quantile(key, LOW)],
-                values[MEDIAN],
-                values[at_quantile(key, HIGH)],
-            ]
-            for key in keys
-        ],
-        index=keys,
-        columns=["low_value", "high_value", "low", "median", "high"],
-    )
+    lines = []
+    for key in keys:
+        low, high = (at_quantile(key, one) for one in (LOW, HIGH))
+        ends = inputs.loc[low, key], inputs.loc[high, key]
+        lines.append([*ends, values[low], values[MEDIAN], values[high]])
+    columns = ["low_value", "high_value", "low", "median", "high"]
+    found = need("pandas").DataFrame(lines, index=keys, columns=columns)
     found.attrs = dict(table.attrs)
     ends = found[["low", "median", "high"]]
     change = ends.max(axis=1) - ends.min(axis=1)

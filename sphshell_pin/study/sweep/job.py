@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import import_extra
+from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.scenario.format.schema import Scenario
 
 if TYPE_CHECKING:
@@ -68,6 +69,11 @@ class Job:
     """Identifies this job."""
     curves: Curves | None = None
     """What its recorded runs leave."""
+
+    @property
+    def path(self) -> Path:
+        """The scenario's file; a shipped one may stand elsewhere on a worker's machine."""
+        return find_scenario(self.name) if self.shipped else Path(self.name)
 
 
 def need(module: str) -> ModuleType:

@@ -26,16 +26,8 @@ MOST_DEATHS = 3
 KILLED = "its worker process died each time it was tried"
 
 # A worker has one processor: threads of the libraries would compete for it.
-_ONE_THREAD = dict.fromkeys(
-    (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-    ),
-    "1",
-)
+_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMEXPR")
+_ONE_THREAD = {f"{one}_NUM_THREADS": "1" for one in _LIBRARIES} | {"VECLIB_MAXIMUM_THREADS": "1"}
 
 
 def run_locally(

@@ -148,19 +148,16 @@ def plan_sweep(
     curves = curves_of(built, bands, band_steps, recorded)
     shipped = path == shipped_scenarios().get(path.stem)
     files, used = digest_files(path.parent, names), versions()
+    varied = [[axis.key, list(axis.values)] for axis in axes]
     head: dict[str, object] = {
         "scenario": path.stem,
         "settings": digest_settings(fixed),
-        "vary": [[axis.key, list(axis.values)] for axis in axes],
+        "vary": varied if design is None else dict(design.description),
         "together": together,
         "verdicts": verdicts,
         "files": files,
         "versions": used,
-    }
-    if design is not None:
-        head["vary"] = dict(design.description)
-    if curves is not None:
-        head["bands"] = [list(curves.names), curves.steps]
+    } | ({} if curves is None else {"bands": [list(curves.names), curves.steps]})
     job = Job(
         name=path.stem if shipped else str(path.absolute()),
         shipped=shipped,

@@ -131,12 +131,15 @@ def write_table(
     ResultError
         It cannot be written; an earlier table stays as it was.
     """
-    write = _write_parquet if path.suffix.lower() in PARQUET else _write_hdf5
     text = json.dumps(description, sort_keys=True)
     known = {name: unit for name, unit in sorted((units or {}).items()) if name in columns}
     try:
         with atomic_file(path) as file:
-            write(file, columns, text, known)
+            if path.suffix.lower() in PARQUET:
+                about = {_ATTRS: json.dumps({"units": known})} if known else {}
+                write_parquet(file, columns, {DATASET: text} | about)
+            else:
+                _write_hdf5(file, columns, text, known)
     except OSError as fault:
         raise ResultError(path, f"cannot be written: {fault.strerror or fault}") from None
 
@@ -152,13 +155,6 @@ def _is_table(path: Path) -> bool:
         return False
 
 
-def _write_parquet(
-    file: IO[bytes], columns: Columns, description: str, units: Mapping[str, str]
-) -> None:
-    metadata = {DATASET: description} | ({_ATTRS: json.dumps({"units": units})} if units else {})
-    write_parquet(file, columns, metadata)
-
-
 def _write_hdf5(
     file: IO[bytes], columns: Columns, description: str, units: Mapping[str, str]
 ) -> None:
@@ -167,7 +163,7 @@ def _write_hdf5(
     encoded: list[NDArray[np.generic]] = []
     kinds = []
     for values in columns.values():
-        if _is_text(values):
+        if values.dtype == object:
             # Of fixed length: texts elsewhere in the file would leave gaps of unknown bytes.
             encoded.append(np.array([one.encode() for one in values], dtype=np.bytes_))
             kinds.append(h5py.string_dtype("utf-8", max(encoded[-1].dtype.itemsize, 1)))
@@ -184,20 +180,12 @@ def _write_hdf5(
 
 def _varied(values: Sequence[Value]) -> NDArray[np.generic]:
     kinds = {type(value) for value in values}
-    if kinds == {bool}:
-        return np.array(values, dtype=np.bool_)
-    with contextlib.suppress(OverflowError):  # whole numbers of Python have no end
-        if kinds == {int}:
-            return np.array(values, dtype=np.int64)
-    with contextlib.suppress(OverflowError):
-        if kinds <= {int, float}:
-            return np.array(values, dtype=np.float64)
+    for known, dtype in (({bool}, np.bool_), ({int}, np.int64), ({int, float}, np.float64)):
+        with contextlib.suppress(OverflowError):  # whole numbers of Python have no end
+            if kinds <= known:
+                return np.array(values, dtype=dtype)
     return _texts([str(value) for value in values])
 
 
 def _texts(values: Sequence[str]) -> NDArray[np.generic]:
     return np.array(values, dtype=object)
-
-
-def _is_text(values: NDArray[np.generic]) -> bool:
-    return bool(values.dtype == object)

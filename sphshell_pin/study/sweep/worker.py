@@ -14,7 +14,7 @@ from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError, SweepError
 from sphshell_pin.scenario import Built, judge
 from sphshell_pin.scenario.format.build import build_scenario
-from sphshell_pin.scenario.format.reading import change_scenario, find_scenario
+from sphshell_pin.scenario.format.reading import change_scenario
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import check_knobs
 from sphshell_pin.scenario.running.figures import (
@@ -97,7 +97,7 @@ def _prepare(job: Job) -> None:
             f"worker {_here()} has {', '.join(other)}; the sweep was started with {wanted}"
         )
     try:
-        path = _path(job)
+        path = job.path
         for name, digest in digest_files(path.parent, job.files).items():
             if digest != job.files[name]:
                 have = "no" if digest == "absent" else "another"
@@ -116,13 +116,8 @@ def _prepare(job: Job) -> None:
     _built[job.token] = built
 
 
-def _path(job: Job) -> Path:
-    # A shipped scenario may stand elsewhere on a worker's machine.
-    return find_scenario(job.name) if job.shipped else Path(job.name)
-
-
 def _try_run(job: Job, run: Run) -> Outcome:
-    path = _path(job)
+    path = job.path
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

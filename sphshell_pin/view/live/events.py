@@ -43,8 +43,7 @@ def _number(value: object) -> float:
 
 
 def _not_negative(value: object) -> float:
-    number = _number(value)
-    if number < 0.0:
+    if (number := _number(value)) < 0.0:
         raise BadMessage("must not be negative")
     return number
 
@@ -66,8 +65,7 @@ def _number_or_word(value: object) -> float | str:
 
 
 def _positive(value: object) -> float:
-    number = _number(value)
-    if not number > 0.0:
+    if not (number := _number(value)) > 0.0:
         raise BadMessage("must be positive")
     return number
 
