@@ -168,15 +168,9 @@ def _print_report(report: RunReport) -> None:
         typer.echo(f"warning: {warning}", err=True)
     if report.audit is not None:
         audited = [
-            (
-                one.name,
-                f"{one.contacts}",
-                f"{one.unmatched}",
-                f"{one.depth_largest:.3g} m",
-                f"{one.depth_rms:.3g} m",
-                f"{one.normal_largest:.3g} rad",
-                f"{one.normal_rms:.3g} rad",
-            )
+            (one.name, f"{one.contacts}", f"{one.unmatched}")
+            + tuple(f"{off:.3g} m" for off in one.depth)
+            + tuple(f"{off:.3g} rad" for off in one.normal)
             for one in report.audit.pairs
         ]
         say("contacts beside those on the exact CAD faces, largest and rms difference")

@@ -5,6 +5,7 @@ Figures are made without pyplot: no window, no global state, any thread.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,7 +45,14 @@ __all__ = [
     "save_figures",
 ]
 
-KINDS = ("overview", "force", "energy", "path", "map", "sensors")
+KINDS: dict[str, Callable[..., Figure]] = {
+    "overview": plot_overview,
+    "force": plot_force_and_depth,
+    "energy": plot_energy,
+    "path": plot_contact_path,
+    "map": plot_contact_map,
+    "sensors": plot_sensors,
+}
 
 
 def plot_result(result: Result, kind: str = "overview", scene: Scene | None = None) -> Figure:
@@ -62,17 +70,7 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
     check_name("kind", kind)
     if kind not in KINDS:
         raise NameNotFound("kind of figure", kind, "a result", KINDS)
-    if kind == "path":
-        return plot_contact_path(result, scene)
-    if kind == "map":
-        return plot_contact_map(result, scene)
-    over_time = {
-        "overview": plot_overview,
-        "force": plot_force_and_depth,
-        "energy": plot_energy,
-        "sensors": plot_sensors,
-    }
-    return over_time[kind](result)
+    return KINDS[kind](result, *([scene] if kind in ("path", "map") else []))
 
 
 def save_figures(

@@ -34,8 +34,7 @@ def unit_normals(raw: RawSurface, found: Found) -> Floats | None:
     found["has_normals"] = True
     found["missing_normals"] = int((~usable).sum())
     found["rescaled_normals"] = int(rescaled.sum())
-    table: Floats = scaled / np.where(usable, length, 1.0)[:, None]
-    return table
+    return np.asarray(scaled / np.where(usable, length, 1.0)[:, None])
 
 
 def settle_normals(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -86,66 +87,55 @@ def _at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
 
 def _of_joints(built: Built) -> list[Quantity]:
     return [
-        Quantity(*quantity_of(title), _at_rows(_state(kind, k)))
+        Quantity(*quantity_of(title), _at_rows(partial(_state, kind, k)))
         for kind, titles in zip("qv", coordinates(built.scene.model), strict=True)
         for k, title in enumerate(titles)
     ]
 
 
-def _state(kind: str, column: int) -> Callable[[Result], Array]:
-    return lambda result: np.asarray(getattr(result, kind)[:, column])
+def _state(kind: str, column: int, result: Result) -> Array:
+    return np.asarray(getattr(result, kind)[:, column])
 
 
 def _of_pairs(built: Built) -> list[Quantity]:
     units = dict.fromkeys(_SERIES, "N") | {"depth": "m"}
     units |= {f"{part}_{a}": "N" for part in ("force", "friction_force") for a in "xyz"}
     return [
-        Quantity(
-            f"pairs.{pair.name}.{name}",
-            unit,
-            _at_rows(_of_pair(k, name)),
-        )
+        Quantity(f"pairs.{pair.name}.{name}", unit, _at_rows(partial(_of_pair, k, name)))
         for k, pair in enumerate(built.scene.pairs)
         for name, unit in units.items()
     ]
 
 
-def _of_pair(pair: int, name: str) -> Callable[[Result], Array]:
+def _of_pair(pair: int, name: str, result: Result) -> Array:
     """Return the sum over the contacts of a pair, or the largest depth; 0 without contact."""
-
-    def of(result: Result) -> Array:
-        if name in _SERIES:
-            return np.asarray(getattr(PairSeries.of(result, pair), _SERIES[name]))
-        contacts = result.contacts.of_pair(pair)
-        part, axis = name[:-2], "xyz".index(name[-1])
-        forces = contacts.force_world if part == "force" else contacts.friction_force_world
-        whole = np.zeros(len(result.t))
-        np.add.at(whole, contacts.row, forces[:, axis])
-        return whole
-
-    return of
+    if name in _SERIES:
+        return np.asarray(getattr(PairSeries.of(result, pair), _SERIES[name]))
+    contacts = result.contacts.of_pair(pair)
+    part, axis = name[:-2], "xyz".index(name[-1])
+    forces = contacts.force_world if part == "force" else contacts.friction_force_world
+    whole = np.zeros(len(result.t))
+    np.add.at(whole, contacts.row, forces[:, axis])
+    return whole
 
 
 def _of_sensors(built: Built, above: str) -> list[Quantity]:
     return [
-        Quantity(f"{above}{sensor.name}.{label}", unit, _reading(sensor.name, i))
+        Quantity(f"{above}{sensor.name}.{label}", unit, partial(_reading, sensor.name, i))
         for sensor in built.simulation.sensors
         for i, (label, unit) in enumerate(map(quantity_of, sensor.columns(built.scene)))
     ]
 
 
-def _reading(sensor: str, column: int) -> Callable[[Result, Array], Array]:
-    def at(result: Result, t: Array) -> Array:
-        # The last reading that had arrived, as a controller or a logger has it.
-        log = result.sensors[sensor]
-        if not len(log):
-            return np.full(len(t), np.nan)
-        # A time as a file has it may be rounded down.
-        late = t + _SAME * float(np.diff(log.t).min(initial=np.inf) if len(log) > 1 else 0.0)
-        row = np.searchsorted(log.t, late, side="right") - 1
-        return np.where(row >= 0, log.values[np.maximum(row, 0), column], np.nan)
-
-    return at
+def _reading(sensor: str, column: int, result: Result, t: Array) -> Array:
+    # The last reading that had arrived, as a controller or a logger has it.
+    log = result.sensors[sensor]
+    if not len(log):
+        return np.full(len(t), np.nan)
+    # A time as a file has it may be rounded down.
+    late = t + _SAME * float(np.diff(log.t).min(initial=np.inf) if len(log) > 1 else 0.0)
+    row = np.searchsorted(log.t, late, side="right") - 1
+    return np.where(row >= 0, log.values[np.maximum(row, 0), column], np.nan)
 
 
 def _of_frames(built: Built) -> list[Quantity]:
@@ -155,24 +145,21 @@ def _of_frames(built: Built) -> list[Quantity]:
         for part, unit in (("", "m"), ("v", "m/s"), ("w", "rad/s")):
             for axis in range(3):
                 label = f"frames.{name}.{part}{'xyz'[axis]}"
-                out.append(Quantity(label, unit, _at_rows(_motion(model, frame, part, axis))))
+                of = partial(_motion, model, frame, part, axis)
+                out.append(Quantity(label, unit, _at_rows(of)))
     return out
 
 
-def _motion(model: pin.Model, frame: int, part: str, axis: int) -> Callable[[Result], Array]:
+def _motion(model: pin.Model, frame: int, part: str, axis: int, result: Result) -> Array:
     """Return position ("") or velocity ("v", "w") of a frame, along an axis of the world."""
-
-    def of(result: Result) -> Array:
-        data, out = model.createData(), np.zeros(len(result.t))
-        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        for row, (q, v) in enumerate(zip(result.q, result.v, strict=True)):
-            pin.forwardKinematics(model, data, q, v)
-            if part:
-                velocity = pin.getFrameVelocity(model, data, frame, aligned)
-                vector = velocity.linear if part == "v" else velocity.angular
-            else:
-                vector = pin.updateFramePlacement(model, data, frame).translation
-            out[row] = vector[axis]
-        return out
-
-    return of
+    data, out = model.createData(), np.zeros(len(result.t))
+    aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    for row, (q, v) in enumerate(zip(result.q, result.v, strict=True)):
+        pin.forwardKinematics(model, data, q, v)
+        if part:
+            velocity = pin.getFrameVelocity(model, data, frame, aligned)
+            vector = velocity.linear if part == "v" else velocity.angular
+        else:
+            vector = pin.updateFramePlacement(model, data, frame).translation
+        out[row] = vector[axis]
+    return out

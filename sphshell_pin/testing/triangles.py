@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from sphshell_pin.base.arrays import Array
 
@@ -44,15 +46,10 @@ def pieces(triangles: Ints, touched: NDArray[np.bool_]) -> list[Ints]:
     Returns the indices of the triangles of each piece.
     """
     rows = np.flatnonzero(touched)
-    label = np.arange(len(rows))
-    while True:
-        lowest = np.full(int(triangles.max()) + 1, len(rows))
-        for corner in range(3):
-            np.minimum.at(lowest, triangles[rows, corner], label)
-        new = lowest[triangles[rows]].min(axis=1)
-        if (new == label).all():
-            break
-        label = new
+    corners = triangles[rows].astype(np.int64)
+    size, first = int(triangles.max()) + 1, corners[:, [0, 0]].ravel()
+    joined = coo_array((np.ones(first.size), (first, corners[:, 1:].ravel())), (size, size))
+    label = connected_components(joined, directed=False)[1][corners[:, 0]]
     return [rows[label == one] for one in np.unique(label)]
 
 

@@ -103,8 +103,7 @@ def outlined_edges(shell: Shell) -> IntArray:
     edges = shell.edge_vertices
     if len(edges) <= MOST_OUTLINED_EDGES:
         return edges
-    sharp: IntArray = edges[shell.edge_class != 0]
-    return sharp
+    return np.asarray(edges[shell.edge_class != 0])
 
 
 def draw_shell(node: Visualizer, shell: Shell, index: int, *, curved: bool = False) -> None:

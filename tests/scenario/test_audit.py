@@ -77,11 +77,11 @@ def test_audit_agrees_with_formulas(name, tmp_path):
     assert audit.normal_error == pytest.approx(angle, rel=0, abs=1e-7)
     (pair,) = audit.pairs
     assert (pair.contacts, pair.unmatched) == (len(log.depth), 0)
-    assert pair.depth_largest == np.abs(audit.depth_error).max()
-    assert pair.depth_rms <= pair.depth_largest
+    assert pair.depth[0] == np.abs(audit.depth_error).max()
+    assert pair.depth[1] <= pair.depth[0]
     # The faces are closed forms; the flat elements below show that the audit finds what is off.
-    assert pair.depth_largest < 1e-12 * size
-    assert pair.normal_largest < 1e-7
+    assert pair.depth[0] < 1e-12 * size
+    assert pair.normal[0] < 1e-7
 
 
 def test_flat_elements_are_off_by_their_chord_error(tmp_path):
@@ -90,8 +90,8 @@ def test_flat_elements_are_off_by_their_chord_error(tmp_path):
         path.read_text().replace('shell = "plate"', 'shell = "plate"\nmethod = "facets"')
     )
     (pair,) = run_built(build(path), tmp_path / "out", recording=False, audit_cad=True).audit.pairs
-    assert 1e-5 < pair.depth_largest < 2e-4
-    assert pair.normal_largest > 1e-3
+    assert 1e-5 < pair.depth[0] < 2e-4
+    assert pair.normal[0] > 1e-3
 
 
 @pytest.mark.parametrize(

@@ -217,17 +217,9 @@ def _tip_frame(
 
 def origin(section: RobotSection) -> tuple[object, ...]:
     """Return what tells robots of one scenario's folder apart before they start and are placed."""
-    return (
-        section.name,
-        section.path,
-        tuple(section.package_dirs),
-        tuple(section.xacro_args.items()),
-        section.density,
-        section.srdf,
-        section.pose,
-        section.floats,
-        section.mimic,
-    )
+    plain = ("name", "path", "density", "srdf", "pose", "floats", "mimic")
+    lists = tuple(section.package_dirs), tuple(section.xacro_args.items())
+    return (*(getattr(section, one) for one in plain), *lists)
 
 
 def check_masses(assembly: Assembly, lock: Collection[str]) -> None:

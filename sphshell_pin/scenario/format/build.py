@@ -336,13 +336,8 @@ def _add_contact(
     with blamed_on(path, key), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
         law, friction = laws
-        how: dict[str, Any] = {
-            "law": law,
-            "friction": friction,
-            "method": contact.method,
-            "name": contact.name,
-        }
-        one = contact.sphere or contact.plane
+        how: dict[str, Any] = {"law": law, "friction": friction, "name": contact.name}
+        how["method"], one = contact.method, contact.sphere or contact.plane
         if one is not None:
             scene.add_contact(to_end(one), *touched, **how)
         else:

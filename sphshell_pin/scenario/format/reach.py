@@ -53,8 +53,7 @@ class Reach:
     def center(self, q: Array) -> Array:
         """Return where the point is (3,) [m]; places of frames and joints are in `data` then."""
         pin.framesForwardKinematics(self.model, self.data, q)
-        center: Array = self.data.oMf[self.frame].act(self.offset)
-        return center
+        return np.asarray(self.data.oMf[self.frame].act(self.offset))
 
     def jacobian(self, q: Array) -> Array:
         """Return the point's velocity and the frame's rotation, (6, k), by the joints that move."""

@@ -91,14 +91,12 @@ class LiveRun:
     @property
     def q(self) -> Array:
         """Configuration (nq,)."""
-        q: Array = self._row.q[0]
-        return q
+        return np.asarray(self._row.q[0])
 
     @property
     def v(self) -> Array:
         """Velocity (nv,)."""
-        v: Array = self._row.v[0]
-        return v
+        return np.asarray(self._row.v[0])
 
     @property
     def contacts(self) -> SceneContacts:

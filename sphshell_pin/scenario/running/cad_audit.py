@@ -44,10 +44,8 @@ class PairAudit:
     file: str
     contacts: int
     unmatched: int
-    depth_largest: float
-    depth_rms: float
-    normal_largest: float
-    normal_rms: float
+    depth: tuple[float, float]
+    normal: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -77,8 +75,8 @@ class CadAudit:
                 "file": pair.file,
                 "contacts": pair.contacts,
                 "unmatched": pair.unmatched,
-                "depth_error": {"largest": pair.depth_largest, "rms": pair.depth_rms},
-                "normal_error": {"largest": pair.normal_largest, "rms": pair.normal_rms},
+                "depth_error": dict(zip(("largest", "rms"), pair.depth, strict=True)),
+                "normal_error": dict(zip(("largest", "rms"), pair.normal, strict=True)),
             }
             for pair in self.pairs
         }
@@ -124,16 +122,9 @@ def audit_cad(built: Built, result: Result) -> CadAudit:
     for index, section in _cad_pairs(built):
         errors = np.stack([depth_error, normal_error])[:, (log.pair == index) & counts]
         known = errors[:, np.isfinite(errors[0])]
-        pairs.append(
-            PairAudit(
-                built.scene.pairs[index].name,
-                str(section.file),
-                errors.shape[1],
-                errors.shape[1] - known.shape[1],
-                *_largest_and_rms(known[0]),
-                *_largest_and_rms(known[1]),
-            )
-        )
+        name, count = built.scene.pairs[index].name, errors.shape[1]
+        off = map(_largest_and_rms, known)
+        pairs.append(PairAudit(name, str(section.file), count, count - known.shape[1], *off))
     return CadAudit(tuple(pairs), depth_error, normal_error)
 
 

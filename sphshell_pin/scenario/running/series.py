@@ -131,13 +131,11 @@ def held(log: SensorLog, t: Array, before: Array | None) -> Array:
     `before` (k,) is the one from before the log; without it times before its first reading get nan.
     """
     first = np.full(len(log.columns), np.nan) if before is None else before
-    values: Array = np.vstack((first, log.values))[np.searchsorted(log.t, t, side="right")]
-    return values
+    return np.asarray(np.vstack((first, log.values))[np.searchsorted(log.t, t, side="right")])
 
 
 def _sum(block: Array) -> Array:
-    total: Array = block.sum(axis=1)
-    return total
+    return np.asarray(block.sum(axis=1))
 
 
 def _column(k: int, factor: float = 1.0) -> Callable[[Array], Array]:

@@ -55,8 +55,7 @@ def tip_position(scene: sp.Scene, q: Array) -> Array:
     """Return where the fingertip is (3,) [m]."""
     data = scene.model.createData()
     pin.framesForwardKinematics(scene.model, data, q)
-    tip: Array = data.oMf[scene.model.getFrameId("panda_hand_tcp")].translation
-    return tip
+    return np.asarray(data.oMf[scene.model.getFrameId("panda_hand_tcp")].translation)
 
 
 def with_sheet(

@@ -38,8 +38,7 @@ def touching_centers(count: int, size: float, radius: float, depth: float) -> Ar
     by_y = -AMPLITUDE * WAVE_Y * np.sin(WAVE_X * x) * np.sin(WAVE_Y * y)
     normal = np.c_[-by_x, -by_y, np.ones(count)]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    centers: Array = np.c_[xy, height(x, y)] + normal * (radius - depth)
-    return centers
+    return np.asarray(np.c_[xy, height(x, y)] + normal * (radius - depth))
 
 
 @dataclass(frozen=True)

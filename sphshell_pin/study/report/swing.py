@@ -51,8 +51,7 @@ class Row:
 
 def any_turn() -> Array:
     """Return a rotation that puts the mirror planes of the icosphere off every swing."""
-    turn: Array = pin.utils.rpyToMatrix(0.4, 1.1, 2.3)
-    return turn
+    return np.asarray(pin.utils.rpyToMatrix(0.4, 1.1, 2.3))
 
 
 def bowl(side: float, turn: Array | None = None) -> Mesh:
@@ -95,8 +94,7 @@ def downward_crossings(t: Array, x: Array, v: Array) -> Array:
         value = ((cubic[0] * share + cubic[1]) * share + cubic[2]) * share + cubic[3]
         derivative = (3 * cubic[0] * share + 2 * cubic[1]) * share + cubic[2]
         share = share - value / derivative
-    crossings: Array = t[rows] + share * step
-    return crossings
+    return np.asarray(t[rows] + share * step)
 
 
 def mean_period(t: Array, x: Array, v: Array, periods: int) -> float:
@@ -159,8 +157,7 @@ def closed_form() -> float:
 
 def energy_changes(result: Result, swing_energy: float = ENERGY) -> Array:
     """Return (E(t) - E(0)) / energy of the swing; E is kinetic, of gravity and of the contacts."""
-    changes: Array = result.energy.residual / swing_energy
-    return changes
+    return np.asarray(result.energy.residual / swing_energy)
 
 
 def swing(scene: Scene, azimuth: float, dt: float = DT, periods: int = PERIODS) -> Swing:
