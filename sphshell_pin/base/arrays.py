@@ -1,4 +1,4 @@
-"""The array of numbers that most of the package computes with."""
+"""The arrays of numbers that the package computes with; shapes are stated where they are used."""
 
 from __future__ import annotations
 
@@ -6,4 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-"""Double precision; shapes are stated where it is used."""
+"""Double precision."""
+Ints = NDArray[np.int32]
+Longs = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+Mask = NDArray[np.bool_]

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Bytes
 from sphshell_pin.base.atomic import atomic_file, atomic_path
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError, import_extra
 
@@ -25,7 +25,7 @@ H264 = (
     *("-color_primaries", "bt709", "-color_trc", "bt709"),
 )
 
-Pixels = NDArray[np.uint8]
+Pixels = Bytes
 """Colors (height, width, 3) of one picture."""
 
 

@@ -19,8 +19,9 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_finite, check_type
 from sphshell_pin.errors import InvalidParameter
 
@@ -124,7 +125,7 @@ def described(doc: str | None, section: str) -> tuple[str, dict[str, tuple[str, 
     return text, found
 
 
-def flat_fields(fields: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
+def flat_fields(fields: Mapping[str, ArrayLike]) -> dict[str, Array]:
     """Return the fields of a compiled class as it takes them: flat arrays, in the order of rows."""
     return {name: np.ravel(np.asarray(value, np.float64)) for name, value in fields.items()}
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin import _core
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_positive, check_type, check_vector, read_only
 from sphshell_pin.base.parameters import parameter
 from sphshell_pin.contact.laws import HuntCrossleyLaw
@@ -16,8 +16,6 @@ from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.contact_set import Method
 from sphshell_pin.shell.shell import Shell
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,7 @@ class _OnPlane(FoundationLaw):
 
 def foundation_pressure(
     shell: Shell, center: npt.ArrayLike, radius: float, law: FoundationLaw, method: str = "smooth"
-) -> tuple[Floats, Floats, Floats, Floats]:
+) -> tuple[Array, Array, Array, Array]:
     """Return where a FoundationLaw presses, by quadrature points on the shell.
 
     Parameters

@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_type
 from sphshell_pin.base.tables import quantity_of
@@ -271,7 +270,7 @@ class _Run:
 _FLOAT, _MARKERS = "std_msgs/Float64", "visualization_msgs/MarkerArray"
 
 
-def _nanoseconds(t: Array, start: int) -> NDArray[np.int64]:
+def _nanoseconds(t: Array, start: int) -> Longs:
     """Return the time stamps of the times `t` [s]: whole nanoseconds since 1970."""
     # As floats first: the nanoseconds of what is far too large are no whole number.
     near = np.abs(t).max(initial=0.0) < _LAST * 1e-9

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sphshell_pin.base.arrays import Array
-from sphshell_pin.patches.placed import Longs, patches_on, poses_along
+from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.patches.placed import patches_on, poses_along
 from sphshell_pin.patches.sampling import divide
 
 if TYPE_CHECKING:

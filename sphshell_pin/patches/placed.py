@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Longs, Mask
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
-
-Longs = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class PlacedPatches:
     slip: Array
     element: Longs
 
-    def select(self, chosen: Longs | NDArray[np.bool_]) -> PlacedPatches:
+    def select(self, chosen: Longs | Mask) -> PlacedPatches:
         """Return those that `chosen`, a mask or indices, picks."""
         return PlacedPatches(*(getattr(self, f.name)[chosen] for f in fields(self)))
 

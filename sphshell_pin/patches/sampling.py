@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
     from sphshell_pin.shell.shell import Shell
 
-Longs = NDArray[np.int64]
 
 _MOST_SAMPLES = 3_000_000
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_name, check_positive, check_vector, read_only
 from sphshell_pin.base.offered import offered
@@ -21,7 +20,7 @@ from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
-from sphshell_pin.patches.placed import Longs, PlacedPatches, patches_on
+from sphshell_pin.patches.placed import PlacedPatches, patches_on
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
@@ -173,7 +172,7 @@ class TaxelGrid:
                 outside[row] += force - loads[on_grid].sum()
         return TaxelImages(result.t, read_only(forces), read_only(outside))
 
-    def _cells(self, points: Array) -> tuple[Longs, Longs, NDArray[np.bool_]]:
+    def _cells(self, points: Array) -> tuple[Longs, Longs, Mask]:
         """Return row and column (k,) of the taxels at `points` (k, 3), and which are there."""
         along, right, up = (points / np.linalg.norm(points, axis=1)[:, None] @ self._basis).T
         angles = np.stack([np.arcsin(np.clip(up, -1.0, 1.0)), np.arctan2(right, along)], axis=1)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result_scene import scene_of
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.figure import INK, NO_CONTACT, only_say, reading_unit
@@ -20,7 +21,6 @@ from sphshell_pin.plot.on_shell import (
 )
 from sphshell_pin.plot.patches import COLORS as PATCH_COLORS
 from sphshell_pin.plot.patches import draw_patches, patches_of, peak_pressure
-from sphshell_pin.view.contact_path import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,10 +51,10 @@ class _View:
     """
 
     shell: Shell
-    values: FloatArray
-    paths: list[FloatArray]
-    starts: dict[str, FloatArray]
-    normal: FloatArray
+    values: Array
+    paths: list[Array]
+    starts: dict[str, Array]
+    normal: Array
     title: str
     patches: PlacedPatches | None = None
 
@@ -117,7 +117,7 @@ def plot_contact_map(
     return figure
 
 
-def element_values(result: Result, pairs: list[int], elements: int, quantity: str) -> FloatArray:
+def element_values(result: Result, pairs: list[int], elements: int, quantity: str) -> Array:
     """Return what each of a shell's `elements` took from `pairs`, (elements,): see QUANTITIES."""
     log = result.contacts
     own = np.isin(log.pair, pairs) & (np.asarray(log.element) >= 0)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result_scene import find_scene
 from sphshell_pin.plot.figure import NO_CONTACT, only_say, reading_unit
 from sphshell_pin.plot.on_shell import PathGroup, Picture, group_paths, shell_figure
-from sphshell_pin.view.contact_path import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +45,7 @@ def plot_contact_path(result: Result, scene: Scene | None = None) -> Figure:
     return figure
 
 
-def color_limits(forces: FloatArray) -> tuple[float, float]:
+def color_limits(forces: Array) -> tuple[float, float]:
     """Return the range of `forces` (k,) [N] that gets the colors.
 
     It ends below an impact far above the rest, and starts at zero unless that would leave only a

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.plot.figure import reading_unit
 from sphshell_pin.plot.on_shell import Picture, color_scale, shell_figure
 
@@ -14,12 +15,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sphshell_pin.shell.shell import Shell
-    from sphshell_pin.view.contact_path import FloatArray
 
 EYE = np.array([0.6, -0.7, 0.5])
 
 
-def plot_differences(title: str, parts: Sequence[tuple[str, Shell, FloatArray]]) -> Figure:
+def plot_differences(title: str, parts: Sequence[tuple[str, Shell, Array]]) -> Figure:
     """Return a Figure of shells, each seen from two opposite sides.
 
     parts : name, shell, and by how much each of its elements differs in depth (m,) [m]; elements

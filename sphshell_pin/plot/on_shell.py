@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.plot.figure import INK, new_figure, reading_unit
-from sphshell_pin.view.contact_path import ContactPath, FloatArray, contact_paths, spaced
+from sphshell_pin.view.contact_path import ContactPath, contact_paths, spaced
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d import Axes3D
-    from numpy.typing import NDArray
 
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
@@ -39,7 +39,7 @@ class PathGroup:
     paths: list[ContactPath]
 
     @property
-    def points(self) -> FloatArray:
+    def points(self) -> Array:
         """All points (k, 3) [m] of the paths, in the frame of the shell or in the world."""
         return np.concatenate([path.points for path in self.paths])
 
@@ -57,7 +57,7 @@ def group_paths(result: Result, scene: Scene | None) -> list[PathGroup]:
     return list(groups.values())
 
 
-def eye_direction(normal: FloatArray) -> FloatArray:
+def eye_direction(normal: Array) -> Array:
     """Return the unit vector (3,) to the eye: before a surface of this mean `normal` (3,).
 
     A little from the side, so that the picture has depth.
@@ -79,15 +79,13 @@ class Picture:
     """
 
     axis: Axes3D
-    toward: FloatArray
-    low: FloatArray
-    high: FloatArray
+    toward: Array
+    low: Array
+    high: Array
     factor: float
 
     @classmethod
-    def of(
-        cls, axis: Axes3D, shell: Shell | None, normal: FloatArray, touched: FloatArray
-    ) -> Picture:
+    def of(cls, axis: Axes3D, shell: Shell | None, normal: Array, touched: Array) -> Picture:
         """Prepare `axis` for all of `shell`, or of a much larger one what is about `touched`.
 
         normal : mean contact normal (3,)
@@ -126,7 +124,7 @@ class Picture:
         return float((self.high - self.low).max())
 
     def draw_shell(
-        self, shell: Shell, values: FloatArray | None = None, colors: FloatArray | None = None
+        self, shell: Shell, values: Array | None = None, colors: Array | None = None
     ) -> bool:
         """Draw `shell`, its elements in `colors` (m, 4) where `values` (m,) are positive.
 
@@ -164,11 +162,11 @@ class Picture:
             )
         return fine
 
-    def kept(self, points: FloatArray) -> NDArray[np.int64]:
+    def kept(self, points: Array) -> Longs:
         """Return the indices of those points of a path (k, 3) [m] that differ in the picture."""
         return spaced(points, self.size / MOST_STEPS)
 
-    def mark_start(self, point: FloatArray, name: str, *, hidden: bool = False) -> None:
+    def mark_start(self, point: Array, name: str, *, hidden: bool = False) -> None:
         """Draw a dot where a pair touched first, `point` (3,) [m], hollow where it is behind."""
         place = point * self.factor
         fill = "white" if hidden else INK
@@ -179,7 +177,7 @@ class Picture:
             text = f"  {name} (behind)" if hidden else f"  {name}"
             self.axis.text(*place, text, fontsize=8, bbox=LABEL_BOX, zorder=6)
 
-    def _shade(self, corners: FloatArray) -> FloatArray:
+    def _shade(self, corners: Array) -> Array:
         """Return the brightness (m,) of elements, lit from above the eye, equal on both sides."""
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
@@ -206,7 +204,7 @@ def color_scale(largest: float, colors: str) -> ScalarMappable:
     return ScalarMappable(Normalize(0.0, largest or 1.0), colormaps[colors])
 
 
-def element_corners(shell: Shell) -> FloatArray:
+def element_corners(shell: Shell) -> Array:
     """Return the corners of each element (m, 4, 3) [m], a triangle's last one twice."""
     elements = np.asarray(shell.elements, dtype=np.int64)
     last = elements[:, min(3, elements.shape[1] - 1)]
@@ -214,7 +212,7 @@ def element_corners(shell: Shell) -> FloatArray:
     return np.asarray(np.asarray(shell.vertices, dtype=float)[whole])
 
 
-def _fewer(corners: FloatArray, bare: NDArray[np.bool_]) -> tuple[NDArray[np.int64], FloatArray]:
+def _fewer(corners: Array, bare: Mask) -> tuple[Longs, Array]:
     """Return the numbers (k,) and corners (k, 4, 3) of the elements to paint.
 
     Of very many `bare` ones (m,) some are left out, and the others enlarged to take their place.

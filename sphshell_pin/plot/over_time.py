@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.plot.figure import NO_CONTACT, count, finish_axis, label_axis, new_figure, say
-from sphshell_pin.plot.series import FloatArray, thinned
+from sphshell_pin.plot.series import thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -124,7 +125,7 @@ def _pair_title(result: Result, pair: PairSeries) -> str:
     )
 
 
-def _plot(axis: Axes, result: Result, values: FloatArray, **look: Any) -> None:
+def _plot(axis: Axes, result: Result, values: Array, **look: Any) -> None:
     """Draw `values` (n,), in the unit of the axis, over the time of `result`."""
     axis.plot(*thinned(np.asarray(result.t), values), linewidth=1.2, **look)
     axis.margins(x=0.01)
@@ -153,7 +154,7 @@ def _draw_depths(axis: Axes, result: Result, touched: list[PairSeries]) -> None:
 def _draw_curves(
     axis: Axes,
     result: Result,
-    curves: dict[str, FloatArray],
+    curves: dict[str, Array],
     quantity: str,
     base: str,
     color: str | None = None,
@@ -201,7 +202,7 @@ def _draw_energies(axis: Axes, result: Result) -> None:
         axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, borderaxespad=0.0)
 
 
-def _energy_curves(result: Result) -> dict[str, tuple[FloatArray, str]]:
+def _energy_curves(result: Result) -> dict[str, tuple[Array, str]]:
     """Return the parts of the energy (n,) [J] and their line styles, by label."""
     energy = result.energy
     kinetic = np.asarray(energy.kinetic, dtype=float)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.plot.figure import INK
-from sphshell_pin.view.contact_path import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
@@ -34,13 +34,13 @@ def patches_of(result: Result, scene: Scene, group: PathGroup) -> PlacedPatches 
     return patches.select(patches.force > 0.0)
 
 
-def peak_pressure(patches: PlacedPatches) -> FloatArray:
+def peak_pressure(patches: PlacedPatches) -> Array:
     """Return the peak of Hertz's pressure of each patch (k,) [Pa]."""
     return np.asarray(1.5 * patches.force / (np.pi * patches.half_axes.prod(axis=1)))
 
 
 def draw_patches(
-    picture: Picture, patches: PlacedPatches, normal: FloatArray, scale: ScalarMappable
+    picture: Picture, patches: PlacedPatches, normal: Array, scale: ScalarMappable
 ) -> None:
     """Draw some ellipses on the side that `normal` (3,) shows, apart from each other, true to size.
 

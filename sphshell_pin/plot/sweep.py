@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import column
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.plot.figure import finish_axis, new_figure, say
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 
 MOST_PANELS = 6
 MOST_CURVES = 12
@@ -159,20 +158,20 @@ def _draw_maps(
     canvas.colorbar(mesh, ax=list(axes), label=figure_label(figure, units))
 
 
-def _borders(values: FloatArray) -> FloatArray:
+def _borders(values: Array) -> Array:
     """Return the borders (n + 1,) of cells around sorted `values` (n,)."""
     if _grows_by_a_factor(values):
         return np.asarray(np.exp(_borders_between(np.log(values))))
     return _borders_between(values)
 
 
-def _borders_between(values: FloatArray) -> FloatArray:
+def _borders_between(values: Array) -> Array:
     between = 0.5 * (values[1:] + values[:-1])
     first, last = 2 * values[0] - between[0], 2 * values[-1] - between[-1]
     return np.concatenate([[first], between, [last]])
 
 
-def _grows_by_a_factor(values: FloatArray) -> bool:
+def _grows_by_a_factor(values: Array) -> bool:
     if len(values) < 3 or values[0] <= 0.0:
         return False
     factors = values[1:] / values[:-1]

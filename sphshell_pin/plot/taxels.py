@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array, Bytes
 from sphshell_pin.base.checks import check_positive
 from sphshell_pin.base.films import check_film, write_film
 from sphshell_pin.errors import InvalidParameter, import_extra
@@ -64,14 +64,14 @@ def save_film(path: Path, images: TaxelImages, *, fps: float, speed: float) -> P
     # Films of odd sizes are refused by some players.
     times = 2 * (-(-LARGE // max(frames.shape[1:3])) // 2 + 1)
 
-    def enlarged(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def enlarged(frame: Bytes) -> Bytes:
         return np.asarray(frame.repeat(times, axis=0).repeat(times, axis=1))
 
     samples = [enlarged(one) for one in frames[:: max(1, len(frames) // SAMPLES)]]
     return write_film(path, map(enlarged, frames), fps, samples)
 
 
-def _grid(images: TaxelImages) -> NDArray[np.float64]:
+def _grid(images: TaxelImages) -> Array:
     if images.forces.ndim != 3:
         raise InvalidParameter(
             "images",
@@ -82,7 +82,7 @@ def _grid(images: TaxelImages) -> NDArray[np.float64]:
     return images.forces
 
 
-def _frames(images: TaxelImages, fps: float, speed: float) -> NDArray[np.uint8]:
+def _frames(images: TaxelImages, fps: float, speed: float) -> Bytes:
     """Return colors (frames, rows, columns, 3) of the taxels, latitude up."""
     forces = _grid(images)
     matplotlib = import_extra("matplotlib", "view", "a film of taxels")

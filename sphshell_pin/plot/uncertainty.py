@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import column
 from sphshell_pin.plot.figure import count, finish_axis, label_axis, new_figure, say
 from sphshell_pin.plot.sweep import figure_label, units_of
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 
 LOW_COLOR, HIGH_COLOR = "#2f6fde", "#d4202a"
 BAND_COLOR = "#2f6fde"
@@ -29,7 +28,7 @@ _MOST_INPUTS = 20
 
 def plot_uncertainty(
     figure: str,
-    values: FloatArray | None = None,
+    values: Array | None = None,
     tornado: pd.DataFrame | None = None,
     indices: pd.DataFrame | None = None,
     units: Mapping[str, str] | None = None,
@@ -108,7 +107,7 @@ def plot_bands(bands: pd.DataFrame, curve: str) -> Figure:
     return canvas
 
 
-def _draw_histogram(axis: Axes, values: FloatArray, figure: str, units: Mapping[str, str]) -> None:
+def _draw_histogram(axis: Axes, values: Array, figure: str, units: Mapping[str, str]) -> None:
     known = values[np.isfinite(values)]
     axis.set(xlabel=figure_label(figure, units), ylabel="runs")
     gaps = len(values) - len(known)
@@ -125,7 +124,7 @@ def _draw_histogram(axis: Axes, values: FloatArray, figure: str, units: Mapping[
     finish_axis(axis, legend=True)
 
 
-def _bins(values: FloatArray) -> list[float] | int:
+def _bins(values: Array) -> list[float] | int:
     """Return the edges of bins: one for each of a few whole numbers, else evenly spaced."""
     low, high = float(values.min()), float(values.max())
     if np.all(values == np.round(values)) and high - low < _MOST_BINS:

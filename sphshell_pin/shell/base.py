@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin import _core
+from sphshell_pin.base.arrays import Array, Bytes, Ints, Mask
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.summary import Summarized
 from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.faces import Face, faces_of
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.options import SIDES, check_size
-from sphshell_pin.shell.raw import Bytes, Floats, Ints, Mask
 
 _ARRAYS: dict[str, npt.DTypeLike] = {
     **dict.fromkeys(("elements", "source_element", "element_face"), np.int32),
@@ -33,19 +33,19 @@ class ShellBase(Summarized):
     crease_angle: float
     source: str | None
     unit: str | None
-    vertices: Floats
+    vertices: Array
     elements: Ints
     triangles: Ints
     triangle_element: Ints
-    normals: Floats | None
+    normals: Array | None
     source_element: Ints
     element_face: Ints | None
     face_names: tuple[str, ...]
-    face_shapes: Floats | None
+    face_shapes: Array | None
     straight: Mask | None
     rounding: float
     finds_faces: bool
-    box: Floats
+    box: Array
     size: float
     health: ShellHealth
     _binding: _core.Shell
@@ -194,12 +194,12 @@ class ShellBase(Summarized):
         return read_only(self._binding.edge_class)
 
     @cached_property
-    def edge_angle(self) -> Floats:
+    def edge_angle(self) -> Array:
         """(E,) turn of each edge [rad], positive where convex."""
         return read_only(self._binding.edge_angle)
 
     @cached_property
-    def triangle_normals(self) -> Floats:
+    def triangle_normals(self) -> Array:
         """(t, 3) unit normals by winding."""
         return read_only(self._binding.triangle_normals)
 

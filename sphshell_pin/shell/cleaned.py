@@ -9,12 +9,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array, Ints, Mask
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.health import ShellHealth
-from sphshell_pin.shell.raw import Floats, Ints, Mask, moved_shapes
+from sphshell_pin.shell.raw import moved_shapes
 
-Array: TypeAlias = NDArray[Any]
-Arrays = Mapping[str, Array]
+AnyArray: TypeAlias = NDArray[Any]
+Arrays = Mapping[str, AnyArray]
 Known: TypeAlias = dict[str, tuple[str, tuple[str | int, ...]]]
 """Numbers and shape of arrays by name: letters stand for sizes that several of them share."""
 ARRAYS: Known = {
@@ -52,20 +53,20 @@ class CleanedSurface:
     rounding : half the step to which the coordinates are known [m], 0 if they show none
     """
 
-    vertices: Floats
+    vertices: Array
     elements: Ints
     triangles: Ints
     triangle_element: Ints
-    normals: Floats | None
+    normals: Array | None
     source_element: Ints
     health: ShellHealth
     element_face: Ints | None = None
     face_names: tuple[str, ...] = ()
-    face_shapes: Floats | None = None
+    face_shapes: Array | None = None
     straight: Mask | None = None
     rounding: float = 0.0
 
-    def moved(self, scale: float, rotation: Floats, translation: Floats) -> CleanedSurface:
+    def moved(self, scale: float, rotation: Array, translation: Array) -> CleanedSurface:
         """Return the surface made larger, then turned by (3, 3), then moved by (3,) [m]."""
         return replace(
             self,

@@ -14,13 +14,14 @@ from dataclasses import replace
 import numpy as np
 
 from sphshell_pin import _core
+from sphshell_pin.base.arrays import Array, Ints, Mask
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.corner_normals import Found, settle_normals, unit_normals
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.orientation import Oriented, as_triangles, find_borders, orient
 from sphshell_pin.shell.polygons import Polygons, examine_quads, without_area
-from sphshell_pin.shell.raw import Floats, Ints, Mask, RawSurface, raw_surface
+from sphshell_pin.shell.raw import RawSurface, raw_surface
 from sphshell_pin.shell.tangent_joints import settle_joints
 
 WELD_TOLERANCE = 1e-7
@@ -135,7 +136,7 @@ def _given(raw: RawSurface) -> Found:
     return found
 
 
-def box_diagonal(points: Floats) -> float:
+def box_diagonal(points: Array) -> float:
     """Diagonal of the box around points (n, 3) [m]."""
     return float(np.linalg.norm([np.ptp(np.ascontiguousarray(points[:, k])) for k in range(3)]))
 
@@ -147,7 +148,7 @@ def _in_use(corners: Ints, count: int) -> Mask:
     return in_use
 
 
-def _without_unused(polygons: Polygons, vertices: Floats) -> tuple[Polygons, Floats]:
+def _without_unused(polygons: Polygons, vertices: Array) -> tuple[Polygons, Array]:
     """Return the polygons over the vertices they use, in the same order, and those."""
     in_use = _in_use(polygons.corners, len(vertices))
     if in_use.all():
@@ -158,12 +159,12 @@ def _without_unused(polygons: Polygons, vertices: Floats) -> tuple[Polygons, Flo
 
 def _mend(
     polygons: Polygons,
-    vertices: Floats,
-    table: Floats | None,
+    vertices: Array,
+    table: Array | None,
     tolerance: float,
     size: float,
     found: Found,
-) -> tuple[Polygons, Floats | None]:
+) -> tuple[Polygons, Array | None]:
     """Polygons of three or four corners, each with area and none twice, edge to edge."""
     counts = polygons.counts
     found["polygons"] = int((counts > 4).sum())
@@ -184,7 +185,7 @@ def _mend(
     return _drop_flat(polygons, vertices, given, found), table
 
 
-def _drop_flat(polygons: Polygons, vertices: Floats, given: Mask, found: Found) -> Polygons:
+def _drop_flat(polygons: Polygons, vertices: Array, given: Mask, found: Found) -> Polygons:
     """Without repeated corners and without elements that have no area."""
     while (repeated := _core.mend_repeats(polygons.offsets, polygons.corners)).size:
         polygons = polygons.drop_slots(repeated.view(np.bool_))
@@ -221,8 +222,8 @@ def _drop_duplicates(polygons: Polygons, given: Mask, found: Found) -> Polygons:
 
 
 def _split_t_junctions(
-    polygons: Polygons, vertices: Floats, table: Floats | None, tolerance: float, most: int
-) -> tuple[Polygons, Floats | None, int]:
+    polygons: Polygons, vertices: Array, table: Array | None, tolerance: float, most: int
+) -> tuple[Polygons, Array | None, int]:
     """With the vertices that lie on open edges made corners there; and how many.
 
     Raises InvalidShell where they are more than `most`: elements that lie on one another in one
@@ -264,7 +265,7 @@ def _split_t_junctions(
 
 
 def _triangulate(
-    polygons: Polygons, vertices: Floats, tolerance: float, size: float, found: Found
+    polygons: Polygons, vertices: Array, tolerance: float, size: float, found: Found
 ) -> Polygons:
     """With everything but triangles and planar, convex quads cut into triangles."""
     cut = polygons.counts > 4
@@ -288,7 +289,7 @@ def _triangulate(
     return polygons.replace_by_triangles(cut, slots, which[polygon].astype(np.int32))
 
 
-def _largest_warp(polygons: Polygons, vertices: Floats, size: float) -> float:
+def _largest_warp(polygons: Polygons, vertices: Array, size: float) -> float:
     """Farthest distance of a corner from the mean plane of its polygon [m]; 0 if all planar."""
     starts = polygons.offsets[:-1]
     points = vertices[polygons.corners]
@@ -304,8 +305,8 @@ def _largest_warp(polygons: Polygons, vertices: Floats, size: float) -> float:
 
 def _assemble(
     oriented: Oriented,
-    vertices: Floats,
-    table: Floats | None,
+    vertices: Array,
+    table: Array | None,
     found: Found,
     turn_normals: bool = True,
 ) -> CleanedSurface:

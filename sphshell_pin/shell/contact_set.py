@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Bytes, Ints
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized
 from sphshell_pin.errors import InvalidParameter, NameNotFound
@@ -75,16 +75,16 @@ class ContactSet(Summarized):
     point: Array
     normal: Array
     depth: Array
-    element: NDArray[np.int32]
-    patch: NDArray[np.int32]
-    feature: NDArray[np.uint8]
+    element: Ints
+    patch: Ints
+    feature: Bytes
     weight: Array
     turn: Array | None = None
     summed: ContactSet | None = None
 
     @classmethod
     def from_rows(
-        cls, rows: bytes, terms: bytes | None, gradient: bool, patches: NDArray[np.int32]
+        cls, rows: bytes, terms: bytes | None, gradient: bool, patches: Ints
     ) -> ContactSet:
         """Build from the core's rows of contacts, and of `terms` where these are more.
 

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.atomic import atomic_path
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES
 from sphshell_pin.shell.cad.process import run_in_child
-from sphshell_pin.shell.raw import Floats, random_places
+from sphshell_pin.shell.raw import random_places
 from sphshell_pin.shell.readers import SUFFIXES, reader_for
 from sphshell_pin.shell.shell import Shell
 from sphshell_pin.shell.writers import encoded
@@ -60,8 +61,8 @@ class Conversion:
 
     source: Held
     target: Held
-    forth: Floats
-    back: Floats
+    forth: Array
+    back: Array
     notes: tuple[str, ...]
 
     @property
@@ -200,11 +201,11 @@ class _Mesh:
         """Return the elements as they are."""
         return self._shell
 
-    def distances(self, points: Floats) -> Floats:
+    def distances(self, points: Array) -> Array:
         """Distances (n,) of points (n, 3) [m]."""
         return np.abs(self._shell.closest_points(points, method="facets").distances)
 
-    def samples(self, count: int, rng: np.random.Generator) -> Floats:
+    def samples(self, count: int, rng: np.random.Generator) -> Array:
         """Random points (count, 3), spread by area [m]."""
         return random_places(self._shell.vertices[self._shell.triangles], count, rng)[1]
 
@@ -235,8 +236,8 @@ class _Faces:
         normals = None if self._raw.normals is None else self._raw.normals.reshape(-1, 3, 3)
         return Shell(self._raw.vertices, elements, normals, name=self.held.path.stem)
 
-    def distances(self, points: Floats) -> Floats:
+    def distances(self, points: Array) -> Array:
         return self._faces.distances(points / self._meters) * self._meters
 
-    def samples(self, count: int, rng: np.random.Generator) -> Floats:
+    def samples(self, count: int, rng: np.random.Generator) -> Array:
         return self._faces.samples(count, rng) * self._meters

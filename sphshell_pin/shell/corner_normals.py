@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array, Mask
 from sphshell_pin.shell.orientation import split_elements
 from sphshell_pin.shell.polygons import Polygons
-from sphshell_pin.shell.raw import Floats, Mask, RawSurface, area_vectors
+from sphshell_pin.shell.raw import RawSurface, area_vectors
 
 Found = dict[str, Any]
 """Findings about a surface, under the names of ShellHealth's fields."""
@@ -17,7 +18,7 @@ UNIT_TOLERANCE = 1e-3
 """Normals off unit length by less than this were rounded when written; more is reported."""
 
 
-def unit_normals(raw: RawSurface, found: Found) -> Floats | None:
+def unit_normals(raw: RawSurface, found: Found) -> Array | None:
     """Return unit normals (c, 3) of all corners, zero where there is none to be had.
 
     What was found about them goes into `found`, under the names of ShellHealth.
@@ -38,12 +39,12 @@ def unit_normals(raw: RawSurface, found: Found) -> Floats | None:
 
 
 def settle_normals(
-    table: Floats,
+    table: Array,
     polygons: Polygons,
-    vertices: Floats,
+    vertices: Array,
     found: Found,
     turn: bool = True,
-) -> Floats:
+) -> Array:
     """Return normals (t, 3, 3) of the triangle corners, on the side of their elements.
 
     All corners of an element are turned together, if their sum points against the element's own

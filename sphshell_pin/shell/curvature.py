@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array, Bytes, Ints, Longs, Mask
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.curved import points_on
 from sphshell_pin.shell.faces import described, distances_from, not_exact
 from sphshell_pin.shell.health import LARGE_OF_TURNS, CurvatureReport, Place
-from sphshell_pin.shell.raw import Bytes, Floats, Ints, Longs, Mask, area_vectors
+from sphshell_pin.shell.raw import area_vectors
 
 CURVED, OFF_FACE = 0, 3
 FLAT_BECAUSE = {
@@ -81,7 +82,7 @@ def curvature_report(shell: ShellBase) -> CurvatureReport:
     )
 
 
-def _not_exact(shell: ShellBase, areas: Floats) -> tuple[str, ...]:
+def _not_exact(shell: ShellBase, areas: Array) -> tuple[str, ...]:
     """Say which faces are not exact; `areas` (t,) [m^2]."""
     faces = shell.faces
     share, off = np.zeros(len(faces)), np.zeros(len(faces))
@@ -101,7 +102,7 @@ def _not_exact(shell: ShellBase, areas: Floats) -> tuple[str, ...]:
     return not_exact(faces, share, off)
 
 
-def distances_at(shell: ShellBase, divisions: int) -> Floats:
+def distances_at(shell: ShellBase, divisions: int) -> Array:
     """Distances (t, k) [m] of points of the curved elements from the flat ones.
 
     The points are those of `curved_mesh` with as many divisions.
@@ -109,13 +110,13 @@ def distances_at(shell: ShellBase, divisions: int) -> Floats:
     return _distances(shell, np.arange(len(shell.triangles)), divisions)
 
 
-def _distances(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
+def _distances(shell: ShellBase, rows: Longs, divisions: int) -> Array:
     """Distances (n, k) [m] of points of the curved triangles `rows` from the flat ones."""
     parts = np.split(rows, range(AT_ONCE, len(rows), AT_ONCE))
     return np.concatenate([_off_flat(shell, some, divisions)[0] for some in parts])
 
 
-def _limits(shell: ShellBase, longest: Floats) -> Floats:
+def _limits(shell: ShellBase, longest: Array) -> Array:
     """(t,) how far from its flat one each curved triangle may be [m]."""
     core = shell.core_for("smooth")
     triangles, normals = shell.triangles, core.corner_normals
@@ -142,7 +143,7 @@ def _has_faces(shell: ShellBase) -> bool:
     return shell.finds_faces and shell.crease_angle > 0.0
 
 
-def _largest_distance(shell: ShellBase, some: Longs, bound: Floats) -> tuple[int, float, Floats]:
+def _largest_distance(shell: ShellBase, some: Longs, bound: Array) -> tuple[int, float, Array]:
     """Return the triangle of `some` with the largest distance, that [m], and its place (3,).
 
     bound : (t,) no triangle is farther off than that [m]
@@ -160,14 +161,14 @@ def _largest_distance(shell: ShellBase, some: Longs, bound: Floats) -> tuple[int
     return worst, float(found[0, highest]) if largest else 0.0, points[0, highest]
 
 
-def _off_flat(shell: ShellBase, rows: Longs, divisions: int) -> tuple[Floats, Floats]:
+def _off_flat(shell: ShellBase, rows: Longs, divisions: int) -> tuple[Array, Array]:
     """Distances (n, k) of k points of curved triangles `rows` from the flat ones; the points."""
     points = points_on(shell, rows, divisions)
     corners = shell.vertices[shell.triangles[rows]]
     return _to_triangles(points, corners), points
 
 
-def _to_triangles(points: Floats, corners: Floats) -> Floats:
+def _to_triangles(points: Array, corners: Array) -> Array:
     """Distances (n, k) of points (n, k, 3) from triangles (n, 3, 3)."""
     normal = area_vectors(corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -200,6 +201,6 @@ def _bending(shell: ShellBase) -> Bytes:
     return np.where(lowest == CURVED, lowest, highest)
 
 
-def _place(point: Floats) -> Place:
+def _place(point: Array) -> Place:
     x, y, z = point.tolist()
     return x, y, z

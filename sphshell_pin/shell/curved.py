@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.shell.base import ShellBase
-from sphshell_pin.shell.raw import Floats, Ints, Longs
 
 
-def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
+def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Array:
     """Points (n, k, 3) [m] of n triangles of `shell`, curved as the method "smooth" has them.
 
     The k points of each are those of a grid that cuts each side into `divisions` pieces: corner 0
@@ -18,7 +18,7 @@ def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
     return points_at(shell, rows, np.stack([1 - u - v, u, v], axis=1))
 
 
-def points_at(shell: ShellBase, rows: Longs, weights: Floats) -> Floats:
+def points_at(shell: ShellBase, rows: Longs, weights: Array) -> Array:
     """Points (n, k, 3) [m] of n curved triangles at barycentric weights (k, 3)."""
     w, u, v = weights.T
     # Bernstein's polynomials of the control points, with their offsets from the flat triangle.
@@ -30,7 +30,7 @@ def points_at(shell: ShellBase, rows: Longs, weights: Floats) -> Floats:
     return np.asarray(points)
 
 
-def curved_mesh(shell: ShellBase, divisions: int = 4) -> tuple[Floats, Ints, Ints]:
+def curved_mesh(shell: ShellBase, divisions: int = 4) -> tuple[Array, Ints, Ints]:
     """Divide every triangle of `shell`, curved as the method "smooth" has it.
 
     Each side is cut into `divisions` pieces. Returns points (t * k, 3) [m], triangles

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sphshell_pin import _core
+from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.base.checks import read_only
-from sphshell_pin.shell.raw import KINDS, Floats, Ints
+from sphshell_pin.shell.raw import KINDS
 
 MOST_GROUPS = 5  # in words
 
@@ -40,8 +41,8 @@ class Face:
     """
 
     kind: str
-    point: Floats
-    axis: Floats | None
+    point: Array
+    axis: Array | None
     radius: float | None
     minor_radius: float | None
     half_angle: float | None
@@ -83,7 +84,7 @@ def faces_of(core: _core.Shell, names: Sequence[str] = ()) -> tuple[Face, ...]:
     )
 
 
-def _reasons(inexact: Floats, names: Sequence[str]) -> dict[int, str]:
+def _reasons(inexact: Array, names: Sequence[str]) -> dict[int, str]:
     """Return by face what is off it: rows (n, 3) of the face, the one beside it, and how far."""
     reasons = {}
     for face, other, off in inexact.tolist():
@@ -94,7 +95,7 @@ def _reasons(inexact: Floats, names: Sequence[str]) -> dict[int, str]:
 
 
 def _face(
-    kind: str, numbers: Floats, elements: Ints, curved: Ints, name: str | None, reason: str
+    kind: str, numbers: Array, elements: Ints, curved: Ints, name: str | None, reason: str
 ) -> Face:
     point, axis = read_only(numbers[:3].copy()), read_only(numbers[3:6].copy())
     radius, second = numbers[6:].tolist()
@@ -132,7 +133,7 @@ def described(faces: Sequence[Face], elements: int) -> str:
     return (", ".join(parts) or "none recognized") + share
 
 
-def not_exact(faces: Sequence[Face], shares: Floats, off: Floats) -> tuple[str, ...]:
+def not_exact(faces: Sequence[Face], shares: Array, off: Array) -> tuple[str, ...]:
     """Return a sentence for each reason why faces are not exact, which names them and the cost.
 
     shares : of their curved elements, of the area of the shell (n,)
@@ -159,7 +160,7 @@ def not_exact(faces: Sequence[Face], shares: Floats, off: Floats) -> tuple[str, 
     return tuple(told)
 
 
-def distances_from(face: Face, points: Floats) -> Floats:
+def distances_from(face: Face, points: Array) -> Array:
     """Distances (n,) [m] of points (n, 3) from a face."""
     away = points - face.point
     if face.axis is None:

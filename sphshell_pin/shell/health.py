@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from sphshell_pin.shell.raw import Floats
+from sphshell_pin.base.arrays import Array
 
 Place = tuple[float, float, float]
 
@@ -411,7 +411,7 @@ class ShellHealth:
             return "none given" + ("" if self.cleaned else "; taken as it came, not cleaned")
         return _fill("given, up to {:degrees} degrees off their element", self.largest_normal_angle)
 
-    def moved(self, scale: float, rotation: Floats, translation: Floats) -> ShellHealth:
+    def moved(self, scale: float, rotation: Array, translation: Array) -> ShellHealth:
         """Return the findings about the surface made `scale` times larger, turned and moved."""
         changes: dict[str, object] = {"curvature": None}
         for name, power in _POWERS.items():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sphshell_pin.errors import InvalidShell
-from sphshell_pin.shell.cleaned import ARRAYS, Array, Arrays, Known, check_arrays
+from sphshell_pin.shell.cleaned import ARRAYS, AnyArray, Arrays, Known, check_arrays
 from sphshell_pin.shell.raw import KINDS
 from sphshell_pin.shell.shell import Shell
 
@@ -18,7 +18,7 @@ _ARRAYS: Known = {
 _ALWAYS = ("vertices", "elements", "triangles")
 
 
-def arrays_of(shell: Shell) -> dict[str, Array]:
+def arrays_of(shell: Shell) -> dict[str, AnyArray]:
     """Return the arrays that a shell is made of, which `shell_of` takes."""
     found = {name: getattr(shell, name) for name in _ARRAYS}
     return {name: array for name, array in found.items() if array is not None}
@@ -76,7 +76,7 @@ def shell_of(
     return Shell.from_surface(surface, crease_angle, side, name, finds_faces=finds_faces)
 
 
-def _are_corners(triangles: Array, owners: Array) -> bool:
+def _are_corners(triangles: AnyArray, owners: AnyArray) -> bool:
     """Whether each triangle has three different corners of its element."""
     if len(triangles) != len(owners):
         return False
@@ -85,10 +85,10 @@ def _are_corners(triangles: Array, owners: Array) -> bool:
     return bool(of_element and ((a != b) & (b != c) & (c != a) & (triangles >= 0).all(1)).all())
 
 
-def _are_units(normals: Array) -> bool:
+def _are_units(normals: AnyArray) -> bool:
     return bool((np.abs(np.linalg.norm(normals.astype(float), axis=2) - 1.0) < 1e-6).all())
 
 
-def _are_faces(shapes: Array) -> bool:
+def _are_faces(shapes: AnyArray) -> bool:
     numbers = shapes.astype(float)
     return bool(np.isfinite(numbers).all() and np.isin(numbers[:, 0], range(-1, len(KINDS))).all())

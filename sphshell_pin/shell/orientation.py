@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from sphshell_pin import _core
+from sphshell_pin.base.arrays import Array, Ints, Longs, Mask
 from sphshell_pin.shell.polygons import Polygons, examine_quads
-from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask, area_vectors
+from sphshell_pin.shell.raw import area_vectors
 
 SMALL_HOLE_EDGES = 4
 SMALL_HOLE_AREA = 0.3
@@ -28,7 +29,7 @@ SAME_VOLUME = 1e-6
 """A component larger by less than this share does not hold another."""
 
 
-def split_elements(polygons: Polygons, vertices: Floats) -> tuple[Longs, Ints]:
+def split_elements(polygons: Polygons, vertices: Array) -> tuple[Longs, Ints]:
     """Split polygons with three or four corners into triangles, those of one side by side.
 
     Returns the corner slots of the triangles (t, 3), and the polygon (t,) of each.
@@ -48,7 +49,7 @@ def split_elements(polygons: Polygons, vertices: Floats) -> tuple[Longs, Ints]:
     return slots, np.repeat(np.arange(len(polygons), dtype=np.int32), counts - 2)
 
 
-def as_triangles(polygons: Polygons, vertices: Floats) -> tuple[Ints, Ints]:
+def as_triangles(polygons: Polygons, vertices: Array) -> tuple[Ints, Ints]:
     """Vertices (t, 3) of the triangles of `split_elements`, and the polygon (t,) of each."""
     if polygons.only_triangles:
         return polygons.corners.reshape(-1, 3), np.arange(len(polygons), dtype=np.int32)
@@ -84,12 +85,12 @@ class Oriented:
     cavities: int
     overlapping: int
     volume: float
-    area: Floats
+    area: Array
     euler_number: int
 
 
 def orient(
-    polygons: Polygons, vertices: Floats, solid: Ints | None = None, keep_winding: bool = False
+    polygons: Polygons, vertices: Array, solid: Ints | None = None, keep_winding: bool = False
 ) -> Oriented:
     """Wind polygons of three and four corners alike within each component.
 
@@ -159,7 +160,7 @@ def orient(
     )
 
 
-def _places(vertices: Floats, triangles: Ints, owner: Ints, wanted: Mask) -> tuple[Floats, Ints]:
+def _places(vertices: Array, triangles: Ints, owner: Ints, wanted: Mask) -> tuple[Array, Ints]:
     """Return points (n, 3) on triangles of the `wanted` components, and the component of each.
 
     They are spread by area, LINES on each component.
@@ -196,7 +197,7 @@ def _closed_components(polygons: Polygons, component: Ints, flip: Mask, number: 
     return closed
 
 
-def find_borders(oriented: Oriented, vertices: Floats) -> dict[str, Any]:
+def find_borders(oriented: Oriented, vertices: Array) -> dict[str, Any]:
     """Count the edges of oriented polygons and follow the open ones.
 
     Returns ShellHealth's fields about edges, boundary loops and holes, by name.

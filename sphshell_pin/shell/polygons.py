@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from sphshell_pin import _core
-from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask, RawSurface, offsets_of
+from sphshell_pin.base.arrays import Array, Ints, Longs, Mask
+from sphshell_pin.shell.raw import RawSurface, offsets_of
 
 FLAT_AREA = 1e-12
 """A triangle of at most this share of its longest edge squared has no area."""
@@ -158,7 +159,7 @@ class Polygons:
         return Polygons(offsets, self.corners[slots], source, rows)
 
 
-def without_area(polygons: Polygons, vertices: Floats) -> Mask:
+def without_area(polygons: Polygons, vertices: Array) -> Mask:
     """(m,) which polygons have no area at all: their corners lie on one line, or in one point."""
     shapes = _core.mend_shapes(polygons.offsets, polygons.corners, vertices)
     flat: Mask = shapes <= 2.0 * FLAT_AREA
@@ -184,12 +185,12 @@ def without_area(polygons: Polygons, vertices: Floats) -> Mask:
 class Quads:
     """Shape of four-sided polygons, each array (q,)."""
 
-    warp: Floats  # farthest corner from the mean plane [m]
+    warp: Array  # farthest corner from the mean plane [m]
     convex: Mask  # in the mean plane; a flat corner is allowed
     other_diagonal: Mask  # split between corners 1 and 3 instead of 0 and 2
 
 
-def examine_quads(corners: Floats) -> Quads:
+def examine_quads(corners: Array) -> Quads:
     """Judge four-sided polygons.
 
     corners : (q, 4, 3) [m]. The diagonal gives the better-shaped pair of triangles; among equals
@@ -202,7 +203,7 @@ def examine_quads(corners: Floats) -> Quads:
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
     height = np.einsum("qkx,qx->qk", corners - corners.mean(axis=1, keepdims=True), normal)
 
-    def shape(i: int, j: int, k: int) -> Floats:
+    def shape(i: int, j: int, k: int) -> Array:
         ab, ac, bc = p[j] - p[i], p[k] - p[i], p[k] - p[j]
         longest = np.maximum(np.maximum(_squares(ab), _squares(ac)), _squares(bc))
         signed = np.einsum("qx,qx->q", np.cross(ab, ac), normal)
@@ -220,5 +221,5 @@ def examine_quads(corners: Floats) -> Quads:
     return Quads(np.abs(height).max(axis=1), convex, other)
 
 
-def _squares(vectors: Floats) -> Floats:
+def _squares(vectors: Array) -> Array:
     return np.asarray(np.einsum("...x,...x->...", vectors, vectors), np.float64)

@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import coal
 import numpy as np
-import numpy.typing as npt
 
+from sphshell_pin.base.arrays import Longs
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.raw import RawSurface, raw_surface
 from sphshell_pin.shell.revolution import Revolution, arc
@@ -82,7 +82,7 @@ def _mesh(mesh: coal.BVHModelBase) -> RawSurface:
     if mesh.getModelType() != coal.BVH_MODEL_TRIANGLES or mesh.num_tris == 0:
         raise InvalidParameter("geometry", mesh, "must be a mesh of triangles, not a point cloud")
     triangles = [mesh.tri_indices(k) for k in range(mesh.num_tris)]
-    indices: npt.NDArray[np.int64] = np.array([(t[0], t[1], t[2]) for t in triangles], np.int64)
+    indices: Longs = np.array([(t[0], t[1], t[2]) for t in triangles], np.int64)
     return raw_surface(np.array(mesh.vertices()), indices)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.base.checks import (
     check_each_positive,
     check_flag,
@@ -21,7 +22,6 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.contact_set import ContactSet, Method
 from sphshell_pin.shell.options import thread_count
-from sphshell_pin.shell.raw import Floats, Ints
 
 
 @dataclass(frozen=True, repr=False)
@@ -37,9 +37,9 @@ class ClosestPoints(Summarized):
     elements : (n,) row of shell.elements
     """
 
-    points: Floats
-    normals: Floats
-    distances: Floats
+    points: Array
+    normals: Array
+    distances: Array
     elements: Ints
 
     def __len__(self) -> int:
@@ -107,7 +107,7 @@ class Queries(ShellBase):
         radii: npt.ArrayLike | float,
         method: str = "smooth",
         threads: int | None = None,
-    ) -> tuple[Floats, Ints]:
+    ) -> tuple[Array, Ints]:
         """Find the contacts of many spheres at once.
 
         Parameters

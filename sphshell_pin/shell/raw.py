@@ -6,17 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.base.checks import as_floats
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.rounding import SCALES, rounding
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int32]
-Longs = npt.NDArray[np.int64]
-Bytes = npt.NDArray[np.uint8]
-Mask = npt.NDArray[np.bool_]
 
 LARGEST_COUNT = np.iinfo(np.int32).max
 
@@ -29,8 +23,8 @@ NO_SHAPE = (-1.0,) + (0.0,) * 8
 
 
 def moved_shapes(
-    shapes: Floats | None, scale: float, rotation: Floats, translation: Floats
-) -> Floats | None:
+    shapes: Array | None, scale: float, rotation: Array, translation: Array
+) -> Array | None:
     """Shapes (f, 9) of faces made larger, then turned by (3, 3), then moved by (3,) [m]."""
     if shapes is None:
         return None
@@ -61,14 +55,14 @@ class RawSurface:
         No vertex is used by polygons of two
     """
 
-    vertices: Floats
+    vertices: Array
     offsets: Longs
     corners: Ints
-    normals: Floats | None = None
+    normals: Array | None = None
     notes: tuple[str, ...] = ()
     faces: Ints | None = None
     face_names: tuple[str, ...] = ()
-    face_shapes: Floats | None = None
+    face_shapes: Array | None = None
     rounding: float = 0.0
     solids: Ints | None = None
 
@@ -91,12 +85,12 @@ class RawSurface:
         return replace(self, notes=(*self.notes, *sentences))
 
 
-def area_vectors(corners: Floats) -> Floats:
+def area_vectors(corners: Array) -> Array:
     """Twice the area times the unit normal (t, 3) of triangles (t, 3, 3)."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def random_places(corners: Floats, count: int, rng: np.random.Generator) -> tuple[Longs, Floats]:
+def random_places(corners: Array, count: int, rng: np.random.Generator) -> tuple[Longs, Array]:
     """Random points (count, 3) of triangles (t, 3, 3), spread by area, and the triangle of each."""
     area = np.linalg.norm(area_vectors(corners), axis=1)
     chosen = rng.choice(len(area), count, p=area / area.sum())
@@ -126,7 +120,7 @@ def raw_surface(vertices: object, elements: object, normals: object = None) -> R
     return RawSurface(points, offsets, corners, given, rounding=rounding(points, SCALES))
 
 
-def check_vertices(points: Floats, first: int = 0) -> None:
+def check_vertices(points: Array, first: int = 0) -> None:
     """Raise InvalidShell unless three vertices or more are there, all finite.
 
     first : the number of the first one in messages
@@ -158,7 +152,7 @@ def check_indices(offsets: Longs, corners: Ints, num_vertices: int, first: int =
         )
 
 
-def _vertices(vertices: object) -> Floats:
+def _vertices(vertices: object) -> Array:
     try:
         points = as_floats(vertices)
     except (TypeError, ValueError, OverflowError) as error:
@@ -224,9 +218,7 @@ def offsets_of(counts: Longs) -> Longs:
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 
 
-def _corner_normals(
-    normals: object, points: Floats, offsets: Longs, corners: Ints
-) -> Floats | None:
+def _corner_normals(normals: object, points: Array, offsets: Longs, corners: Ints) -> Array | None:
     if normals is None:
         return None
     try:

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sphshell_pin.shell.raw import KINDS, NO_SHAPE, Floats, Longs, RawSurface, raw_surface
+from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.shell.raw import KINDS, NO_SHAPE, RawSurface, raw_surface
 
 Profile = tuple[float, float]
 """A unit normal in the half-plane of the profile: (radial, axial)."""
@@ -27,9 +28,9 @@ class Revolution:
         self._circle = np.column_stack([np.cos(turns), np.sin(turns)])
         # Quarter turns are exact: a point meant to lie on an axis does.
         self._circle[np.abs(self._circle) < 1e-15] = 0.0
-        self._vertices: list[Floats] = []
+        self._vertices: list[Array] = []
         self._elements: list[Longs] = []
-        self._normals: list[Floats] = []
+        self._normals: list[Array] = []
         self._names: list[str] = []
         self._shapes: list[tuple[float, ...]] = []
         self._faces: list[Longs] = []
@@ -86,12 +87,12 @@ class Revolution:
             rows.append([*(ring[i] for i in corners), -1][:4])
         self._add(np.array(rows), np.tile([0.0, 0.0, 1.0 if up else -1.0], (len(rows), 4, 1)))
 
-    def _add(self, elements: Longs, normals: Floats) -> None:
+    def _add(self, elements: Longs, normals: Array) -> None:
         self._elements.append(elements)
         self._normals.append(normals)
         self._faces.append(np.full(len(elements), len(self._names) - 1))
 
-    def surface(self, stretch: Floats | None = None) -> RawSurface:
+    def surface(self, stretch: Array | None = None) -> RawSurface:
         """All that was added, larger by the factors `stretch` (3,) along the axes."""
         vertices, normals = np.concatenate(self._vertices), np.concatenate(self._normals)
         if stretch is not None:

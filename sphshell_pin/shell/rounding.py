@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from sphshell_pin.base.arrays import Array
 
 SAMPLE = 1000
 """Vertices that are looked at."""
@@ -23,7 +22,7 @@ SCALES = (1.0, 1e-3, 1e-2, 0.0254)
 """Meters per unit in which arrays may have been rounded, before they were scaled."""
 
 
-def rounding(numbers: Floats, scales: tuple[float, ...] = (1.0,)) -> float:
+def rounding(numbers: Array, scales: tuple[float, ...] = (1.0,)) -> float:
     """Return half the step to which coordinates (n, 3) are known, 0 where they show none.
 
     They are also tried divided by each of `scales`; the result is in the unit of `numbers`.
@@ -47,7 +46,7 @@ def rounding(numbers: Floats, scales: tuple[float, ...] = (1.0,)) -> float:
     return max(found)
 
 
-def _last_digit(values: Floats) -> float:
+def _last_digit(values: Array) -> float:
     """Return a unit in the last digit of the largest of `values` (n,), 0 if all need many digits.
 
     The third largest stands for it: one or two may have a digit more in front, as 100 has.
@@ -62,7 +61,7 @@ def _last_digit(values: Floats) -> float:
     return step
 
 
-def _grid_step(values: Floats) -> float:
+def _grid_step(values: Array) -> float:
     """Return the step of which all `values` (n,), sorted, are multiples, 0 if there is none."""
     gaps = np.diff(values)
     gaps = gaps[gaps > 2e-7 * values[-1]]

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from sphshell_pin import _core
-from sphshell_pin.shell.raw import Floats, Ints
-
-Bools = npt.NDArray[np.bool_]
+from sphshell_pin.base.arrays import Array, Ints, Mask
 
 TANGENT_ANGLE = np.deg2rad(1.0)
 """Faces whose normals differ by less at a common vertex are tangent there; CAD systems take
 0.1 to 1 degree for that."""
 
 
-def settle_joints(
-    normals: Floats, triangles: Ints, face: Ints, plane: Bools | None = None
-) -> Floats:
+def settle_joints(normals: Array, triangles: Ints, face: Ints, plane: Mask | None = None) -> Array:
     """Return corner normals (t, 3, 3) that are equal wherever faces are tangent.
 
     Parameters
@@ -47,7 +42,7 @@ def settle_joints(
     return settled.reshape(normals.shape)
 
 
-def _settled(normals: Floats, flat: Bools) -> Floats:
+def _settled(normals: Array, flat: Mask) -> Array:
     """Mean normals (g, k, 3) of those that are linked by small angles; of planes, if any is one.
 
     g vertices with k corners each, of which those that are `flat` (g, k) lie on planes.

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array, Ints, Mask
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.base import ShellBase
-from sphshell_pin.shell.raw import Floats, Ints, Mask, area_vectors
+from sphshell_pin.shell.raw import area_vectors
 from sphshell_pin.shell.readers.mesh import STL_RECORD
 from sphshell_pin.units import metres_per_unit
 
@@ -29,10 +30,10 @@ class Written:
     normals per element corner (m, 4, 3) or None, scale [m per file unit].
     """
 
-    vertices: Floats
+    vertices: Array
     elements: Ints
     triangles: Ints
-    normals: Floats | None
+    normals: Array | None
     scale: float
     name: str
 
@@ -89,8 +90,8 @@ def encoded(path: Path, shell: ShellBase, unit: str) -> bytes:
 
 
 def corners_of_elements(
-    normals: Floats | None, elements: Ints, triangles: Ints, triangle_element: Ints
-) -> Floats | None:
+    normals: Array | None, elements: Ints, triangles: Ints, triangle_element: Ints
+) -> Array | None:
     """Return normals by element corner (m, 4, 3) from those by triangle corner (t, 3, 3)."""
     if normals is None:
         return None
@@ -102,12 +103,12 @@ def corners_of_elements(
     return out
 
 
-def _points(vertices: Floats, start: str = "") -> list[str]:
+def _points(vertices: Array, start: str = "") -> list[str]:
     # repr gives the shortest text that reads back as the same number.
     return [f"{start}{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
 
 
-def _split_by_normal(surface: Written, normals: Floats) -> tuple[Written, Floats]:
+def _split_by_normal(surface: Written, normals: Array) -> tuple[Written, Array]:
     """Return the surface with points repeated where normals differ, and a normal for each."""
     used = surface.used
     corner, normal = surface.elements[used], normals[used]

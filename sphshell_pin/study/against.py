@@ -9,9 +9,10 @@ from itertools import permutations, product
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.base.checks import check_positive
 from sphshell_pin.contact import ImpactLaw
-from sphshell_pin.shell.raw import KINDS, Floats, Ints, Longs, area_vectors, random_places
+from sphshell_pin.shell.raw import KINDS, area_vectors, random_places
 from sphshell_pin.shell.shell import Shell
 from sphshell_pin.units import METRES_PER_UNIT
 
@@ -166,7 +167,7 @@ def compare_shells(
     return Against(radius, DEPTH * radius, size, tolerance, moved, tuple(faces), unreached)
 
 
-def differences_on(found: Against, of: int, shell: Shell) -> Floats:
+def differences_on(found: Against, of: int, shell: Shell) -> Array:
     """Return the largest difference of depth (m,) [m] on the face of each element, 0 where none is.
 
     `of` : 0 of the first shell, 1 of the second
@@ -246,7 +247,7 @@ def _differences(
         )
 
 
-def _force(other: Shell, own: Shell, center: Floats, radius: float) -> float:
+def _force(other: Shell, own: Shell, center: Array, radius: float) -> float:
     one, two = (np.linalg.norm(s.contacts(center, radius).force(LAW)) for s in (other, own))
     return float(one / two)
 
@@ -257,7 +258,7 @@ def _moved(first: Shell, second: Shell, rng: np.random.Generator) -> str:
     (area, middle, axes), (other_area, other_middle, other_axes) = map(_moments, (first, second))
     scale, unit = _scale(float(np.sqrt(other_area / area)), second.unit)
 
-    def away(rotation: Floats, scale: float, center: Floats) -> float:
+    def away(rotation: Array, scale: float, center: Array) -> float:
         there = (points - middle) @ rotation.T * scale + center
         found = second.closest_points(there, method="facets")
         return float(np.mean(np.abs(found.distances))) / scale
@@ -289,7 +290,7 @@ def _moved(first: Shell, second: Shell, rng: np.random.Generator) -> str:
     return f"the second is the first {', '.join(words) or 'in another place'}{unit}"
 
 
-def _moments(shell: Shell) -> tuple[float, Floats, Floats]:
+def _moments(shell: Shell) -> tuple[float, Array, Array]:
     """Area [m^2], its center (3,) [m], and its principal axes as columns (3, 3)."""
     corners = shell.vertices[shell.triangles]
     area = 0.5 * np.linalg.norm(area_vectors(corners), axis=1)

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from sphshell_pin.base.arrays import Array
-
-Ints = NDArray[np.int64]
+from sphshell_pin.base.arrays import Array, Longs, Mask
 
 
 def distances(points: Array, corners: Array) -> Array:
@@ -24,7 +21,7 @@ def closest(point: Array, corners: Array) -> Array:
     return np.asarray(trimesh.triangles.closest_point(corners, same))  # type: ignore[no-untyped-call]
 
 
-def closest_inside(point: Array, corners: Array) -> tuple[Ints, Array]:
+def closest_inside(point: Array, corners: Array) -> tuple[Longs, Array]:
     """Return the triangles (k,) of (t, 3, 3) closest to `point` (3,) at their inside, and where.
 
     Points (k, 3) well inside: there the distance has a strict minimum, whatever the neighbors are.
@@ -40,7 +37,7 @@ def closest_inside(point: Array, corners: Array) -> tuple[Ints, Array]:
     return inside, (a + first[:, None] * u + second[:, None] * v)[inside]
 
 
-def pieces(triangles: Ints, touched: NDArray[np.bool_]) -> list[Ints]:
+def pieces(triangles: Longs, touched: Mask) -> list[Longs]:
     """Split the `touched` (t,) among triangles (t, 3) into pieces that hang together by vertices.
 
     Returns the indices of the triangles of each piece.
@@ -53,7 +50,7 @@ def pieces(triangles: Ints, touched: NDArray[np.bool_]) -> list[Ints]:
     return [rows[label == one] for one in np.unique(label)]
 
 
-def crossed(start: Array, end: Array, corners: Array) -> Ints:
+def crossed(start: Array, end: Array, corners: Array) -> Longs:
     """Return the triangles (t, 3, 3) through which the path from `start` (3,) to `end` (3,) leads.
 
     By Moeller and Trumbore (1997); a path within a triangle's plane crosses nothing.

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
-    FloatArray,
     IntArray,
     Move,
     mover,
@@ -75,7 +75,7 @@ class ArrowScale:
         return self.reference_length / self.reference_force
 
     @classmethod
-    def from_forces(cls, forces: FloatArray, length: float) -> ArrowScale:
+    def from_forces(cls, forces: Array, length: float) -> ArrowScale:
         """Choose the scale at which the peak of `forces` (k,) [N] is about `length` [m] long.
 
         A peak far above the rest (an impact before a rest) would leave nothing to see of the rest:
@@ -88,7 +88,7 @@ class ArrowScale:
         peak = min(float(present.max()), 1.6 * float(np.median(present)))
         return cls(reference, nice(peak * reference / length), 2.5 * reference)
 
-    def cuts(self, forces: FloatArray) -> bool:
+    def cuts(self, forces: Array) -> bool:
         """Tell whether any of `forces` (k,) [N] has an arrow longer than the longest."""
         return bool(np.any(forces * self.metres_per_newton > self.longest))
 
@@ -96,7 +96,7 @@ class ArrowScale:
         return f"{self.reference_length * 1e3:g} mm = {self.reference_force:g} N"
 
 
-def largest_force(contacts: Contacts) -> FloatArray:
+def largest_force(contacts: Contacts) -> Array:
     """Magnitude (k,) of the total force of each contact [N]."""
     total = contacts.normal_world * contacts.normal_force[:, None] + contacts.friction_force_world
     return np.asarray(np.linalg.norm(total, axis=1))
@@ -106,9 +106,9 @@ def largest_force(contacts: Contacts) -> FloatArray:
 class Forces:
     """Forces (k, 3) [N] to be drawn as arrows from `point` (k, 3) [m], in the world."""
 
-    point: FloatArray
-    normal: FloatArray
-    friction: FloatArray
+    point: Array
+    normal: Array
+    friction: Array
 
 
 def pushing(contacts: Contacts) -> Forces:
@@ -129,7 +129,7 @@ def pushing(contacts: Contacts) -> Forces:
     return Forces(contacts.point_world[~saddle], normal[~saddle], friction[~saddle])
 
 
-def strongest(force: FloatArray, size: int) -> IntArray:
+def strongest(force: Array, size: int) -> IntArray:
     """Return the indices of the `size` largest of `force` (k,) at most, in their order."""
     return np.sort(np.argsort(-force, kind="stable")[:size])
 
@@ -166,7 +166,7 @@ class ArrowPool:
             self._nodes["points"].append(point)
         self._where = np.zeros((size, 3))
         # Where a hidden arrow waits: most of a pool does, in most frames.
-        self._waiting: list[FloatArray | None] = [None] * len(self._arrows)
+        self._waiting: list[Array | None] = [None] * len(self._arrows)
         self._shown: set[int] = set()
         self._directions = np.tile(np.array([0.0, 0.0, 1.0]), (len(self._arrows), 1))
         self.update(None, ArrowScale())
@@ -197,7 +197,7 @@ class ArrowPool:
         for node in self._nodes[part]:
             show(node, on)
 
-    def _slots(self, points: FloatArray, rows: IntArray) -> dict[int, int]:
+    def _slots(self, points: Array, rows: IntArray) -> dict[int, int]:
         """Return which of `rows` each slot shows: a contact keeps its slot while it moves little.
 
         Else an arrow would sweep across the picture whenever another contact comes or goes.
@@ -216,7 +216,7 @@ class ArrowPool:
         taken.update(zip(free, (int(rows[index]) for index in sorted(left)), strict=False))
         return taken
 
-    def _place_arrow(self, arrow: int, contact: int, force: FloatArray, scale: ArrowScale) -> None:
+    def _place_arrow(self, arrow: int, contact: int, force: Array, scale: ArrowScale) -> None:
         size = math.hypot(*force.tolist())
         if not math.isfinite(size):
             size = 0.0  # of a run that diverges: it has no direction to show

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.view.nodes import Command, FloatArray
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.view.nodes import Command
 from sphshell_pin.view.robot import check_geometry_model
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _FAR = 2.0  # in sizes of the robot: corners of shells that are farther away may
 
 # From the target to the eye, None where it is chosen. From straight above there is no upright: y
 # points up in the picture.
-DIRECTIONS: dict[str, FloatArray | None] = {
+DIRECTIONS: dict[str, Array | None] = {
     "fit": None,
     "front": np.array([1.0, 0.0, 0.0]),
     "side": np.array([0.0, -1.0, 0.0]),
@@ -39,8 +40,8 @@ _CORNERS = np.array(np.meshgrid(*3 * [(-1.0, 1.0)])).reshape(3, -1).T
 class View:
     """A camera at `eye` (3,) that looks at `target` (3,), world frame [m]."""
 
-    eye: FloatArray
-    target: FloatArray
+    eye: Array
+    target: Array
 
     @property
     def distance(self) -> float:
@@ -50,12 +51,12 @@ class View:
     @classmethod
     def of(
         cls,
-        action: FloatArray,
-        around: FloatArray,
-        normal: FloatArray,
+        action: Array,
+        around: Array,
+        normal: Array,
         radius: float,
         reach: float = REACH,
-        direction: FloatArray | None = None,
+        direction: Array | None = None,
     ) -> View:
         """Choose a view of the points `action` (k, 3) where the contact happens.
 
@@ -83,13 +84,13 @@ class View:
         return cls(target + (distance + 0.3 * (high[2] - low[2])) * direction, target)
 
 
-def ball_around(points: FloatArray, least: float = 0.0) -> tuple[FloatArray, float]:
+def ball_around(points: Array, least: float = 0.0) -> tuple[Array, float]:
     """Return center (3,) and radius, `least` or more, of the ball around the box of points [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     return 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), least)
 
 
-def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> FloatArray:
+def _direction(target: Array, subject: Array, normal: Array) -> Array:
     """Return the unit vector (3,) from the target to the eye: from where the surface is seen."""
     reach = np.linalg.norm(subject - target, axis=1).max()
     outward = np.array([target[0], target[1], 0.0])
@@ -115,12 +116,12 @@ def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> F
 
 def choose_view(
     scene: Scene,
-    configurations: FloatArray,
-    points_world: FloatArray | None = None,
-    normals_world: FloatArray | None = None,
+    configurations: Array,
+    points_world: Array | None = None,
+    normals_world: Array | None = None,
     visual_model: pin.GeometryModel | None = None,
     reach: float = REACH,
-    direction: FloatArray | None = None,
+    direction: Array | None = None,
     *,
     whole: bool = False,
 ) -> View:
@@ -138,9 +139,9 @@ def choose_view(
         check_geometry_model(model, visual_model)
         boxes = _geometry_boxes(visual_model)
     spheres = [one for pair in scene.pairs for one in pair.spheres]
-    centers: list[FloatArray] = []
-    around: list[FloatArray] = []
-    shells: list[FloatArray] = []
+    centers: list[Array] = []
+    around: list[Array] = []
+    shells: list[Array] = []
     for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
         pin.forwardKinematics(model, data, configurations[row])
         around += [np.array(data.oMi[k].translation) for k in range(1, model.njoints)]
@@ -180,14 +181,14 @@ def choose_view(
     return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
 
 
-def _corners(where: pin.SE3, box: FloatArray) -> FloatArray:
+def _corners(where: pin.SE3, box: Array) -> Array:
     """Return the corners (8, 3) [m] of a `box` (2, 3) that is placed at `where`."""
     low, high = box
     corners = 0.5 * (low + high) + 0.5 * (high - low) * _CORNERS
     return np.asarray(corners @ where.rotation.T + where.translation)
 
 
-def _geometry_boxes(geometry_model: pin.GeometryModel) -> list[tuple[int, pin.SE3, FloatArray]]:
+def _geometry_boxes(geometry_model: pin.GeometryModel) -> list[tuple[int, pin.SE3, Array]]:
     """Return joint, placement and box (2, 3) of geometry whose loaded size can be trusted."""
     boxes = []
     for body in geometry_model.geometryObjects:
@@ -224,7 +225,7 @@ def look(visualizer: Visualizer, view: View) -> None:
     visualizer.window.send(Command(target))
 
 
-def _y_up(point: FloatArray) -> list[float]:
+def _y_up(point: Array) -> list[float]:
     """Return `point` (3,) as the page's camera has it, with y up."""
     x, y, z = (float(value) for value in point)
     return [x, z, -y]

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.patches.placed import poses_along
 
 if TYPE_CHECKING:
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result_parts import ContactLog
     from sphshell_pin.dynamics.scene.scene import Scene
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 LARGEST = 1e15  # beyond this, [m] or [N], nothing can be drawn
 
 
@@ -28,12 +26,12 @@ class ContactRows:
     `patches` (k,) are those of the contacts, None where they were not recorded.
     """
 
-    row: IndexArray
-    pair: IndexArray
-    point_world: FloatArray
-    normal_world: FloatArray
-    normal_force: FloatArray
-    friction_force_world: FloatArray
+    row: Longs
+    pair: Longs
+    point_world: Array
+    normal_world: Array
+    normal_force: Array
+    friction_force_world: Array
     patches: Patches | None = None
 
     @classmethod
@@ -52,7 +50,7 @@ class ContactRows:
             sound &= (np.abs(vector) < LARGEST).all(axis=1)
         return rows if sound.all() else rows.select(sound)
 
-    def select(self, chosen: slice | IndexArray | NDArray[np.bool_]) -> ContactRows:
+    def select(self, chosen: slice | Longs | Mask) -> ContactRows:
         """Return the entries that `chosen`, a slice, mask or indices, picks."""
         columns: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
         for name, column in columns.items():
@@ -75,11 +73,11 @@ class ContactPath:
 
     pair: int
     on_shell: bool
-    row: IndexArray
-    points: FloatArray
-    normals: FloatArray
-    force: FloatArray
-    runs: tuple[IndexArray, ...]
+    row: Longs
+    points: Array
+    normals: Array
+    force: Array
+    runs: tuple[Longs, ...]
 
 
 def contact_paths(result: Result, scene: Scene | None) -> list[ContactPath]:
@@ -113,7 +111,7 @@ def contact_paths(result: Result, scene: Scene | None) -> list[ContactPath]:
     return paths
 
 
-def spaced(points: FloatArray, step: float) -> IndexArray:
+def spaced(points: Array, step: float) -> Longs:
     """Return indices into `points` (k, 3) that thin them to one or two per `step` [m] of length."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     along = np.concatenate(([0.0], np.cumsum(steps)))

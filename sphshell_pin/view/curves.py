@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.view.contact_path import LARGEST
 from sphshell_pin.view.meshes import pack_numbers
-from sphshell_pin.view.nodes import FloatArray, Json
+from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
@@ -31,10 +31,10 @@ class Curves:
     """
 
     name: str
-    t: FloatArray
-    normal: FloatArray
-    friction: FloatArray
-    depth: FloatArray
+    t: Array
+    normal: Array
+    friction: Array
+    depth: Array
     figures: dict[str, float]
 
     def packed(self) -> Json:
@@ -76,7 +76,7 @@ def run_curves(result: Result, count: int) -> list[Curves]:
     return curves
 
 
-def _curves(series: PairSeries, t: FloatArray, known: dict[str, float]) -> Curves:
+def _curves(series: PairSeries, t: Array, known: dict[str, float]) -> Curves:
     columns = [t, *(one[: len(t)] for one in (series.normal, series.friction, series.depth))]
     # The last row of a run that diverged may hold forces that no chart can show.
     sound = (np.abs(np.stack(columns)) < LARGEST).all(axis=0)
@@ -88,7 +88,7 @@ def _curves(series: PairSeries, t: FloatArray, known: dict[str, float]) -> Curve
     return Curves(series.name, t[rows], normal[rows], friction[rows], depth[rows], figures)
 
 
-def _figures(t: FloatArray, normal: FloatArray, depth: FloatArray) -> dict[str, float]:
+def _figures(t: Array, normal: Array, depth: Array) -> dict[str, float]:
     """Return the figures of rows, by the trapezoidal rule."""
     steps = np.diff(t)
     touch = (depth > 0.0) | (normal > 0.0)
@@ -102,7 +102,7 @@ def _figures(t: FloatArray, normal: FloatArray, depth: FloatArray) -> dict[str, 
     }
 
 
-def extremes(bins: int, *columns: FloatArray) -> NDArray[np.int64]:
+def extremes(bins: int, *columns: Array) -> Longs:
     """Return the rows of the extremes of each column (n,) within `bins` equal parts of the rows.
 
     All rows, where these are fewer than the extremes might be.

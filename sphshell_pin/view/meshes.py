@@ -11,8 +11,8 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.readers.mesh import STL_RECORD, stl_corners
 from sphshell_pin.view.nodes import Json
@@ -108,7 +108,7 @@ def lit_facets(data: bytes) -> bytes:
     return title + len(facets).to_bytes(4, "little") + facets.tobytes()
 
 
-def pack_numbers(values: NDArray[np.float64], *, exact: bool) -> Json:
+def pack_numbers(values: Array, *, exact: bool) -> Json:
     """Describe `values` (n,) as `low` + `step` * integers, these as differences that compress well.
 
     An integer is stored as its difference to the one `stride` before it, the signs folded (0, -1,
@@ -137,14 +137,14 @@ def pack_numbers(values: NDArray[np.float64], *, exact: bool) -> Json:
     }
 
 
-def _fold(whole: NDArray[np.int64], stride: int) -> NDArray[np.int64]:
+def _fold(whole: Longs, stride: int) -> Longs:
     """Return the differences to the number `stride` before, without signs, by component."""
     steps = np.diff(whole.reshape(-1, stride), axis=0, prepend=np.zeros((1, stride), np.int64))
-    folded: NDArray[np.int64] = ((steps << 1) ^ (steps >> 63)).T.reshape(-1)
+    folded: Longs = ((steps << 1) ^ (steps >> 63)).T.reshape(-1)
     return folded
 
 
-def _are_normals(values: NDArray[np.float64]) -> bool:
+def _are_normals(values: Array) -> bool:
     if len(values) % 3:
         return False
     return bool(np.all(np.abs(np.linalg.norm(values.reshape(-1, 3), axis=1) - 1.0) < 1e-2))

@@ -13,18 +13,17 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin._interrupts import interrupts_delayed
+from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import MissingExtra
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32] | NDArray[np.int64]
+IntArray = Ints | Longs
 Json = dict[str, Any]
-Move = Callable[[FloatArray], object]
+Move = Callable[[Array], object]
 
 # Never zero: a transform with a zero scale cannot be decomposed, and its node is lost for good.
 HIDDEN_SCALE = 1e-6
@@ -76,7 +75,7 @@ def viewer_script() -> Path:
     return Path(found.origin).parent / "viewer" / "dist" / "main.min.js"
 
 
-def typed_array(values: FloatArray | IntArray) -> Json:
+def typed_array(values: Array | IntArray) -> Json:
     """Describe the rows of `values` (n, k) as a three.js buffer attribute (float32 or uint32)."""
     import umsgpack
 
@@ -90,9 +89,7 @@ def typed_array(values: FloatArray | IntArray) -> Json:
     }
 
 
-def triangle_mesh(
-    vertices: FloatArray, triangles: IntArray, colors: FloatArray | None = None
-) -> Json:
+def triangle_mesh(vertices: Array, triangles: IntArray, colors: Array | None = None) -> Json:
     """Geometry of an indexed mesh: `vertices` (n, 3) [m] of `colors` (n, 3), `triangles` (t, 3)."""
     attributes = {"position": typed_array(vertices)}
     if colors is not None:
@@ -101,12 +98,12 @@ def triangle_mesh(
     return {"type": "BufferGeometry", "data": data}
 
 
-def line_segments(vertices: FloatArray, segments: IntArray) -> Json:
+def line_segments(vertices: Array, segments: IntArray) -> Json:
     """Geometry of lines: `segments` (s, 2) index `vertices` (n, 3) [m]."""
     return triangle_mesh(vertices, segments)
 
 
-def lattice(ticks: FloatArray) -> tuple[FloatArray, IntArray]:
+def lattice(ticks: Array) -> tuple[Array, IntArray]:
     """Return the crossings (n, 3) of lines at `ticks` (k,) of x and y, z = 0, and the lines (s, 2).
 
     They are in pieces from crossing to crossing: some browsers lose lines that pass the camera.
@@ -214,9 +211,7 @@ def node_name(name: str) -> str:
     return name.replace("/", "_") or "_"
 
 
-def pose(
-    rotation: FloatArray, translation: FloatArray, scale: FloatArray | float = 1.0
-) -> FloatArray:
+def pose(rotation: Array, translation: Array, scale: Array | float = 1.0) -> Array:
     """Homogeneous (4, 4) of `rotation` (3, 3) times diag(`scale`), and `translation` (3,) [m]."""
     matrix = np.zeros((4, 4))
     np.multiply(rotation, scale, out=matrix[:3, :3])
@@ -225,12 +220,12 @@ def pose(
     return matrix
 
 
-def hidden_at(place: FloatArray) -> FloatArray:
+def hidden_at(place: Array) -> Array:
     """Return the matrix (4, 4) of a node that waits, too small to be seen, at `place` (3,) [m]."""
     return pose(np.eye(3), place, HIDDEN_SCALE)
 
 
-def rod_along(start: FloatArray, step: FloatArray, width: float) -> FloatArray:
+def rod_along(start: Array, step: Array, width: float) -> Array:
     """Return the matrix (4, 4) that makes a unit rod the one from `start` along `step` (3,) [m].
 
     `width` [m] is what its radii are multiplied by; `step` must have a length.
@@ -252,7 +247,7 @@ class OnJoint:
         self._move((data.oMi[self.joint] * self._placement).homogeneous)
 
 
-def rotation_to(direction: FloatArray) -> FloatArray:
+def rotation_to(direction: Array) -> Array:
     """Return a rotation (3, 3) that takes y, the axis of three.js's cylinders, to `direction`."""
     # Plain numbers: for three of them NumPy takes ten times as long, in every frame of every arrow.
     x, y, z = direction.tolist()

@@ -16,17 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.view.meshes import pack_facets, take_out_numbers
-from sphshell_pin.view.nodes import (
-    HIDDEN_SCALE,
-    FloatArray,
-    Json,
-    Sent,
-    is_below,
-    typed_array,
-    viewer_script,
-)
+from sphshell_pin.view.nodes import HIDDEN_SCALE, Json, Sent, is_below, typed_array, viewer_script
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -51,7 +44,7 @@ class FilmWindow:
         self._commands: dict[tuple[str, str, str], Json] = {}
         self._texts: dict[str, Json] = {}
         self._frames: dict[str, dict[int, list[float]]] = {}
-        self._switches: dict[str, tuple[FloatArray, list[bool]]] = {}
+        self._switches: dict[str, tuple[Array, list[bool]]] = {}
 
     def send(self, command: Sent) -> None:
         """Take one meshcat command."""
@@ -69,7 +62,7 @@ class FilmWindow:
         # An object that replaces another comes first again, before its properties.
         self._commands[kind, path, data.get("property", "")] = data
 
-    def switch(self, visualizer: Visualizer, times: FloatArray, visible: list[bool]) -> None:
+    def switch(self, visualizer: Visualizer, times: Array, visible: list[bool]) -> None:
         """Show or hide the visualizer's node from each of `times` (k,) [s of the page] on."""
         self._switches[visualizer.path.lower()] = (times, visible)
 
@@ -98,7 +91,7 @@ class FilmWindow:
 
         return {key: shared(item) for key, item in data.items()}
 
-    def commands(self, times: FloatArray) -> list[Json]:
+    def commands(self, times: Array) -> list[Json]:
         """Return every command of the page; frame k is shown at `times[k]` [s of the page]."""
         moving: list[Json] = []
         stills: list[Json] = []
@@ -125,13 +118,13 @@ class FilmWindow:
         return [*self._texts.values(), *scene, *stills, *([animation] if moving else [])]
 
 
-def _clip(path: str, tracks: list[Json], times: FloatArray) -> Json:
+def _clip(path: str, tracks: list[Json], times: Array) -> Json:
     duration = max(float(times[-1]), 1e-3)
     clip = {"name": "default", "fps": 1, "duration": duration, "tracks": tracks}
     return {"path": path, "clip": clip}
 
 
-def _pose_tracks(times: FloatArray, matrices: FloatArray) -> list[Json]:
+def _pose_tracks(times: Array, matrices: Array) -> list[Json]:
     """Split `matrices` (n, 4, 4) into position, quaternion and scale tracks, those that change."""
     scale = np.linalg.norm(matrices[:, :3, :3], axis=1)
     # A mirror goes into x, as three.js has it when it decomposes a matrix.

@@ -7,18 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.view.arrows import Contacts, strongest
-from sphshell_pin.view.nodes import (
-    FloatArray,
-    Move,
-    hidden_at,
-    mover,
-    on_top,
-    pose,
-    set_object,
-    triangle_mesh,
-)
+from sphshell_pin.view.nodes import Move, hidden_at, mover, on_top, pose, set_object, triangle_mesh
 from sphshell_pin.view.surface import between_rings, ramp_colors
 
 if TYPE_CHECKING:
@@ -100,7 +92,7 @@ class PatchPool:
 
     def _place(
         self, contacts: Contacts, k: int, patches: Patches, scale: PatchScale
-    ) -> tuple[int, FloatArray]:
+    ) -> tuple[int, Array]:
         patch = patches[k]
         normal, axis = contacts.normal_world[k], patch["axis_world"]
         a, b = patch["half_axes"] * scale.factor

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.checks import check_positive
 from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
@@ -30,7 +31,7 @@ from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, 
 from sphshell_pin.view.display import TRAIL_COLOR, Display
 from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
 from sphshell_pin.view.frames import GRID_COLOR
-from sphshell_pin.view.nodes import FloatArray, css, new_visualizer
+from sphshell_pin.view.nodes import css, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
@@ -39,8 +40,6 @@ from sphshell_pin.view.run_panel import run_panel
 
 if TYPE_CHECKING:
     from os import PathLike
-
-    from numpy.typing import NDArray
 
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
@@ -275,12 +274,12 @@ def view_result(
 
 
 def choose_rows(
-    t: FloatArray,
+    t: Array,
     contacts: ContactRows,
     fps: float,
     speed: float,
     span: tuple[float, float] | None = None,
-) -> tuple[NDArray[np.int64], FloatArray]:
+) -> tuple[Longs, Array]:
     """Return the recorded row of each frame (f,) and its time in the page (f,) [s].
 
     The frames are those of the run from and to the times `span` [s], one where both are the same;
@@ -313,7 +312,7 @@ def choose_rows(
     return rows, times
 
 
-def _forces(contacts: ContactRows, arrows: ArrowKind) -> FloatArray:
+def _forces(contacts: ContactRows, arrows: ArrowKind) -> Array:
     """Magnitudes of all arrows that `contacts` bring into the picture [N]."""
     if arrows == "total":
         return largest_force(contacts)

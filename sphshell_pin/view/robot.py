@@ -11,12 +11,12 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin._interrupts import interrupts_delayed
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.frames import PALE_AXIS_COLORS, draw_axes
 from sphshell_pin.view.meshes import lit_facets
 from sphshell_pin.view.nodes import (
-    FloatArray,
     Move,
     OnJoint,
     hidden_at,
@@ -92,7 +92,7 @@ class GeometryRobot:
         self._model = model
         self._geometry = geometry_model
         self._placed = geometry_model.createData()
-        self._parts: list[tuple[Move, pin.SE3, FloatArray]] = []
+        self._parts: list[tuple[Move, pin.SE3, Array]] = []
         self._paths: list[str] = []
         for index, body in enumerate(geometry_model.geometryObjects):
             node = visualizer[viewer.getViewerNodeName(body, pin.GeometryType.VISUAL)]
@@ -125,7 +125,7 @@ def frame_of_body(model: pin.Model, joint: int, number: int | None = None) -> st
     return frame_on_joint(model, joint)
 
 
-def _in_body(body: pin.GeometryObject) -> FloatArray:
+def _in_body(body: pin.GeometryObject) -> Array:
     """Return the matrix (4, 4) from what the loader draws to the geometry object's own frame."""
     matrix = np.diag([*body.meshScale, 1.0])
     if isinstance(body.geometry, coal.Plane | coal.Halfspace):
@@ -147,13 +147,13 @@ class SkeletonRobot:
         visualizer: Visualizer,
         model: pin.Model,
         size: float,
-        tips: list[tuple[int, FloatArray]],
+        tips: list[tuple[int, Array]],
         drawn: set[int],
     ) -> None:
         self._model = model
         self._held: list[tuple[str, int]] = []
         self._width = 0.012 * size
-        self._links: list[tuple[Move, int, int, FloatArray]] = []
+        self._links: list[tuple[Move, int, int, Array]] = []
         self._axes: list[OnJoint] = []
         root = visualizer["robot"]
         ends = [

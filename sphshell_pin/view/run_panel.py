@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View
 from sphshell_pin.view.curves import run_curves
 from sphshell_pin.view.meshes import pack_numbers
-from sphshell_pin.view.nodes import FloatArray, Json
+from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
@@ -26,7 +27,7 @@ def run_panel(
     scene: Scene,
     contacts: ContactRows,
     count: int,
-    frames: FloatArray,
+    frames: Array,
     views: Mapping[str, View],
 ) -> Json:
     """Return the page's command "panel" for the first `count` rows of `result`.
@@ -46,7 +47,7 @@ def run_panel(
     }
 
 
-def _focus(scene: Scene, contacts: ContactRows, frames: FloatArray) -> Json | None:
+def _focus(scene: Scene, contacts: ContactRows, frames: Array) -> Json | None:
     """Describe the way of the tip: `points` (f, 3) [m], and the `distance` [m] of a close-up.
 
     It is the mean of the centers of the spheres, each weighted by what its pair pressed in total,

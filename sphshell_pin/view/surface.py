@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.view.nodes import (
-    FloatArray,
     IntArray,
     Json,
     line_segments,
@@ -51,10 +51,10 @@ class SurfaceMesh:
     `triangles` (t, 3); `segments` (s, 2) between the points `outline` (p, 3) [m].
     """
 
-    vertices: FloatArray
+    vertices: Array
     patch: IntArray
     triangles: IntArray
-    outline: FloatArray
+    outline: Array
     segments: IntArray
 
     @classmethod
@@ -139,26 +139,24 @@ def draw_faces(node: Visualizer, shell: Shell, *, curved: bool = False) -> None:
     draw_colored(node["faces"], mesh.vertices, mesh.triangles, colors)
 
 
-def hex_colors(names: Sequence[str]) -> FloatArray:
+def hex_colors(names: Sequence[str]) -> Array:
     """Return colors (n, 3) from 0 to 1 for names like "#7fa8a0"."""
     return np.array([[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in names]) / 255.0
 
 
-def ramp_colors(share: FloatArray, ramp: Sequence[str]) -> FloatArray:
+def ramp_colors(share: Array, ramp: Sequence[str]) -> Array:
     """Return colors (n, 3) from 0 to 1 for shares (n,): 0 the first of `ramp`, 1 the last."""
     at, stops = np.linspace(0.0, 1.0, len(ramp)), hex_colors(ramp)
     return np.stack([np.interp(share, at, stops[:, k]) for k in range(3)], axis=1)
 
 
-def draw_colored(
-    node: Visualizer, vertices: FloatArray, triangles: IntArray, colors: FloatArray
-) -> None:
+def draw_colored(node: Visualizer, vertices: Array, triangles: IntArray, colors: Array) -> None:
     """Draw a mesh at `node` with `colors` (n, 3) from 0 to 1 of its vertices."""
     look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10, **PUSHED_BACK)
     set_object(node, triangle_mesh(vertices, triangles, colors), look)
 
 
-def patch_colors(count: int) -> FloatArray:
+def patch_colors(count: int) -> Array:
     """Return `count` muted colors (n, 3) from 0 to 1, neighbors in number well apart."""
     # Hues by the golden ratio: no two of any few in a row are close.
     hue = (0.47 + 0.618033988749895 * np.arange(count)) % 1.0
@@ -166,7 +164,7 @@ def patch_colors(count: int) -> FloatArray:
     return np.asarray(0.40 + 0.30 * np.clip(ramp, 0.0, 1.0))
 
 
-def great_circles(radius: float, points: int = 48) -> tuple[FloatArray, IntArray]:
+def great_circles(radius: float, points: int = 48) -> tuple[Array, IntArray]:
     """Return vertices (n, 3) [m] and segments (s, 2) of three circles of `radius` [m] about 0."""
     angles = 2.0 * np.pi * np.arange(points) / points
     circle = np.stack((np.cos(angles), np.sin(angles), np.zeros(points)), axis=1) * radius
@@ -184,7 +182,7 @@ def between_rings(rings: int, sides: int) -> IntArray:
     return np.concatenate([np.stack(half, axis=-1).reshape(-1, 3) for half in halves])
 
 
-def tube(points: FloatArray, radius: float, sides: int = 6) -> tuple[FloatArray, IntArray]:
+def tube(points: Array, radius: float, sides: int = 6) -> tuple[Array, IntArray]:
     """Return vertices (n, 3) and triangles (t, 3) of a tube of `radius` [m] along `points` (k, 3).
 
     Needs two points or more, no two neighbors equal. A line would be one pixel wide anywhere.

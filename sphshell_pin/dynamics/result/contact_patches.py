@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter
 
 RECORDED = ("patch", "torque", "state")
@@ -32,7 +33,7 @@ def check_record(record: Collection[str]) -> frozenset[str]:
     return frozenset(record)
 
 
-def patch_columns(patches: Patches) -> dict[str, NDArray[np.float64]]:
+def patch_columns(patches: Patches) -> dict[str, Array]:
     """Return patches as named scalar columns, units in the names (for CSV, tables)."""
     columns = {
         "half_axis_a [m]": patches["half_axes"][:, 0],

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from sphshell_pin.base.arrays import Array
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -24,11 +23,11 @@ class PairSeries:
     """
 
     name: str
-    normal: FloatArray
-    friction: FloatArray
-    depth: FloatArray
-    count: FloatArray
-    force_world: FloatArray
+    normal: Array
+    friction: Array
+    depth: Array
+    count: Array
+    force_world: Array
 
     @property
     def touches(self) -> bool:

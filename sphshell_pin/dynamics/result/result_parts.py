@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 
@@ -21,7 +21,7 @@ class ContactLog(SceneContacts):
     """
 
     t: Array
-    row: NDArray[np.int64]
+    row: Longs
 
     def _facts(self) -> list[Fact]:
         rows = len(np.unique(self.row))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.offered import offered
 from sphshell_pin.errors import InvalidParameter, ResultError
 
@@ -55,7 +55,7 @@ def check_scene(result: Result, scene: Scene, name: str) -> None:
         )
 
 
-def sound_rows(name: str, *states: NDArray[np.float64], limit: float = np.inf) -> int:
+def sound_rows(name: str, *states: Array, limit: float = np.inf) -> int:
     """Return how many rows of `states`, (n, k) each, there are up to where their numbers end.
 
     That is where a run diverged: a number is not finite, or its size not below `limit`. Raises

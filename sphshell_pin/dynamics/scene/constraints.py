@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
@@ -30,7 +29,7 @@ class ContactConstraints(Summarized):
     models: list[pin.PointContactConstraintModel]
     depth: Array
     compliance: Array
-    pair: NDArray[np.int32]
+    pair: Ints
 
     def _facts(self) -> list[Fact]:
         return [Fact("contacts", len(self.models))]

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Bytes, Ints
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized
 
 Columns = dict[str, NDArray[Any]]  # of numbers of several kinds
-Rows = bytes | bytearray | NDArray[np.uint8]
+Rows = bytes | bytearray | Bytes
 
 ROW = np.dtype(_core.contact_row_type())
 """The structured type of the core's rows: its fields are those of SceneContacts."""
@@ -35,16 +35,16 @@ class SceneContacts(Summarized):
     than they would one by one.
     """
 
-    pair: NDArray[np.int32]
+    pair: Ints
     point_world: Array
     normal_world: Array
     depth: Array
     normal_force: Array
     friction_force_world: Array
     slip_velocity_world: Array
-    element: NDArray[np.int32]
-    feature: NDArray[np.uint8]
-    contact_id: NDArray[np.int32]
+    element: Ints
+    feature: Bytes
+    contact_id: Ints
 
     def __len__(self) -> int:
         """Return the number of contacts."""

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.errors import NameNotFound, import_extra
@@ -74,7 +73,7 @@ class SensorLog(Summarized):
 
 def split_logs(
     columns: Mapping[str, tuple[str, ...]],
-    which: NDArray[np.int32],
+    which: Ints,
     t: Array,
     sampled: Array,
     values: Array,
@@ -92,7 +91,7 @@ def split_logs(
 
 def joined_logs(
     sensors: Mapping[str, SensorLog],
-) -> tuple[NDArray[np.int32], Array, Array, Array]:
+) -> tuple[Ints, Array, Array, Array]:
     """Return all readings, one sensor after the other.
 
     They are: the number of the sensor, when each arrived and when it was taken (s,) [s], and the

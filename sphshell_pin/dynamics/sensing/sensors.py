@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_name, check_type
 from sphshell_pin.base.parameters import Component, flat_fields, parameter
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
@@ -66,7 +67,7 @@ class Sensor(Component):
         """Return what the C++ class of this kind is made of, by name."""
         raise NotImplementedError
 
-    def reading(self, values: NDArray[np.float64]) -> NDArray[np.float64] | float | bool:
+    def reading(self, values: Array) -> Array | float | bool:
         """Return a reading as a controller gets it."""
         raise NotImplementedError
 
@@ -164,7 +165,7 @@ class ForceTorqueSensor(_Analog, kind="force-torque"):
         force = self.force_range, self.force_noise
         return [*3 * [force], *3 * [(self.torque_range, self.torque_noise)]]
 
-    def reading(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def reading(self, values: Array) -> Array:
         """Return the force [N] and the torque [N m] (6,)."""
         return values
 
@@ -208,7 +209,7 @@ class JointTorqueSensor(_Analog, kind="joint-torque"):
     def _spread(self) -> list[tuple[float | None, float]]:
         return [(self.range, self.noise)]
 
-    def reading(self, values: NDArray[np.float64]) -> float:
+    def reading(self, values: Array) -> float:
         """Return the torque [N m], or force [N]."""
         return float(values[0])
 
@@ -278,7 +279,7 @@ class ContactSwitch(Sensor, kind="contact-switch"):
             return frozenset(frames_of_subtree(scene.model, name))
         return subtree_of(scene, name).frames
 
-    def reading(self, values: NDArray[np.float64]) -> bool:
+    def reading(self, values: Array) -> bool:
         """Return whether it is closed."""
         return bool(values[0])
 

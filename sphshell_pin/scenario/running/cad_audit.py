@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Ints, Mask
 from sphshell_pin.errors import SphshellError, UnitWarning
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
@@ -139,13 +139,13 @@ def _cad_pairs(built: Built) -> Iterator[tuple[int, ShellSection]]:
             yield index, section
 
 
-def _counts(log: ContactLog) -> npt.NDArray[np.bool_]:
+def _counts(log: ContactLog) -> Mask:
     """Return which logged contacts (m,) are minima of their own.
 
     A saddle lies between two of them, where the faces need have nothing; a minimum as deep as its
     saddle adds nothing to the force: an element is bent a little too little there.
     """
-    counts: npt.NDArray[np.bool_] = (log.normal_force >= 0.0) & (log.feature != Feature.RING)
+    counts: Mask = (log.normal_force >= 0.0) & (log.feature != Feature.RING)
     for i in np.flatnonzero(log.normal_force < 0.0):
         begin, end = np.searchsorted(log.row, log.row[i] + np.arange(2))
         near = np.arange(begin, end)
@@ -195,7 +195,7 @@ def _audit_shell(
 
 def _feet(
     section: ShellSection, path: Path, centers: Array, points: Array
-) -> tuple[Array, Array, npt.NDArray[np.int32]]:
+) -> tuple[Array, Array, Ints]:
     """Return the places of the exact faces next to contacts, see `cad.jobs.stationary_points`."""
     from sphshell_pin.shell.cad.process import run_in_child
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Longs
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import SceneContacts
@@ -50,7 +49,7 @@ class Rows:
         t: Array,
         pairs: int,
         contacts: SceneContacts,
-        row: NDArray[np.int64] | int,
+        row: Longs | int,
         more: Mapping[str, Array] | None = None,
     ) -> Rows:
         """Sum `contacts` into rows at the instants `t` (n,) [s]; contact k belongs to `row[k]`."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
 
+from sphshell_pin.base.arrays import Array, Ints, Longs, Mask
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.cad.face_mesh import ALONG, FaceMesh
 from sphshell_pin.shell.cad.face_surface import stationary_parameters
@@ -19,7 +20,6 @@ from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.surface import CadSurface
 from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.curved import points_at
-from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask
 
 _ON_SIDES = [np.roll([1 - share, share, 0.0], side) for side in range(3) for share in ALONG]
 WEIGHTS = np.array([*_ON_SIDES, [1 / 3, 1 / 3, 1 / 3]])
@@ -47,9 +47,9 @@ class Errors:
     a face from its exact curve, 0 for the others
     """
 
-    sides: Floats
-    middles: Floats
-    borders: Floats
+    sides: Array
+    middles: Array
+    borders: Array
 
     @property
     def surface(self) -> float:
@@ -101,7 +101,7 @@ class _Places:
         polygon = surface.source_element[surface.triangle_element]
         self.corners = surface.vertices[surface.triangles] / factor
         self._sides = _own_sides(surface.triangles, cad.found.face_of(polygon))
-        self._of_face: list[tuple[FaceMesh, Longs, Floats]] = []
+        self._of_face: list[tuple[FaceMesh, Longs, Array]] = []
         self._curves = _Curves()
         corner_rows = np.repeat(polygon, 3)
         for face, mesh, rows, uv in cad.found.locate(corner_rows, self.corners.reshape(-1, 3)):
@@ -124,7 +124,7 @@ class _Places:
         points = np.einsum("kc,tcx->tkx", WEIGHTS, self.corners)
         return self._measure(points, np.repeat(some[:, None], 3, axis=1), some)
 
-    def _measure(self, points: Floats, on_sides: Mask, in_middles: Mask) -> Errors:
+    def _measure(self, points: Array, on_sides: Mask, in_middles: Mask) -> Errors:
         """Errors of points (t, k, 3) at WEIGHTS of all triangles; only where wanted (t, 3), (t,).
 
         A side that triangles of a face share needs to be measured in one of them.
@@ -185,7 +185,7 @@ class _Sides:
     first: Mask
     on_border: Mask
 
-    def spread(self, values: Floats) -> Floats:
+    def spread(self, values: Array) -> Array:
         """Give all triangles (t, 3) what the first one of each side has."""
         largest = np.zeros(int(self.number.max(initial=-1)) + 1)
         np.maximum.at(largest, self.number.ravel(), values.ravel())
@@ -248,10 +248,10 @@ class _Curves:
     """
 
     def __init__(self) -> None:
-        self.shapes: list[tuple[Floats, Longs]] = []
-        self.others: list[tuple[Occ, Longs, Floats]] = []
+        self.shapes: list[tuple[Array, Longs]] = []
+        self.others: list[tuple[Occ, Longs, Array]] = []
 
-    def add(self, curve: Occ, places: Longs, ends: Floats) -> None:
+    def add(self, curve: Occ, places: Longs, ends: Array) -> None:
         kind = curve.GetType()
         if kind == GeomAbs_Line:
             line = curve.Line()
@@ -272,7 +272,7 @@ class _Curves:
             self.shapes = [(rows, places)]
 
 
-def _from_shape(shape: Floats, points: Floats) -> Floats:
+def _from_shape(shape: Array, points: Array) -> Array:
     """Largest distances (n,) of points (n, k, 3) along sides from lines and circles (n, 7)."""
     axis, radius = shape[:, None, 3:6], shape[:, 6:]
     offset = points - shape[:, None, :3]
@@ -282,7 +282,7 @@ def _from_shape(shape: Floats, points: Floats) -> Floats:
     return np.asarray(away.max(axis=1, initial=0.0))
 
 
-def _from_curve(curve: Occ, points: Floats, ends: Floats, settled: float) -> Floats:
+def _from_curve(curve: Occ, points: Array, ends: Array, settled: float) -> Array:
     """Largest distances (n,) of points (n, k, 3) along sides from a curve, `ends` (n, 2) on it.
 
     Newton's steps shorter than `settled` are the last.

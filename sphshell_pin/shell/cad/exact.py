@@ -15,10 +15,11 @@ from OCP.gp import gp_Pnt2d
 from OCP.IntTools import IntTools_FClass2d
 from OCP.TopAbs import TopAbs_OUT
 
+from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.shell.cad.face_mesh import FaceMesh
 from sphshell_pin.shell.cad.face_surface import stationary_parameters
 from sphshell_pin.shell.cad.surface import CadSurface
-from sphshell_pin.shell.raw import Floats, Ints, random_places
+from sphshell_pin.shell.raw import random_places
 from sphshell_pin.shell.shell import Shell
 
 TRIMMING = 1e-9
@@ -45,8 +46,8 @@ class StationaryPoint:
     The normal is None on edges and vertices, where it is the direction to the point asked for.
     """
 
-    point: Floats
-    normal: Floats | None
+    point: Array
+    normal: Array | None
 
 
 class TrimmedFaces:
@@ -65,7 +66,7 @@ class TrimmedFaces:
         """Box diagonal and area of the tessellation."""
         return self._shell.size, self._shell.health.area
 
-    def distances(self, points: Floats) -> Floats:
+    def distances(self, points: Array) -> Array:
         """Distances (n,) of points (n, 3).
 
         Where the closest point of a surface is beyond the border of its face, the distance from the
@@ -81,7 +82,7 @@ class TrimmedFaces:
             found[k] = min(found[k], *self._to_surfaces(same, polygons, places))
         return np.maximum(found, np.abs(near.distances) - error)
 
-    def samples(self, count: int, rng: np.random.Generator) -> Floats:
+    def samples(self, count: int, rng: np.random.Generator) -> Array:
         """Random points (n <= count, 3) of the exact surfaces, spread by area."""
         points = []
         for face, mesh, _, uv in self._cad.found.locate(*random_places(self._corners, count, rng)):
@@ -89,7 +90,7 @@ class TrimmedFaces:
             points.append(mesh.surface.nodes(uv[[self._holds(face, one) for one in uv]])[0])
         return np.concatenate(points)
 
-    def stationary_point(self, center: Floats, contact: Floats) -> StationaryPoint | None:
+    def stationary_point(self, center: Array, contact: Array) -> StationaryPoint | None:
         """Return the stationary point of the distance from `center` next to `contact`, (3,) each.
 
         A closest point or a saddle between two of them; None if there is none near the contact.
@@ -120,7 +121,7 @@ class TrimmedFaces:
                 return found[int(np.argmin(np.where(nearer, away, np.inf)))]
         return best
 
-    def _faces_near(self, point: Floats, radius: float) -> tuple[Ints, Floats]:
+    def _faces_near(self, point: Array, radius: float) -> tuple[Ints, Array]:
         """Nearest triangle (k,) of each face within `radius` of a point, and its place (k, 3)."""
         touched = self._shell.contacts(point, radius, method="elements")
         polygons = self._shell.source_element[touched.element]
@@ -128,18 +129,18 @@ class TrimmedFaces:
         _, first = np.unique(self._cad.found.face_of(polygons), return_index=True)
         return polygons[first], touched.point[first]
 
-    def _to_surfaces(self, points: Floats, polygons: Ints, near: Floats) -> Floats:
+    def _to_surfaces(self, points: Array, polygons: Ints, near: Array) -> Array:
         """Distances (n,) of points from the surfaces below triangles, next to points `near`."""
         found = np.full(len(points), np.inf)
         for _, mesh, own, uv in self._cad.found.locate(polygons, near):
             found[own] = mesh.surface.distances(points[own], uv, SETTLED * self._cad.size)
         return found
 
-    def _holds(self, face: int, uv: Floats) -> bool:
+    def _holds(self, face: int, uv: Array) -> bool:
         """Whether a face holds the point of its surface at parameters uv (2,)."""
         return bool(self._inside(face).Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_OUT)
 
-    def _on_edges(self, mesh: FaceMesh, center: Floats, near: Floats) -> Iterator[StationaryPoint]:
+    def _on_edges(self, mesh: FaceMesh, center: Array, near: Array) -> Iterator[StationaryPoint]:
         """Stationary points on the edges of a face, and their ends."""
         for border in mesh.borders:
             away = np.linalg.norm(mesh.points[border.nodes] - near, axis=1)

@@ -18,10 +18,11 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
+from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.shell.cad.face_surface import SINGULAR, FaceSurface, dot
 from sphshell_pin.shell.cad.model import subshapes
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.raw import Floats, Longs, Mask, area_vectors
+from sphshell_pin.shell.raw import area_vectors
 
 ALONG = (0.25, 0.5, 0.75)
 """Where along a side the distance is measured."""
@@ -38,10 +39,10 @@ class Border:
     """
 
     nodes: Longs
-    at: Floats
+    at: Array
     curve: Occ
 
-    def error(self, points: Floats) -> float:
+    def error(self, points: Array) -> float:
         """Largest distance of the curve from the polyline through `points` of the nodes."""
         if self.curve.GetType() == GeomAbs_Line:
             ends = ((points[self.nodes[k]], self.curve.Value(self.at[k])) for k in (0, -1))
@@ -82,11 +83,11 @@ class FaceMesh:
     """
 
     surface: FaceSurface
-    points: Floats
-    exact: Floats
-    uv: Floats
+    points: Array
+    exact: Array
+    uv: Array
     free: Mask
-    normals: Floats
+    normals: Array
     triangles: Longs
     borders: tuple[Border, ...]
     reversed: bool
@@ -136,7 +137,7 @@ class FaceMesh:
             mesh = mesh._split(sides, of_triangle, marked)
         return mesh, float(largest)
 
-    def corner_normals(self) -> Floats:
+    def corner_normals(self) -> Array:
         """Exact unit normals (t, 3, 3) at the corners, on the face's outer side.
 
         Where the surface has none, as at the pole of a sphere or the tip of a cone, or several, as
@@ -148,7 +149,7 @@ class FaceMesh:
             corners[limits] = self._limits(limits)
         return -corners if self.reversed else corners
 
-    def parameters(self, nodes: Longs) -> Floats:
+    def parameters(self, nodes: Longs) -> Array:
         """Parameters (k, c, 2) of the c nodes of k sides or triangles.
 
         A pole takes those of the other nodes: the parameters between them belong to points between.
@@ -160,7 +161,7 @@ class FaceMesh:
         mean = np.where(free, 0.0, uv).sum(axis=1, keepdims=True) / np.maximum(count, 1)
         return np.where(free & (count > 0), mean, uv)
 
-    def parameters_at(self, triangles: Longs, points: Floats) -> Floats:
+    def parameters_at(self, triangles: Longs, points: Array) -> Array:
         """Parameters (n, 2) of points (n, 3) near `triangles` (n,)."""
         nodes = self.triangles[triangles]
         corners = self.points[nodes]
@@ -173,7 +174,7 @@ class FaceMesh:
         weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
         return np.asarray(np.einsum("nk,nkx->nx", weights, self.parameters(nodes)))
 
-    def _errors(self, sides: Longs, tolerance: float) -> tuple[Floats, Floats]:
+    def _errors(self, sides: Longs, tolerance: float) -> tuple[Array, Array]:
         """Largest distance to the surface along each side, and at the middle of each triangle."""
         at_sides = np.zeros(len(sides))
         between = self.parameters(sides)
@@ -218,7 +219,7 @@ class FaceMesh:
             triangles=np.concatenate(pieces),
         )
 
-    def _limits(self, chosen: Mask) -> Floats:
+    def _limits(self, chosen: Mask) -> Array:
         uv = self.parameters(self.triangles)
         start = uv[chosen]
         toward = np.broadcast_to(uv.mean(axis=1)[:, None], uv.shape)[chosen] - start
@@ -269,7 +270,7 @@ def _borders(face: Occ, found: Occ, location: Occ) -> Iterator[Border]:
         )
 
 
-def _to_segments(point: Floats, start: Floats, span: Floats) -> Floats:
+def _to_segments(point: Array, start: Array, span: Array) -> Array:
     """Distances of points (3,) or (n, 3) from segments (n, 3)."""
     square = np.maximum(dot(span, span), np.finfo(float).tiny)
     along = np.clip(dot(point - start, span) / square, 0.0, 1.0)

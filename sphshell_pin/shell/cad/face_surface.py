@@ -7,8 +7,9 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_C0
 from OCP.gp import gp_Pnt, gp_Vec
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.raw import KINDS, NO_SHAPE, Floats
+from sphshell_pin.shell.raw import KINDS, NO_SHAPE
 
 MOST_STEPS = 8
 """Of Newton's method to a closest point; it starts next to it."""
@@ -61,7 +62,7 @@ class FaceSurface:
         axis = (0.0, 0.0, 1.0) if kind == "sphere" else shape.Axis().Direction().Coord()
         return [float(number), *place, *axis, radius, second]
 
-    def nodes(self, uv: Floats) -> tuple[Floats, Floats]:
+    def nodes(self, uv: Array) -> tuple[Array, Array]:
         """Points and unit normals (n, 3) at parameters uv (n, 2); zero where there is no normal."""
         points, by_u, by_v = self.derivatives(uv)
         normal = np.cross(by_u, by_v)
@@ -73,7 +74,7 @@ class FaceSurface:
         defined = length > SINGULAR * self._scale
         return points, np.where(defined, normal / np.where(defined, length, 1.0), 0.0)
 
-    def derivatives(self, uv: Floats) -> tuple[Floats, Floats, Floats]:
+    def derivatives(self, uv: Array) -> tuple[Array, Array, Array]:
         """Points and derivatives by u and by v at parameters uv (n, 2), (n, 3) each."""
         place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
         rows, first = [], self._surface.D1
@@ -83,7 +84,7 @@ class FaceSurface:
         table = np.array(rows).reshape(-1, 9)
         return table[:, :3], table[:, 3:6], table[:, 6:]
 
-    def distances(self, points: Floats, uv: Floats, tolerance: float) -> Floats:
+    def distances(self, points: Array, uv: Array, tolerance: float) -> Array:
         """Distances (n,) of points next to the surface at uv (n, 2), without its trimming.
 
         Newton's steps go on while they are longer than `tolerance`: less changes the distance by
@@ -115,7 +116,7 @@ class FaceSurface:
                 break
         return distance
 
-    def stationary(self, point: Floats, uv: Floats, settled: float) -> Floats | None:
+    def stationary(self, point: Array, uv: Array, settled: float) -> Array | None:
         """Parameters (2,) of a stationary point of the distance to `point` (3,), next to `uv` (2,).
 
         A closest point or a saddle of the distance, without the trimming; None if there is none.
@@ -144,8 +145,8 @@ class FaceSurface:
 
 
 def stationary_parameters(
-    curve: Occ, points: Floats, seeds: Floats, ends: tuple[float, float], settled: float
-) -> Floats:
+    curve: Occ, points: Array, seeds: Array, ends: tuple[float, float], settled: float
+) -> Array:
     """Parameters (n,) of stationary points of the distances from points (n, 3) to a curve, or nan.
 
     Between the parameters `ends`, next to `seeds` (n,); Newton's method ends with a step shorter
@@ -176,12 +177,12 @@ def stationary_parameters(
     return found
 
 
-def dot(a: Floats, b: Floats) -> Floats:
+def dot(a: Array, b: Array) -> Array:
     """Scalar products (n,) of vectors (n, k)."""
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
-def _distances_from(kind: str, shape: Floats, points: Floats) -> Floats:
+def _distances_from(kind: str, shape: Array, points: Array) -> Array:
     """Distances (n,) of points (n, 3) from a shape (8,): point, axis, and two radii."""
     axis, (radius, second) = shape[3:6], shape[6:]
     from_point = points - shape[:3]

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.cad.curved_error import hold_curvature
 from sphshell_pin.shell.cad.exact import TrimmedFaces
@@ -20,7 +21,6 @@ from sphshell_pin.shell.cad.surface import load_cad
 from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.cleaning import clean_surface
 from sphshell_pin.shell.converting import Conversion, exchange
-from sphshell_pin.shell.raw import Floats, Ints
 
 BETWEEN = 100
 """Contacts after which the audit reports that it continues."""
@@ -56,9 +56,9 @@ def stationary_points(
     unit: str | None,
     options: CadOptions,
     scales: tuple[float, ...],
-    centers: Floats,
-    contacts: Floats,
-) -> tuple[Floats, Floats, Ints]:
+    centers: Array,
+    contacts: Array,
+) -> tuple[Array, Array, Ints]:
     """Find the stationary point on the trimmed faces next to each of k contacts.
 
     scales : by which the faces were made larger, one after the other

@@ -19,7 +19,7 @@ from sphshell_pin.base import regular_file
 from sphshell_pin.base.cache import cache_folder, is_own, keep_newest, mark_used, write_own
 from sphshell_pin.errors import UnitWarning
 from sphshell_pin.shell.cad.options import PACKAGE, CadOptions
-from sphshell_pin.shell.cleaned import ARRAYS, Array, CleanedSurface, check_arrays
+from sphshell_pin.shell.cleaned import ARRAYS, AnyArray, CleanedSurface, check_arrays
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.readers.text import read_bytes
 
@@ -98,7 +98,7 @@ class KeptSurface:
 
 
 def _surface(
-    arrays: dict[str, Array], names: tuple[str, ...], health: ShellHealth, rounding: float
+    arrays: dict[str, AnyArray], names: tuple[str, ...], health: ShellHealth, rounding: float
 ) -> CleanedSurface:
     """Return the surface; InvalidShell, TypeError or ValueError if the arrays are of none."""
     given = {name: arrays[name] for name in ARRAYS if name in arrays}

@@ -11,10 +11,10 @@ from OCP.GeomAbs import GeomAbs_C0, GeomAbs_C1
 from OCP.ShapeBuild import ShapeBuild_ReShape
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideContinuity
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell.cad.face_surface import FaceSurface
 from sphshell_pin.shell.cad.model import CadFace, CadModel, faces_of
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.raw import Floats
 from sphshell_pin.shell.tangent_joints import TANGENT_ANGLE
 
 ACROSS = 1e-6
@@ -74,7 +74,7 @@ def _has_kink(face: Occ) -> bool:
     return False
 
 
-def _normals(surface: FaceSurface, column: int, value: float) -> Floats:
+def _normals(surface: FaceSurface, column: int, value: float) -> Array:
     """Return the normals along the line where the parameter of `column` has a value."""
     other = 1 - column
     uv = np.empty((PLACES, 2))

@@ -18,11 +18,11 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS
 
+from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import InvalidParameter, InvalidShell
 from sphshell_pin.shell.cad.face_mesh import FaceMesh, take_mesh
 from sphshell_pin.shell.cad.model import CadModel, count_open_edges
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.raw import Floats, Ints, Longs
 
 ANGLE = 0.35
 """Neighbouring elements on a face turn by about this at most [rad]: less than the crease angle."""
@@ -78,8 +78,8 @@ class Tessellation:
         return np.searchsorted(self.starts, triangles, side="right") - 1
 
     def locate(
-        self, triangles: Ints | Longs, points: Floats
-    ) -> Iterator[tuple[int, FaceMesh, Longs, Floats]]:
+        self, triangles: Ints | Longs, points: Array
+    ) -> Iterator[tuple[int, FaceMesh, Longs, Array]]:
         """Find the parameters of points (n, 3) near `triangles` (n,) [units of the model].
 
         Yields, face by face: the face, its mesh, the rows (k,) of the points on it, and the

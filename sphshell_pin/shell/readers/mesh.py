@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import ShellFileError
-from sphshell_pin.shell.raw import Floats, RawSurface
+from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers.text import (
     finish,
     indices,
@@ -144,7 +145,7 @@ def _check_reals(path: Path, line: int, words: list[str]) -> None:
         raise ShellFileError(path, f"'{' '.join(words)}': {error}", line) from None
 
 
-def _reals(path: Path, words: Sequence[object], width: int = 3) -> Floats:
+def _reals(path: Path, words: Sequence[object], width: int = 3) -> Array:
     try:
         return real_numbers(words).reshape(-1, width)
     except ValueError as error:

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import ShellFileError
-from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurface
+from sphshell_pin.shell.raw import LARGEST_COUNT, RawSurface
 from sphshell_pin.shell.readers.text import finish, pack_polygons, read_bytes, real_numbers
 
 _TYPES = {
@@ -64,7 +65,7 @@ def parse_ply(path: Path, data: bytes) -> RawSurface:
         If the file is truncated, holds no faces, or does not follow the format.
     """
     form, elements, start = _header(path, data)
-    table: dict[str, Floats] = {}
+    table: dict[str, Array] = {}
     polygons: Polygons | None = None
     try:
         body = data[start:]
@@ -139,7 +140,7 @@ class _Data:
         self._data = data
         self._at = 0
 
-    def table(self, element: _Element) -> dict[str, Floats]:
+    def table(self, element: _Element) -> dict[str, Array]:
         """Read an element without lists: its columns by name."""
         rows = self._take(np.dtype([(p.name, p.kind) for p in element.properties]), element.count)
         return {prop.name: rows[prop.name].astype(np.float64) for prop in element.properties}

@@ -15,8 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import ShellFileError
-from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface
+from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
 
 # No two neighbors in a pattern match the same text: a long line would cost its length squared.
@@ -79,7 +80,7 @@ class _Lines:
             raise self.fault(k, must)
         return [int(value) for value in values]
 
-    def rows_of_three(self, start: int, count: int, what: str) -> tuple[Floats, int]:
+    def rows_of_three(self, start: int, count: int, what: str) -> tuple[Array, int]:
         """Return `count` rows (count, 3) from line `start` on, and the line after them."""
         stop = start + count
         if stop > len(self.text):

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.base import regular_file
+from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import InvalidShell, ShellFileError
 from sphshell_pin.shell.raw import (
     LARGEST_COUNT,
-    Floats,
-    Ints,
-    Longs,
     RawSurface,
     check_indices,
     check_vertices,
@@ -35,7 +33,7 @@ def read_bytes(path: Path) -> bytes:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
 
 
-def real_numbers(words: Sequence[object]) -> Floats:
+def real_numbers(words: Sequence[object]) -> Array:
     """Return words of a file as numbers; ValueError, also for 1_0, which is one in Python alone."""
     if words and isinstance(words[0], str) and "_" in "".join(map(str, words)):
         raise ValueError("an underscore in a number")
@@ -60,10 +58,10 @@ def indices(values: Sequence[int] | Longs) -> Ints:
 
 def finish(
     path: Path,
-    vertices: Floats,
+    vertices: Array,
     offsets: Longs,
     corners: Ints,
-    normals: Floats | None = None,
+    normals: Array | None = None,
     notes: tuple[str, ...] = (),
 ) -> RawSurface:
     """Check what every file must fulfil: enough points, all finite, indices in range."""

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Mask
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.report import Fitted, Series
 from sphshell_pin.study.fit.statistics import Spread, serial_of, variance_is
@@ -24,7 +24,7 @@ def remarks_on(
     dof: int,
     tolerance: float,
     *,
-    still: NDArray[np.bool_],
+    still: Mask,
     converged: bool,
 ) -> list[str]:
     """Return what is to be said of a fit; `tolerance` is the relative error of its runs.
@@ -49,7 +49,7 @@ def remarks_on(
 
 
 def _undetermined(
-    fitted: Sequence[Fitted], free: Sequence[Free], spread: Spread, still: NDArray[np.bool_]
+    fitted: Sequence[Fitted], free: Sequence[Free], spread: Spread, still: Mask
 ) -> list[str]:
     out = []
     together: set[int] = set()

@@ -8,9 +8,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Mask
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.remarks import remarks_on
 from sphshell_pin.study.fit.report import Fit, Fitted, Series
@@ -160,7 +159,7 @@ class Search:
         weighted = (self.measured - values) / sigma
         return float(np.sum(np.log(sigma)) + 0.5 * weighted @ weighted)
 
-    def _leave_unfelt(self, spread: Spread, still: NDArray[np.bool_]) -> None:
+    def _leave_unfelt(self, spread: Spread, still: Mask) -> None:
         """Put parameters that change nothing that was measured back to where they started."""
         unfelt = still & (np.abs(spread.blind) == 1.0).any(axis=0)
         start = np.array([one.to_x(one.start) for one in self.free])
@@ -168,7 +167,7 @@ class Search:
         if unfelt.any() and self.runs.predict(x) is not None:
             self.x = x
 
-    def _beyond(self, jacobian: Array, half: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def _beyond(self, jacobian: Array, half: Array) -> tuple[Array, Mask]:
         """Return the middles (p,) of the intervals, and which parameters the bounds hold.
 
         Of a value at a bound the middle is where the residuals would be least without it. Where an
@@ -247,7 +246,7 @@ class Search:
         )
         return np.asarray(derivatives * (use / self.sigma)[:, None])
 
-    def _final_derivatives(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def _final_derivatives(self) -> tuple[Array, Array, Mask]:
         """Return the weighted derivatives (N, p) at the solution, their error, which x do nothing.
 
         The error is by how much differences over one step and over twice the step differ, and a
@@ -323,7 +322,7 @@ def _inset(bound: Array) -> Array:
     return np.where(np.isfinite(bound), 1e-9 * np.maximum(1.0, np.abs(bound)), 0.0)
 
 
-def _with_held(spread: Spread, held: NDArray[np.bool_]) -> Spread:
+def _with_held(spread: Spread, held: Mask) -> Spread:
     """Return the spread of all parameters; those `held` at a bound have none."""
     if not held.any():
         return spread

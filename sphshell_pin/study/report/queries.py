@@ -12,10 +12,9 @@ from collections.abc import Callable
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.study.report.contents import (
     TIME_COLUMNS,
     Finding,
@@ -43,7 +42,7 @@ Times = dict[tuple[str, int], Array]
 """Times of a query [s] (rounds,) by the code and the number of triangles."""
 
 
-def coal_tree(vertices: Array, triangles: NDArray[np.int32]) -> coal.BVHModelOBBRSS:
+def coal_tree(vertices: Array, triangles: Ints) -> coal.BVHModelOBBRSS:
     """Return Coal's tree of a mesh."""
     tree = coal.BVHModelOBBRSS()
     tree.beginModel(len(triangles), len(vertices))
@@ -53,9 +52,7 @@ def coal_tree(vertices: Array, triangles: NDArray[np.int32]) -> coal.BVHModelOBB
     return tree
 
 
-def coal_contestant(
-    vertices: Array, triangles: NDArray[np.int32], centers: Array
-) -> Callable[[], float]:
+def coal_contestant(vertices: Array, triangles: Ints, centers: Array) -> Callable[[], float]:
     """Time coal.collide, called from Python, which adds about 1 us to some 100 us."""
     tree, sphere = coal_tree(vertices, triangles), coal.Sphere(RADIUS)
     request = coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, 1_000_000)

@@ -8,9 +8,8 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, Ints
 
 AMPLITUDE, WAVE_X, WAVE_Y = 0.03, 9.0, 7.0
 
@@ -20,7 +19,7 @@ def height(x: Array, y: Array) -> Array:
     return AMPLITUDE * np.sin(WAVE_X * x) * np.cos(WAVE_Y * y)
 
 
-def wavy_sheet(cells: int, size: float) -> tuple[Array, NDArray[np.int32]]:
+def wavy_sheet(cells: int, size: float) -> tuple[Array, Ints]:
     """Return vertices and 2 * cells^2 triangles of a square sheet of side `size` [m]."""
     x = np.linspace(-size / 2, size / 2, cells + 1)
     grid_x, grid_y = np.meshgrid(x, x, indexing="ij")
@@ -46,7 +45,7 @@ class Mesh:
     """Vertices (n, 3) [m], triangles (m, 3) and the exact outward unit normals (n, 3)."""
 
     vertices: Array
-    triangles: NDArray[np.int32]
+    triangles: Ints
     normals: Array
 
     @property
@@ -117,7 +116,7 @@ def torus(ring: float, tube: float, side: float) -> Mesh:
     return Mesh(vertices, triangles, normals)
 
 
-def random_grid(cells: int, half: float, seed: int = 1) -> tuple[Array, Array, NDArray[np.int32]]:
+def random_grid(cells: int, half: float, seed: int = 1) -> tuple[Array, Array, Ints]:
     """Return moved x, y (n,) over the square of side 2 `half`, and random halves of the cells."""
     rng = np.random.default_rng(seed)
     vertices, triangles = wavy_sheet(cells, 2 * half)

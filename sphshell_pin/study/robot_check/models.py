@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from sphshell_pin import robots
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 
 
@@ -113,7 +113,7 @@ def _from_library(name: str, *, mimic: bool) -> Subject:
     description = replace(description, mimics=rules, notes=notes)
     srdf = folder / loader.path / loader.srdf_subpath / loader.srdf_filename
 
-    def pose(model: pin.Model) -> NDArray[np.float64]:
+    def pose(model: pin.Model) -> Array:
         # Rotor inertias and the reference posture stand beside the URDF.
         if not loader.srdf_filename:
             return np.asarray(pin.neutral(model))
@@ -132,7 +132,7 @@ def _without_meshes(
     *,
     free_flyer: bool,
     mimic: bool = True,
-    pose: Callable[[pin.Model], NDArray[np.float64]] | None = None,
+    pose: Callable[[pin.Model], Array] | None = None,
 ) -> Subject:
     model = robots.build_model(description, free_flyer=free_flyer, mimic=mimic)
     q0 = pose(model) if pose is not None else description.q0(model)

@@ -7,16 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario import Built
 from sphshell_pin.study.quantities import quantities_of
 from sphshell_pin.study.sweep.job import Outcome
 from sphshell_pin.study.sweep.table import Columns
-
-FloatArray = NDArray[np.float64]
 
 STEPS = 200
 MOST_STEPS = 100_000
@@ -34,7 +32,7 @@ class Curves:
     """Steps of equal length from 0 to `duration` [s]."""
 
     @property
-    def times(self) -> FloatArray:
+    def times(self) -> Array:
         """The grid (steps + 1,) [s]."""
         return np.linspace(0.0, self.duration, self.steps + 1)
 

@@ -8,14 +8,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import stated_pairs
 from sphshell_pin.base.parameters import Component, parameter
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.study.sweep.job import need
 
-FloatArray = NDArray[np.float64]
 Dist = Mapping[str, "str | Distribution"]
 
 _CALL = re.compile(r"\s*(\w+)\s*\(([^()]*)\)\s*")
@@ -25,7 +24,7 @@ _CALL = re.compile(r"\s*(\w+)\s*\(([^()]*)\)\s*")
 class Distribution(Component):
     """A distribution of one number; its kinds are `Normal`, `Uniform` and `LogNormal`."""
 
-    def quantile(self, share: FloatArray) -> FloatArray:
+    def quantile(self, share: Array) -> Array:
         """Return the values that `share` (n,) of the distribution lies below.
 
         Raises MissingExtra without scipy.
@@ -49,7 +48,7 @@ class Normal(Distribution, kind="normal"):
     mean: float = parameter()
     deviation: float = parameter(above=0)
 
-    def quantile(self, share: FloatArray) -> FloatArray:
+    def quantile(self, share: Array) -> Array:
         """Return the values that `share` (n,) of the distribution lies below."""
         return np.asarray(need("scipy.stats").norm.ppf(share, self.mean, self.deviation))
 
@@ -73,7 +72,7 @@ class Uniform(Distribution, kind="uniform"):
         if not self.low < self.high:
             raise InvalidParameter("high", self.high, f"must be more than low = {self.low:g}")
 
-    def quantile(self, share: FloatArray) -> FloatArray:
+    def quantile(self, share: Array) -> Array:
         """Return the values that `share` (n,) of the distribution lies below."""
         found = need("scipy.stats").uniform.ppf(share, self.low, self.high - self.low)
         return np.asarray(found)
@@ -107,7 +106,7 @@ class LogNormal(Distribution, kind="lognormal"):
             )
         super().__post_init__()
 
-    def quantile(self, share: FloatArray) -> FloatArray:
+    def quantile(self, share: Array) -> Array:
         """Return the values that `share` (n,) of the distribution lies below."""
         ppf = need("scipy.stats").lognorm.ppf
         return np.asarray(ppf(share, math.log(self.factor), scale=self.median))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.study.sweep.job import need
 from sphshell_pin.study.sweep.sampling import DRAWN, HIGH, LOW, MEDIAN, A, B, at_quantile, swapped
@@ -15,7 +15,6 @@ from sphshell_pin.study.sweep.table import DESIGN, varied_keys
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 
 QUANTILES = (5, 25, 50, 75, 95)
 """In percent."""
@@ -134,7 +133,7 @@ def sobol_indices(
         rng=seed,
     )
     low, high = found.confidence_interval
-    columns: dict[str, FloatArray] = {}
+    columns: dict[str, Array] = {}
     for kind, *three in zip(("first", "total"), _estimate(values), low, high, strict=True):
         columns |= dict(zip((kind, f"{kind}_low", f"{kind}_high"), three, strict=True))
     return need("pandas").DataFrame(columns, index=keys)
@@ -205,7 +204,7 @@ def quantile_bands(curves: pd.DataFrame, curve: str) -> pd.DataFrame:
     return made
 
 
-def _quantiles(values: FloatArray) -> list[float]:
+def _quantiles(values: Array) -> list[float]:
     if not len(values):
         return [np.nan] * len(QUANTILES)
     with np.errstate(invalid="ignore"):  # between two infinities
@@ -238,7 +237,7 @@ def _check_complete(rows: pd.DataFrame, figure: str, purpose: str) -> None:
         )
 
 
-def _estimate(values: FloatArray) -> FloatArray:
+def _estimate(values: Array) -> Array:
     """Return first-order and total indices (2, d, ...) of the runs A, B, AB_1 ... (d + 2, ..., n).
 
     Resamples, between the first and the last axis, are to scipy several figures of the same runs.

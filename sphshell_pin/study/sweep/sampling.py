@@ -7,14 +7,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.study.sweep.distributions import Dist, Distribution, distributions_of, forms
 from sphshell_pin.study.sweep.grid import MOST_RUNS, Axis, Value
 from sphshell_pin.study.sweep.job import need
-
-FloatArray = NDArray[np.float64]
 
 SAMPLES = ("sobol", "lhs")
 SAMPLE, A, B, MEDIAN = "sample", "A", "B", "median"
@@ -42,7 +40,7 @@ class Design:
     """The runs of a sweep with uncertain inputs, in their order."""
 
     dists: Mapping[str, Distribution]
-    values: FloatArray
+    values: Array
     """(n, d): the values of each run, in the order of `dists`."""
     parts: tuple[str, ...]
     """What each run is for: "sample"; "A", "B", "AB KEY"; "median", "5 % KEY", "95 % KEY"."""
@@ -156,7 +154,7 @@ def _check(sample: str | None, n: int | None, seed: int, indices: bool, tornado:
         )
 
 
-def _unit_points(sample: str, n: int, d: int, seed: int) -> FloatArray:
+def _unit_points(sample: str, n: int, d: int, seed: int) -> Array:
     """Return `n` points in the unit cube (n, d)."""
     qmc = need("scipy.stats").qmc
     if sample == "sobol":
@@ -164,7 +162,7 @@ def _unit_points(sample: str, n: int, d: int, seed: int) -> FloatArray:
     return np.asarray(qmc.LatinHypercube(d, rng=seed).random(n))
 
 
-def _saltelli(points: FloatArray) -> FloatArray:
+def _saltelli(points: Array) -> Array:
     """Return A, B, AB_1 ... AB_d of each point (n, d + 2, d); `points` (n, 2 d) are A beside B."""
     n, d = points.shape[0], points.shape[1] // 2
     a, b = points[:, :d], points[:, d:]
@@ -175,7 +173,7 @@ def _saltelli(points: FloatArray) -> FloatArray:
     return found
 
 
-def _one_at_a_time(d: int) -> FloatArray:
+def _one_at_a_time(d: int) -> Array:
     """Return the medians, then each input at its low and high quantile (2 d + 1, d)."""
     found = np.full((2 * d + 1, d), 0.5)
     for i in range(d):

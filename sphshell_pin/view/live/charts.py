@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import NameNotFound
-from sphshell_pin.view.nodes import FloatArray, Json
+from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario.running.player import Rows
@@ -66,9 +67,9 @@ class Thinner:
 
     def __init__(self) -> None:
         self._piece, self._time, self._spacing = -math.inf, 0.0, 0.0
-        self._values: FloatArray | None = None
+        self._values: Array | None = None
 
-    def add(self, t: FloatArray, values: FloatArray, spacing: float) -> list[Point]:
+    def add(self, t: Array, values: Array, spacing: float) -> list[Point]:
         """Take rows at `t` (n,) [s] of `values` (n, k); return the points of finished pieces.
 
         A piece is `spacing` [s] long.
@@ -197,7 +198,7 @@ class Charts:
         points = thinner.add(rows.t, self._values(rows), max(spacing, length / MOST_POINTS))
         return points + thinner.end()
 
-    def _values(self, rows: Rows) -> FloatArray:
+    def _values(self, rows: Rows) -> Array:
         values = np.empty((len(rows), len(self.keys)))
         for k, key in enumerate(self.keys):
             values[:, k] = self.series[key].values(rows)

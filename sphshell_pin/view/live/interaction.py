@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.view.arrows import Forces
@@ -13,7 +14,7 @@ from sphshell_pin.view.live.events import BadMessage, Client, Event
 from sphshell_pin.view.live.picture import Picture, frame_point
 from sphshell_pin.view.live.player import Interactive
 from sphshell_pin.view.live.window import LiveWindow
-from sphshell_pin.view.nodes import FloatArray, Json
+from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario.live.drag import Dragged
@@ -38,7 +39,7 @@ class Interaction:
         self._window = window
         self._dragger: Client | None = None
         self._holds: dict[Client, Event] = {}
-        self._pushed: tuple[str, FloatArray, float] | None = None  # until a time [s]
+        self._pushed: tuple[str, Array, float] | None = None  # until a time [s]
 
     @property
     def push(self) -> Forces | None:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.view.arrows import ArrowPool, ArrowScale, Forces, arrow_length
 from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
 from sphshell_pin.view.display import HIDDEN_AT_FIRST, PARTS, Display
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
-    FloatArray,
     Move,
     hidden_at,
     material,
@@ -259,8 +259,8 @@ class _Trails:
     def clear(self) -> None:
         for pair in {pair for pair, _ in getattr(self, "_drawn", ())}:
             self._display.trail_node(pair).delete()
-        self._drawn: dict[tuple[int, int], FloatArray] = {}
-        self._points: dict[int, list[FloatArray]] = {}
+        self._drawn: dict[tuple[int, int], Array] = {}
+        self._points: dict[int, list[Array]] = {}
         self._piece: dict[int, int] = {}
         self._undrawn: dict[int, int] = {}
 
@@ -284,7 +284,7 @@ class _Trails:
             where = self._display.data.oMi[pair.joint_j] * pair.placement_j
             self._extend(index, where.actInv(contacts.point_world[k]))
 
-    def _extend(self, index: int, point: FloatArray) -> None:
+    def _extend(self, index: int, point: Array) -> None:
         points = self._points.setdefault(index, [])
         if points:
             step = math.dist(points[-1], point)
@@ -339,7 +339,7 @@ def lowered(view: View) -> View:
     return View(view.eye + lift + 0.08 * (view.eye - view.target), view.target + lift)
 
 
-def _seen_in(player: Player) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _seen_in(player: Player) -> tuple[Array, Array, Array]:
     """Return configurations (n, nq), and points and normals (k, 3) of the contacts seen in them.
 
     They are those of now, of a finished run those of all of it.
@@ -362,7 +362,7 @@ def _pool(scene: Scene) -> int:
     return max(4, min(POOL, 2 * len(scene.pairs)))
 
 
-def frame_point(model: pin.Model, data: pin.Data, name: str) -> FloatArray | None:
+def frame_point(model: pin.Model, data: pin.Data, name: str) -> Array | None:
     """Return the origin (3,) [m] of a frame or joint in the world; None if there is none."""
     if model.existFrame(name):
         frame = model.frames[model.getFrameId(name)]

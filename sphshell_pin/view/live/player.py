@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from sphshell_pin.view.nodes import FloatArray
+from sphshell_pin.base.arrays import Array
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -44,7 +44,7 @@ class Player(Protocol):
         """Time at which it starts [s]."""
 
     @property
-    def q(self) -> FloatArray:
+    def q(self) -> Array:
         """Configuration (nq,)."""
 
     @property
@@ -88,7 +88,7 @@ class Player(Protocol):
     def change(self, key: str, value: float | str) -> None:
         """Set a parameter; raise SphshellError, and go on unchanged, where it cannot be."""
 
-    def push(self, body: str, force_world: FloatArray, seconds: float) -> None:
+    def push(self, body: str, force_world: Array, seconds: float) -> None:
         """Push the origin of a body with `force_world` (3,) [N] for `seconds` [s]."""
 
     def seek(self, t: float) -> None:
@@ -114,9 +114,7 @@ class Interactive(Player, Protocol):
     def aim(self, joint: str, value: float) -> None:
         """Move a target [rad or m]; raise SphshellError, and go on unchanged, where it cannot."""
 
-    def pull(
-        self, frame: str, point: FloatArray, target_world: FloatArray, stiffness: float
-    ) -> None:
+    def pull(self, frame: str, point: Array, target_world: Array, stiffness: float) -> None:
         """Pull a point (3,) [m] of a frame to a target, until `release` or another pull or push.
 
         `stiffness` [N/m] is that for each kg which has to be moved.

@@ -11,7 +11,8 @@ import threading
 
 import numpy as np
 
-from sphshell_pin.view.nodes import FloatArray, Json, Move, Sent, is_below
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.view.nodes import Json, Move, Sent, is_below
 
 _FIRST_ROWS = 64
 
@@ -60,7 +61,7 @@ class LiveWindow:
         """Return a routine that places the node at `path` without a command for each matrix."""
         return lambda matrix: self._place(path, matrix.T.reshape(16))
 
-    def matrix(self, path: str) -> FloatArray | None:
+    def matrix(self, path: str) -> Array | None:
         """Return where the node at `path` was last placed (4, 4); None if it was not."""
         row = self._row_of.get(path)
         return None if row is None else self._drawn[row].reshape(4, 4).T.astype(float)
@@ -106,7 +107,7 @@ class LiveWindow:
             return frame, None
         return frame, b"\xdd" + len(messages).to_bytes(4, "big") + b"".join(messages)
 
-    def _place(self, path: str, matrix: FloatArray | list[float]) -> None:
+    def _place(self, path: str, matrix: Array | list[float]) -> None:
         """Place the node at `path` at `matrix` (16,), column by column."""
         row = self._row_of.get(path)
         if row is None:
