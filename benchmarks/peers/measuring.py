@@ -195,9 +195,9 @@ def measure(
     """Run the engines (names of ENGINES) over the scenes (names of SCENES).
 
     Returns a row for every setting, and for every peer that can do it how many times more it costs
-    than this package: a step of the Panda at its cheapest setting and our default; the swing in the bowl
-    at the peer's best error. `say` is called with every row as one line. A peer that is not
-    installed, cannot do a scene, crashes or takes too long has a row that says so.
+    than this package: a step of the Panda at its cheapest setting and our default; the swing in
+    the bowl at the peer's best error. `say` is called with every row as one line. A peer that is
+    not installed, cannot do a scene, crashes or takes too long has a row that says so.
     """
     scenes = list(scenes)
     names = [OURS, *(name for name in engines if name != OURS)]
