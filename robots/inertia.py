@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import xml.etree.ElementTree as ET
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -152,5 +152,10 @@ def _element(inertia: pin.Inertia) -> ET.Element:
 
 
 def _list(links: list[str]) -> str:
-    more = f" and {len(links) - _LISTED} others" if len(links) > _LISTED else ""
-    return f"link{'s' * (len(links) > 1)} {', '.join(links[:_LISTED])}{more}"
+    return f"link{'s' * (len(links) > 1)} {few(links)}"
+
+
+def few(names: Sequence[str]) -> str:
+    """List the first few of `names`, and say how many more there are."""
+    more = f" and {len(names) - _LISTED} others" if len(names) > _LISTED else ""
+    return f"{', '.join(names[:_LISTED])}{more}"
