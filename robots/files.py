@@ -409,6 +409,12 @@ def _check_tree(root: ET.Element) -> None:
                 )
             if end == "child" and link is not None:
                 movers[link].append(str(joint.get("name")))
+    roots = [str(link) for link in links if link not in movers]
+    if len(roots) > 1:
+        raise ValueError(
+            f"no joint moves or fixes the links {', '.join(map(repr, sorted(roots)))}: a URDF has "
+            "one such root; fix the others to it, with a joint of type fixed"
+        )
     for link, names in movers.items():
         if len(names) > 1:
             raise ValueError(

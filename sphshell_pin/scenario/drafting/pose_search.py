@@ -208,9 +208,10 @@ class _Search:
         for found in self._places():
             stance = found.stance
             pair = chosen_materials(asked, [tip], stance.mass)
-            if not stance.force and len(self.tried.errors) == _MOST_WEAK:
-                self.tried.leave_out("effort", "they do not carry the robot's own weight")
             if "effort" in self.tried.without:
+                stance = replace(stance, force=NO_LIMIT)
+            elif not stance.force and len(self.tried.errors) == _MOST_WEAK:
+                self.tried.leave_out("effort", "they do not carry the robot's own weight")
                 stance = replace(stance, force=NO_LIMIT)
             try:
                 force = press_force(stance, tip, pair, asked.press)
