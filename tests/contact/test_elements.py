@@ -1,7 +1,5 @@
 """The paper's sum over elements, ghost forces and all."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """FoundationLaw in scenes: wrenches, friction by points, energy, derivatives, files."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
