@@ -15,7 +15,7 @@ from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.hand_text import GAP
 from sphshell_pin.scenario.drafting.new import new_scenario
-from sphshell_pin.scenario.drafting.part import Part
+from sphshell_pin.scenario.drafting.part import Part, word_primitive
 from sphshell_pin.scenario.format.shape_tables import Box, Cylinder
 from tests.scenario.files import run_well
 from tests.studies import mostly_studies
@@ -246,3 +246,10 @@ def test_an_allegro_hand_holds(side, surface, tmp_path):
     assert {name.rpartition("/")[2] for name in result.pairs} == {
         f"link_{k}.0_tip" for k in (3, 7, 11, 15)
     }
+
+
+@pytest.mark.parametrize("word", ["sphere", "cylinder", "box"])
+def test_a_part_of_one_word_is_five_radii_wide(word):
+    corners = word_primitive(word, 0.01).shell().vertices
+    height = 0.05 if word == "sphere" else 0.1
+    np.testing.assert_allclose(np.ptp(corners, axis=0), [0.05, 0.05, height], rtol=1e-2)
