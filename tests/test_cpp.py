@@ -3,8 +3,6 @@
 What these tests build is left in build/cpp and beside it: the next run compiles what has changed.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re
