@@ -25,7 +25,7 @@ constexpr double kOfRounding = 1.8;
 // found there.
 constexpr double kMostMoved = 3;
 // Systems write CAD files whose edges are off the faces by this share of the size.
-constexpr double kFileTolerance = 2e-5;
+constexpr double kFileTolerance = 1e-4;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
