@@ -78,7 +78,8 @@ int main(int argc, char** argv) {
   const double radius = 0.012, depth = 0.0005;
   mount.placement.translation() = data.oMf[model.getFrameId(kTip)].translation() +
                                   Vector3d(-0.013, 0.007, depth - radius - height(0.013, -0.007));
-  scene.add_contact({radius, kTip}, waves(std::atoi(argv[4])), sphshell_pin::ImpactLaw{1e4, 1.5, 50.0, 1e-4},
+  scene.add_contact({radius, kTip}, waves(std::atoi(argv[4])),
+                    sphshell_pin::ImpactLaw{1e4, 1.5, 50.0, 1e-4},
                     sphshell_pin::CoulombFriction{0.3, 0.2, 0.01, 0.1}, mount);
   sphshell_pin::SceneState by_pinocchio(scene);
   scene.use_compiled(argv[2]);
