@@ -146,7 +146,7 @@ def judge(
             continue
         found = depth.max()
         error = abs(found - deepest)
-        # Ripples of what is not exact, within its chord error, are separate where they barely touch.
+        # Ripples of what is not exact, within its chord error, are apart where they barely touch.
         beside = 0.0 if known[element].all() else rough
         tolerance = max(tolerance, beside)
         if error > tolerance:
