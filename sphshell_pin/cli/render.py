@@ -5,9 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import typer
-
-from sphshell_pin.cli.app import OfOption, RunArgument, command, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, echo, progress_bar
 from sphshell_pin.errors import InvalidParameter, SphshellError
 
 
@@ -77,4 +75,4 @@ def render(
             title=replay.title,
             told=lambda done, count: update(completed=done, total=count),
         )
-    typer.echo(drawn)
+    echo(drawn)

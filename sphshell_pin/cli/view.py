@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import typer
-
 from sphshell_pin.cli.app import (
     OfOption,
     PackageDirOption,
     SetOption,
     changes_of,
     command,
+    echo,
 )
 
 
@@ -55,5 +54,5 @@ def view(
         port=port,
         open=open_,
         color=color,  # type: ignore[arg-type]
-        told=lambda url: typer.echo(f"{url}  (Ctrl-C ends the run)"),
+        told=lambda url: echo(f"{url}  (Ctrl-C ends the run)"),
     )
