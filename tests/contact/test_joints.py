@@ -1,7 +1,5 @@
 """Where exact faces meet: of two tangent faces one has the contact, whatever the facets are."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

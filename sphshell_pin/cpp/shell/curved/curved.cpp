@@ -290,6 +290,7 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
     face_cells_ = {};
   build_cones(shell);
   bound_cells(shell);
+  if (!face_cells_.empty()) face_search_ = std::make_unique<FaceSearch>(shell, *this);
 }
 
 // Why an element is flat: its normals were set aside at a crease, or do not lean.

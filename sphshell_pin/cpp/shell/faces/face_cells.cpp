@@ -340,6 +340,7 @@ class CellMaker {
         if (const double off = off_face(f, k); off > cut_) give_up(f, out_.of[g].face, off);
       }
     }
+    std::vector<char> asked(faces_.shapes.size(), 0);
     for (std::size_t f = 0; f < out_.of.size(); ++f) {
       FaceCell& cell = out_.of[f];
       if (cell.face < 0) continue;
@@ -352,6 +353,15 @@ class CellMaker {
         }
       cell.exact = !needed || !open_[f];
       cell.closed = needed && !open_[f];
+      if (cell.closed) asked[cell.face] = 1;
+    }
+    // And then within it, too: one question for all of its facets.
+    for (std::size_t f = 0; f < out_.of.size(); ++f) {
+      FaceCell& cell = out_.of[f];
+      if (cell.face < 0 || cell.closed) continue;
+      cell.closed = asked[cell.face] && !open_[f] &&
+                    std::all_of(cell.side, cell.side + 3,
+                                [](FaceCell::Side side) { return side == FaceCell::Side::Inner; });
       for (int k = 0; k < 3 && !cell.closed; ++k) cell.side[k] = FaceCell::Side::Cubic;
     }
   }
