@@ -224,7 +224,7 @@ class TrimmedSolid:
 
         OpenCASCADE's answer is off by 1e-5 mm beside edges whose parameter curves are splines.
         """
-        nearest = np.full(len(points), BESIDE_EDGE)
+        nearest = np.full(len(points), np.inf)
         for edge in self.edges:
             if number not in edge.faces or not len(points):
                 continue
@@ -239,7 +239,8 @@ class TrimmedSolid:
             off = np.linalg.norm(away, axis=1)
             into = self.inward(edge, edge.faces.index(number), on, tangents)
             within = np.einsum("nx,nx->n", away, into)
-            for k in np.flatnonzero(off < nearest[rows]).tolist():
+            beside = off < max(BESIDE_EDGE, 10 * edge.tolerance)
+            for k in np.flatnonzero(beside & (off < nearest[rows])).tolist():
                 if off[k] < nearest[rows[k]]:
                     nearest[rows[k]] = off[k]
                     # At an end of the edge it is another one that decides.

@@ -9,9 +9,10 @@ import pytest
 pytest.importorskip("OCP")
 
 from sphshell_pin import Shell
-from sphshell_pin.shell.cad import require_kernel
+from sphshell_pin.shell.cad import require_kernel, tessellation
 from sphshell_pin.shell.curved import curved_mesh
 from tests.oracle.cad import ExactShape, curved_places, deviation
+from tests.parts.occ import faces as occ_faces
 from tests.shell import cad_shapes as shapes
 from tests.shell.cad_cases import (
     KNOWN,
@@ -127,3 +128,20 @@ def test_smooth_forces_are_or_converge_to_those_on_the_exact_surface(name, tmp_p
         return
     assert order((rms(found[0]), rms(found[1])), tuple(chords)) >= 2.9
     assert found[1].max() < 4e-4
+
+
+def test_a_face_that_gets_no_triangles_is_meshed_more_finely(monkeypatch):
+    """OpenCASCADE finds none for some faces of real files until its deflection is smaller."""
+    shape = shapes.drilled_plate()
+    found = tuple(occ_faces(shape))
+    lay, take, laid = tessellation._lay, tessellation.take_mesh, []
+    monkeypatch.setattr(tessellation, "_lay", lambda *of: (laid.append(of[1]), lay(*of)))
+    monkeypatch.setattr(
+        tessellation,
+        "take_mesh",
+        lambda face: None if face is found[0] and laid[-1] > 1e-2 else take(face),
+    )
+    made = tessellation.tessellate(shape, found, 50.0, 5e-2, 1e-3)
+    assert None not in made.meshes
+    assert laid[-1] < 1e-2
+    assert made.error <= 5e-2

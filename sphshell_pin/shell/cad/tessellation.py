@@ -8,11 +8,13 @@ from functools import cached_property
 
 import numpy as np
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
 from OCP.collections import (
     IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap,
 )
+from OCP.GProp import GProp_GProps
 from OCP.IMeshTools import IMeshTools_Parameters
 from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp
@@ -39,6 +41,9 @@ REFINED = 3.0
 MOST_TRIES, MOST_ROUNDS = 4, 6
 """Times to mesh anew, more finely; times to halve the sides inside a face."""
 
+FINER = 0.4
+"""Where a face has no triangles the next mesh is so much finer."""
+
 SEWING_TOLERANCES = (1e-6, 1e-5, 1e-4)
 """Shares of the size within which the borders of faces are joined, if that joins more of them."""
 
@@ -52,11 +57,13 @@ class Tessellation:
     meshes : one per face, None where OpenCASCADE finds no triangles
     interior, border : largest distance measured from the surfaces, and from their borders [units
         of the model]
+    missing : faces without triangles, but slivers
     """
 
     meshes: tuple[FaceMesh | None, ...]
     interior: float
     border: float
+    missing: int = 0
 
     @property
     def error(self) -> float:
@@ -162,13 +169,21 @@ def tessellate(
     best: Tessellation | None = None
     for _ in range(MOST_TRIES):
         found = _mesh(shape, faces, deflection, target)
-        if best is None or found.error < MARGIN * best.error:
-            stuck = best is not None and found.error > 0.8 * best.error
+        if best is None or found.missing < best.missing:
+            stuck, best = False, found
+        elif found.missing > best.missing:
+            stuck = False
+        elif found.error < MARGIN * best.error:
+            stuck = best.missing == 0 and found.error > 0.8 * best.error
             best = found
         else:
-            stuck = True
-        if best.error <= target or stuck or found.count > MOST_TRIANGLES // 4:
+            stuck = best.missing == 0
+        near = best.error <= target and best.missing == 0
+        if near or stuck or found.count > MOST_TRIANGLES // 4:
             break
+        if found.missing:
+            deflection *= FINER
+            continue
         deflection *= min(max(0.8 * target / found.error, 0.2), 0.7)
     if best is None or best.count == 0:
         raise InvalidShell("no face of the model can be given triangles: check it in its CAD")
@@ -194,7 +209,18 @@ def _mesh(shape: Occ, faces: tuple[Occ, ...], deflection: float, target: float) 
             border = max(border, mesh.border_error(target))
             meshes[k], error = mesh.refined(target, MOST_ROUNDS)
             interior = max(interior, error)
-    return Tessellation(tuple(meshes), interior, border)
+    return Tessellation(tuple(meshes), interior, border, _missing(faces, meshes, target))
+
+
+def _missing(faces: tuple[Occ, ...], meshes: list[FaceMesh | None], target: float) -> int:
+    """Count faces that should have triangles: OpenCASCADE finds some only for a finer mesh."""
+    count = 0
+    for face, mesh in zip(faces, meshes, strict=True):
+        if mesh is None:
+            properties = GProp_GProps()
+            BRepGProp.SurfaceProperties_s(face, properties)
+            count += abs(properties.Mass()) > target**2
+    return count
 
 
 def _meet(meshes: list[FaceMesh | None]) -> list[FaceMesh | None]:
