@@ -42,7 +42,7 @@ class Tried(Searched):
 
     runs: int = 0
     force: float = 0.0
-    """Of the last draft [N]."""
+    """Force of the last draft [N]."""
     faults: list[Fault] = field(default_factory=list)
     without: tuple[str, ...] = ()
     """Kinds of what acts in the joints that are left out."""
