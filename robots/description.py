@@ -22,7 +22,7 @@ DEEPEST = 100
 """Elements of the file one within another; robots need seven."""
 
 MOST_ATTRIBUTES = 200
-"""Of an element: the time to read them grows with their square."""
+"""Most attributes of an element: the time to read them grows with their square."""
 
 LONGEST_CHAIN = 1000
 """Links one behind another; the parser overflows the stack of 8 MB at about 3800."""

@@ -400,7 +400,7 @@ def _check_tree(root: ET.Element) -> None:
         for end in ("parent", "child"):
             elements = joint.findall(end)
             if len(elements) > 1:
-                # Of several, readers take different ones: what was checked would not be read.
+                # Readers take different ones of several: what was checked would not be read.
                 raise ValueError(
                     f"joint '{joint.get('name')}' has {len(elements)} <{end}> elements: leave one"
                 )

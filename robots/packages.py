@@ -31,7 +31,7 @@ class Folders:
     file: Path
     given: tuple[Path, ...] = ()
     kept: Mapping[str, Path] | None = None
-    """Of a description that is no file any more: its meshes by name, the only files to read."""
+    """Meshes of a description that is no file any more by name, the only files to read."""
 
     @classmethod
     def of(cls, file: Path, given: Iterable[str | PathLike[str]] = ()) -> Folders:

@@ -37,7 +37,7 @@ _OF_NUMBERS = "float_array p vcount matrix translate rotate scale color float do
 _NUMBERS = frozenset(_OF_NUMBERS.split())
 _KNOWN = _NUMBERS.union(_PLAIN.split())
 _LINKS = ("url", "source", "target")
-_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([-+.\deE]+)")
+_UNIT = re.compile(rb"<unit\b[^<>]*?\bmeter\s*=\s*[\"']\s*([-+.\deE]+)")
 _ODD, _CONTINUED = re.compile(rb"[\0\f\v]|\\\r(?!\n)"), re.compile(rb"\\\r?\n")
 _MATERIALS = re.compile(rb"mtllib([^\r\n]*)")
 _CORNER = re.compile(r"(-?\d+)(?:/-?\d*)?(?:/(-?\d+))?")

@@ -22,7 +22,7 @@ from sphshell_pin.errors import MissingExtra
 from sphshell_pin.robots.packages import Folders
 
 TIME_LIMIT = 5.0
-"""Of the processor, to expand a file [s]; large robots take one or two."""
+"""Time of the processor, to expand a file [s]; large robots take one or two."""
 
 WAIT = 60.0
 """How long the process is waited for [s], on a busy machine too."""

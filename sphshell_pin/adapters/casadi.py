@@ -233,7 +233,7 @@ class Step(_SceneFunction):
         simulation = Simulation(scene, self._integrator)
         d = simulation.step_derivatives(q, v, tau, parameters=self.parameters)
         nv = len(v)
-        # Of the displacement from q0 by the tangent space where the step ends.
+        # Derivative of the displacement from q0 by the tangent space where the step ends.
         end = pin.difference(self._model, self._q0, d.q)
         back = pin.dDifference(self._model, self._q0, d.q, pin.ArgumentPosition.ARG1)
         blocks = [d.by_state[:, :nv], d.by_state[:, nv:], d.by_tau, d.by_parameters]

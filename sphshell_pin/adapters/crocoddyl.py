@@ -179,7 +179,7 @@ class _Data:
 
     evaluator: Evaluator | StepEvaluator
     last: Evaluator
-    """Of a last node, which has no controls."""
+    """Evaluator of a last node, which has no controls."""
     last_derivatives: tuple[Array, Array]
     motion: Array
     """The acceleration, or the next state."""

@@ -29,7 +29,7 @@ class NamedNumber:
     at: int
     path: tuple[str, ...]
     shape: tuple[int, ...] | None = ()
-    """Of one value; None where a value is an object (a law), or an integer or None (a seed)."""
+    """Shape of a value; None where it is an object (a law), or an integer or None (a seed)."""
     ends: tuple[str, ...] | None = ("",)
     """What its columns in derivatives are called behind the name; None if it has none."""
 

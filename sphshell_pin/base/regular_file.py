@@ -12,10 +12,10 @@ import stat
 from os import PathLike
 
 MOST = 4e9
-"""Of a file, unless stated [bytes]."""
+"""Most of a file, unless stated [bytes]."""
 
 MOST_TEXT = 100e6
-"""Of a scenario, a robot's description or a package.xml [bytes]."""
+"""Most of a scenario, a robot's description or a package.xml [bytes]."""
 
 SMALL = 1 << 16
 """Files of the system state no size [bytes]."""

@@ -65,7 +65,7 @@ def write_parquet(file: IO[bytes], table: Table, metadata: Mapping[str, str]) ->
     for name, values in table.items():
         array = np.asarray(values)
         text = isinstance(values, list) or array.dtype == object
-        # Of an empty list the type would be unknown.
+        # The type of an empty list would be unknown.
         columns[name] = arrow.array(array.tolist(), arrow.string()) if text else values
     whole = arrow.table(columns).replace_schema_metadata(metadata)
     parquet.write_table(whole, file, compression="zstd")

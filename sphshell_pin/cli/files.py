@@ -87,7 +87,7 @@ def check(
     from sphshell_pin.shell.cad import CAD_SUFFIXES
 
     def load(file: Path, unit: str | None, unit_option: str, first: bool = True) -> Shell:
-        # Of two files, options of CAD belong to those that are CAD.
+        # Where there are two files, options of CAD belong to those that are CAD.
         cad = against is None or file.suffix.lower() in CAD_SUFFIXES
         try:
             return Shell.from_file(

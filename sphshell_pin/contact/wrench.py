@@ -19,7 +19,7 @@ from sphshell_pin.contact.friction import Friction, check_friction
 from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
 
-# Of force, moment and rate where nothing touches.
+# Force, moment and rate where nothing touches.
 _NOTHING = (0.0, np.zeros(3), np.zeros(3), np.zeros(3))
 
 
@@ -35,7 +35,7 @@ class BristleState:
         self.radius = check_not_negative("radius", radius, "m")
         self.relaxation = check_positive("relaxation", relaxation, "s")
         self.stretch_world: Array = np.zeros(3)
-        """Of the bristle (3,) [m]; zero without contact.
+        """Stretch of the bristle (3,) [m]; zero without contact.
 
         Of MindlinFriction the stretch it would have if the disc of contact had a radius of 1 m.
         """

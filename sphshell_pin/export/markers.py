@@ -15,7 +15,7 @@ from sphshell_pin.view.surface import SURFACE_COLORS, SurfaceMesh
 
 Stamp = tuple[int, int]
 
-# Of visualization_msgs/Marker.
+# Types and actions of visualization_msgs/Marker.
 ARROW, SPHERE, LINE_LIST, SPHERE_LIST, TRIANGLE_LIST = 0, 2, 5, 7, 11
 DELETEALL = 3
 _COLORS = (("r", 16), ("g", 8), ("b", 0))

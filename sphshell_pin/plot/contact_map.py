@@ -190,7 +190,7 @@ def _views(
                 starts[str(result.pairs[path.pair])] = path.points[0]
         if not paths:
             continue
-        # Of a sheet without thickness both sides are the same elements.
+        # Both sides of a sheet without thickness are the same elements.
         behind = (side * facing < BEHIND) if shell.is_closed else np.zeros(len(values), bool)
         shown = np.where(behind, 0.0, values)
         title = shell.name + where

@@ -22,7 +22,7 @@ _ARRAYS: dict[str, npt.DTypeLike] = {
     **dict.fromkeys(("elements", "source_element", "element_face"), np.int32),
     **dict.fromkeys(("normals", "face_shapes"), np.float64),
 }
-"""Of a surface, taken over as they are."""
+"""Arrays of a surface, taken over as they are."""
 
 
 class ShellBase(Summarized):

@@ -16,7 +16,7 @@ LARGE_OF_TURNS = 8.0
 round surfaces it is up to 3."""
 
 LARGE_SHARE = 0.5
-"""Of the given normals: if more than that are not used, they are not those of the surface."""
+"""Share of the given normals: if more than that are not used, they are not those of the surface."""
 
 _WRONG_NORMALS = (
     "the normals are wrong (noisy, averaged over sharp edges, or of another surface): correct them "
@@ -109,7 +109,7 @@ _POWERS = {
     **dict.fromkeys(("area", "largest_hole_area"), 2),
     "volume": 3,
 }
-"""Of the length in fields that grow with the surface."""
+"""Powers of the length in fields that grow with the surface."""
 
 
 class _Sentences(string.Formatter):

@@ -125,7 +125,7 @@ def orient(
         owner = component[element]
         places, of_place = _places(vertices, triangles, owner, group >= 0)
         pairs, share = _core.mend_overlaps(vertices, triangles, owner, places, of_place, group)
-        # Of two that share room only the larger can hold the other.
+        # Only the larger of two that share room can hold the other.
         size = np.abs(volume)[pairs]
         larger = size[:, 1] * (1.0 - SAME_VOLUME) > size[:, 0]
         depth = np.bincount(pairs[larger & (share > INSIDE), 0], minlength=number)

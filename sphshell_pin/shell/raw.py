@@ -16,7 +16,7 @@ LARGEST_COUNT = np.iinfo(np.int32).max
 
 
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus")
-"""Of faces, in the order of FaceKind in C++."""
+"""Kinds of faces, in the order of FaceKind in C++."""
 
 NO_SHAPE = (-1.0,) + (0.0,) * 8
 """The row of `face_shapes` of a face of another kind."""

@@ -17,7 +17,7 @@ from sphshell_pin.shell.shell import Shell
 from sphshell_pin.units import METERS_PER_UNIT
 
 RADIUS, DEPTH = 0.02, 0.025
-"""Of the spheres as a share of the size; how deep they are pressed, as a share of the radius."""
+"""Radius of the spheres as a share of the size; depth as a share of the radius."""
 
 SMALLER = 0.2
 """Spheres that would touch several places are made smaller by this factor, with the same depth."""

@@ -17,7 +17,7 @@ from sphshell_pin.testing.numbers import changed, is_place, names_of, scale_of
 # Central differences of order 4: places, in steps, and weights.
 _PLACES = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0))
 
-# Of a number at its bound, from its one side.
+# Differences of a number at its bound, from its one side.
 _AHEAD = ((0.0, -25.0 / 12.0), (1.0, 4.0), (2.0, -3.0), (3.0, 4.0 / 3.0), (4.0, -0.25))
 
 # What rounding leaves of a force or an acceleration, relative to the largest, and how much larger

@@ -127,7 +127,7 @@ def render_recording(
             f"gives {frames:.2g} frames, of {MOST_FRAMES} at most, at the speed {speed:g}",
         )
     rows, times = choose_rows(t, contacts, fps, speed, span)
-    # Of a part of a run, too: pictures of it have the same cameras and the same arrows.
+    # This holds for a part of a run, too: pictures of it have the same cameras and the same arrows.
     of_run = rows if span is None else choose_rows(t, contacts, fps, speed)[0]
     shown = contacts.select(np.isin(contacts.row, of_run))
     q = np.asarray(result.q, dtype=float)

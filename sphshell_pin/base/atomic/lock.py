@@ -11,7 +11,7 @@ from pathlib import Path
 
 from sphshell_pin.base.regular_file import read_text
 
-# Of file systems without locks, such as Lustre as it is often mounted.
+# Errors of file systems without locks, such as Lustre as it is often mounted.
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF}
 
 

@@ -100,7 +100,7 @@ def joint_motion(joint: pin.JointModel, q: Expression) -> JointMotion | None:
     ratio, offset = (float(rule.scaling), float(rule.offset)) if mimics else (1.0, 0.0)
     if joint.nvExtended != 1 or ratio == 0.0:
         return None
-    # Of one velocity, the axis is constant: at a place where all of q are numbers of a joint.
+    # The axis of one velocity is constant: at a place where all of q are numbers of a joint.
     data = joint.createData()
     joint.calc(data, np.full(q.shape[0], 0.5**0.5))
     axis = np.asarray(data.S).reshape(6, 1) / ratio

@@ -33,13 +33,13 @@ if TYPE_CHECKING:
 __all__ = ["CartesianImpedance"]
 
 
-# Of a path's points from their shell, as a part of its size, and of the path from the moved point,
-# as a part of the robot's reach: what is farther is probably a mistake.
+# Distances of a path's points from their shell, as a part of its size, and of the path from the
+# moved point, as a part of the robot's reach: what is farther is probably a mistake.
 OFF_PATH, OUT_OF_REACH = 0.1, 0.05
 # A step between neighboring knots, as a part of the shell's size: the nearest point has changed to
 # another side. And the part of the speed that the curvature of a spline leaves.
 JUMP, SLOW = 0.05, 0.2
-# Of the rows of a run, how many are looked at.
+# Rows of a run that are looked at.
 _MOST_ROWS = 200
 
 

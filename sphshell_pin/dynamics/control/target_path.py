@@ -18,10 +18,10 @@ __all__ = ["Curve", "Timing", "path_fields"]
 # A path on a shell has a knot each `size` / KNOTS: pieces between points leave a curved surface. A
 # spline has that many on its length, and some between two points.
 KNOTS, KNOTS_BETWEEN = 500, 8
-# Of a path on a shell, over the size of the shell: what is longer is in another unit.
+# Length of a path on a shell, over the size of the shell: what is longer is in another unit.
 LONGEST = 2000.0
-# Of a spline: where it turns by more at a knot [rad] it has a corner, not a curvature. Knots that
-# are nearer than this part of their usual distance are one.
+# A spline has corners: where it turns by more at a knot [rad] it has a corner, not a curvature.
+# Knots that are nearer than this part of their usual distance are one.
 CORNER, SAME = 0.2, 1e-6
 
 
@@ -262,7 +262,7 @@ def _speed_reached(length: float, most: float | None, jerk: float | None) -> flo
             return speed
     assert most is not None  # without limits every speed is reached
     bend = 0.0 if jerk is None else most / jerk
-    # Of v (v / most + bend) = length, without a difference of near numbers.
+    # Root of v (v / most + bend) = length, without a difference of near numbers.
     return float(2 * length / (bend + np.sqrt(bend * bend + 4 * length / most)))
 
 

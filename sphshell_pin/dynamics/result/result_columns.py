@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Columns = dict[str, ArrayLike]
 
-# Of joints with several coordinates: the units of q and of v.
+# Joints with several coordinates: the units of q and of v.
 _SEVERAL = {
     "JointModelFreeFlyer": (["m"] * 3 + ["1"] * 4, ["m/s"] * 3 + ["rad/s"] * 3),
     "JointModelPlanar": (["m", "m", "1", "1"], ["m/s", "m/s", "rad/s"]),

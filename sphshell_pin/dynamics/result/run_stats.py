@@ -35,7 +35,7 @@ class PairFigures:
     steps, on the dense output; peaks of fixed steps are the largest at the ends of steps.
     """
 
-    # Of files: what has another type is refused.
+    # What has another type in a file is refused.
     __pydantic_config__: ClassVar[Mapping[str, bool]] = {"strict": True}
 
     contact_time: float

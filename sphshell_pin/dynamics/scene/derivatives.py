@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import Scene
 
 
-# Of Parameter in C++.
+# Values of Parameter in C++.
 _FIELD, _RADIUS, _BALL, _OFFSET, _PLACEMENT = range(5)
 _PLACES = {
     ("placement",): _PLACEMENT,

@@ -32,7 +32,7 @@ DEFAULT_SPEED = 0.1
 _ANY_LAW = HuntCrossleyLaw(1.0, 1.0)
 # Steps in the shortest time scale: enough for a few percent with fixed steps.
 STEPS_PER_SCALE = 30
-# Of the bristles' relaxation time [s].
+# Longest of the bristles' relaxation time [s].
 LONGEST_RELAXATION = 2e-5
 
 
@@ -115,7 +115,7 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     gravity = float(np.linalg.norm(model.gravity.linear))
     pairs = tuple(map(_with_curvature, scene.pairs, explain_pairs(scene, q, v)))
     warnings = beyond_limits(model, q)
-    # Of the pairs that were stated together the first speaks for those with the same warning.
+    # The first of the pairs stated together speaks for those with the same warning.
     seen: dict[tuple[str, str], list[str]] = {}
     for pair, figures in zip(scene.pairs, pairs, strict=True):
         for warning in _warnings_of(scene, pair, figures):

@@ -36,9 +36,9 @@ _NO_LIMIT = 1e300
 # How far a stop gives way at the joint's highest speed, and a spring of dry friction before it
 # slides: [rad], or of a prismatic joint [m].
 _STOP_DEPTH, _STICK_DEPTH = (0.01, 0.001), (1e-3, 1e-4)
-# Of the default stop: the share of the speed that is left after an impact at the highest speed.
+# The default stop: the share of the speed that is left after an impact at the highest speed.
 _RESTITUTION = 0.5
-# Of a joint whose file states none [rad/s], [m/s].
+# Speed of a joint whose file states none [rad/s], [m/s].
 _SPEED = (1.0, 0.1)
 # Damping of the springs of dry friction, as a share of the critical one.
 _STICK_DAMPING = 0.7

@@ -78,7 +78,7 @@ class SceneParts(Summarized):
         self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
         # What a locked joint holds, its frames do not say any more.
         self._whole = (pin.Model(model), q) if self.lock else (self._model, q)
-        # Of joints that are held nothing is left to model.
+        # Nothing is left to model of joints that are held.
         held = () if joints is None else tuple(n for n in model.names if n not in self._model.names)
         self._joints = check_joints(joints, self._model, held)
         self._model = self._joints.with_armature(self._model)

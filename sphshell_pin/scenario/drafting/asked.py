@@ -49,13 +49,13 @@ class Asked:
     path: Array | str | None
     """Points on the part (k, 3) [m], or one of SHAPES."""
     length: float | None
-    """Of a path of SHAPES [m]."""
+    """Length of a path of SHAPES [m]."""
     tips: Literal["one", "all"]
     base: Literal["fixed", "floating"] | None
     package_dirs: Sequence[str | PathLike[str]]
     xacro_args: Mapping[str, str] | None
     density: float | None
-    """Of the links whose mass the robot's file does not state [kg/m^3]."""
+    """Density of the links whose mass the robot's file does not state [kg/m^3]."""
     mimic: bool
     out: str | PathLike[str] | None
     force: bool

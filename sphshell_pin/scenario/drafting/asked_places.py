@@ -70,7 +70,7 @@ def _on_face(shell: Shell, text: str, radius: float, gap: float) -> list[TouchPo
     areas, middles = 0.5 * np.linalg.norm(cross, axis=1), corners.mean(axis=1)
     carriers = np.asarray(shell.triangle_element)
     masks = [np.isin(carriers, face.elements) for face in faces]
-    # Of faces alike the upper one.
+    # The upper one of faces alike.
     ranks = [(float(f"{-areas[on].sum():.3g}"), -float(middles[on, 2].max())) for on in masks]
     for k in sorted(range(len(faces)), key=ranks.__getitem__)[:_MOST_FACES]:
         on = masks[k]

@@ -96,7 +96,7 @@ def draft_text(
     for key, limits in _parameters(plan, pairs).items():
         text += f"[[knob]]\nkey = {toml(key)}\n"
         text += "".join(f"{bound} = {toml(value)}\n" for bound, value in limits.items()) + "\n"
-    # Of several feet a rough surface may leave one in the air.
+    # A rough surface may leave one of several feet in the air.
     return text + _fill("expect", pair=pairs[0], mean_force=mean_force)
 
 

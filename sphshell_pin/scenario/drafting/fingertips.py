@@ -16,8 +16,8 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, gripper_joints
 
-# Of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's place, as
-# meshes of fingertips stand out of the spheres that stand for them.
+# Points of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's
+# place, as meshes of fingertips stand out of the spheres that stand for them.
 AT_TIP = 1.5
 _ASKED = "as it was asked for"
 # Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at

@@ -8,7 +8,7 @@ from sphshell_pin.base.arrays import Array
 
 # Sides of the pyramid that stands for a friction cone, inscribed in it.
 _SIDES = 8
-# Of all normal forces, the least share of each contact, of an even one.
+# Least share of each contact in all normal forces, relative to an even one.
 _LEAST = 0.15
 # Bisections of the coefficient of friction, and a residual that is none, as a part of all forces.
 _HALVINGS, _BALANCED = 9, 1e-7

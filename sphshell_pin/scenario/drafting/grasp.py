@@ -18,15 +18,16 @@ from sphshell_pin.shell.shell import Shell
 
 # Hands that are tried: random postures, and how many of them, the best, get a part.
 _POSTURES, _BEST = 8000, 60
-# Of a posture: the tips stand in front of the thumb within this part of their distance to it.
+# Unevenness of a posture: the tips stand in front of the thumb within this part of their distance
+# to it.
 _UNEVEN = 0.35
-# Of a finger's last link, the least part of it that points to the part between the tips.
+# Least part of a finger's last link that points to the part between the tips.
 _INWARD = 0.1
 # How much fingers differ from each other, as a part of the joints' ranges.
 _ALIKE = 0.1
 # Part of a joint's range that is left free at its ends.
 _MARGIN = 0.05
-# Of the inverse kinematics: steps, damping [m^2], longest step [rad], gap's tolerance [m].
+# Inverse kinematics: steps, damping [m^2], longest step [rad], gap's tolerance [m].
 _STEPS, _DAMPING, _LONGEST, _CLOSE = 30, 1e-6, 0.15, 1e-7
 # How much the part may be wider or narrower than the open hand, as a part of it, how many places
 # with a part are looked at, and how many grasps are enough.
@@ -35,7 +36,7 @@ _WIDER, _MOST_PLACES, _ENOUGH = 0.5, 600, 30
 _OFFSETS = (0.0, 0.2, 0.4)
 # Places of one posture that are looked at before it is another one's turn.
 _TURN = 6
-# Of the friction that there is, how much a grasp may use.
+# Share of the friction that a grasp may use.
 _USED = 0.6
 
 
@@ -46,7 +47,7 @@ class Grasp:
     q: Array
     """Configuration of the hand (nq,): all gaps are as asked."""
     placement: pin.SE3
-    """Of the part."""
+    """Placement of the part."""
     points: Array
     """On the part (k, 3) [m], nearest to the tips."""
     normals: Array

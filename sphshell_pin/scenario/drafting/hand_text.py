@@ -29,10 +29,10 @@ from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.schema import ShellSection
 
 GAP = 1e-4
-"""Of each fingertip at the start [m]."""
+"""Gap of each fingertip at the start [m]."""
 
 DURATION, HELD = 1.5, 0.05
-"""Of the run [s], and how well the largest force is held in it."""
+"""Duration of the run [s], and how well the largest force is held in it."""
 
 _TEMPLATE = Path(__file__).with_name("hand.template").read_text("utf-8")
 # How far the joints' springs are drawn by the largest torque [rad].
@@ -62,7 +62,7 @@ class HandDraft:
 
     @property
     def contact(self) -> Contact:
-        """Of its tips with the part."""
+        """Contact of its tips with the part."""
         radius, share = float(self.hand.radii.min()), self.part.mass / len(self.hand.tips)
         return sticking(self.materials, radius, 0.1, self.press, share)
 

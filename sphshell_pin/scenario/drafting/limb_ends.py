@@ -21,7 +21,7 @@ from sphshell_pin.shell.shell import Shell
 _STANDS_OUT, _BALL, _OF_REACH = 0.25, 1 / 3, 0.01
 # Steps of the search for the ball that covers an end, and of that for the smallest ball.
 _DEPTHS, _STEPS = 40, 300
-# Of what is at the axis of a joint: its distance from it, as a part of the link's size.
+# Distance of what is at the axis of a joint from it, as a part of the link's size.
 _AT_AXIS = 0.2
 
 

@@ -52,7 +52,7 @@ class NewScenario:
     text: str
     built: Built
     explanation: Explanation
-    """Of the start, see Scene.explain."""
+    """Explanation of the start, see Scene.explain."""
     why: tuple[str, ...]
     """One sentence for each choice that was made for the user."""
 

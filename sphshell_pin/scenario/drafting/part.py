@@ -25,7 +25,7 @@ class Part:
 
     mass: float
     center: Array
-    """Of its mass (3,) [m], in the frame of the surface."""
+    """Center of its mass (3,) [m], in the frame of the surface."""
     inertia: Array
     """About that (3, 3) [kg m^2]."""
 

@@ -44,7 +44,7 @@ class Way:
 
     @property
     def length(self) -> float:
-        """Of the way [m]."""
+        """Length of the path [m]."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 

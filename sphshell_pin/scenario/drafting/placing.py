@@ -35,13 +35,13 @@ class Place:
     stance: Stance
     touch: TouchPoint
     placement: pin.SE3
-    """Of the part in the world."""
+    """Placement of the part in the world."""
     on_face: bool
     """Whether the sphere touches one face there, and once."""
     raised: float
     """How far the part's underside is above the floor [m]."""
     side: Array
-    """Of the part (3,), which is turned to the tip."""
+    """Side of the part (3,), which is turned to the tip."""
 
     def with_gap(self, gap: float) -> Place:
         """Return the place with the sphere at the `gap` [m] to the part, which stays if it can."""

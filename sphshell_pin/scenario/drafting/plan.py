@@ -35,7 +35,7 @@ from sphshell_pin.shell import Shell
 
 UP = np.array([0.0, 0.0, 1.0])
 
-# Of a tip at the start, as a part of its radius; of a body that falls, and of feet.
+# Gap of a tip at the start, as a part of its radius; of a body that falls, and of feet.
 TIP_GAP, FALL_GAP, FOOT_GAP = 0.02, 2.0, 0.1
 # How far from the middle a body falls, as a part of the surface's box.
 FALL_BESIDE = 0.1
@@ -43,11 +43,11 @@ FALL_BESIDE = 0.1
 TIP_TURN = 0.02
 # Largest normal force by default [N], and in weights of the tip's effective mass.
 MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
-# Of the path across a surface: radii a second.
+# Speed of the path across a surface: radii a second.
 PATH_RATE = 3.0
 LEAD_IN = 0.5
 FORCE_RISE = 0.25
-# Of the target's speed and acceleration, each [s].
+# Ramps of the target's speed and acceleration, each [s].
 RAMP = 0.25
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
 # radii.
@@ -129,13 +129,13 @@ class Plan:
     duration: float
     gap: float
     placement: pin.SE3
-    """Of the shell in the world."""
+    """Placement of the shell in the world."""
     root: Array | None
     """Where the free root starts: x y z and quaternion x y z w."""
     why: tuple[str, ...] = ()
     """One sentence for each choice that was made for the user."""
     left_out: tuple[str, ...] = ()
-    """Of what the robot's file states of its joints."""
+    """Left out of what the robot's file states of its joints."""
     repair: str = ""
     """What was changed of a draft that failed; "" of the first draft."""
 

@@ -47,11 +47,11 @@ _MOST_RUNS, _MOST_SLIDES, _MOST_DROPS = 10, 6, 3
 _MOST_STILL = 12
 # Places at which efforts do not carry the robot, before they are taken for wrong.
 _MOST_WEAK = 4
-# Of the part above the floor, in turn, as parts of the robot's reach.
+# Heights of the part above the floor, in turn, as parts of the robot's reach.
 _LIFTS = (0.0, 0.1, 0.25)
 # Between links and part at the start, along the approach, in radii of the sphere.
 _ROOM = 0.1
-# Of a draft that fails while the tip slides or after a hard touch: time to settle [s].
+# Time to settle of a draft that failed while the tip slid or after a hard touch [s].
 _CALM_LEAD_IN = 1.5
 # A run that is cut before links reach the part ends this part of its time earlier, and is no
 # shorter than this [s].

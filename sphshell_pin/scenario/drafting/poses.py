@@ -24,11 +24,11 @@ _SEEDS, _APART, _MOST = 32, 0.3, 4
 _BESIDE = 0.3
 NO_LIMIT = 1e9
 """Efforts [N m] and forces [N] beyond this stand for none."""
-# Of a joint at ease to its nearer limit, as a part of its range.
+# Distance of a joint at ease from its nearer limit, as a part of its range.
 _AT_EASE = 0.2
-# Of a height that is asked for, as a part of the reach; of a path that is followed, as a part of
-# its step, and the tip's turn on it [rad]; the turn of a joint [rad] that would move the tip by its
-# reach, beyond which a posture is near a singular one.
+# Tolerances: of a height that is asked for, as a part of the reach; of a path that is followed, as
+# a part of its step, and the tip's turn on it [rad]; the turn of a joint [rad] that would move the
+# tip by its reach, beyond which a posture is near a singular one.
 _HEIGHT, _ASTRAY, _TURNED, _FASTEST = 1e-4, 0.1, 0.02, 6.0
 
 
@@ -39,13 +39,13 @@ class Stance:
     reach_of: Reach
     """Which moves the joints that move the tip."""
     radius: float
-    """Of the tip's sphere [m]."""
+    """Radius of the tip's sphere [m]."""
     q: Array
     """Configuration of the whole robot (nq,)."""
     lock: tuple[str, ...]
     """Joints that do not move the tip."""
     center: Array
-    """Of the tip's sphere (3,) [m]."""
+    """Center of the tip's sphere (3,) [m]."""
     approach: Array
     """Unit (3,): where the tip presses."""
     slide: Array | None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # A path on a surface ends before a turn this sharp from one of its points to the next.
 _SHARPEST = np.cos(np.deg2rad(35.0))
-# Of a contact's normal with the surface's, where a face is touched and not an edge.
+# Cosine of a contact's normal with the surface's, where a face is touched and not an edge.
 _ALIGNED = 0.98
 # A sheet's mean normal, as a part of that of a plane.
 _SHEET = 0.3
@@ -38,7 +38,7 @@ class TouchPoint:
     normal: Array
     """Unit (3,), from the surface to the sphere."""
     center: Array
-    """Of the sphere (3,) [m], whose gap to the surface is the one asked for."""
+    """Center of the sphere (3,) [m], whose gap to the surface is the one asked for."""
 
 
 def find_touch_point(

@@ -27,7 +27,7 @@ _MOST_ROWS = 300
 _SETTLED, _SHAKEN = 0.6, 0.1
 # How far the tip may stay behind its path, in radii: its spring gives way by a fifth of one.
 _BEHIND = 0.6
-# Of the end of a run in which a robot stands still [s].
+# Time at the end of a run in which a robot stands still [s].
 _LAST = 0.3
 
 

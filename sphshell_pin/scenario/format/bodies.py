@@ -32,7 +32,7 @@ from sphshell_pin.scenario.format.schema import (
     TipAt,
 )
 
-# Of a tip that is brought somewhere: starts of the search, and how near it comes [m], [rad].
+# A tip that is brought somewhere: starts of the search, and how near it comes [m], [rad].
 _SEEDS, _AT_TIP, _ALONG = 40, 1e-6, 1e-4
 
 

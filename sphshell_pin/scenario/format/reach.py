@@ -14,7 +14,7 @@ from sphshell_pin.dynamics.scene.models import find_frame
 # Steps of a solution, the largest turn of a joint in one of them [rad], its least damping, and the
 # residual at which it is found.
 _STEPS, _LARGEST, _DAMPING, _FOUND = 80, 0.25, 1e-5, 1e-7
-# Of a joint to a limit that it has passed, as a part of its range.
+# Distance of a joint from a limit that it has passed, as a part of its range.
 _MARGIN = 0.02
 
 
@@ -60,7 +60,7 @@ class Reach:
         local = pin.computeFrameJacobian(
             self.model, self.data, q, self.frame, pin.LOCAL_WORLD_ALIGNED
         )
-        # Of one velocity Pinocchio returns (6,).
+        # Pinocchio returns (6,) for one velocity.
         found: Array = np.reshape(local, (6, self.model.nv))[:, self.columns].copy()
         arm = self.center(q) - self.data.oMf[self.frame].translation
         found[:3] -= pin.skew(arm) @ found[3:]

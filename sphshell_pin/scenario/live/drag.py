@@ -60,12 +60,12 @@ class Drag:
 
     @property
     def stiffness(self) -> float:
-        """Of the spring [N/m]."""
+        """Stiffness of the spring [N/m]."""
         return self.mass * self.rate**2
 
     @property
     def damping(self) -> float:
-        """Of the damper [N s/m]."""
+        """Damping of the damper [N s/m]."""
         return 2.0 * self.mass * self.rate
 
     @classmethod

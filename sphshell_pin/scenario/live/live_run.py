@@ -80,7 +80,7 @@ class LiveRun:
 
     @property
     def visual_model(self) -> pin.GeometryModel:
-        """Of the scene's model."""
+        """Visual geometry of the scene's model."""
         return self.built.visual_model
 
     @property

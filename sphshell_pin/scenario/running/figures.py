@@ -26,7 +26,7 @@ PAIR_FIGURES = {
     "max_depth_time": "s",
 }
 PAIR_UNITS = {"impulse": "N s", "peak_force_time": "s"} | PAIR_FIGURES
-"""Of all figures of a pair in `RunStats`."""
+"""Units of all figures of a pair in `RunStats`."""
 JOINT_FIGURES = {
     "stop_time": "s",
     "stops": "",
@@ -39,7 +39,7 @@ JOINT_FIGURES = {
 _SLIDING = {"N m s": "N s", "N m": "N", "rad": "m", "rad/s": "m/s"}
 """Units of a joint that slides, by those of one that turns."""
 SENSOR_FIGURES = ("min", "max", "mean", "last")
-"""Of each value of a sensor's readings, in the unit of its column."""
+"""Figures of each value of a sensor's readings, in the unit of its column."""
 RUN_FIGURES = {
     "energy.exchanged": "J",
     "energy.residual": "J",
@@ -49,7 +49,7 @@ RUN_FIGURES = {
     "stats.duration": "s",
 }
 MORE_STATS = {"stats.rejected": "", "stats.evaluations": "", "stats.dt": "s"}
-"""Of the integrator, for sweeps and comparisons."""
+"""Figures of the integrator, for sweeps and comparisons."""
 NOT_REPEATABLE = ("stats.real_time_factor",)
 """Figures that are no property of the motion: they differ from one time to the next."""
 

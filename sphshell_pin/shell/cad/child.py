@@ -27,7 +27,7 @@ IDLE = 90.0
 """A child without a job ends after this time [s]."""
 
 MOST_WRITTEN = 1 << 20
-"""Of its standard error, which is a file [bytes]."""
+"""Most of its standard error, which is a file [bytes]."""
 
 GRACE = 10.0
 """How much longer than the time limit a child may live that its parent has not ended [s]."""
@@ -131,7 +131,7 @@ def _of_memory(error: BaseException | None) -> bool:
     while error is not None:
         if isinstance(error, MemoryError) or type(error).__name__ == "Standard_OutOfMemory":
             return True
-        # Of a library that is loaded within the limit, in the words of the loader.
+        # Fault of a library that is loaded within the limit, in the words of the loader.
         if isinstance(error, ImportError) and re.search(
             "failed to map|allocate memory", str(error)
         ):

@@ -12,10 +12,10 @@ from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.raw import KINDS, NO_SHAPE
 
 MOST_STEPS = 8
-"""Of Newton's method to a closest point; it starts next to it."""
+"""Most steps of Newton's method to a closest point; it starts next to it."""
 
 MOST_STATIONARY_STEPS = 40
-"""Of Newton's method toward a stationary point of the distance."""
+"""Most steps of Newton's method toward a stationary point of the distance."""
 
 SINGULAR = 1e-10
 """Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
@@ -48,7 +48,7 @@ class FaceSurface:
         radius = second = 0.0
         if kind == "cone":
             radius, second = shape.RefRadius(), shape.SemiAngle()
-            # Of its two halves that which the face is on has a positive radius.
+            # The one of its two halves that the face is on has a positive radius.
             middle = 0.5 * (self.low[1] + self.high[1])
             if radius + middle * np.sin(second) < 0.0:
                 radius, second = -radius, -second

@@ -24,7 +24,7 @@ from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.readers.text import read_bytes
 
 MOST_BYTES = 500_000_000
-"""Of all surfaces together; those used longest ago go."""
+"""Size of all surfaces together; those used longest ago go."""
 
 _ALWAYS = ("vertices", "elements", "triangles", "triangle_element", "source_element")
 _DIGEST = hashlib.blake2b().digest_size

@@ -27,10 +27,10 @@ from sphshell_pin.shell.cad.messages import ALIVE, WRITE, unpack
 from sphshell_pin.shell.cad.options import CadOptions
 
 TIME_LIMIT = 600.0
-"""Of a CAD file, unless stated [s]: several times what the finest tessellations take."""
+"""Time for a CAD file, unless stated [s]: several times what the finest tessellations take."""
 
 MEMORY_LIMIT = 8e9
-"""Of a CAD file, unless stated [bytes]."""
+"""Memory for a CAD file, unless stated [bytes]."""
 
 KEPT = 60.0
 """How long a child is kept for the next file [s]; it ends by itself some seconds later."""
@@ -42,13 +42,13 @@ LONGEST = 1e6
 """Larger time limits are replaced by this one, which the system's timers can hold [s]."""
 
 LARGEST = 1 << 32
-"""Of an answer [bytes]; two million triangles take a tenth."""
+"""Size of an answer [bytes]; two million triangles take a tenth."""
 
 CHILD = "sphshell_pin.shell.cad.child"
 """The module whose `serve` runs in the process."""
 
 MOST_JOBS = 50
-"""Of one child: OpenCASCADE does not give all memory back."""
+"""Jobs of one child: OpenCASCADE does not give all memory back."""
 
 _ADVICE = (
     "the file is damaged, or triggers a defect of OpenCASCADE: check it in its CAD program, or "

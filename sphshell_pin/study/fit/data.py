@@ -26,7 +26,7 @@ Source = str | PathLike[str] | Mapping[str, ArrayLike]
 TIME, SIGMA = "t", ".sigma"
 # A time may be so much beyond the end of a run, as a part of it, for having been rounded.
 _ROUNDED = 1e-6
-_HEADER = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]\s*)?", re.DOTALL)
+_UNIT = re.compile(r"\[([^\[\]]*)\]$")
 _EXAMPLE = "t [s],pairs.tip.normal_force [N]"
 
 
@@ -90,12 +90,12 @@ class _Table:
         """Return the table of headers and columns; DataError where two have one name."""
         table = cls(source, {}, lines)
         for header, values in columns:
-            found = _HEADER.fullmatch(header)
-            assert found is not None
-            name = found[1].strip()
+            found = _UNIT.search(header.strip())
+            unit = None if found is None else found[1]
+            name = (header.strip() if found is None else header.strip()[: found.start()]).strip()
             if name in table.columns:
                 raise table.fault(f"two columns are called '{name}'")
-            table.columns[name] = header, found[2], values
+            table.columns[name] = header, unit, values
         return table
 
     def values(self, name: str, unit: str) -> Array:

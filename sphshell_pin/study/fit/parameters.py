@@ -134,7 +134,7 @@ def _free(key: str, span: Range | None, scenario: Scenario, path: Path) -> Free:
         shown = None if isinstance(value, dict | list) else value
         raise ScenarioError(path, key, "is not a number, so it cannot be fitted", shown)
     if isinstance(value, int):
-        # Of a family's number that may be a list, a whole one stays as the file has it.
+        # A whole number of a family, which may be a list, stays as the file has it.
         try:
             change_scenario(scenario, {found.key: repr(value + 0.5)}, path)
         except ScenarioError as fault:

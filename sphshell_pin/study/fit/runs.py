@@ -26,7 +26,7 @@ from sphshell_pin.study.fit.data import Measured
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.quantities import row_step
 
-# Of integrators with a fixed step: differences see rounding and the kinks at touches.
+# Tolerance for integrators with a fixed step: differences see rounding and the kinks at touches.
 _FIXED_STEP_TOLERANCE = 1e-9
 _LEAST_TOLERANCE = 1e-12
 

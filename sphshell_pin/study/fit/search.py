@@ -21,7 +21,7 @@ Progress = Callable[[int, float], object]
 # Weights that are estimated change the values, which change the weights.
 _MOST_ROUNDS = 6
 _SAME_SIGMA = 0.02
-# Of a slope: an error that no longer matters, and how often its step is halved to come to it.
+# Derivatives: an error that no longer matters, and how often its step is halved to come to it.
 _SMALL_ERROR, _MOST_HALVINGS = 0.01, 8
 # Parts of the experiments' time that are fitted one after the other where all at once fail.
 _STAGES = (0.125, 0.25, 0.5)
@@ -276,7 +276,7 @@ class Search:
             derivatives.append(near)
             least = rounding / step
             errors.append(np.maximum(np.abs(error), least))
-            # Of each column: one of large values would hide what another feels.
+            # Lengths of each column: one of large values would hide what another feels.
             lengths = [np.linalg.norm([near[one.at], least[one.at]], axis=1) for one in self.parts]
             still.append(all(length <= 2.0 * noise for length, noise in lengths))
         return np.column_stack(derivatives), np.column_stack(errors), np.array(still)

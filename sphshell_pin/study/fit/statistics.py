@@ -9,13 +9,13 @@ import numpy as np
 
 from sphshell_pin.base.arrays import Array
 
-# Of a residual that is noise, a test says in so many cases that it is not.
+# Share of cases in which a test says of noise that it is none.
 FALSE_ALARM = 0.01
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Of p parameters x: `covariance` (p, p), infinite on the diagonal of undetermined ones.
+    """Spread of p parameters x: `covariance` (p, p), infinite on the diagonal of undetermined ones.
 
     `blind` (k, p) are changes of x, of length 1, along which the data say nothing.
     """

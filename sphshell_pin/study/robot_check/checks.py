@@ -33,7 +33,8 @@ from sphshell_pin.testing.found import contacts_of_scene, passage
 # Speed of the sphere in radii per second, and depth in radii where it touches.
 SPEED, _DEPTH = 25.0, 0.1
 _RTOL = 1e-9
-# Of a run [s]: to come, to touch (three times depth / speed, as the law is made) and to leave.
+# Duration of a run [s]: to come, to touch (three times depth / speed, as the law is made) and to
+# leave.
 _DURATION = 1.2 * (0.05 + 3.0 * 0.2) / SPEED
 
 _IMPACTS = 8

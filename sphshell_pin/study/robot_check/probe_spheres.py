@@ -16,8 +16,8 @@ from sphshell_pin.study.robot_check.models import Subject
 from sphshell_pin.study.robot_check.postures import random_posture
 from sphshell_pin.testing.forces import point_jacobian
 
-# Of spheres whose size nobody knows [m]: least and largest. Smaller ones in a URDF's collision
-# geometry than _DUMMY [m] only keep a place.
+# Radii of spheres whose size nobody knows [m]: least and largest. Smaller ones in a URDF's
+# collision geometry than _DUMMY [m] only keep a place.
 _RADII, _DUMMY = (0.005, 0.05), 0.002
 # A sphere on a lever shorter than that, in radii, only rolls: no fingertip.
 _FEWEST = 4.0

@@ -28,7 +28,7 @@ from sphshell_pin.testing.forces import point_jacobian
 
 PLATE, BASE = "sphshell_check_plate", "sphshell_check_base"
 
-# Of the patch, in radii of the sphere: half its side, height and length of its waves.
+# The patch, in radii of the sphere: half its side, height and length of its waves.
 _HALF, _HEIGHT, _WAVE = 12.0, 0.3, 12.0
 _CELLS = 20
 # Deepest indentation the law is made for, in radii.
@@ -59,7 +59,7 @@ class Touch:
     q: Array
     v: Array
     speed: float
-    """Of the sphere's center against the patch [m/s]."""
+    """Speed of the sphere's center against the patch [m/s]."""
     mass: float
     """That the contact feels along its normal [kg]."""
 

@@ -50,7 +50,7 @@ class Plan:
     """The values of each run, in the order of `axes`."""
     runs: list[Run]
     digests: list[str]
-    """Of each run's settings."""
+    """Digests of each run's settings."""
     figures: tuple[str, ...]
     """Columns that a finished run fills."""
     job: Job
@@ -59,7 +59,7 @@ class Plan:
     design: Design | None = None
     """What the runs of a sample are for."""
     units: Mapping[str, str] = field(default_factory=dict)
-    """Of keys and figures, those that are known."""
+    """Units of keys and figures, those that are known."""
 
     @property
     def varied(self) -> pd.DataFrame:

@@ -164,7 +164,8 @@ def _write_hdf5(
     kinds = []
     for values in columns.values():
         if values.dtype == object:
-            # Of fixed length: texts elsewhere in the file would leave gaps of unknown bytes.
+            # Texts have a fixed length: texts elsewhere in the file would leave gaps of unknown
+            # bytes.
             encoded.append(np.array([one.encode() for one in values], dtype=np.bytes_))
             kinds.append(h5py.string_dtype("utf-8", max(encoded[-1].dtype.itemsize, 1)))
         else:

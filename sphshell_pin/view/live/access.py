@@ -55,7 +55,7 @@ class Access:
     def __init__(self, host: str, address: str, framed: str | None = None) -> None:
         self.token = process_token()
         self.frame_token = secrets.token_urlsafe(24)
-        """Of an address that another page, such as a notebook, may show in a frame."""
+        """Token of an address that another page, such as a notebook, may show in a frame."""
         self.is_open = not ipaddress.ip_address(address.partition("%")[0]).is_loopback
         self._names = {"localhost", host.lower(), socket.gethostname().lower()} - {""}
         # The picture that the page itself has in a frame.

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from sphshell_pin.view.live.player import Player
 
 G = 9.81
-# Of the width of the picture: how far a free body hangs below the cursor, of the spring unless the
-# user chooses another one.
+# Share of the width of the picture: how far a free body hangs below the cursor, of the spring
+# unless the user chooses another one.
 SAG = 0.05
 NOT_HERE = "this run cannot be dragged or aimed: it is a finished one, or its player cannot"
 

@@ -29,7 +29,7 @@ class Player(Protocol):
 
     @property
     def visual_model(self) -> pin.GeometryModel | None:
-        """Of scene.model, or None for a skeleton."""
+        """Visual geometry of scene.model, or None for a skeleton."""
 
     @property
     def scene(self) -> Scene:

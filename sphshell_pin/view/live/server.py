@@ -72,7 +72,7 @@ class Server:
         self._woken = False
         self._stopping = False
         try:
-            # Of a name with several addresses, one port has to do for all.
+            # One port has to do for all addresses of a name.
             sockets = tornado.netutil.bind_sockets(port, host, reuse_port=False)[:1]
         except socket.gaierror as fault:
             raise SphshellError(
