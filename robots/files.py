@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes
+from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import ShellFileError, SphshellError
@@ -294,7 +295,7 @@ def _with_meshes(
             if found is not None and not reason:
                 mesh.set("filename", str(found.absolute()))
                 if meters and found.suffix.lower() == ".dae":
-                    scale = [float(x) for x in mesh.get("scale", "1 1 1").split()]
+                    scale = [number_of(x) for x in mesh.get("scale", "1 1 1").split()]
                     mesh.set("scale", " ".join(str(x * collada_unit(found)) for x in scale))
             elif visual or found is None:
                 missing[uri] = None
@@ -355,7 +356,8 @@ def _mimics(root: ET.Element) -> Iterable[Mimic]:
         name, of = joint.get("name", ""), rule.get("joint", "")
         try:
             ratio, offset = (
-                float(rule.get(key) or usual) for key, usual in (("multiplier", 1), ("offset", 0))
+                number_of(rule.get(key) or usual)
+                for key, usual in (("multiplier", "1"), ("offset", "0"))
             )
         except ValueError:
             raise ValueError(f"joint '{name}' mimics '{of}' by what is no number") from None

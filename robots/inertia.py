@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_positive
+from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.robots.description import Description
@@ -96,7 +97,7 @@ def _mass(link: ET.Element) -> float:
     """Return the mass that a link of a URDF states [kg], 0 where it states none."""
     mass = link.find("inertial/mass")
     try:
-        return max(float(mass.get("value", "0")), 0.0) if mass is not None else 0.0
+        return max(number_of(mass.get("value", "0")), 0.0) if mass is not None else 0.0
     except ValueError:
         return 1.0  # left to the parser, which refuses it
 

@@ -1,7 +1,5 @@
 """A law from a table: monotone, of one slope at its rows, energy the integral of force."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np
@@ -143,7 +141,8 @@ def test_a_scenario_names_a_file_beside_it(tmp_path) -> None:
         ("0,0\n1e-3,2\n2e-3,1\n", r"force\[2\] = 1.0 must be more than the row before, 2.0"),
         ("1e-3,0\n2e-3,1\n", r"depth\[0\] = 0.001 must be 0"),
         ("0,1\n2e-3,2\n", r"force\[0\] = 1.0 must be 0"),
-        ("0,0\n1e-3,nan\n", "must be finite"),
+        ("0,0\n1e-3,nan\n", "must hold two numbers in line 2"),
+        ("0,0\n1e-3,1_0\n", "must hold two numbers in line 2"),
         ("depth,force\n0,0\n1e-3,1,2\n", "two numbers in line 3"),
         ("0,0\nx,1\n", "two numbers in line 2"),
         (None, "cannot be read"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 
@@ -83,6 +84,13 @@ def test_the_search_ends_at_the_workspace(tmp_path: Path) -> None:
     folders = Folders.of(file)
     assert folders.package("arm_resources") is None
     assert str(tmp_path / "one" / "src") in folders.searched()
+
+
+def test_a_uri_of_a_file_is_that_file_wherever_it_is(tmp_path: Path) -> None:
+    file, mesh = workspace(tmp_path / "one", "src/arm_resources"), tmp_path / "far off" / "a b.stl"
+    mesh.parent.mkdir()
+    mesh.touch()
+    assert Folders.of(file).find(f"file://{quote(str(mesh))}") == mesh
 
 
 def test_a_workspace_lists_its_robots(tmp_path: Path) -> None:

@@ -110,13 +110,6 @@ def test_locking_keeps_the_other_joints_values(tmp_path):
     assert max(g.parentJoint for g in visual.geometryObjects) == reduced.njoints - 1
 
 
-def test_one_robot_keeps_its_names_and_a_continuous_joint_takes_an_angle(tmp_path):
-    text = 'title = "x"\nrobot.name = "turntable"\nrobot.start = { axle = 0.7 }\nrun.duration = 1\n'
-    assembly = assembled(tmp_path, text)
-    assert list(assembly.model.names) == ["universe", "axle"]
-    np.testing.assert_allclose(assembly.q0, [np.cos(0.7), np.sin(0.7)])
-
-
 FAULTS = {
     "unknown joint": (
         "knuckle = 0.3",

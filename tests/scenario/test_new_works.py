@@ -14,7 +14,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, shipped_scenarios
-from sphshell_pin.scenario.drafting.clearance import Links
+from sphshell_pin.scenario.drafting.clearance import Links, _fixed_to
 from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
@@ -287,3 +287,21 @@ def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
     frame, *offset, radius = command.groups()
     offset = [float(one) for one in offset]
     new_scenario(PROBE, frame=frame, offset=offset, radius=float(radius), out=tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("joint", "held", "fixed"),
+    [
+        (1, {2, 3}, {1, 2, 3}),
+        (3, {2, 3}, {1, 2, 3}),
+        (3, {3}, {2, 3}),
+        (2, {4}, {2}),
+        (3, {4}, {3, 4}),
+    ],
+)
+def test_links_beyond_locked_joints_are_fixed_to_one_another(joint, held, fixed):
+    """Of a chain of four joints."""
+    model = pin.Model()
+    for k in range(4):
+        model.addJoint(k, pin.JointModelRX(), pin.SE3.Identity(), f"joint{k}")
+    assert _fixed_to(model, joint, held) == fixed
