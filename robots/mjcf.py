@@ -21,13 +21,14 @@ from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import import_extra
 from sphshell_pin.robots.description import MOST_LINKS, Description, check_memory
+from sphshell_pin.robots.mjcf_attach import attach
 from sphshell_pin.robots.mjcf_compile import LEFT_OUT, Compiled, silent
 from sphshell_pin.robots.mjcf_couplings import couplings
 from sphshell_pin.robots.mjcf_includes import include
 from sphshell_pin.robots.packages import Folders
 
 # What makes bodies of its own, without end, or runs a plugin.
-_UNKNOWN = ("composite", "flexcomp", "replicate", "attach", "deformable", "flex", "plugin")
+_UNKNOWN = ("composite", "flexcomp", "replicate", "deformable", "flex", "plugin")
 _KINDS = {2: ("sphere", 1), 3: ("capsule", 2), 4: ("ellipsoid", 3), 5: ("cylinder", 2)}
 _KINDS |= {6: ("box", 3), 7: ("mesh", 0)}
 _GRAY = (0.5, 0.5, 0.5, 1.0)
@@ -46,6 +47,7 @@ def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> 
         mujoco = import_extra("mujoco", "mujoco", "an MJCF file")
     if folders.kept is None:
         include(root, [folders.file.resolve()])
+        attach(root, [folders.file.resolve()])
     elif root.find(".//include") is not None:
         raise ValueError("it includes other files")
     links = sum(1 for _ in root.iter("body"))

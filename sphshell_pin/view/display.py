@@ -173,8 +173,8 @@ class Display:
     @property
     def grid(self) -> str | None:
         """What the grid shows, if it is shown."""
-        step = f"{1e3 * grid_spacing(self.view):g} mm"
-        return None if "grid" in self._hidden else f"grid of {step} at z = {self._floor:.4g} m"
+        step, height = f"{1e3 * grid_spacing(self.view):g} mm", round(self._floor, 6) + 0.0
+        return None if "grid" in self._hidden else f"grid of {step} at z = {height:g} m"
 
     @property
     def face_keys(self) -> list[tuple[str, str]]:

@@ -10,6 +10,7 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.dynamics.scene.mimic import mimics
+from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.mjcf_compile import silent
 
@@ -383,3 +384,29 @@ def test_what_only_shows_or_moves_the_robot_is_not_read(tmp_path):
     assert robot.model.damping == [2.0]
     (ball,) = robot.visual_model.geometryObjects or robot.collision_model.geometryObjects
     np.testing.assert_allclose(ball.meshColor, [0.1, 0.2, 0.3, 1], atol=1e-6)
+
+
+def test_models_that_are_attached_weigh_and_move_as_in_mujoco(tmp_path):
+    """Their defaults stay theirs, and those of two copies apart."""
+    (tmp_path / "link.xml").write_text(
+        '<mujoco><default><geom density="500"/><default class="heavy"><geom density="4000"/>'
+        '</default></default><worldbody><body name="b" pos="0 0 .1"><joint name="j" axis="0 1 0"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/><body pos="0 0 .3">'
+        '<joint name="k" axis="1 0 0"/><geom class="heavy" size=".03"/></body></body></worldbody>'
+        "</mujoco>"
+    )
+    file = tmp_path / "two.xml"
+    file.write_text(
+        '<mujoco><default><default class="heavy"><geom density="9"/></default></default><asset>'
+        '<model name="link" file="link.xml"/></asset><worldbody><body name="c"><joint name="base" '
+        'type="slide"/><geom size=".1"/><attach model="link" prefix="l_"/><frame pos="0 .2 0">'
+        '<attach model="link" body="b" prefix="r_"/></frame></body></worldbody></mujoco>'
+    )
+    mujoco = pytest.importorskip("mujoco")
+    theirs = mujoco.MjModel.from_xml_path(str(file))
+    data, mass = mujoco.MjData(theirs), np.zeros((theirs.nv, theirs.nv))
+    mujoco.mj_forward(theirs, data)
+    mujoco.mj_fullM(theirs, data, mass)
+    model = robots.load_file(file).model
+    at = [model.joints[model.getJointId(theirs.joint(k).name)].idx_v for k in range(theirs.njnt)]
+    assert np.allclose(mass_matrix(model, pin.neutral(model))[np.ix_(at, at)], mass, atol=1e-12)

@@ -64,7 +64,10 @@ def find_tips(
         find_frame(robot.model, frame)
         known = [one for one in known if one.frame == frame]
     elif not floats(robot.model):
-        known = known[:1]
+        # Not a head or a caster beside an arm.
+        deep = {one.frame: _joint_of(robot.model, one.frame) for one in known}
+        most = max(map(len, robot.model.supports))
+        known = [one for one in known if 2 * len(robot.model.supports[deep[one.frame]]) > most][:1]
     if known and offset is not None:
         known = [replace(known[0], offset=offset, source=_ASKED)]
     if not known:
