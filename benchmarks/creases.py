@@ -1,6 +1,6 @@
 """How noise on a scan decides which elements bend, and which joints of a file become creases.
 
-python -m benchmarks.creases [FILE ...]    # files in millimetres
+python -m benchmarks.creases [FILE ...]    # files in millimeters
 """
 
 from __future__ import annotations

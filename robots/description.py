@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
@@ -15,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.texts import number_of, visible
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.robots.packages import Folders
 
@@ -80,6 +80,11 @@ def check_memory(nv: int) -> None:
         )
 
 
+_PARTS = frozenset(["origin", "mass", "inertia", "sphere", "cylinder", "capsule", "box", "mesh"])
+_COUNTS = dict.fromkeys(["xyz", "rpy", "size", "scale"], 3)
+_COUNTS |= dict.fromkeys(["value", "ixx", "ixy", "ixz", "iyy", "iyz", "izz", "radius", "length"], 1)
+
+
 def parsed(text: bytes) -> ET.Element:
     """Return the root element of XML that `check_size` has passed; ValueError where it has faults.
 
@@ -89,19 +94,23 @@ def parsed(text: bytes) -> ET.Element:
         root = ET.fromstring(_declared(text))
     except ET.ParseError as error:
         raise ValueError(f"it is not well-formed XML: {error}") from None
-    # Of a link one of whose numbers ends in a blank or is none, urdfdom drops the whole inertia.
-    for element in root.iter():
-        element.attrib.update({name: value.strip() for name, value in element.attrib.items()})
+    for element in root.iter():  # which urdfdom prints as they are
+        plain = {name: visible(value.strip()) for name, value in element.attrib.items()}
+        element.attrib.update(plain)
+    # urdfdom drops an inertia or a collision one of whose numbers is none to it, and goes on.
     for link in root.iter("link"):
-        for part in (*link.findall("inertial/mass"), *link.findall("inertial/inertia")):
-            for name, value in part.attrib.items():
+        for part in (*link.findall("inertial/*"), *link.findall("collision//*")):
+            for name in _COUNTS.keys() & part.attrib.keys() if part.tag in _PARTS else ():
+                value, count = part.attrib[name], _COUNTS[name]
                 try:
-                    float(value)
+                    numbers = [number_of(word) for word in value.split()]
                 except ValueError:
-                    raise ValueError(
-                        f"the {part.tag} of link '{link.get('name')}' has {name} = '{value}', "
-                        "which is no number"
-                    ) from None
+                    numbers = []
+                if len(numbers) != count:
+                    must = f"must be {count} finite number{'s' * (count > 1)}"
+                    where = f"the {part.tag} of link '{link.get('name')}' has {name} = '{value}'"
+                    raise ValueError(f"{where}, which {must}")
+                part.set(name, " ".join(map(repr, numbers)))
     return root
 
 
@@ -136,10 +145,10 @@ def check_poses(root: ET.Element, model: pin.Model) -> None:
                     f"{where}: the robot has no such joint; correct the name or leave it out"
                 )
             try:
-                values = [float(part) for part in value.split()]
+                values = [number_of(part) for part in value.split()]
             except ValueError:
                 values = []
-            if len(values) != count or not all(map(math.isfinite, values)):
+            if len(values) != count:
                 raise ValueError(
                     f"{where}: value '{value}' must be {count} finite number{'s' * (count > 1)}"
                 )

@@ -45,7 +45,7 @@ _CORNER = re.compile(r"(-?\d+)(?:/-?\d*)?(?:/(-?\d+))?")
 
 def collada_unit(path: Path) -> float:
     """Return the length of the unit that a Collada file states [m]."""
-    found = _UNIT.search(read_bytes(path, MOST_TEXT))
+    found = _UNIT.search(read_bytes(path))
     try:
         return float(found[1]) if found else 1.0
     except ValueError:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from sphshell_pin.base.limits import child_command, last_line
 from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
+from sphshell_pin.base.texts import visible
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.robots.packages import Folders
 
@@ -78,7 +79,7 @@ def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> byt
         raise ValueError(_advised(str(answer.get("reason")), file))
     if fault is not None or not isinstance(urdf, str):
         raise ValueError(f"xacro cannot expand it: its process {fault or 'gave no answer'}")
-    sys.stderr.write(answer["said"])  # xacro's warnings
+    sys.stderr.write(visible(answer["said"]))  # xacro's warnings
     return urdf.encode()
 
 

@@ -56,7 +56,7 @@ def find(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Array, Array, Array]:
             relief, slope = tip_relief(s)
             if overlap <= relief:
                 continue
-            # The relief bends the flank: its normal passes gear 1's centre at base * (1 - slope).
+            # The relief bends the flank: its normal passes gear 1's center at base * (1 - slope).
             # With this lever the contact gives back exactly the energy it stores.
             lever = BASE_1 * (1 - slope)
             tilt = np.arccos((lever + BASE_2) / CENTRES)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from sphshell_pin.errors import InvalidParameter
 
-METRES_PER_UNIT: dict[str, float] = {
+METERS_PER_UNIT: dict[str, float] = {
     "m": 1.0,
     "dm": 0.1,
     "cm": 0.01,
@@ -20,7 +20,7 @@ METRES_PER_UNIT: dict[str, float] = {
     "yd": 0.9144,
     "mil": 2.54e-5,
 }
-"""Metres in one unit of length."""
+"""Meters in one unit of length."""
 
 _ALIASES: dict[str, str] = {
     "meter": "m",
@@ -52,14 +52,14 @@ ADAMS_UNITS: dict[str, tuple[float, float]] = {
     "in-lbf-s": (0.0254, 4.4482216152605),
     "ft-lbf-s": (0.3048, 4.4482216152605),
 }
-"""Metres per length unit and newtons per force unit of ADAMS's unit systems."""
+"""Meters per length unit and newtons per force unit of ADAMS's unit systems."""
 
 SUSPICIOUS_RATIO = 1000.0
 """A surface this many times larger than what touches it was probably not given in meters."""
 
 
-def metres_per_unit(unit: str) -> float:
-    """Metres in one `unit` of length ("m", "mm", "in", ...).
+def meters_per_unit(unit: str) -> float:
+    """Meters in one `unit` of length ("m", "mm", "in", ...).
 
     Raises InvalidParameter for an unknown unit; the message lists the valid ones.
     """
@@ -67,21 +67,21 @@ def metres_per_unit(unit: str) -> float:
         name = unit.strip()
         name = _ALIASES.get(name.lower(), name)
         for known in (name, name.lower()):
-            if known in METRES_PER_UNIT:
-                return METRES_PER_UNIT[known]
-    raise InvalidParameter("unit", unit, f"must be one of: {', '.join(METRES_PER_UNIT)}")
+            if known in METERS_PER_UNIT:
+                return METERS_PER_UNIT[known]
+    raise InvalidParameter("unit", unit, f"must be one of: {', '.join(METERS_PER_UNIT)}")
 
 
-def length_to_metres(value: float, unit: str) -> float:
+def length_to_meters(value: float, unit: str) -> float:
     """Convert a length from `unit` to meters."""
-    return value * metres_per_unit(unit)
+    return value * meters_per_unit(unit)
 
 
 def adams_stiffness_to_si(stiffness: float, exponent: float, units: str = "mm-N-s") -> float:
     """ADAMS stiffness K [force/length^exponent] in [N/m^exponent].
 
     K converts by (1 / meters per unit)^exponent, which is 1000^2.2 = 3.98e6 for ADAMS's default
-    exponent in millimetres, not by 1000.
+    exponent in millimeters, not by 1000.
     """
     length, force = adams_units(units)
     return float(stiffness * force / length**exponent)
@@ -127,6 +127,6 @@ def size_warning(surface_size: float, reference_size: float, what: str) -> str |
         return None
     return (
         f"the surface measures {surface_size:.4g} m, {surface_size / reference_size:.3g} times the "
-        f"{what} of {reference_size:.4g} m: if its file is in millimetres, load it with unit='mm' "
+        f"{what} of {reference_size:.4g} m: if its file is in millimeters, load it with unit='mm' "
         f"(it then measures {surface_size * 1e-3:.4g} m)"
     )

@@ -1,12 +1,14 @@
 """The command line: examples in every help, one sentence and exit code 2 for every fault."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 
 import pytest
+from typer.testing import CliRunner
 
 import sphshell_pin
 from sphshell_pin.cli import app
@@ -18,6 +20,8 @@ HEARS_CTRL_C = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
     "from sphshell_pin.cli import main; main()"
 )
+XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="{}"/></robot>'
+URDF = "<robot name='a'><joint name='{}'><parent link='b'/><child link='b'/></joint></robot>"
 COMMANDS = [one.name or one.callback.__name__ for one in app.registered_commands]
 
 
@@ -263,3 +267,22 @@ def test_characters_that_an_encoding_lacks_are_escaped(tmp_path):
     )
     assert run.returncode == 0
     assert b"\\xe9" in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "text"),
+    [
+        ("check-robot", "a.xacro", XACRO.format("${xacro.fatal('\\x1b]0;x\\x07')}")),
+        ("check-robot", "a.xacro", XACRO.format("a${xacro.warning('\\x1b[2J')}")),
+        ("check-robot", "a.urdf", URDF.format("\x9b2J")),
+        ("run", "a.toml", '[robot]\n"\\u001b[2Jx" = 1\n'),
+        ("check", "a.obj", "v 0 \x1b]52;c;YQ==\x07 0\nf 1 2 3\n"),
+    ],
+)
+def test_no_text_of_a_file_reaches_the_terminal_as_a_command(command, name, text, tmp_path):
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    given = [command, tmp_path / name, *(["--unit", "m"] if command == "check" else [])]
+    done = CliRunner().invoke(app, [*map(str, given)], color=True)
+    assert done.exit_code in (1, 2)
+    assert "\\x" in done.output
+    assert not re.search("[\0-\b\v-\x1f\x7f-\x9f]", done.output)

@@ -17,6 +17,7 @@ import weakref
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
+from typing import NoReturn
 
 import numpy as np
 import pinocchio as pin
@@ -32,7 +33,7 @@ from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.result.result_parts import ContactLog
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts, columns
-from sphshell_pin.errors import InvalidParameter, SetupWarning, SphshellError
+from sphshell_pin.errors import InvalidParameter, NotPicklable, SetupWarning, SphshellError
 from sphshell_pin.shell import Shell
 
 with imports_of("mujoco"):
@@ -189,6 +190,13 @@ class MujocoContacts:
         self._attached = False
         self._core.detach()
 
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled: the contacts are those of a model of this process."""
+        raise NotPicklable(
+            "MujocoContacts cannot be copied or pickled; a copy of the model has them, too: "
+            "attach them again in another process"
+        )
+
     def __enter__(self) -> MujocoContacts:
         """Return itself: `with attach(...) as contacts:` detaches at the end."""
         return self
@@ -250,8 +258,10 @@ def attach(
     settings = {"law": law, "friction": friction, "method": method}
     for ball, end in zip(balls, ends, strict=True):
         scene.add_contact(ball, shell, frame, pose, name=end.name, **settings)  # type: ignore[arg-type]
-    _claim_callbacks()
+    _check_callbacks()
     made = MujocoContacts(model, scene, shell, bodies, ends, log)
+    for slot, own in _callbacks().items():
+        getattr(mujoco, f"set_mjcb_{slot}")(own)
     if made.substeps > 1:
         said = (
             f"MuJoCo's timestep of {model.opt.timestep:.3g} s is too long for this law: the "
@@ -357,7 +367,7 @@ def _set_now(slot: str) -> object:
     return getattr(mujoco, f"get_mjcb_{slot}")()
 
 
-def _claim_callbacks() -> None:
+def _check_callbacks() -> None:
     for slot, own in _callbacks().items():
         now = _set_now(slot)
         if now is not None and now is not own:
@@ -368,8 +378,6 @@ def _claim_callbacks() -> None:
                 "contype and conaffinity in place of "
             )
             raise InvalidParameter("model", now, f"must have no {after}it")
-    for slot, own in _callbacks().items():
-        getattr(mujoco, f"set_mjcb_{slot}")(own)
 
 
 def _touches(scene: Scene, shell: Shell) -> list[str]:

@@ -26,29 +26,30 @@ def open_regular(path: str | PathLike[str], most: float = MOST) -> io.BufferedRe
 
     Raises OSError, whose `strerror` says what the file is instead.
     """
-    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    flags = os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC
+    file: io.BufferedReader = io.BufferedReader(
+        io.FileIO(path, opener=lambda name, _: os.open(name, flags))
+    )
     try:
-        about = os.fstat(number)
-        if stat.S_ISDIR(about.st_mode):
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        about = os.fstat(file.fileno())
         if not stat.S_ISREG(about.st_mode):
-            raise OSError(errno.EINVAL, "is a pipe, a socket or a device, not a file", str(path))
+            raise OSError(errno.EINVAL, "is a pipe, a socket or a device, not a file")
         if about.st_size > most:
             size = f"{about.st_size / 1e9:.3g} GB, more than {most / 1e9:.3g} GB"
-            raise OSError(errno.EFBIG, f"it holds {size}", str(path))
-        return open(number, "rb")
-    except BaseException:
-        os.close(number)
+            raise OSError(errno.EFBIG, f"it holds {size}")
+        if not file.peek(1):  # empty, or one of the system's files, for which a reader would wait
+            os.read(file.fileno(), 1)
+    except OSError as error:
+        error.filename = str(path)
+        file.close()
         raise
+    return file
 
 
 def read_bytes(path: str | PathLike[str], most: float = MOST) -> bytes:
     """Return the content of a file, see `open_regular`."""
     with open_regular(path, most) as file:
-        content = file.read(max(os.fstat(file.fileno()).st_size, SMALL))  # no more: it may grow
-    if content is None:  # of some of the system's files, for which a reader would wait
-        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN), str(path))
-    return content
+        return file.read(max(os.fstat(file.fileno()).st_size, SMALL))  # no more: it may grow
 
 
 def read_text(path: str | PathLike[str], most: float = MOST) -> str:

@@ -20,6 +20,7 @@ from sphshell_pin import errors
 from sphshell_pin._interrupts import interrupts_heard
 from sphshell_pin.base.cache import CACHE
 from sphshell_pin.base.checks import stated_pairs
+from sphshell_pin.base.texts import visible
 from sphshell_pin.cli.printing import lossy_streams
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 
@@ -182,11 +183,11 @@ def _faults() -> Iterator[None]:
     except (typer.Exit, typer.Abort):
         raise
     except KeyboardInterrupt as error:
-        typer.echo(f"interrupted{f': {error}' if str(error) else ''}", err=True)
+        echo(f"interrupted{f': {error}' if str(error) else ''}", err=True)
         raise typer.Exit(INTERRUPTED) from None
     except Exception as error:
         if _comes_from_ctrl_c(error):
-            typer.echo("interrupted", err=True)
+            echo("interrupted", err=True)
             raise typer.Exit(INTERRUPTED) from None
         if _debug.get():
             raise
@@ -194,7 +195,7 @@ def _faults() -> Iterator[None]:
         # Another fault is a defect, or comes from the user's routines: say where to look.
         text = str(error) if known else f"{type(error).__name__}: {error}"
         text = ", ".join([text, *getattr(error, "__notes__", ())])
-        typer.echo(f"error: {text}{'' if known else ' (see it with --debug)'}", err=True)
+        echo(f"error: {text}{'' if known else ' (see it with --debug)'}", err=True)
         raise typer.Exit(ERROR) from None
 
 
@@ -208,7 +209,7 @@ def _plain_warnings() -> Iterator[None]:
             usual(message, *place, **more)
         elif str(message) not in shown:
             shown.add(str(message))
-            typer.echo(f"warning: {message}", err=True)
+            echo(f"warning: {message}", err=True)
 
     with warnings.catch_warnings():
         usual = warnings.showwarning
@@ -252,7 +253,12 @@ def if_installed() -> Iterator[None]:
     try:
         yield
     except MissingExtra as missing:
-        typer.echo(str(missing), err=True)
+        echo(str(missing), err=True)
+
+
+def echo(text: object, *, err: bool = False) -> None:
+    """Print a line on stdout or stderr, see `visible`."""
+    typer.echo(visible(str(text)), err=err)
 
 
 def say(text: str, *, bold: str = "") -> None:
@@ -264,7 +270,7 @@ def colored(text: str, color: str) -> Text:
     """Return a cell of a table in `color`."""
     from rich.text import Text
 
-    return Text(text, color)
+    return Text(visible(text), color)
 
 
 def print_table(columns: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:
@@ -320,21 +326,21 @@ def progress_bar(title: str, *columns: str, **task: Any) -> Iterator[Callable[..
 
 
 def plain(text: str) -> str:
-    """Return `text` so that rich prints its brackets as they are."""
+    """Return `text` so that rich prints its brackets as they are, see `visible`."""
     from rich.markup import escape
 
-    return escape(text)
+    return escape(visible(text))
 
 
 def length_of(option: str, text: str | None) -> float | None:
     """Return a length [m] written as a number, or as a number with its unit."""
     if text is None:
         return None
-    from sphshell_pin.units import metres_per_unit
+    from sphshell_pin.units import meters_per_unit
 
     found = re.fullmatch(r"\s*([0-9.+eE-]*[0-9.])\s*([a-zA-Zµ]*)\s*", text)
     try:
         number = float(found[1] if found else text)
     except ValueError:
         raise InvalidParameter(option, text, "must be a length: 0.012 (meters), 12mm") from None
-    return number * (metres_per_unit(found[2]) if found and found[2] else 1.0)
+    return number * (meters_per_unit(found[2]) if found and found[2] else 1.0)

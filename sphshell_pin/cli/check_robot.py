@@ -23,6 +23,7 @@ from sphshell_pin.cli.app import (
     argument,
     colored,
     command,
+    echo,
     length_of,
     make_table,
     option,
@@ -129,7 +130,7 @@ def check_robot_(
     _print(reports)
     if stopped:
         left = len(names) - len(reports)
-        typer.echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
+        echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
         raise typer.Exit(INTERRUPTED)
     command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
     if json is not None:

@@ -7,9 +7,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from sphshell_pin.cli.app import OfOption, RunArgument, command, option, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, echo, option, progress_bar
 from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
@@ -81,7 +79,7 @@ def export(
         place = out or beside(run, f"_{to}")
         files = write_tables(place, result, scene, format=to, command=command)  # type: ignore[arg-type]
     for file in files:
-        typer.echo(file)
+        echo(file)
 
 
 def file_of(run: Path) -> Path:
@@ -130,7 +128,7 @@ def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | 
         if scenario is not None:
             raise
         result = Result.load(file_of(run))
-        typer.echo(f"warning: joints have numbers instead of names: {fault}", err=True)
+        echo(f"warning: joints have numbers instead of names: {fault}", err=True)
         return result, None
 
 

@@ -19,6 +19,7 @@ from sphshell_pin.cli.app import (
     argument,
     changes_of,
     command,
+    echo,
     if_installed,
     option,
     print_table,
@@ -162,7 +163,7 @@ def _write(
     try:
         check_knobs(read_scenario(fitted), fitted, ranges=True)
     except ScenarioError as fault:
-        typer.echo(f"note: the fitted scenario needs a change before it runs: {fault}", err=True)
+        echo(f"note: the fitted scenario needs a change before it runs: {fault}", err=True)
     return files
 
 
@@ -193,5 +194,5 @@ def _print_report(found: Fit, files: list[Path]) -> None:
         rows.append((called, f"{len(series.t)}", f"{series.rms:.4g}", sigma, series.unit))
     print_table(("data", "values", "rms residual", "sigma", "unit"), rows)
     for remark in found.remarks:
-        typer.echo(f"note: {remark}", err=True)
+        echo(f"note: {remark}", err=True)
     say(f"files: {', '.join(map(str, files))}")

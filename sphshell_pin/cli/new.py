@@ -6,8 +6,6 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
-import typer
-
 from sphshell_pin.cli.app import (
     DensityOption,
     MimicOption,
@@ -15,6 +13,7 @@ from sphshell_pin.cli.app import (
     RadiusOption,
     XacroArgOption,
     command,
+    echo,
     length_of,
     option,
     progress_bar,
@@ -148,7 +147,7 @@ def new(
                 out=out,
                 force=force,
                 # What was tried goes to the error stream, the answer to the other.
-                tell=lambda what: typer.echo(what, err=True),
+                tell=lambda what: echo(what, err=True),
             )
     except UnitMissing as error:
         raise SphshellError(f"the unit {error.must('--unit {}')}") from error

@@ -6,9 +6,7 @@ import re
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from sphshell_pin.cli.app import OfOption, RunArgument, command, option, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, echo, option, progress_bar
 from sphshell_pin.errors import InvalidParameter, SphshellError
 
 
@@ -76,4 +74,4 @@ def render(
             title=replay.title,
             told=lambda done, count: update(completed=done, total=count),
         )
-    typer.echo(drawn)
+    echo(drawn)

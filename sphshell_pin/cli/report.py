@@ -12,6 +12,7 @@ from sphshell_pin.cli.app import (
     PERCENT,
     colored,
     command,
+    echo,
     option,
     print_table,
     progress_bar,
@@ -60,8 +61,8 @@ def _print(made: Report) -> None:
         rows.append((one.what, one.text, one.spread_text, one.aim_text, cell))
     print_table(("figure", "median", "quartiles", "aim", "verdict"), rows)
     for line in [line for section in made.sections for line in section.unmeasured]:
-        typer.echo(f"not measured: {line}", err=True)
+        echo(f"not measured: {line}", err=True)
     if made.caution:
-        typer.echo(f"caution: {made.caution}", err=True)
+        echo(f"caution: {made.caution}", err=True)
     for section in made.failed:
-        typer.echo(f"not measured: {section.title}: {section.error}", err=True)
+        echo(f"not measured: {section.title}: {section.error}", err=True)

@@ -22,6 +22,7 @@ from sphshell_pin.cli.app import (
     changes_of,
     colored,
     command,
+    echo,
     option,
     print_table,
     progress_bar,
@@ -68,7 +69,7 @@ def run(
     changes = changes_of(set_, dt, duration, compiled)
     built = build(scenario, changes)
     for warning in explain_built(built).warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        echo(f"warning: {warning}", err=True)
     with progress_bar(built.name, PERCENT, "TimeRemainingColumn", total=1.0) as update:
         report = run_built(
             built,
@@ -106,12 +107,12 @@ def _exit_code(report: RunReport, *, changed: bool) -> int:
         hint = ""
         if isinstance(report.stopped, SimulationDiverged):
             hint = "; sphshell-pin explain, with the same --set, names a fitting dt"
-        typer.echo(f"{report.stopped}{hint}\npartial results are in {report.folder}", err=True)
+        echo(f"{report.stopped}{hint}\npartial results are in {report.folder}", err=True)
         return INTERRUPTED if isinstance(report.stopped, Interrupted) else ERROR
     if all(verdict.met for verdict in report.verdicts):
         return 0
     if changed:
-        typer.echo("the scenario was changed: missed expectations are not counted", err=True)
+        echo("the scenario was changed: missed expectations are not counted", err=True)
         return 0
     return MISSED
 
@@ -164,9 +165,9 @@ def _print_report(report: RunReport) -> None:
         f"in {stats.wall_time:.3g} s, {stats.steps} steps of {stats.dt:g} s)"
     )
     if energy["relative_residual"] > SUSPICIOUS_RESIDUAL:
-        typer.echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
+        echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
     for warning in report.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        echo(f"warning: {warning}", err=True)
     if report.audit is not None:
         audited = [
             (
@@ -188,4 +189,4 @@ def _print_report(report: RunReport) -> None:
     print_table(("figure", "expected", "measured", "verdict"), judged)
     say(f"files in {report.folder}: {', '.join(file.name for file in report.files)}")
     for note in report.notes:
-        typer.echo(note, err=True)
+        echo(note, err=True)

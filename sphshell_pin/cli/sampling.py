@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import typer
 
-from sphshell_pin.cli.app import if_installed, print_table, say
+from sphshell_pin.cli.app import echo, if_installed, print_table, say
 from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def report_sample(
             try:
                 found = shown[what] = compute(table, name)
             except InvalidParameter as fault:
-                typer.echo(f"no {called}: {fault}", err=True)
+                echo(f"no {called}: {fault}", err=True)
             else:
                 show(name, found)
         if shown:

@@ -20,6 +20,7 @@ from sphshell_pin.cli.app import (
     SetOption,
     changes_of,
     command,
+    echo,
     option,
     print_table,
     progress_bar,
@@ -145,7 +146,7 @@ def sweep(
                 out=file,
                 retry_failed=retry_failed,
                 progress=progress,
-                note=lambda sentence: typer.echo(sentence, err=True),
+                note=lambda sentence: echo(sentence, err=True),
             )
     except KeyboardInterrupt as stop:
         again = shlex.join(["sphshell-pin", *sys.argv[1:]])
@@ -184,7 +185,7 @@ def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
     except InvalidParameter as fault:
         if plot:
             raise
-        typer.echo(f"no picture: {fault}", err=True)
+        echo(f"no picture: {fault}", err=True)
         return []
     return plot or own
 
@@ -195,7 +196,7 @@ def _print_head(plan: Plan, report: SweepReport) -> None:
     done = f"{total - report.failed} done, {report.failed} failed{before}"
     say(f": {total} runs, {done}", bold=str(plan.head["scenario"]))
     if report.deaths:
-        typer.echo(f"{report.deaths} workers died; their runs were done again", err=True)
+        echo(f"{report.deaths} workers died; their runs were done again", err=True)
 
 
 def _print_ranges(plan: Plan, report: SweepReport) -> None:
@@ -216,6 +217,6 @@ def _print_failures(plan: Plan, report: SweepReport) -> None:
             f"{axis.key} = {row[axis.key]} {plan.units.get(axis.key, '')}".rstrip()
             for axis in plan.axes
         ]
-        typer.echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
+        echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
     if len(failed) > _MOST_FAILURES:
-        typer.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)
+        echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)

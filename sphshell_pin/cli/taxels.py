@@ -6,9 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from sphshell_pin.cli.app import RunArgument, command, if_installed, option
+from sphshell_pin.cli.app import RunArgument, command, echo, if_installed, option
 from sphshell_pin.cli.export import file_of
 
 
@@ -47,8 +45,8 @@ def taxels(
     images = grid.images(replay.result, replay.scene)
     folder = file.parent if out is None else out
     folder.mkdir(parents=True, exist_ok=True)
-    typer.echo(images.save(folder / "taxels.npz"))
+    echo(images.save(folder / "taxels.npz"))
     with if_installed():
-        typer.echo(images.save_film(folder / "taxels.gif", speed=speed))
+        echo(images.save_film(folder / "taxels.gif", speed=speed))
     felt, missed = float(images.forces.max()), float(abs(images.outside).max())
-    typer.echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")
+    echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")

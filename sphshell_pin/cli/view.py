@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from sphshell_pin.cli.app import (
     OfOption,
     PackageDirOption,
@@ -13,6 +11,7 @@ from sphshell_pin.cli.app import (
     argument,
     changes_of,
     command,
+    echo,
     option,
 )
 
@@ -61,5 +60,5 @@ def view(
         port=port,
         open=open_,
         color=color,  # type: ignore[arg-type]
-        told=lambda url: typer.echo(f"{url}  (Ctrl-C ends the run)"),
+        told=lambda url: echo(f"{url}  (Ctrl-C ends the run)"),
     )

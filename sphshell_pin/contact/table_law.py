@@ -11,6 +11,7 @@ from pathlib import Path
 from sphshell_pin.base.checks import check_vector
 from sphshell_pin.base.parameters import Component, parameter
 from sphshell_pin.base.regular_file import read_text
+from sphshell_pin.base.texts import number_of
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 
@@ -66,9 +67,9 @@ class TableLaw(NormalLaw, kind="table"):
         table = []
         for i, (k, row) in enumerate(rows):
             try:
-                depth, force = map(float, row)
+                depth, force = map(number_of, row)
             except ValueError:
-                if i == 0:
+                if i == 0 and not any(map(_is_number, row)):
                     continue  # the header
                 must = f"must hold two numbers in line {k}: depth [m], force [N]"
                 raise InvalidParameter("file", str(path), must) from None
@@ -89,6 +90,15 @@ class TableLaw(NormalLaw, kind="table"):
             f"table of {len(self.depth)} rows down to {self.depth[-1] * 1e3:.4g} mm and "
             f"{self.force[-1]:.4g} N, linear beyond, undamped"
         )
+
+
+def _is_number(text: str) -> bool:
+    """Whether it is a number in Python, where 1_0 and nan are some."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 @dataclass(frozen=True)

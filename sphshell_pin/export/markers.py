@@ -114,10 +114,10 @@ def contact_markers(
             ("normal", NORMAL_COLOR, drawn.normal[k]),
             ("friction", FRICTION_COLOR, drawn.friction[k]),
         ):
-            length = float(np.linalg.norm(force)) * scale.metres_per_newton
+            length = float(np.linalg.norm(force)) * scale.meters_per_newton
             if not 0.0 < length < np.inf:
                 continue
-            way = force * (scale.metres_per_newton * min(1.0, scale.longest / length))
+            way = force * (scale.meters_per_newton * min(1.0, scale.longest / length))
             ends = np.array([point, point + way])
             name = f"{what}/{pairs[pair[k]]}"
             shape = (0.5 * size, size, 0.0)  # widths of shaft and head

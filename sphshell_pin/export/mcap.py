@@ -140,7 +140,7 @@ class _Run:
             "start [ns]": str(self.start),
             "integrator": stats.integrator,
             "dt [s]": repr(stats.dt),
-            "arrows [m/N]": repr(self.scale.metres_per_newton),
+            "arrows [m/N]": repr(self.scale.meters_per_newton),
             "longest arrow [m]": repr(self.scale.longest),
         }
         said |= {f"contact {name}": topic for name, topic in self.topics.items()}

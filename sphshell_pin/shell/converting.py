@@ -18,7 +18,7 @@ from sphshell_pin.shell.raw import Floats, random_places
 from sphshell_pin.shell.readers import SUFFIXES, reader_for
 from sphshell_pin.shell.shell import Shell
 from sphshell_pin.shell.writers import encoded
-from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
+from sphshell_pin.units import METERS_PER_UNIT, meters_per_unit
 
 SAMPLES = 5000
 """Points taken of each surface to measure how far it is from the other."""
@@ -117,7 +117,7 @@ def convert(
     if not goal.parent.is_dir():
         raise ShellFileError(goal, "cannot be written: there is no such folder")
     if unit_out is not None:
-        metres_per_unit(unit_out)
+        meters_per_unit(unit_out)
     options = CadOptions(chord_error, bodies, faces)
     limits = CadOptions(time_limit=time_limit, memory_limit=memory_limit)
     with_cad = bool({suffix, goal.suffix.lower()} & set(CAD_SUFFIXES))
@@ -150,7 +150,7 @@ def exchange(
 ) -> Conversion:
     """Give what the `target` holds to `write`, read that back and compare it with the source."""
     first = _surface(source, unit_in, options)
-    unit = unit_out or (first.held.unit if first.held.unit in METRES_PER_UNIT else "mm")
+    unit = unit_out or (first.held.unit if first.held.unit in METERS_PER_UNIT else "mm")
     write(_content(target, unit, first, options))
     suffix = target.suffix.lower()
     carried = suffix == ".shl" or suffix in CAD_SUFFIXES

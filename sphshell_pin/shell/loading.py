@@ -14,7 +14,7 @@ from sphshell_pin.shell.cad.process import run_in_child, warn_caller
 from sphshell_pin.shell.cleaning import box_diagonal, clean_surface
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
-from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
+from sphshell_pin.units import METERS_PER_UNIT, meters_per_unit
 
 Scale = str | float | None
 
@@ -36,7 +36,7 @@ def load_surface(
     Raises as `Shell.from_file` does.
     """
     if unit is not None:
-        metres_per_unit(unit)  # an unknown unit is reported before a long file is read
+        meters_per_unit(unit)  # an unknown unit is reported before a long file is read
     number = _check_scale(scale)
     file, suffix = reader_for(path)
     if suffix not in CAD_SUFFIXES:
@@ -80,8 +80,8 @@ def _load_raw(
     raw = READERS[suffix](file)
     if unit is None:
         size = box_diagonal(raw.vertices[raw.corners.ravel()])
-        raise UnitMissing(file, size, METRES_PER_UNIT)
-    factor = metres_per_unit(unit) * number
+        raise UnitMissing(file, size, METERS_PER_UNIT)
+    factor = meters_per_unit(unit) * number
     return raw.scaled(factor).noting(*_scaled(number)), unit, factor
 
 
@@ -96,7 +96,7 @@ def _load_shl(
     written = found.scale
     if scale is None:
         scale = "apply" if unit is None else "ignore"
-    length = metres_per_unit(unit) if unit is not None else 1.0
+    length = meters_per_unit(unit) if unit is not None else 1.0
     taken = f"unit '{unit}'" if unit is not None else "meters"
     if scale == "apply":
         factor = length * written

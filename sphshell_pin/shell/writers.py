@@ -18,7 +18,7 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.raw import Floats, Ints, Mask, area_vectors
 from sphshell_pin.shell.readers.mesh import STL_RECORD
-from sphshell_pin.units import metres_per_unit
+from sphshell_pin.units import meters_per_unit
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def encoded(path: Path, shell: ShellBase, unit: str) -> bytes:
     InvalidParameter
         Of an unknown suffix or unit; the message lists the known ones.
     """
-    scale = metres_per_unit(unit)
+    scale = meters_per_unit(unit)
     surface = Written(
         vertices=shell.vertices / scale,
         elements=shell.elements,

@@ -13,7 +13,7 @@ from sphshell_pin.base.checks import check_positive
 from sphshell_pin.contact import ImpactLaw
 from sphshell_pin.shell.raw import KINDS, Floats, Ints, Longs, area_vectors, random_places
 from sphshell_pin.shell.shell import Shell
-from sphshell_pin.units import METRES_PER_UNIT
+from sphshell_pin.units import METERS_PER_UNIT
 
 RADIUS, DEPTH = 0.02, 0.025
 """Of the spheres as a share of the size; how deep they are pressed, as a share of the radius."""
@@ -302,8 +302,8 @@ def _moments(shell: Shell) -> tuple[float, Floats, Floats]:
 
 def _scale(measured: float, taken: str | None) -> tuple[float, str]:
     """Return the scale that is meant by a measured one, and the unit that explains it, in words."""
-    for right, meters in METRES_PER_UNIT.items():
-        factor = METRES_PER_UNIT.get(taken or "", 0.0) / meters or 1.0
+    for right, meters in METERS_PER_UNIT.items():
+        factor = METERS_PER_UNIT.get(taken or "", 0.0) / meters or 1.0
         if abs(measured / factor - 1.0) < SAME_SCALE:
             words = f", as {taken} to {right}: the unit of one of them is wrong"
             return factor, "" if factor == 1.0 else words

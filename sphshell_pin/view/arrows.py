@@ -70,7 +70,7 @@ class ArrowScale:
     longest: float = np.inf
 
     @property
-    def metres_per_newton(self) -> float:
+    def meters_per_newton(self) -> float:
         """Length per force [m/N]."""
         return self.reference_length / self.reference_force
 
@@ -90,7 +90,7 @@ class ArrowScale:
 
     def cuts(self, forces: FloatArray) -> bool:
         """Tell whether any of `forces` (k,) [N] has an arrow longer than the longest."""
-        return bool(np.any(forces * self.metres_per_newton > self.longest))
+        return bool(np.any(forces * self.meters_per_newton > self.longest))
 
     def __str__(self) -> str:
         return f"{self.reference_length * 1e3:g} mm = {self.reference_force:g} N"
@@ -225,7 +225,7 @@ class ArrowPool:
         size = math.hypot(*force.tolist())
         if not math.isfinite(size):
             size = 0.0  # of a run that diverges: it has no direction to show
-        length = min(size * scale.metres_per_newton, scale.longest)
+        length = min(size * scale.meters_per_newton, scale.longest)
         start = self._where[contact]
         place_shaft, place_head = self._arrows[arrow]
         if length <= 0.05 * self._width:

@@ -129,7 +129,7 @@ def sphere(radius: float, segments: int = 32) -> Json:
 
 
 def rod(radius_start: float, radius_end: float) -> Json:
-    """Geometry of a rod or cone along y, one unit long and centred, as three.js has it."""
+    """Geometry of a rod or cone along y, one unit long and centered, as three.js has it."""
     return {
         "type": "CylinderGeometry",
         "radiusTop": radius_end,

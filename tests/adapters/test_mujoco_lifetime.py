@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import gc
+import pickle
+import subprocess
 import sys
 import weakref
 
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter, SphshellError
+from sphshell_pin.errors import InvalidParameter, NotPicklable, SphshellError
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -52,11 +54,15 @@ def test_a_copy_of_a_model_has_its_contacts_while_they_last(monkeypatch):
         mujoco.mj_forward(one, data)
         assert [bool(force) for force in data.qfrc_passive[[2, 8]]] == pushed
         assert data.ncon == 2 - sum(pushed)
+    for change in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(NotPicklable, match="a copy of the model has them"):
+            change(contacts)
     # Flags that were overwritten do not end them.
-    model.opt.enableflags = flags
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    assert data.qfrc_passive[2] > 0
+    for overwritten in (flags | 1 << 30, flags):
+        model.opt.enableflags = overwritten
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        assert data.qfrc_passive[2] > 0
     with pytest.raises(InvalidParameter, match="the spheres were attached in, or of a copy of it"):
         second.contacts(data)
     third = copy.deepcopy(other)
@@ -148,3 +154,50 @@ def test_a_fault_in_a_step_is_reported_at_once_and_by_check(fault, monkeypatch):
         with pytest.raises(SphshellError, match=said):
             contacts.check()
     contacts.check()
+
+
+# Programs of their own, as they crashed or hung.
+REFUSED = """
+import mujoco
+from tests.adapters.mujoco_models import slab, on_slab
+from sphshell_pin.errors import InvalidParameter
+pair = '<contact><pair geom1="ball0" geom2="slab"/></contact></mujoco>'
+model = mujoco.MjModel.from_xml_string(slab(2).replace("</mujoco>", pair))
+try:
+    on_slab(model, "ball0")
+except InvalidParameter:
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 2 and mujoco.get_mjcb_passive() is None
+    print("done")
+"""
+AT_ONCE = """
+import mujoco, threading
+import sphshell_pin as sp
+from tests.adapters.mujoco_models import attach, model_of, plate, slab
+law = sp.FunctionLaw(lambda depth, rate, p: 1e5 * max(depth, 0.0))
+model, data = model_of(slab(1))
+contacts = attach(model, plate(0.1), ["ball0"], body="part", law=law, log=True)
+def step():
+    mujoco.mj_step(model, mujoco.MjData(model))
+def work():
+    for _ in range(30):
+        one = threading.Thread(target=step)
+        one.start()
+        one.join()
+workers = [threading.Thread(target=work) for _ in range(6)]
+for one in workers:
+    one.start()
+while any(one.is_alive() for one in workers):
+    contacts.check()
+    contacts.log(data)
+print("done")
+"""
+
+
+@pytest.mark.parametrize("program", [REFUSED, AT_ONCE], ids=["refused", "at once"])
+def test_a_first_attach_that_is_refused_and_laws_of_python_in_new_threads(program):
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.stdout == "done\n", done.stderr

@@ -104,14 +104,14 @@ def test_one_sided_open_shells_are_warned_of() -> None:
     assert any("one-sided" in warning for warning in scene.explain(q).warnings)
 
 
-def test_a_radius_in_millimetres_is_suspected() -> None:
+def test_a_radius_in_millimeters_is_suspected() -> None:
     scene, shell = sp.Scene(models.arm()), sp.Shell(*meshes.grid_plate(), name="plate")
     with pytest.warns(UnitWarning, match="radius = 10 .* is more than the robot's reach"):
         scene.add_contact(sphere=sp.Sphere(10, "ball"), shell=shell, law=models.LAW)
     assert any("is it in mm?" in warning for warning in scene.explain().warnings)
 
 
-def test_millimetres_taken_for_metres_are_suspected() -> None:
+def test_millimeters_taken_for_meters_are_suspected() -> None:
     scene = sp.Scene(ball_model())
     vertices, elements = meshes.grid_plate()
     large = sp.Shell(1000 * vertices, elements, name="plate")

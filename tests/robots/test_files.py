@@ -1,5 +1,6 @@
 """Robots' files: package paths, poses, mimic joints, and what is refused."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin import robots
+from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import NameNotFound, RobotWarning
 from tests.studies import mostly_studies
@@ -63,7 +65,7 @@ def test_packages_are_found(tmp_path, monkeypatch, place, manifest, variable, fo
     given = [tmp_path / folder]
     if variable:
         full = folder.format(tmp_path) if "{}" in folder else str(tmp_path / folder)
-        with pytest.raises(robots.RobotError, match="package_dirs"):
+        with pytest.warns(RobotWarning, match="--package-dir"):
             robots.load_file(file)
         monkeypatch.setenv(variable, full)
         given = []
@@ -103,7 +105,8 @@ def test_tags_may_have_letters_of_any_language(tmp_path):
     assert robots.load_file(path).model.nq == 3
 
 
-def test_a_visual_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
+def test_a_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
+    """Motion needs none; a collision mesh that is there and broken ends, as it would touch."""
     file = arm(tmp_path, visual=URI)
     text = file.read_text()
     part = f"<visual>{MESH.format(URI)}</visual>"
@@ -112,8 +115,24 @@ def test_a_visual_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
         robot = robots.load_file(file)
     assert len(caught) == 1
     assert robot.visual_model.ngeoms == 0
-    with pytest.raises(robots.RobotError, match=r"cube\.stl is not there.*--package-dir"):
-        robots.load_file(arm(tmp_path, collision=URI))
+    file = arm(tmp_path, collision=URI)
+    with pytest.warns(RobotWarning, match=r"cube\.stl; what lacks its .* touches nothing"):
+        assert robots.load_file(file).model.nv == 1
+    folder = tmp_path / "arm_meshes" / "meshes"
+    folder.mkdir(parents=True)
+    (folder / "cube.stl").write_text("no mesh")
+    with pytest.raises(robots.RobotError, match=r"a mesh cannot be loaded.*cube\.stl"):
+        robots.load_file(file)
+
+
+def test_a_joint_without_a_limit_element_has_no_limits(tmp_path):
+    file = arm(tmp_path)
+    text = re.sub(r"<limit[^>]*/>", "", file.read_text())
+    file.write_text(text.replace("continuous", "revolute"))
+    with pytest.warns(RobotWarning, match="they have no <limit>"):
+        model = robots.load_file(file).model
+    assert model.nv == 1
+    assert not JointComponents.from_model(model).limits
 
 
 @pytest.mark.parametrize(
@@ -179,7 +198,7 @@ def test_poses_of_an_srdf():
     [
         ("name='f1_base' value='nan'", "'f1_base': value 'nan' must be 1 finite number"),
         ("name='f1_base' value='1 2 3'", "'f1_base': value '1 2 3' must be 1 finite number"),
-        ("name='f1_base' value='wide'", "'f1_base': value 'wide' must be"),
+        ("name='f1_base' value='0.1_5'", "'f1_base': value '0.1_5' must be"),
         ("name='f1_base'", "'f1_base': value '' must be"),
         ("value='1'", "'': the robot has no such joint"),
         ("name='f9' value='1'", "'f9': the robot has no such joint"),
@@ -191,14 +210,6 @@ def test_poses_that_would_be_left_out_are_named(tmp_path, joint, words):
     srdf.write_text(f"<robot name='h'><group_state name='p'><joint {joint}/></group_state></robot>")
     with pytest.raises(robots.RobotError, match=rf"p\.srdf: .*pose 'p', joint.*{words}"):
         robots.load_file(FOLDER / "hand.urdf.xacro", srdf=srdf)
-
-
-def test_values_of_poses_are_read_whole(tmp_path):
-    srdf = tmp_path / "p.srdf"
-    one = "<joint name='f1_base' value='0.1_5'/>"
-    srdf.write_text(f"<robot name='h'><group_state name='p'>{one}</group_state></robot>")
-    robot = robots.load_file(FOLDER / "hand.urdf.xacro", srdf=srdf, pose="p")
-    assert 0.15 in robot.q0
 
 
 def check_reduced(whole: pin.Model, model: pin.Model) -> None:
@@ -267,6 +278,29 @@ def test_mimic_joints_of_files_are_exact(name):
     # A geometry keeps its joint and frame.
     (tip, *_) = robots.end_spheres(robots.load_file(file, mimic=True))
     assert model.existFrame(tip.frame)
+
+
+def test_numbers_that_urdfdom_would_drop_with_their_part_are_refused(tmp_path):
+    """An inertia or a collision goes with one of its numbers, in silence."""
+    shapes = ("<sphere radius='1'/>", "<box size='1 1 1'/>", "<cylinder radius='1' length='1'/>")
+    places = "".join(
+        f"<collision><origin xyz='1 0 0' rpy='1 0 0'/><geometry>{shape}</geometry></collision>"
+        for shape in shapes
+    )
+    inertial = INERTIAL.replace("<inertial>", "<inertial><origin xyz='0 0 1' rpy='0 0 1'/>")
+    file = arm(tmp_path)
+    whole = file.read_text().replace(INERTIAL, inertial + places)
+    file.write_text(whole)
+    robot = robots.load_file(file)
+    assert robot.collision_model.ngeoms == 3
+    assert robot.model.inertias[1].mass == 1
+    starts = [found.end() for found in re.finditer("[a-z]='(?=1)", whole)]
+    assert len(starts) == 14
+    for at in starts:
+        for number in ("1_0", "nan", "1e400", "-inf", "0x10", "\u0661", "", "1 1 1 1"):
+            file.write_text(whole[:at] + number + whole[at + 1 :], encoding="utf-8")
+            with pytest.raises(robots.RobotError, match=r"must be [13] finite number"):
+                robots.load_file(file)
 
 
 @pytest.mark.parametrize("name", ["gripper.xml", "hand.xml", "chained_fingers.xml"])

@@ -10,6 +10,7 @@ from urllib.parse import quote
 import pytest
 
 from sphshell_pin import robots
+from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.robots.workspace import find_robots
 from tests.command import call
@@ -169,8 +170,23 @@ def test_a_mesh_of_another_folder_is_not_taken_for_a_missing_one(
     mesh.rename(file.parents[1] / other)
     uri = "meshes" if other.startswith("urdf") else "folder"
     file.write_text(file.read_text().replace("resources/meshes/", f"resources/{uri}/"))
-    with pytest.raises(robots.RobotError, match=rf"a mesh cannot be loaded.*{uri}/one\.obj"):
+    with pytest.warns(RobotWarning, match=rf"missing or broken: .*{uri}/one\.obj"):
         robots.load_file(file)
+
+
+def test_a_package_whose_meshes_were_put_into_more_folders_and_the_nearer_of_two(
+    tmp_path: Path,
+) -> None:
+    file = workspace(tmp_path, "src/vendor/arm_resources")
+    package(tmp_path / "src" / "another" / "arm_resources")
+    mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
+    for name in ("collision/large/one.obj", "visual/large/one.obj"):
+        (mesh.parent / name).parent.mkdir(parents=True)
+        (mesh.parent / name).write_bytes(mesh.read_bytes())
+    mesh.unlink()
+    file.write_text(file.read_text().replace("/one.obj", "/collision/one.obj"))
+    (geometry,) = robots.load_file(file).collision_model.geometryObjects
+    assert geometry.meshPath.endswith("vendor/arm_resources/meshes/collision/large/one.obj")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.errors import ScenarioError
+from sphshell_pin.errors import RobotWarning, ScenarioError
 from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.format.reading import read_scenario
 from tests.scenario.files import pose_of, write
@@ -160,7 +160,7 @@ def test_a_missing_mesh_names_the_searched_folders(tmp_path):
         '<mesh filename="package://arm/a.stl"/></geometry></collision></link></robot>'
     )
     text = 'title = "x"\nrobot.urdf = "r.urdf"\nrun.duration = 1\n'
-    with pytest.raises(ScenarioError, match=r"package://arm/a.stl.*package_dirs"):
+    with pytest.warns(RobotWarning, match=r"package://arm/a.stl.*--package-dir"):
         assembled(tmp_path, text)
     with pytest.raises(ScenarioError, match="does not exist"):
         assembled(tmp_path, text + 'robot.package_dirs = ["meshes"]\n')

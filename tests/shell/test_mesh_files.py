@@ -280,8 +280,9 @@ def test_bytes_behind_an_stl_file_are_noted(tmp_path):
     assert "17 bytes behind the last triangle of the file are left out" in health.notes
 
 
+@pytest.mark.parametrize("number", ["1_0", "\u0661"])
 @pytest.mark.parametrize("suffix", ["obj", "ply", "off", "shl"])
-def test_numbers_of_python_alone_are_refused(suffix, tmp_path):
+def test_numbers_of_python_alone_are_refused(suffix, number, tmp_path):
     text = {
         "obj": "v 1_0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
         "off": "OFF\n3 1 0\n1_0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
@@ -290,9 +291,13 @@ def test_numbers_of_python_alone_are_refused(suffix, tmp_path):
         "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
         "1_0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
     }[suffix]
-    (tmp_path / f"a.{suffix}").write_text(text)
-    with pytest.raises(ShellFileError):
-        Shell.from_file(tmp_path / f"a.{suffix}", None if suffix == "shl" else "m")
+    file = tmp_path / f"a.{suffix}"
+    file.write_text(text.replace("1_0", "2"))
+    Shell.from_file(file, None if suffix == "shl" else "m")
+    for changed in (text.replace("1_0", number), text.replace("1_0", "2").replace("3", number, 1)):
+        file.write_text(changed, encoding="utf-8")
+        with pytest.raises(ShellFileError):
+            Shell.from_file(file, None if suffix == "shl" else "m")
 
 
 TOKENS = [

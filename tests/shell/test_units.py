@@ -1,4 +1,4 @@
-"""Units of length, ADAMS's numbers in SI, and the warning that names millimetres."""
+"""Units of length, ADAMS's numbers in SI, and the warning that names millimeters."""
 
 import numpy as np
 import pytest
@@ -8,26 +8,26 @@ from hypothesis import strategies as st
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.units import (
     ADAMS_UNITS,
-    METRES_PER_UNIT,
+    METERS_PER_UNIT,
     adams_damping_to_si,
     adams_length_to_si,
     adams_stiffness_from_si,
     adams_stiffness_to_si,
-    length_to_metres,
-    metres_per_unit,
+    length_to_meters,
+    meters_per_unit,
     size_warning,
 )
 
 
 def test_lengths():
-    assert length_to_metres(25.4, "mm") == pytest.approx(length_to_metres(1.0, "in"))
-    assert length_to_metres(1.0, "ft") == pytest.approx(length_to_metres(12.0, "inch"))
-    for name, value in METRES_PER_UNIT.items():
-        assert metres_per_unit(name) == value
-        assert metres_per_unit(f" {name.upper()} ") == value
+    assert length_to_meters(25.4, "mm") == pytest.approx(length_to_meters(1.0, "in"))
+    assert length_to_meters(1.0, "ft") == pytest.approx(length_to_meters(12.0, "inch"))
+    for name, value in METERS_PER_UNIT.items():
+        assert meters_per_unit(name) == value
+        assert meters_per_unit(f" {name.upper()} ") == value
     for wrong in ("furlong", "", None, 3):
         with pytest.raises(InvalidParameter, match="must be one of: m, dm, cm, mm"):
-            metres_per_unit(wrong)
+            meters_per_unit(wrong)
 
 
 def test_default_stiffness_of_adams_is_not_1e8():

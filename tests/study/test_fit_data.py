@@ -88,6 +88,7 @@ WRONG = {
     "time nan": (HEAD + "0,1\nnan,1\n", "line 3: 'nan' in column 't .s.' is not a finite number$"),
     "time missing": (HEAD + "0,1\n,1\n", "line 3: the time is missing"),
     "value nan": (HEAD + "0,1\n0.1,nan\n", "line 3: 'nan' .* leave the cell empty where"),
+    "underscore": (HEAD + "0,1\n0.1,1_0\n", "line 3: '1_0' in column .* is not a finite number"),
     "a word": (HEAD + "0,1\n0.1,high\n", "line 3: 'high' in column .* is not a finite number"),
     "semicolons": ("t [s];x [m]\n0;1,5\n", "line 1: columns must be separated by commas"),
     "decimal commas": (HEAD + "0,06,1\n", "line 2: has 3 values, the header has 2 columns"),

@@ -26,7 +26,7 @@ def last_transforms(pool_of, given, scale, **options):
 def test_an_impact_does_not_shrink_the_rest_to_nothing():
     values = np.concatenate((np.full(100, 2.0), [5000.0]))
     scale = ArrowScale.from_forces(values, 0.1)
-    assert 2.0 * scale.metres_per_newton > 0.1 / 8.0
+    assert 2.0 * scale.meters_per_newton > 0.1 / 8.0
     assert scale.cuts(values)
     assert not scale.cuts(np.full(3, 2.0))
 
@@ -41,7 +41,7 @@ def test_an_arrow_goes_from_the_contact_along_the_force():
         # three.js's unit cylinder lies along y from -1/2 to 1/2.
         np.testing.assert_allclose((shaft @ [0, -0.5, 0, 1])[:3], start, atol=1e-12)
         np.testing.assert_allclose(
-            (head @ [0, 0.5, 0, 1])[:3], start + force * scale.metres_per_newton, atol=1e-12
+            (head @ [0, 0.5, 0, 1])[:3], start + force * scale.meters_per_newton, atol=1e-12
         )
         np.testing.assert_allclose(shaft @ [0, 0.5, 0, 1], head @ [0, -0.5, 0, 1], atol=1e-12)
     np.testing.assert_allclose(where["point_0"][:3, 3], start)

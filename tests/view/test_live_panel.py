@@ -47,7 +47,7 @@ def test_json_has_no_nan_and_no_infinity():
     }
 
 
-def test_contacts_are_listed_in_millimetres_and_stick_creep_or_slip():
+def test_contacts_are_listed_in_millimeters_and_stick_creep_or_slip():
     laws = [
         None,
         CoulombFriction(0.3, 0.2, v_static=0.01, v_dynamic=0.1),

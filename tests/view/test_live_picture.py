@@ -46,7 +46,7 @@ def test_the_rim_of_a_cone_is_the_limit_of_friction():
     easel.draw()
     easel.picture.show("cones", True)
     contacts, scale = easel.player.contacts, easel.draw() and easel.picture.arrow_scale
-    force = contacts.normal_force[0] * scale.metres_per_newton
+    force = contacts.normal_force[0] * scale.meters_per_newton
     cone = easel.where("cones/cone_0")
     # three.js's cone lies along y from -1/2, the apex, to 1/2, a rim of radius one.
     np.testing.assert_allclose((cone @ [0, -0.5, 0, 1])[:3], contacts.point_world[0], atol=1e-6)
@@ -191,8 +191,8 @@ def test_the_scale_of_arrows_is_found_once_and_then_kept():
     assert easel.picture.arrow_scale == found
     easel.picture.magnify_arrows(2.0)
     easel.draw()
-    assert easel.picture.arrow_scale.metres_per_newton == pytest.approx(
-        2.0 * found.metres_per_newton
+    assert easel.picture.arrow_scale.meters_per_newton == pytest.approx(
+        2.0 * found.meters_per_newton
     )
     easel.picture.magnify_arrows(1.0)
     easel.picture.clear()

@@ -126,8 +126,10 @@ MujocoContacts::Scratch& MujocoContacts::scratch() {
     const auto at = scratches_.find(own);
     if (at != scratches_.end()) return *at->second;
   }
+  // The copy of a law in Python waits for the interpreter's lock, whose holder may wait for mutex_.
+  auto made = std::make_unique<Scratch>(prototype_);
   const std::unique_lock lock(mutex_);
-  return *(scratches_[own] = std::make_unique<Scratch>(prototype_));
+  return *(scratches_[own] = std::move(made));
 }
 
 // cvel is the velocity of the body's point that is at the center of mass of its tree, in the

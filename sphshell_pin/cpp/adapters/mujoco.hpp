@@ -148,8 +148,8 @@ int filter_contact(const void* model, void* data, int geom, int other);
 // `size` says, which is zero where nothing is remembered.
 int register_memory(void* register_plugin, void* get_config);
 
-// A model is known by a mark in its enableflags, which its copies carry: they have its contacts,
-// too, until those of the model end. A mark that was overwritten is found by the model's address.
+// A model is known by its address until it is deleted, and its copies by a mark in the enableflags:
+// they have its contacts, too, until those of the model end.
 // register_passive() returns what touches already, or nothing where the contacts are registered.
 std::string register_passive(void* model, std::shared_ptr<MujocoContacts> contacts);
 // Of all models; the marks of those without other contacts are taken away.

@@ -49,13 +49,8 @@ struct Registry {
   }
   const Marked* find(const void* model) const {
     if (marked.empty()) return nullptr;
-    std::uint32_t number = mark(model);
-    if (number == 0) {
-      const auto at = owners.find(model);
-      if (at == owners.end()) return nullptr;
-      number = at->second;
-    }
-    const auto at = marked.find(number);
+    const auto owned = owners.find(model);
+    const auto at = marked.find(owned == owners.end() ? mark(model) : owned->second);
     if (at == marked.end()) return nullptr;
     const bool same = std::memcmp(at->second.sizes.data(), model, kSizes) == 0;
     return same ? &at->second : nullptr;

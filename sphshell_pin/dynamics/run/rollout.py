@@ -136,7 +136,7 @@ class Rollout(Summarized, Sequence[Result]):
             run, name = through[0]
             runs = len({run for run, _ in through})
             warnings.warn(
-                f"in {runs} of {count} runs, the first of them run {run}, a sphere's centre was "
+                f"in {runs} of {count} runs, the first of them run {run}, a sphere's center was "
                 f"pushed through the shell: the law of contact '{name}' is too weak for the speed",
                 WeakLawWarning,
                 stacklevel=4,

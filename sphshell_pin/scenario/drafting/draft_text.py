@@ -113,7 +113,7 @@ def pair_names(tips: Sequence[Tip], shell: str) -> list[str]:
 
 
 def decimals(gap: float) -> int:
-    """Return how many decimals of a metre keep the `gap` [m] at the start to half a percent."""
+    """Return how many decimals of a meter keep the `gap` [m] at the start to half a percent."""
     return max(4, math.ceil(-math.log10(gap / 200)))
 
 

@@ -64,7 +64,7 @@ class CadModel:
 
     @property
     def meters(self) -> float:
-        """Metres per unit of `shape`."""
+        """Meters per unit of `shape`."""
         return self.unit.shape_meters
 
     @property

@@ -43,7 +43,7 @@ class CadSurface:
 
     @property
     def factor(self) -> float:
-        """Metres per unit of the file."""
+        """Meters per unit of the file."""
         return self.model.unit.meters
 
     def notes(self) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.raw import Floats, Ints, Longs
 
 ANGLE = 0.35
-"""Neighbouring elements on a face turn by about this at most [rad]: less than the crease angle."""
+"""Neighboring elements on a face turn by about this at most [rad]: less than the crease angle."""
 
 MARGIN = 0.95
 """Between the points measured the distance may be a little larger."""

@@ -12,7 +12,7 @@ from OCP.StepRepr import StepRepr_GlobalUnitAssignedContext
 
 from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, UnitWarning
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
+from sphshell_pin.units import METERS_PER_UNIT, meters_per_unit
 
 MILLIMETER = 1e-3
 """OpenCASCADE's tolerances are meant for numbers in millimeters: STEP and IGES are read in them."""
@@ -102,12 +102,12 @@ def take_unit(
     names = header.names
     if unit is None:
         if not names:
-            raise UnitMissing(path, size, METRES_PER_UNIT)
+            raise UnitMissing(path, size, METERS_PER_UNIT)
         if len(names) > 1:
             note = f"units {_listed(names)} from the file's header, each for its own part"
             return header, "mm", note
         return header, names[0], f"unit '{names[0]}' from the file's header"
-    stated = metres_per_unit(unit)
+    stated = meters_per_unit(unit)
     if not names:
         return HeaderUnit((unit,), stated, stated), unit, ""
     if len(names) > 1:
@@ -131,7 +131,7 @@ def take_unit(
 
 def _called(meters: float) -> str:
     """Name of a unit, its length if it has none."""
-    known = (name for name, one in METRES_PER_UNIT.items() if math.isclose(one, meters))
+    known = (name for name, one in METERS_PER_UNIT.items() if math.isclose(one, meters))
     return next(known, f"{meters:.9g} m")
 
 

@@ -35,7 +35,7 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.model import CadModel, Part, compound
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES, Occ
 from sphshell_pin.shell.cad.units import MILLIMETER
-from sphshell_pin.units import metres_per_unit
+from sphshell_pin.units import meters_per_unit
 
 if TYPE_CHECKING:
     from sphshell_pin.shell.shell import Shell
@@ -74,13 +74,13 @@ def cad_content(path: Path, parts: Sequence[Part], meters: float, unit: str) -> 
     """
     suffix, stream = path.suffix.lower(), io.BytesIO()
     if suffix in BREP_SUFFIXES:
-        shapes = [_scaled(shape, meters / metres_per_unit(unit)) for _, shape in parts]
+        shapes = [_scaled(shape, meters / meters_per_unit(unit)) for _, shape in parts]
         stream.write(b"DBRep_DrawableShape\n")
         BRepTools.Write_s(shapes[0] if len(shapes) == 1 else compound(shapes), stream)
         done = True
     else:
         names = STEP_UNITS if suffix in STEP_SUFFIXES else IGES_UNITS
-        known = [name for name in names if metres_per_unit(name) == metres_per_unit(unit)]
+        known = [name for name in names if meters_per_unit(name) == meters_per_unit(unit)]
         if not known:
             raise InvalidParameter("unit", unit, f"must be one of: {', '.join(names)}")
         parts = [(name, _scaled(shape, meters / MILLIMETER)) for name, shape in parts]

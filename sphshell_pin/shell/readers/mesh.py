@@ -18,6 +18,7 @@ import numpy.typing as npt
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, RawSurface
 from sphshell_pin.shell.readers.text import (
+    check_ascii,
     finish,
     indices,
     pack_polygons,
@@ -125,6 +126,7 @@ def read_obj(path: Path) -> RawSurface:
 
 def _obj_index(path: Path, line: int, word: str, latest: int, what: str) -> int:
     try:
+        check_ascii([word])
         index = int(word)
     except ValueError:
         raise ShellFileError(path, f"'{word}' is not the index of a {what}", line) from None
@@ -173,6 +175,7 @@ def read_off(path: Path) -> RawSurface:
         header = data.pop(0)
     words = header + [word for row in data for word in row]
     try:
+        check_ascii(words)
         num_vertices, num_faces = int(words[0]), int(words[1])
     except (ValueError, IndexError):
         raise ShellFileError(path, "must count vertices, faces and edges first", first) from None

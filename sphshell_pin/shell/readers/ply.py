@@ -15,7 +15,13 @@ import numpy.typing as npt
 
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurface
-from sphshell_pin.shell.readers.text import finish, pack_polygons, read_bytes, real_numbers
+from sphshell_pin.shell.readers.text import (
+    check_ascii,
+    finish,
+    pack_polygons,
+    read_bytes,
+    real_numbers,
+)
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -114,6 +120,7 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
         try:
             if not words or words[0] in ("ply", "comment", "obj_info"):
                 continue
+            check_ascii(words[2:3] if words[0] == "element" else [])
             if words[0] == "format":
                 form = words[1]
             elif words[0] == "element":

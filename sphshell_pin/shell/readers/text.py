@@ -35,10 +35,17 @@ def read_bytes(path: Path) -> bytes:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
 
 
+def check_ascii(words: Sequence[object]) -> None:
+    """Raise ValueError for words that are numbers in Python alone."""
+    text = "".join(map(str, words))
+    if "_" in text or not text.isascii():
+        raise ValueError("an underscore or a foreign digit in a number")
+
+
 def real_numbers(words: Sequence[object]) -> Floats:
     """Return words of a file as numbers; ValueError, also for 1_0, which is one in Python alone."""
-    if words and isinstance(words[0], str) and "_" in "".join(map(str, words)):
-        raise ValueError("an underscore in a number")
+    if words and isinstance(words[0], str):
+        check_ascii(words)
     return np.array(words, np.float64)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.regular_file import read_text
+from sphshell_pin.base.texts import number_of
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound
 from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.quantities import Quantity
@@ -291,7 +292,7 @@ def _read_csv(path: Path) -> _Table:
             if not cell.strip():
                 continue
             value = _number(cell)
-            if value is None or not math.isfinite(value):
+            if value is None:
                 reason = f"'{cell.strip()}' in column '{head[i]}' is not a finite number"
                 if head[i].partition(" ")[0] != TIME:
                     reason += "; leave the cell empty where nothing was measured"
@@ -302,6 +303,6 @@ def _read_csv(path: Path) -> _Table:
 
 def _number(text: str) -> float | None:
     try:
-        return float(text)
+        return number_of(text)
     except ValueError:
         return None

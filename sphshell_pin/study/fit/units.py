@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.units import METRES_PER_UNIT
+from sphshell_pin.units import METERS_PER_UNIT
 
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}
-_LENGTH = {**METRES_PER_UNIT, "µm": 1e-6}
+_LENGTH = {**METERS_PER_UNIT, "µm": 1e-6}
 _FORCE = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605}
 _ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
 

@@ -17,8 +17,8 @@ _SINGULAR = 1e-9
 def random_posture(model: pin.Model, rng: np.random.Generator) -> Array:
     """Return a random configuration (nq,) within the joints' limits.
 
-    Where a joint has none (or more than a turn) it lies within half a turn [rad] or half a metre of
-    its neutral place; free bodies are turned anyhow within half a metre of the origin.
+    Where a joint has none (or more than a turn) it lies within half a turn [rad] or half a meter of
+    its neutral place; free bodies are turned anyhow within half a meter of the origin.
     """
     move = np.zeros(model.nv)
     limited: list[tuple[int, float]] = []

@@ -206,7 +206,7 @@ class ConePool:
                 k = int(order[slot])
                 law = pairs[int(contacts.pair[k])].friction
                 mu = 0.0 if law is None else law.largest_coefficient
-                height = min(contacts.normal_force[k] * scale.metres_per_newton, scale.longest)
+                height = min(contacts.normal_force[k] * scale.meters_per_newton, scale.longest)
                 if min(mu, 1.0) * height > HIDDEN_SCALE:
                     along = height * contacts.normal_world[k]
                     matrix = rod_along(contacts.point_world[k], along, mu * height)

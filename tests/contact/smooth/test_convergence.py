@@ -71,7 +71,7 @@ def test_order_with_estimated_normals(name: str, depth: float) -> None:
 def test_one_contact(name: str, exact: bool) -> None:
     """Never none nor two, unless the surface of the elements is off by nearly the depth."""
     for h in SIDES:
-        # In metres: the force goes with depth^1.5, and the probes are but a sample.
+        # In meters: the force goes with depth^1.5, and the probes are but a sample.
         error = 2 * measured(name, h, DEPTHS[0], exact)[0].max() * DEPTHS[0] / 1.5
         for depth in DEPTHS:
             count = measured(name, h, depth, exact)[2]

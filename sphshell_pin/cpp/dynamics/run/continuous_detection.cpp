@@ -22,11 +22,11 @@ double distance_of(const Pair& pair, const Vec3& center) {
 }  // namespace
 
 // One known distance for each pair and each cluster.
-Guard::Guard(const SceneData& scene)
+ContinuousDetection::ContinuousDetection(const SceneData& scene)
     : known_(scene.pairs().size()), known_of_cluster_(scene.clusters().size()) {}
 
 // Where each sphere is at the begin of the step, and whether it touches.
-void Guard::begin(const SceneData& scene) {
+void ContinuousDetection::begin(const SceneData& scene) {
   for (std::size_t k = 0; k < known_.size(); ++k) {
     known_[k].center = scene.states()[k].center;
     known_[k].touching = scene.states()[k].count > 0;
@@ -45,7 +45,8 @@ void Guard::begin(const SceneData& scene) {
 
 // Whether the ball of a cluster has been as far from the shell as none of its spheres moved: then
 // none of them needs a look of its own.
-bool Guard::is_clear(const SceneData& scene, const Cluster& cluster, Known& known) const {
+bool ContinuousDetection::is_clear(const SceneData& scene, const Cluster& cluster,
+                                   Known& known) const {
   if (known.touching) return false;
   double moved = 0, radius = std::numeric_limits<double>::infinity();
   for (std::size_t k = cluster.first; k <= cluster.last; ++k) {
@@ -61,7 +62,8 @@ bool Guard::is_clear(const SceneData& scene, const Cluster& cluster, Known& know
 // The share of the step up to which no sphere can have passed through anything unseen; 1 and more:
 // all of it. A touching sphere may move by kTouching of its radius, another one by its gap and
 // kApart.
-double Guard::allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end) {
+double ContinuousDetection::allowed(SceneData& scene, const State& from, const State& to,
+                                    bool gap_at_end) {
   double share = std::numeric_limits<double>::infinity();
   const double h = to.t - from.t;
   const double turned =
@@ -101,7 +103,7 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to, bool
 
 // A lower bound of the gap of a sphere at the begin of the step; the distance is looked up where
 // the one known is worn out.
-double Guard::gap(const Pair& pair, double radius, Known& known) {
+double ContinuousDetection::gap(const Pair& pair, double radius, Known& known) {
   // The distance known at the anchor, less the way since: still a lower bound.
   double distance = known.distance - (known.center - known.anchor).norm();
   if (known.distance < 0 || distance < std::max(2 * radius, 0.5 * known.distance)) {
@@ -112,7 +114,8 @@ double Guard::gap(const Pair& pair, double radius, Known& known) {
 }
 
 // Length of the center's path in the shell's frame, by chords.
-double Guard::path(SceneData& scene, std::size_t k, const State& from, const State& to) {
+double ContinuousDetection::path(SceneData& scene, std::size_t k, const State& from,
+                                 const State& to) {
   const Pair& pair = scene.pairs()[k];
   Multibody& body = scene.body();
   const double h = to.t - from.t;

@@ -11,9 +11,9 @@ namespace sphshell {
 // radius while they are apart, and by a quarter of the radius while they touch. So the force acts
 // before the center comes near the surface, at any speed, and what is missed between two
 // evaluations is a touch of at most r / 2000.
-class Guard {
+class ContinuousDetection {
  public:
-  explicit Guard(const SceneData& scene);
+  explicit ContinuousDetection(const SceneData& scene);
 
   // The scene's last evaluate() was at the state where the next step begins.
   void begin(const SceneData& scene);

@@ -36,7 +36,7 @@ Stepping::Stepping(SceneData& scene, Torques& torques, const StepSettings& setti
       scene_(scene),
       chart_(scene, torques),
       stepper_(make_stepper(settings.integrator, scene)),
-      guard_(scene),
+      detection_(scene),
       events_(scene),
       state_(std::move(start)),
       next_(state_) {
@@ -58,7 +58,7 @@ void Stepping::restart() {
   last_ = scene_.powers();
   scene_.accept(state_.z);
   free_ = !scene_.touching() && !scene_.joints().act();
-  guard_.begin(scene_);
+  detection_.begin(scene_);
   events_.begin();
   proposal_ = kFirstStep;
   after_event_ = false;
@@ -84,7 +84,7 @@ void Stepping::resume(const double* from) {
   scene_.evaluate(state_.q, state_.v, state_.z, true);
   set_fine(from[7] != 0);
   free_ = !scene_.touching() && !scene_.joints().act();
-  guard_.begin(scene_);
+  detection_.begin(scene_);
   events_.begin();
   proposal_ = from[4], last_error_ = from[5];
   after_event_ = from[6] != 0;
@@ -105,7 +105,7 @@ bool Stepping::make_fixed(double end) {
   next_.t = end;
   active_->complete(chart_, next_);
   scene_.evaluate(next_.q, next_.v, next_.z);
-  if (guard_.allowed(scene_, state_, next_) >= 1) return true;
+  if (detection_.allowed(scene_, state_, next_) >= 1) return true;
   scene_.restart();
   scene_.evaluate(state_.q, state_.v, state_.z);
   proposal_ = std::min(proposal_, 0.1 * (end - state_.t));
@@ -154,7 +154,7 @@ Stepping::Made Stepping::make_controlled(double end) {
     bool is_met = false;
     if (small || (error < kUsableError && event_steps < kMostEventSteps)) {
       scene_.evaluate(next_.q, next_.v, next_.z);
-      const double allowed = guard_.allowed(scene_, state_, next_, true);
+      const double allowed = detection_.allowed(scene_, state_, next_, true);
       if (allowed < 1 && small) {
         ++rejected_;
         h *= std::clamp(0.95 * allowed, 0.01, 0.9);
@@ -238,7 +238,7 @@ double Stepping::predicted_step(double h) {
     chart_.finish(state_.t + h, probe_, next_);
     scene_.restart();
     scene_.evaluate(next_.q, next_.v, next_.z);
-    const double allowed = guard_.allowed(scene_, state_, next_, true);
+    const double allowed = detection_.allowed(scene_, state_, next_, true);
     if (allowed >= 1) break;
     h *= std::clamp(0.95 * allowed, 0.01, 0.9);
   }
@@ -322,7 +322,7 @@ void Stepping::accept() {
   scene_.accept(next_.z);
   std::swap(state_, next_);
   free_ = !scene_.touching() && !scene_.joints().act();
-  guard_.begin(scene_);
+  detection_.begin(scene_);
   events_.begin();
 }
 

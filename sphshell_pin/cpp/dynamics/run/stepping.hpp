@@ -81,7 +81,7 @@ class Stepping {
   // The second one is for what a fixed step cannot resolve.
   std::unique_ptr<Stepper> stepper_, fine_stepper_;
   Stepper* active_;
-  Guard guard_;
+  ContinuousDetection detection_;
   Events events_;
   State state_, next_;
   Powers last_;

@@ -58,7 +58,7 @@ void CurvedFacet::set_side(int k, const Vec3& first, const Vec3& last) {
   exponent = std::max(exponent - 47, -1000);  // 47 bits and a sign; below, all is zero
   exponent_[k] = static_cast<std::int16_t>(exponent);
   constexpr std::int64_t kMost = (std::int64_t(1) << 47) - 1;
-  const double units = std::ldexp(1.0, -exponent);  // of one metre
+  const double units = std::ldexp(1.0, -exponent);  // of one meter
   for (int at = 0; at < 6; ++at) {
     const double units_off = units * (at < 3 ? first[at] : last[at - 3]);
     const auto nearest = static_cast<std::int64_t>(units_off + std::copysign(0.5, units_off));
