@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized, show_value
+from sphshell_pin.base.summary import show_value
 from sphshell_pin.study.fit.report import Fitted
 from tests.models import ball
 
@@ -129,23 +129,6 @@ def test_figures_are_those_of_the_object_with_units(shown):
     assert "<b>sheet</b>" in repr(shown["shell"])
     rollout = Cells(shown["rollout"]._repr_html_()).texts
     assert "ball-sheet.peak_force" in rollout
-
-
-class Many(Summarized):
-    def _facts(self):
-        return [Fact("length", 0.5, "m"), Fact("rows", 30), Fact("hidden", 1, brief=False)]
-
-    def _rows(self):
-        return Detail(("i",), [(i,) for i in range(30)], 30)
-
-
-def test_long_tables_are_cut_and_say_so():
-    assert repr(Many()) == "<Many: length 0.5 m, 30 rows>"
-    texts = Cells(Many()._repr_html_()).texts
-    assert "hidden" in texts
-    assert f"and {30 - MOST_ROWS} more" in texts
-    assert str(MOST_ROWS - 1) in texts
-    assert str(MOST_ROWS + 1) not in texts
 
 
 @pytest.mark.parametrize(

@@ -194,12 +194,6 @@ METHOD = "contact.ball-plate.method"
 WITH_METHOD = DROP.replace('shell = "plate"\n', 'shell = "plate"\nmethod = "smooth"\n')
 
 
-def test_a_word_of_a_choice_may_be_a_knob(tmp_path):
-    (found,) = live_parameters(build(write(tmp_path, WITH_METHOD + knob(METHOD))))
-    assert (found.value, found.choices) == ("smooth", ("facets", "smooth", "elements"))
-    assert (found.label, found.unit, found.restart) == ("method", "", False)
-
-
 @pytest.mark.parametrize(
     ("text", "more", "says"),
     [

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import shutil
 
 import numpy as np
 import pinocchio as pin
@@ -82,24 +81,6 @@ def test_energy_goes_with_the_row(replay):
     replay.seek(0.01)
     lost = energy.potential[0] - energy.potential[replay.row]
     assert replay.exchanged == pytest.approx(0.5 * (energy.kinetic[replay.row] + lost), rel=1e-12)
-
-
-def test_results_and_scenario_may_move_together(tmp_path):
-    home = tmp_path / "here"
-    home.mkdir()
-    (home / "vertices.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    primitive = 'primitive = { type = "box", size = [0.2, 0.2, 0.02] }'
-    write(home, DROP.replace(primitive, 'file = "vertices.obj"\nunit = "m"\nside = "both"'))
-    run_built(build(home / "drop.toml"), home / "out", recording=False)
-    origin = sp.Result.load(home / "out" / "run.npz").origin
-    assert origin.scenario == str(home / "drop.toml")
-    home.rename(tmp_path / "there")
-    moved = Replay(tmp_path / "there" / "out" / "run.npz")
-    assert moved.result.origin.scenario == str(tmp_path / "there" / "drop.toml")
-    # The results alone have what they need.
-    shutil.copytree(tmp_path / "there" / "out", tmp_path / "alone")
-    shutil.rmtree(tmp_path / "there")
-    assert Replay(tmp_path / "alone" / "run.npz").scene.pairs[0].shell.elements.shape[0] == 1
 
 
 def test_a_shipped_scenario_is_found_by_its_name(tmp_path):

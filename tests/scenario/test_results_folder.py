@@ -230,6 +230,18 @@ def test_a_folder_called_like_a_result_is_told(no_pictures, tmp_path):
     assert os.listdir(tmp_path / "out") == ["energy.png"]
 
 
+def test_a_parent_that_another_process_removes_meanwhile_is_made_again(tmp_path, monkeypatch):
+    lock, gone = AtomicFolder._lock_by, iter([True])
+
+    def lock_by(folder, path):
+        if next(gone, False):
+            path.parent.rmdir()
+        lock(folder, path)
+
+    monkeypatch.setattr(AtomicFolder, "_lock_by", lock_by)
+    assert put(tmp_path / "x" / "out", "new") == {"a": "new", LAST: "new"}
+
+
 def test_a_folder_made_in_vain_is_removed(tmp_path):
     out = tmp_path / "x" / "y"
 

@@ -7,8 +7,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import ScenarioError
-from sphshell_pin.scenario import build, rebuild, run_scenario
-from sphshell_pin.scenario.live.live_run import LiveRun
+from sphshell_pin.scenario import build, run_scenario
 from sphshell_pin.scenario.running.replay import Replay
 from tests.scenario.files import DROP, write
 
@@ -75,20 +74,6 @@ def test_readings_are_figures(tmp_path, no_pictures):
     assert [one.measured for one in report.verdicts] == [1.0, log[-1, 2], log[:, 3].mean()]
     with pytest.raises(ScenarioError, match=r"nearest ones are: sensors\.inside\.force_"):
         run_scenario(write(tmp_path, DROP + SENSORS + expect.replace("force_z", "force")))
-
-
-def test_values_of_sensors_can_be_changed(tmp_path):
-    path = write(tmp_path, DROP + SENSORS)
-    built = build(path, {"sensor.inside.rate": "250", "sensor.touch.delay": "0.002"})
-    assert [one.rate for one in built.simulation.sensors] == [250.0, 1000.0]
-    assert built.simulation.sensors[1].delay == 0.002
-    assert rebuild(built, {"sensor.inside.cutoff": "20"}).simulation.sensors[0].cutoff == 20.0
-    live = LiveRun(build(path))
-    live.advance(0.01)
-    live.change("sensor.inside.cutoff", 50.0)
-    assert live.time > 0.009
-    live.advance(0.01)
-    assert live.built.simulation.sensors[0].cutoff == 50.0
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.scenario.running.run import run_built
-from sphshell_pin.scenario.running.series import held, motion_series
+from sphshell_pin.scenario.running.series import motion_series
 from tests.scenario.files import FINGER, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -60,22 +60,6 @@ def test_torques_are_recorded_once_they_are_asked_for(tmp_path) -> None:
     assert torque.values(live.now)[0] == pytest.approx(expected, rel=1e-9)
     live.reset()  # and in the next run
     assert np.isfinite(torque.values(live.advance(0.02))[1:]).all()
-
-
-def test_a_sensor_shows_the_last_reading_that_had_arrived(built) -> None:
-    live, whole = (
-        LiveRun(built),
-        built.simulation.run(built.q0, built.v0, 0.1, built.controller, record_dt=5e-3),
-    )
-    log = whole.sensors["wrist"]
-    curve = next(one for one in live.series if one.key == "sensor.wrist.force_x")
-    pieces = [live.advance(duration) for duration in (0.007, 0.0004, 0.03, 0.0626)]
-    t = np.concatenate([rows.t for rows in pieces])
-    values = np.concatenate([curve.values(rows) for rows in pieces])
-    np.testing.assert_array_equal(values, [log.at(one)[0] for one in t])
-    assert np.isnan(values[0])
-    assert len(np.unique(values[1:])) > 10
-    np.testing.assert_array_equal(held(log, t, None)[:, 0], values)
 
 
 def test_a_finished_run_offers_what_it_recorded(built, tmp_path) -> None:

@@ -75,16 +75,6 @@ def test_a_ball_falls_on_a_ball(tmp_path):
     assert [pair.kind for pair in report.built.scene.pairs][:2] == ["sphere-sphere", "sphere-shell"]
 
 
-def test_a_slider_changes_the_other_sphere(tmp_path):
-    changes = {
-        "contact.balls.other_sphere.radius": "0.013",
-        "contact.floor.spheres.1.radius": "0.02",
-    }
-    scene = build(write(tmp_path, TWO_BALLS), changes).scene
-    assert scene.pair("balls").other_sphere.radius == 0.013
-    assert scene.pair("floor/lower/ball").sphere.radius == 0.02
-
-
 def test_collision_spheres_of_a_hand(tmp_path):
     scene = build(write(tmp_path, HAND)).scene
     wanted = robots.collision_spheres(robots.load("allegro_right_hand"))

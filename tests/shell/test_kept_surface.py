@@ -124,5 +124,6 @@ def test_the_oldest_go(tmp_path: Path) -> None:
     for k in range(5):
         (tmp_path / str(k)).write_bytes(bytes(100))
         os.utime(tmp_path / str(k), (k, k))
+    (tmp_path / "link").symlink_to("0")  # itself it is new, and small
     keep_newest(tmp_path, 250)
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["3", "4"]
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["3", "4", "link"]

@@ -2,7 +2,6 @@
 
 import json
 
-import meshcat
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,8 +10,7 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from tests.scenario.arms import write_arm
 from tests.scenario.files import write
-from tests.view.live_driver import OTHER_TAB, TAB, ForeignWindow, frames, say
-from tests.view.live_player import BallPlayer, FilmPlayer
+from tests.view.live_driver import OTHER_TAB, TAB, frames, say
 
 NODE = "/meshcat/robot/visuals/lower_0"
 
@@ -172,27 +170,3 @@ def test_patches_are_computed_when_they_are_switched_on(ball):
     frames(ball, 2)
     assert ball.player.patches is None
     assert ball._state()["pressure"] is None
-
-
-def test_a_finished_run_and_other_players_offer_neither_drags_nor_targets(make):
-    for player in (FilmPlayer(), BallPlayer()):
-        live = make(player)
-        assert hello(live)["drag"] is None
-        assert hello(live)["targets"] == []
-        drag(live, [1.0, 0.0, 0.5])
-        say(live, "target", joint="elbow", value=0.1)
-        say(live, "show", part="pressure", on=True)
-        frames(live, 1)
-        assert [text for _, text in live.told] == [
-            "this run cannot be dragged or aimed: it is a finished one, or its player cannot"
-        ] * 2
-
-
-def test_a_picture_in_somebody_elses_window_offers_no_drag(make, tmp_path):
-    player = LiveRun(build(write_arm(tmp_path)))
-    live = make(player, visualizer=meshcat.Visualizer(window=ForeignWindow()))
-    assert hello(live)["drag"] is None
-    assert len(hello(live)["targets"]) == 2
-    drag(live, [1.0, 0.0, 0.5])
-    frames(live, 1)
-    assert len(live.told) == 1

@@ -219,18 +219,6 @@ def test_a_state_that_is_no_number_is_not_drawn(make):
     assert np.isfinite(live._window._matrices).all()
 
 
-def test_ctrl_c_ends_it_cleanly():
-    class Interrupted(BallPlayer):
-        def advance(self, duration, wall=np.inf):
-            if self.time > 0.1:
-                raise KeyboardInterrupt
-            return super().advance(duration, wall)
-
-    live = Live(Interrupted())
-    live.run()
-    assert not live.server._thread.is_alive()
-
-
 def test_a_picture_in_somebody_elses_window(make):
     window = ForeignWindow()
     live = make(visualizer=meshcat.Visualizer(window=window))
