@@ -1,5 +1,5 @@
-// Inside of recognition.cpp, guesses.cpp, growth.cpp, evidence.cpp, steps.cpp and snapping.cpp: the
-// search for faces in a mesh.
+// Inside of recognition.cpp, guesses.cpp, growth.cpp, evidence.cpp, steps.cpp, agreement.cpp and
+// snapping.cpp: the search for faces in a mesh.
 #pragma once
 
 #include <algorithm>
