@@ -1,22 +1,26 @@
 """A compiled robot against Pinocchio: python -m benchmarks.compiled.
 
 Presses Panda's tool into a surface of 200 k triangles with both, in turn, and prints the time of a
-step, the ratio, and how far the motions are apart; then what the robot took to be compiled.
+step, the ratio, and how far the motions are apart; what the robot took to be compiled; and a loop
+of one's own in C++ over the same, tests/cpp/press.cpp, which `make test` builds.
 """
 
 from __future__ import annotations
 
 import os
 import resource
+import subprocess
 import tempfile
 import time
 
+import example_robot_data
 import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.base.cache import CACHE
+from sphshell_pin.dynamics.compiled.robot import compile_robot
 
 STEPS, ROUNDS, RADIUS = 4000, 15, 0.012
 Q = np.array([0, 0.35, 0, -2.0, 0, 2.35, 0.8, 0.02, 0.02])
@@ -71,7 +75,10 @@ def main() -> None:
     print(f"ratio: {middle:.2f} (quartiles {low:.2f} to {high:.2f})")
     ends = [simulation.run(Q, None, 0.01).q[-1] for simulation in simulations.values()]
     print(f"apart after 10 000 steps: {np.abs(ends[0] - ends[1]).max():.1e}")
-    print(f"compiler: {compiler:.2f} CPU s")
+    print(f"compiler: {compiler:.2f} CPU s", flush=True)
+    panda = example_robot_data.load("panda")
+    program = "build/cpp-tests/press", panda.urdf, compile_robot(panda.model), str(STEPS), "317"
+    subprocess.run(program, check=True)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from sphshell_pin.robots.files import (
     keep_spheres,
     read,
 )
-from sphshell_pin.robots.inertia import mass_fault, with_density
+from sphshell_pin.robots.inertia import few, mass_fault, with_density
 from sphshell_pin.robots.library_names import is_library_name, library_source
 from sphshell_pin.robots.mesh_spheres import MeshSpheres, spheres_of_link, spheres_of_mesh
 
@@ -215,13 +215,13 @@ def load_file(
     MJCF it may be a `<key>`.
 
     Limits, damping, dry friction and armature are in the model's attributes of those names. Warns
-    with RobotWarning of visual meshes that are missing, and of what the file states that is not
+    with RobotWarning of meshes that are missing, and of what the file states that is not
     modeled.
 
     Raises
     ------
     RobotError
-        The file or one of its collision meshes is missing or cannot be read, or the robot is too
+        The file is missing, it or one of its collision meshes cannot be read, or the robot is too
         large: a chain of more than 1000 links, or more degrees of freedom than 2 GB of memory hold
         (315). The floating root link has no mass. With `mimic`: a kinematic loop, or a joint that
         mimics none that is there.
@@ -238,7 +238,8 @@ def load_file(
     _load_poses(model, srdf)
     collision, missing = build_geometry(description, model, pin.GeometryType.COLLISION)
     visual, without = build_geometry(description, model, pin.GeometryType.VISUAL)
-    missing = [*missing, *without]
+    touch = "; what lacks its collision mesh touches nothing" if missing else ""
+    missing = [*dict.fromkeys((*missing, *without))]
     robot = LoadedRobot(
         name or model.name,
         model,
@@ -250,8 +251,7 @@ def load_file(
     )
     if missing:
         warnings.warn(
-            f"{path}: without these visual meshes, which are missing or broken: "
-            f"{', '.join(missing)}; "
+            f"{path}: without these meshes, which are missing or broken: {few(missing)}{touch}; "
             f"searched in {description.folders.searched()} (see --package-dir)",
             RobotWarning,
             stacklevel=2,

@@ -113,7 +113,8 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
             what = "MJCF"
             return plain(root, folders, floats=free_flyer)
         _check_tree(root)
-        return Description(file, folders, root, tuple(_mimics(root)))
+        notes = tuple(_with_limits(root))
+        return Description(file, folders, root, tuple(_mimics(root)), notes=notes)
     except (ValueError, OSError, LookupError, RuntimeError) as error:  # the last: Pinocchio's
         if isinstance(error, SphshellError):
             raise
@@ -176,10 +177,10 @@ def build_model(
 def build_geometry(
     description: Description, model: pin.Model, kind: pin.GeometryType, *, drawn: bool = True
 ) -> tuple[pin.GeometryModel, list[str]]:
-    """Return the geometry of a kind, and the visual meshes that are missing.
+    """Return the geometry of a kind, and the meshes that are missing, or visual and broken.
 
     Collada meshes are in meters, but for visual ones that are `drawn`: who draws them applies their
-    unit. Raises RobotError for a collision mesh that is missing, and for one that cannot be read.
+    unit. Raises RobotError for a collision mesh that cannot be read.
     """
     visual = kind == pin.GeometryType.VISUAL
     root, missing = _with_meshes(description, visual=visual, meters=not (visual and drawn))
@@ -258,7 +259,7 @@ def _is_visual(part: ET.Element) -> bool:
 def _with_meshes(
     description: Description, *, visual: bool, meters: bool
 ) -> tuple[ET.Element, list[str]]:
-    """Return a copy that names meshes by absolute paths; missing visual ones are out.
+    """Return a copy that names meshes by absolute paths, without those that are missing.
 
     With `meters` Collada meshes are scaled by their unit, which Coal ignores.
     """
@@ -290,13 +291,13 @@ def _with_meshes(
                 continue
             uri = mesh.get("filename", "")
             found = description.folders.find(uri)
-            reason = f"{uri} is not there" if found is None else _mesh_reason(found)
+            reason = "" if found is None else _mesh_reason(found)
             if found is not None and not reason:
                 mesh.set("filename", str(found.absolute()))
                 if meters and found.suffix.lower() == ".dae":
                     scale = [number_of(x) for x in mesh.get("scale", "1 1 1").split()]
                     mesh.set("scale", " ".join(str(x * collada_unit(found)) for x in scale))
-            elif visual:
+            elif visual or found is None:
                 missing[uri] = None
                 link.remove(part)
             else:
@@ -331,6 +332,19 @@ def _mesh_fault(description: Description, reason: str) -> RobotError:
         f"{description.folders.searched()}: give the folder above the package with --package-dir, "
         "package_dirs in a scenario or in Python"
     )
+
+
+def _with_limits(root: ET.Element) -> Iterator[str]:
+    """Give joints an empty <limit>, which states none, where urdfdom asks for one; say of which."""
+    kinds = ("revolute", "prismatic")
+    bare = [
+        one for one in root.iter("joint") if one.get("type") in kinds and one.find("limit") is None
+    ]
+    for joint in bare:
+        ET.SubElement(joint, "limit", effort="0", velocity="0")
+    if bare:
+        names = ", ".join(f"'{one.get('name')}'" for one in bare)
+        yield f"without limits of the joints {names}: they have no <limit>"
 
 
 def _mimics(root: ET.Element) -> Iterable[Mimic]:
@@ -397,6 +411,12 @@ def _check_tree(root: ET.Element) -> None:
                 )
             if end == "child" and link is not None:
                 movers[link].append(str(joint.get("name")))
+    roots = [str(link) for link in links if link not in movers]
+    if len(roots) > 1:
+        raise ValueError(
+            f"no joint moves or fixes the links {', '.join(map(repr, sorted(roots)))}: a URDF has "
+            "one such root; fix the others to it, with a joint of type fixed"
+        )
     for link, names in movers.items():
         if len(names) > 1:
             raise ValueError(

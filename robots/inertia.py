@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import xml.etree.ElementTree as ET
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +19,8 @@ from sphshell_pin.robots.description import Description
 from sphshell_pin.robots.files import build_geometry, build_model, keep_geometry_of
 from sphshell_pin.shell.shell import Shell
 
+# Of a link whose geometry keeps a place, at most that part of the heaviest link's mass.
+_SPECK = 1e-5
 # Names that a sentence lists; a part of the largest inertia below which a joint moves no mass.
 _LISTED, _NONE = 8, 1e-14
 
@@ -26,8 +28,9 @@ _LISTED, _NONE = 8, 1e-14
 def with_density(description: Description, density: float) -> tuple[Description, str]:
     """Return a URDF in which each link has an inertial that states none, and what was added.
 
-    `density` [kg/m^3] is that of its collision geometry, or of its visual one if it has no other;
-    open meshes are taken for their convex hulls. Links without geometry stay as they are.
+    `density` [kg/m^3] is that of its collision geometry, or of its visual one if it has no other,
+    or but a speck that keeps a place; open meshes are taken for their convex hulls. Links without
+    geometry stay as they are.
     """
     check_positive("density", density, "kg/m^3")
     if description.is_mjcf:
@@ -36,14 +39,15 @@ def with_density(description: Description, density: float) -> tuple[Description,
     model = build_model(description)
     frames = {f.name: k for k, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
     for kind in ("collision", "visual"):
-        bare = [one for one in root.findall("link") if not _mass(one)]
+        speck = _SPECK * max(added.values(), default=0.0)
+        bare = [one for one in root.findall("link") if not _mass(one) > speck]
         part = copy.deepcopy(description)
         keep_geometry_of(part, {one.get("name", "") for one in bare}, kind)
         of = getattr(pin.GeometryType, kind.upper())
         geometry, _ = build_geometry(part, model, of, drawn=False)
         for link in bare:
             inertia = _inertia(model, geometry, frames.get(link.get("name", "")), density)
-            if inertia.mass > 0.0:
+            if inertia.mass > _mass(link):
                 for stated in link.findall("inertial"):
                     link.remove(stated)
                 link.insert(0, _element(inertia))
@@ -153,5 +157,10 @@ def _element(inertia: pin.Inertia) -> ET.Element:
 
 
 def _list(links: list[str]) -> str:
-    more = f" and {len(links) - _LISTED} others" if len(links) > _LISTED else ""
-    return f"link{'s' * (len(links) > 1)} {', '.join(links[:_LISTED])}{more}"
+    return f"link{'s' * (len(links) > 1)} {few(links)}"
+
+
+def few(names: Sequence[str]) -> str:
+    """List the first few of `names`, and say how many more there are."""
+    more = f" and {len(names) - _LISTED} others" if len(names) > _LISTED else ""
+    return f"{', '.join(names[:_LISTED])}{more}"

@@ -50,7 +50,7 @@ class Folders:
             yield from _beside(folder, name)
         for folder in _listed("AMENT_PREFIX_PATH"):
             yield from _beside(folder / "share", name)
-        for folder in (*_listed("ROS_PACKAGE_PATH"), *self.given, workspace(home)):
+        for folder in (*_listed("ROS_PACKAGE_PATH"), *self.given, *workspaces(home)):
             yield from _below(folder, name)
 
     def package(self, name: str) -> Path | None:
@@ -78,7 +78,18 @@ class Folders:
             tried.append(place)
         # Where no folder is called as its own is, all files may have been put into one.
         whole = any(os.path.isdir(place.parent) for place in tried)
-        return None if whole else self._alone(parts[-1])
+        return self._sorted_anew(scheme, parts) if whole else self._alone(parts[-1])
+
+    def _sorted_anew(self, scheme: str, parts: Sequence[str]) -> Path | None:
+        """Return the only file of a package whose path has all of `parts`, and folders between.
+
+        Newer versions of a package put its meshes into more folders than older ones.
+        """
+        k = parts.index("share") + 1 if "share" in parts[:-2] else 0
+        package = self.package(parts[k]) if k or scheme == "package" else None
+        files = () if package is None else package.rglob(parts[-1])
+        found = [one for one in files if _has_all(one.parts, parts[k + 1 :])]
+        return found[0] if len(found) == 1 else None
 
     def _moved(self, parts: Sequence[str]) -> Iterator[Path]:
         """Yield where a file of a renamed package, or of another machine's folders, may be."""
@@ -109,13 +120,19 @@ class Folders:
     def searched(self) -> str:
         """Say where has been searched."""
         home = self.file.absolute().parent
-        searched = [str(one) for one in (*self.given, self.file.parent, workspace(home))]
+        searched = [str(one) for one in (*self.given, self.file.parent, workspaces(home)[-1])]
         searched += [
             f"${name} ({os.environ[name]})"
             for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
             if os.environ.get(name)
         ]
         return ", ".join(dict.fromkeys(searched))
+
+
+def _has_all(parts: Sequence[str], wanted: Sequence[str]) -> bool:
+    """Whether `wanted` are among `parts`, in that order."""
+    rest = iter(parts)
+    return all(one in rest for one in wanted)
 
 
 def _listed(variable: str) -> list[Path]:
@@ -141,20 +158,21 @@ def _stated_name(package_xml: Path) -> str | None:
         return None
 
 
-def workspace(folder: Path) -> Path:
-    """Return the highest folder that holds packages beside that of `folder`, or `folder` itself.
+def workspaces(folder: Path) -> list[Path]:
+    """Return the folders that hold packages beside that of `folder`, or `folder` itself.
 
-    That is the clone (its .git) or the `src` above the package, else the folder of the package.
+    They end with the clone (its .git) or the `src` above the package, else with the folder of the
+    package; of two packages of a name the nearer one counts.
     """
     above = (folder, *folder.parents)
     packages = [one for one in above if (one / "package.xml").is_file()]
     if not packages:
-        return folder
+        return [folder]
     roots = list(packages[-1].parents)[:_ABOVE]
     if (packages[-1] / ".git").exists():
         roots.insert(0, packages[-1])
-    ends = [one for one in roots if one.name == "src" or (one / ".git").exists()]
-    return ends[-1] if ends else packages[-1].parent
+    ends = [k for k, one in enumerate(roots) if one.name == "src" or (one / ".git").exists()]
+    return roots[: ends[-1] + 1] if ends else [packages[-1].parent]
 
 
 def _below(root: Path, name: str) -> Iterator[Path]:

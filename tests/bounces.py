@@ -1,7 +1,5 @@
 """A ball that bounces off a plate at an angle, through the package's own runs."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ eps |f| / h; steps of 1e-3, 1e-4 and 1e-5 of the length or value on which a func
 tried, and the best counts: a kink nearby or rounding spoils one of them, a wrong derivative none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Small surfaces the tests share; every builder returns (vertices (n,3), elements (m,3|4))."""
 
-from __future__ import annotations
-
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray

@@ -1,7 +1,5 @@
 """Small models the dynamics tests share, built joint by joint."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray

@@ -6,8 +6,6 @@ of its own: the corners of the links' meshes against the closed parts, the side 
 start's distance from singular postures and the part's height.
 """
 
-from __future__ import annotations
-
 import argparse
 import multiprocessing
 import sys

@@ -9,8 +9,6 @@ A module of hard cases:
         yield compare("at rest", "ball of 1 kg", "depth = m g / k", expected, measured, 1e-9)
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, Protocol, TypeVar

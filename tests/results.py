@@ -1,7 +1,5 @@
 """What tests compare of two results."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

@@ -4,8 +4,6 @@ One point counts for both bodies, the contact point on the shell, so the ball ro
 `r - depth` about its center: `b = I / (m (r - depth)^2)` stands where a hard ball has 2/5.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

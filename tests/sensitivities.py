@@ -1,7 +1,5 @@
 """Runs whose sensitivities are compared with differences of whole runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

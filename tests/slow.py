@@ -1,7 +1,5 @@
 """Writes tests/slow.txt, the tests that `make quick` leaves out: `pytest -p tests.slow`."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

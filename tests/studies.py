@@ -1,7 +1,5 @@
 """Parameters of a test of which `make test` takes some and `make studies` the others."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any
 

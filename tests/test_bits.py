@@ -7,8 +7,6 @@ same on all of them; whole runs are the same wherever glibc's choice is. Nothing
 runs where it is not: Pinocchio takes sin and cos from glibc.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -101,9 +99,7 @@ def hashes() -> list[dict[str, str]]:
 
 
 @pytest.mark.parametrize("what", ["contacts", "laws"])
-def test_contacts_and_laws_have_the_same_bits_on_every_processor(
-    hashes: list[dict[str, str]], what: str
-) -> None:
+def test_contacts_and_laws_have_the_same_bits_on_every_processor(hashes, what):
     assert len({one[what] for one in hashes}) == 1
 
 

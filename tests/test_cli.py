@@ -1,7 +1,5 @@
 """The command line: examples in every help, one sentence and exit code 2 for every fault."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
@@ -100,13 +98,6 @@ def test_a_faulty_scenario_and_debug(tmp_path):
     told = call("--debug", "run", path)
     assert told.exception is not None
     assert type(told.exception).__name__ == "ScenarioError"
-
-
-def test_a_quaternion_of_no_length_names_file_and_key(tmp_path):
-    for last in ("0", "0.5"):
-        told = refused("run", write(tmp_path, DROP.replace("0, 0, 0, 1]", f"0, 0, 0, {last}]")))
-        assert "drop.toml: robot.ball.start: " in told
-        assert "'root_joint'" in told
 
 
 OWN = """

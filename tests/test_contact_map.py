@@ -1,7 +1,5 @@
 """The contact map: what each element took, and from where it is seen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -195,8 +193,3 @@ def test_what_passed_between_the_rows_is_reported(figures, said):
         assert ("record more often" in title) == bool(said)
         if quantity == "time":
             assert said in title
-
-
-def test_a_notebook_gets_a_picture():
-    scene, result = stand_ins.ball_on_plate()
-    assert plot_result(result, "map", scene)._repr_png_().startswith(b"\x89PNG")

@@ -4,8 +4,6 @@ It is written by hand, since nanobind does not know what is in a tuple or what a
 with the generated one mypy finds 43 errors in the package.
 """
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

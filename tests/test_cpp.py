@@ -3,8 +3,6 @@
 What these tests build is left in build/cpp and beside it: the next run compiles what has changed.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re
@@ -14,11 +12,14 @@ import sys
 import sysconfig
 from pathlib import Path
 
+import example_robot_data
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.base import cache
+from sphshell_pin.dynamics.compiled.robot import compile_robot
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "docs" / "examples" / "cpp"
@@ -170,6 +171,20 @@ def test_contacts_are_those_of_python_to_the_bit(built):
     wanted = np.concatenate(rows)
     assert len(wanted) > 300
     np.testing.assert_array_equal(np.loadtxt(done.stdout.splitlines()), wanted)
+
+
+def test_a_loop_of_its_own_moves_a_compiled_robot_as_pinocchio_does(built, monkeypatch, tmp_path):
+    monkeypatch.setenv(cache.CACHE, str(tmp_path / "cache"))
+    panda = example_robot_data.load("panda")
+    path = compile_robot(panda.model)
+    printed = call(built / "cpp-tests" / "press", panda.urdf, path, 10, 40)
+    found = re.search(r"touching 1, apart (\S+)", printed)
+    assert found, printed
+    assert float(found[1]) < 1e-13
+    refused = [built / "cpp-tests" / "press", panda.urdf, ROOT / "README.md", "1", "2"]
+    done = subprocess.run(refused, capture_output=True, text=True, check=False, env=ENVIRONMENT)
+    assert done.returncode
+    assert "must be what compile_robot() made for this model" in done.stderr
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="nm lists the names of an ELF library")

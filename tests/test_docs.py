@@ -1,7 +1,5 @@
 """The documents keep their word: code runs, scenarios are valid, links lead somewhere."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import re

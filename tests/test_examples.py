@@ -4,8 +4,6 @@ Each is made a notebook and executed; what it comes to is checked in its own ker
 `check_NAME` of this module.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import re
 from pathlib import Path

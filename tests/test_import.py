@@ -1,7 +1,5 @@
 """Importing the package brings in what every user needs, and nothing else; imports go one way."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import json
@@ -154,9 +152,7 @@ def test_a_core_of_other_versions_is_not_loaded(tmp_path: Path, wrong: str) -> N
     assert f"'{'pin' if wrong == 'pinocchio' else 'coal'}==2.6.*'" in said
 
 
-def test_without_the_wheels_the_libraries_are_not_those_of_pip(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_wheels_the_libraries_are_not_those_of_pip(tmp_path, monkeypatch):
     """Conda's and ROS's packages have no metadata, or other ones."""
     hide = tmp_path / "hide"
     hide.mkdir()

@@ -1,7 +1,5 @@
 """A number has one name: in files, --set, sliders, sweeps, fits, `vary` and derivatives."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 

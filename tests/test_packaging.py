@@ -1,7 +1,5 @@
 """Packaging and release: what pyproject.toml, the workflows and the wheel promise each other."""
 
-from __future__ import annotations
-
 import fnmatch
 import importlib.metadata
 import importlib.util

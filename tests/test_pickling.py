@@ -1,7 +1,5 @@
 """What a user sends to another process, or copies, computes the same bits there."""
 
-from __future__ import annotations
-
 import copy
 import multiprocessing
 import pickle

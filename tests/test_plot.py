@@ -1,4 +1,3 @@
-import subprocess
 import sys
 
 import numpy as np
@@ -80,17 +79,6 @@ def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
     np.testing.assert_array_equal(series.count, [0, 2, 0])
 
 
-def test_contacts_that_share_the_load_are_counted_in_the_figure():
-    alone = [{"row": row, "depth": 1e-3} for row in range(3)]
-    shared = [*alone, {"row": 1, "depth": 1e-3}]
-    for rows, drawn in ((alone, False), (shared, True)):
-        result = a_result([0, 1, 2], np.zeros((3, 8)), rows, ("tip",))
-        for figure in (plot.plot_force_and_depth(result), plot.plot_result(result)):
-            assert ("contacts at once" in labels(figure)) == drawn
-    counts = plot.plot_force_and_depth(result).axes[-1].lines[0].get_ydata()
-    np.testing.assert_array_equal(counts, [1, 2, 1])
-
-
 def test_a_run_without_contact_is_told_in_words(tmp_path):
     result = without_contact()
     for figure in (
@@ -99,14 +87,6 @@ def test_a_run_without_contact_is_told_in_words(tmp_path):
         plot.plot_result(result),
     ):
         assert plot.NO_CONTACT in texts(figure)
-    assert len(plot.save_figures(result, tmp_path)) == 3
-
-
-def test_a_single_instant_of_contact_is_drawn(tmp_path):
-    scene, _ = ball_on_plate()
-    q = np.tile(ball_configuration([0, 0, 0.05]), (2, 1))
-    result = a_result([0, 1], q, [{"row": 1, "point_world": [0.1, 0.2, 0.0]}], ("ball",))
-    assert len(plot.save_figures(result, tmp_path, scene)) == 4
     assert len(plot.save_figures(result, tmp_path)) == 3
 
 
@@ -120,13 +100,6 @@ def test_the_path_on_a_wall_is_seen_from_the_side_of_its_normal():
     axis = plot.plot_contact_path(a_result([0, 1, 2], q, rows), scene).axes[0]
     elevation, azimuth = np.deg2rad([axis.elev, axis.azim])
     assert np.cos(elevation) * np.cos(azimuth) < -0.8
-
-
-def test_colours_serve_the_usual_forces_not_one_impact():
-    scene, result = ball_on_plate()
-    result.contacts.normal_force[0] = 4000.0
-    bar = plot.plot_contact_path(result, scene).axes[-1]
-    assert 4.0 < bar.get_ylim()[1] < 10.0
 
 
 def test_every_shell_has_its_own_picture_and_every_pair_its_name():
@@ -193,14 +166,3 @@ def test_without_matplotlib_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingExtra, match=r"sphshell-pin\[view\]"):
         plot.plot_result(without_contact())
-
-
-def test_no_global_figure_is_made(tmp_path):
-    script = (
-        "import sys; from sphshell_pin.plot import save_figures;"
-        "from tests.test_plot import without_contact;"
-        f"save_figures(without_contact(), {str(tmp_path)!r});"
-        "print('matplotlib.pyplot' in sys.modules)"
-    )
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "False"

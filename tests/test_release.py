@@ -1,7 +1,5 @@
 """What states a version, a dependency or a title more than once states the same."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import tomllib
@@ -18,7 +16,6 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 RECIPE = ROOT / "packaging" / "conda" / "recipe.yaml"
 # What a package on PyPI is called on conda-forge, where that differs.
 CONDA = {"pin": "pinocchio", "meshcat": "meshcat-python", "matplotlib": "matplotlib-base"}
-FORMS = ROOT / ".github" / "ISSUE_TEMPLATE"
 
 
 def released():
@@ -132,21 +129,3 @@ def test_the_ros_package_is_a_plain_cmake_project():
     assert package.findtext("export/build_type") == "cmake"
     assert package.findtext("license") == PROJECT["license"]
     assert {"pinocchio", "coal"} <= {one.text for one in package.findall("depend")}
-
-
-@pytest.mark.parametrize("name", ["bug", "feature"])
-def test_an_issue_form_asks(name):
-    form = load(FORMS / f"{name}.yml")
-    assert {"name", "description", "body"} <= set(form)
-    ids = [one["id"] for one in form["body"]]
-    assert len(set(ids)) == len(ids)
-    assert any(one.get("validations", {}).get("required") for one in form["body"])
-    assert all(one["attributes"]["label"] for one in form["body"])
-
-
-def test_the_command_of_the_bug_form_works(capsys):
-    form = load(FORMS / "bug.yml")
-    (versions,) = (one for one in form["body"] if one["id"] == "versions")
-    (program,) = re.findall(r'python -c "(.*)"', versions["attributes"]["description"])
-    exec(compile(program, "bug.yml", "exec"), {})
-    assert f"('sphshell_pin', '{sphshell_pin.__version__}')" in capsys.readouterr().out

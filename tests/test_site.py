@@ -1,7 +1,5 @@
 """The documentation site: builds without a warning, makes no external requests, and is complete."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re

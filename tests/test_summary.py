@@ -1,7 +1,5 @@
 """What an object shows of itself: a line or two of text, a small table in a notebook."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 
@@ -10,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized, names, show_value
+from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized, show_value
 from sphshell_pin.study.fit.report import Fitted
 from tests.models import ball
 
@@ -133,14 +131,6 @@ def test_figures_are_those_of_the_object_with_units(shown):
     assert "ball-sheet.peak_force" in rollout
 
 
-def test_empty_objects_show_themselves():
-    sheet = sp.Shell([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    none = sheet.contacts([0, 0, 5.0], 0.1)
-    assert repr(none) == "<ContactSet: 0 contacts>"
-    assert "<ContactSet>" not in none._repr_html_()
-    assert "contact none" in repr(sp.Scene(ball()))
-
-
 class Many(Summarized):
     def _facts(self):
         return [Fact("length", 0.5, "m"), Fact("rows", 30), Fact("hidden", 1, brief=False)]
@@ -173,7 +163,3 @@ def test_long_tables_are_cut_and_say_so():
 )
 def test_values(value, text):
     assert show_value(value) == text
-
-
-def test_many_names_are_counted():
-    assert names("abcdef") == "'a', 'b', 'c', 'd', ... (6)"

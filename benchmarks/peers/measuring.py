@@ -195,9 +195,9 @@ def measure(
     """Run the engines (names of ENGINES) over the scenes (names of SCENES).
 
     Returns a row for every setting, and for every peer that can do it how many times more it costs
-    than this package: a step of the Panda at the cheapest setting of each; the swing in the bowl
-    at the peer's best error. `say` is called with every row as one line. A peer that is not
-    installed, cannot do a scene, crashes or takes too long has a row that says so.
+    than this package: a step of the Panda at its cheapest setting and our default; the swing in
+    the bowl at the peer's best error. `say` is called with every row as one line. A peer that is
+    not installed, cannot do a scene, crashes or takes too long has a row that says so.
     """
     scenes = list(scenes)
     names = [OURS, *(name for name in engines if name != OURS)]
@@ -226,8 +226,8 @@ def compared(rows: list[Row], scene: str, peer: str) -> tuple[Row, Row] | None:
     ours = [row for row in good if row.engine == OURS]
     if scene == "press":
         theirs = [row for row in theirs if row.errors["pressed [mm]"] > 0]
-        found = [min(some, key=lambda row: row.cost) for some in (theirs, ours) if some]
-        return (found[0], found[1]) if len(found) == 2 else None
+        # Ours is the default; the compiled robot has a row of its own.
+        return (min(theirs, key=lambda row: row.cost), ours[0]) if theirs and ours else None
     if scene not in SWINGS or not theirs:
         return None
     best = best_of(theirs)

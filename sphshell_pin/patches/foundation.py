@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.patches.placed import Longs, patches_on, poses_along
@@ -47,6 +46,9 @@ def foundation_loads(
     samples = divide(shell, patches.points, reach + fine, fine, curved=pair.method == "smooth")
     if not len(samples.areas):
         return
+    # Imported where it is used: it takes as long as all else of a short run.
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(samples.points)
     part = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)[samples.triangle]]
     for k, point in enumerate(patches.points):

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter
@@ -53,6 +52,9 @@ def divide(shell: Shell, places: Array, reach: float, resolution: float, curved:
 
     Raises InvalidParameter for a resolution that needs too many pieces.
     """
+    # Imported where it is used: it takes as long as all else of a short run.
+    from scipy.spatial import cKDTree
+
     surface, near_places = _Surface(shell, curved), cKDTree(places)
     owner = np.arange(len(shell.triangles))
     weights = np.eye(3)[surface.as_pieces()]

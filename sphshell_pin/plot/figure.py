@@ -39,7 +39,7 @@ def new_figure(width: float, height: float, title: str = "") -> Figure:
 def png(figure: Figure, dpi: int = RESOLUTION) -> bytes:
     """Return `figure` as a .png file."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=dpi)
+    figure.savefig(stream, format="png", dpi=dpi, pil_kwargs={"compress_level": 1})
     return stream.getvalue()
 
 

@@ -1,7 +1,5 @@
 """Workers, choices of settings, tables and files."""
 
-from __future__ import annotations
-
 import math
 import os
 

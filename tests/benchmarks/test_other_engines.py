@@ -1,7 +1,5 @@
 """The adapters of Drake, PyBullet and EXUDYN against closed forms and Pinocchio."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +8,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from benchmarks.peers import drake, scenes
-from benchmarks.peers.engine import CannotDo
 from benchmarks.peers.merged import merged_urdf
 from benchmarks.peers.workers import engine_called
 from sphshell_pin.study.report import swing
 
 SAP = {"contact": "kSap", "dt": 1e-3, "edge": 1e-3}
-EXPLICIT = {"integrator": "runge_kutta3", "max_step": 0.01, "accuracy": 1e-4, "edge": 1e-3}
 BULLET = {"dt": 1e-3, "breaking": 1e-4}
 
 
@@ -28,36 +24,6 @@ def engine_of(name):
 def coarse(scene, **changes):
     """Return the scene on a small plate of large triangles: quick to load."""
     return replace(scene, surface=scenes.shapes.plate(0.06, 0.02), **changes)
-
-
-@pytest.mark.parametrize(
-    ("engine", "params", "rolls"),
-    [
-        ("drake", EXPLICIT, True),
-        ("drake", EXPLICIT, False),
-        ("drake", SAP, True),
-        ("drake", SAP, False),
-        ("pybullet", BULLET, True),
-    ],
-)
-def test_free_flight_is_a_parabola(engine, params, rolls):
-    velocity, spin = np.array([0.3, -0.2, 0.5]), np.array([4.0, 5.0, -6.0]) * rolls
-    scene = coarse(
-        scenes.plate(),
-        rolls=rolls,
-        position=(0.0, 0.0, 0.2),
-        velocity=tuple(velocity),
-        angular_velocity=tuple(spin),
-        duration=0.1,
-    )
-    found = engine_of(engine).run(scene, params)
-    np.testing.assert_allclose(found.t[-1], 0.1)
-    # Semi-implicit Euler falls by dt * t / 2 * g further than the parabola.
-    exact = [0, 0, 0.2] + np.outer(found.t, velocity)
-    exact[:, 2] -= 0.5 * 9.81 * found.t * (found.t + params.get("dt", 0.0))
-    np.testing.assert_allclose(found.position, exact, atol=1e-9)
-    np.testing.assert_allclose(found.velocity[-1], velocity + [0, 0, -0.981], atol=1e-9)
-    np.testing.assert_allclose(found.angular_velocity, np.tile(spin, (len(found.t), 1)), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -74,15 +40,6 @@ def test_the_weight_is_carried_as_deep_as_by_the_spring(engine, params, rel):
     np.testing.assert_allclose(found.force[-50:].mean(axis=0), [0, 0, scene.weight], atol=2e-3)
     depth = scene.radius - found.position[-1, 2]
     assert depth == pytest.approx(scene.weight / scene.stiffness, rel=rel)
-
-
-@pytest.mark.parametrize(("engine", "name"), [("drake", "edge"), ("pybullet", "dt")])
-def test_every_scene_has_settings_and_a_first_set_of_params(engine, name):
-    engine = engine_of(engine)
-    for build in scenes.SCENES.values():
-        scene = build()
-        assert all(engine.settings(scene).values())
-        assert engine.param_sets(scene)[0][name] > 0
 
 
 @pytest.mark.parametrize(
@@ -154,21 +111,6 @@ def test_the_law_of_the_bowl_has_the_period_of_the_spring():
     assert period == pytest.approx(swing.reference_period(), rel=1e-5)
 
 
-def test_a_long_step_of_drake_passes_through_the_sheet():
-    scene = scenes.impact()
-    found = engine_of("drake").run(scene, SAP | {"edge": 5e-4})
-    assert scene.errors(found) == {"passed": 1.0}
-
-
-def test_friction_of_bullet_holds_a_body_that_cannot_turn():
-    scene = replace(scenes.slope(), rolls=False)
-    found = engine_of("pybullet").run(scene, BULLET)
-    # The whole force of the plate, friction included, balances the tilted gravity.
-    carried = found.force[-100:].mean(axis=0)
-    np.testing.assert_allclose(carried, -scene.mass * np.array(scene.gravity), atol=5e-3)
-    assert np.abs(found.angular_velocity).max() < 1e-6
-
-
 def test_continuous_collision_detection_of_bullet_stops_the_ball():
     scene, engine = scenes.impact().variants()[3], engine_of("pybullet")
     passed = [
@@ -207,15 +149,3 @@ def test_exudyn_carries_and_rolls(solver):
     assert 0 < held.errors(engine.run(held, params))["creep [m/s]"] < 1e-3
     table = replace(scenes.turntable(), surface=scenes.shapes.plate(0.2, 0.05))
     assert table.errors(engine.run(table, params))["rate"] < 0.02
-
-
-def test_exudyn_has_settings_and_params_but_for_the_arm():
-    engine = engine_of("exudyn")
-    for build in scenes.SCENES.values():
-        scene = build()
-        if scene.name == "press":
-            with pytest.raises(CannotDo, match="URDF"):
-                engine.param_sets(scene)
-        else:
-            assert engine.settings(scene)["contact"]
-            assert {"solver", "dt", "exact edges"} == set(engine.param_sets(scene)[0])

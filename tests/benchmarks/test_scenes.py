@@ -1,17 +1,13 @@
 """The scenes' truths, against equations of motion integrated here and against plain geometry."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from benchmarks.peers import press as press_module
 from benchmarks.peers import scenes
 from benchmarks.peers.engine import Trajectory
-from sphshell_pin.errors import MissingExtra
 from sphshell_pin.study.report import swing
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -139,20 +135,6 @@ def test_at_rest_the_plate_and_the_groove_are_right():
     assert max(errors.values()) < 1e-12
 
 
-def test_a_shot_passed_or_came_back():
-    scene = scenes.impact()
-    t = np.array([0.0, scene.duration])
-    back = np.array([[0, 0, 0.02], [0, 0, 0.3]])
-    velocity = np.array([[0, 0, -100.0], [0, 0, 90.0]])
-    came_back = scene.errors(trajectory(t, back, velocity))
-    assert came_back == {"passed": 0.0, "speed": pytest.approx(0.1)}
-    passed = scene.errors(trajectory(t, -back, velocity))
-    assert passed == {"passed": 1.0}
-    assert scene.joined([came_back, passed]) == {"passed": 0.5, "speed": pytest.approx(0.1)}
-    starts = [variant.position[2] for variant in scene.variants()]
-    assert len(set(starts)) == len(starts)
-
-
 @pytest.mark.parametrize("name", [name for name in scenes.SCENES if name != "press"])
 def test_the_surface_is_one_thing_in_all_its_forms(name):
     surface = scenes.SCENES[name]().surface
@@ -175,21 +157,3 @@ def test_the_surface_is_one_thing_in_all_its_forms(name):
             distance = np.minimum(distance, outside + np.maximum(-local.max(axis=1), 0))
         # On the surface of a box, up to the sagitta of the cylinder's facets.
         assert distance.max() < 1e-4
-
-
-@pytest.mark.robots
-def test_the_press_starts_as_deep_as_it_says():
-    try:
-        scene = press_module.press()
-    except MissingExtra as missing:
-        pytest.skip(str(missing))
-    assert len(scene.surface.triangles) == 199712
-    x, y, z = np.array(scene.place)
-    point = np.array([[x, y, z + scene.radius - scene.rise]])
-    pressed = scene.errors(trajectory(np.zeros(1), point, point))["pressed [mm]"]
-    # The sheet slopes there: by height it is `rise`, measured along the normal it is more.
-    apart = scene.surface.vertices - point
-    nearest = np.linalg.norm(apart, axis=1).min()
-    assert pressed * 1e-3 == pytest.approx(scene.radius - nearest, abs=2e-4)
-    assert "prismatic" not in scene.urdf
-    assert "visual" not in scene.urdf

@@ -1,7 +1,5 @@
 """What the contact tests share: probe positions, and comparison of contact sets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Wrong arguments are named, and nothing else happens."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

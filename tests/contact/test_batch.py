@@ -1,7 +1,5 @@
 """Many queries at once are the single ones, bit for bit, for any number of threads."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -32,8 +30,3 @@ def test_equals_single_queries(name: str, method: str) -> None:
         again = shell.contacts_batch(centers, radii, method=method, threads=threads)
         assert np.array_equal(depth, again[0])
         assert np.array_equal(count, again[1])
-
-
-def test_empty_batch() -> None:
-    depth, count = shell_of(meshes.cube()).contacts_batch(np.empty((0, 3)), np.empty(0))
-    assert depth.shape == count.shape == (0,)

@@ -1,7 +1,5 @@
 """The columns of a contact query: made when they are read, and the same however it is asked."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The wrench routine for anybody's contact points: one point, two bodies that move and turn."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

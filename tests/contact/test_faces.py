@@ -1,7 +1,5 @@
 """Contacts on the exact faces of CAD files and of meshes: closed forms, and OpenCASCADE's own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import coal

@@ -1,7 +1,5 @@
 """The fast query meets the brute-force definition on random, structured and nasty surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

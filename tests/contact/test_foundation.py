@@ -1,7 +1,5 @@
 """FoundationLaw's integrals against its definition, closed forms, and its own potential."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

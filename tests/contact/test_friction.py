@@ -1,7 +1,5 @@
 """Two-velocity Coulomb friction against the documented table and formula."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

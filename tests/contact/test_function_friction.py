@@ -1,7 +1,5 @@
 """Friction of one's own does what the friction does whose formula it states."""
 
-from __future__ import annotations
-
 import math
 import pickle
 

@@ -1,7 +1,5 @@
 """A law of one's own does what the law does whose formula it states."""
 
-from __future__ import annotations
-
 import copy
 import ctypes
 import gc
@@ -87,13 +85,6 @@ def test_it_answers_as_its_twin(kind) -> None:
     assert law.depth_at(20.0) == pytest.approx(TWIN.depth_at(20.0))
     assert law.contact_time(1e-3, 0.3) == pytest.approx(TWIN.contact_time(1e-3, 0.3), rel=1e-5)
     assert (law.k, law.b) == (1e6, 0.5)
-
-
-@pytest.mark.parametrize("power", np.arange(1, 15) / 2)
-def test_the_energy_is_the_integral_of_powers(power) -> None:
-    law = sp.FunctionLaw(FORCE(lambda depth, rate, p: depth**power))
-    for depth in (1e-5, 2.0):
-        assert law.energy(depth) == pytest.approx(depth ** (power + 1) / (power + 1), rel=1e-12)
 
 
 BALL = np.array([0.01, 0.02, 0.0492, 0, 0, 0, 1.0])

@@ -1,7 +1,5 @@
 """`HertzLaw` where a flat goes on smoothly into a fillet: the energy does not jump."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

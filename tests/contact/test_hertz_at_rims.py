@@ -1,7 +1,5 @@
 """`HertzLaw` with the surface's curvature: rims, borders, corners and the smallest depths."""
 
-from __future__ import annotations
-
 import coal
 import numpy as np
 import pinocchio as pin

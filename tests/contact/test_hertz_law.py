@@ -1,7 +1,5 @@
 """HertzLaw: the stiffness follows from the curvature of a tessellated shell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

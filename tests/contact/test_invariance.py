@@ -1,7 +1,5 @@
 """What must not matter does not: numbering, winding, copies, pose, scale, diagonals, splits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Normal force laws: documented spot values, units, closed forms, limits of their parameters."""
 
-from __future__ import annotations
-
 import dataclasses
 from decimal import Decimal, localcontext
 

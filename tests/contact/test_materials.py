@@ -1,7 +1,5 @@
 """Friction and restitution of two materials."""
 
-from __future__ import annotations
-
 import pytest
 
 import sphshell_pin as sp

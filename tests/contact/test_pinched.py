@@ -3,8 +3,6 @@
 `python -m tests.contact.test_pinched` walks 5000 r on each surface.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from typer.testing import CliRunner

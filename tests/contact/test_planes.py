@@ -1,7 +1,5 @@
 """A plane under a shell: lowest points against brute force, closed forms and what lies level."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

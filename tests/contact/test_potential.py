@@ -4,8 +4,6 @@ Paths are triangles that graze a surface: over elements, creases, joints between
 corners. The integrals are adaptive, as the force has kinks where contacts come and go.
 """
 
-from __future__ import annotations
-
 import ctypes
 import itertools
 from collections.abc import Callable

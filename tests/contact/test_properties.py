@@ -1,7 +1,5 @@
 """Laws of contact sets on whatever surfaces hypothesis thinks of."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One-sided shells: what counts outside, and the push back out of the inside."""
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np

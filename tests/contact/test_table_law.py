@@ -1,7 +1,5 @@
 """A law from a table: monotone, of one slope at its rows, energy the integral of force."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Depths and time scales of laws and frictions, in closed form."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

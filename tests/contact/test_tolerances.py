@@ -1,7 +1,5 @@
 """What the tolerances of contact/query/tolerances.hpp change; nothing else depends on them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

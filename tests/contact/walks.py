@@ -1,7 +1,5 @@
 """Walks of a sphere over a surface: where its elastic potential jumps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -7,8 +7,6 @@ B-spline surface goes through a grid of its points between the edges, in 3.2 tim
 largest distance of the face from it is printed.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 python -m tests.data.make_propeller    # needs the extra `cad`
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

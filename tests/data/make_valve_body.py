@@ -6,8 +6,6 @@ A valve body as one prints it of nylon: a barrel with a bore on a bolted flange,
 two side ports, edges rounded. The axis is z, the flange stands on z = 0.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

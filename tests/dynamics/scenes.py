@@ -1,7 +1,5 @@
 """Scenes in which something touches, with a state: what the tests of derivatives share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

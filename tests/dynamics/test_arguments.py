@@ -1,7 +1,5 @@
 """Wrong arguments of scenes, runs and controllers get a sentence that names them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import contextmanager
 
@@ -223,25 +221,6 @@ def test_a_rounded_placement_passes() -> None:
     pair = Scene(ball()).add_contact(Sphere(0.05, "ball"), plate(), placement=rounded, law=LAW)
     rounded.translation = np.zeros(3)
     assert pair.placement.translation == pytest.approx(np.ones(3))
-
-
-def test_replace_pair() -> None:
-    scene = on_plate(ball(), LAW)
-    scene.replace_pair("ball-plate", friction=None, method="elements")
-    assert scene.pair("ball-plate").law == LAW
-    assert scene.pair("ball-plate").method == "elements"
-
-
-def test_joints_of_a_controller_may_come_from_a_generator() -> None:
-    scene = on_plate(arm(), LAW)
-    controller = sp.GravityCompensation(joints=(name for name in ["two_joint"]))
-    masks = [controller.actuated(scene.model) for _ in range(2)]
-    assert masks[0].tolist() == masks[1].tolist() == [0, 1, 0]
-
-
-def test_locking_every_joint_holds_the_robot_still() -> None:
-    scene = Scene(arm(), lock=["one_joint", "two_joint", "ball_joint"])
-    assert scene.model.nv == 0
 
 
 def mimicking() -> pin.Model:

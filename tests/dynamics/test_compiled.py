@@ -1,7 +1,5 @@
 """Compiled robots: the same motion as Pinocchio's, for all kinds of joints that are compiled."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -110,9 +108,7 @@ def test_runs_rollouts_and_accelerations_are_those_of_pinocchio(name: str) -> No
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(b).max())
 
 
-def test_a_robot_is_compiled_once_and_again_when_its_file_is_damaged(
-    cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_robot_is_compiled_once_and_again_when_its_file_is_damaged(cache, monkeypatch):
     compiled = []
     usual = compiled_robot._compile
 
@@ -160,9 +156,7 @@ def massless() -> pin.Model:
         (pin.Model, "has 0 joints"),
     ],
 )
-def test_other_models_stay_with_pinocchio_and_a_sentence(
-    make: Callable[[], pin.Model], cause: str
-) -> None:
+def test_other_models_stay_with_pinocchio_and_a_sentence(make, cause):
     with pytest.warns(SetupWarning, match=f"Pinocchio's own algorithms.*{cause}"):
         scene = sp.Scene(make(), compiled=True)
     assert scene.bind_joints() is None
@@ -170,9 +164,7 @@ def test_other_models_stay_with_pinocchio_and_a_sentence(
         compiled_robot.compile_robot(make())
 
 
-def test_without_a_compiler_or_a_folder_a_sentence_says_what_to_do(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_a_compiler_or_a_folder_a_sentence_says_what_to_do(monkeypatch):
     monkeypatch.setenv("CC", "/no/such/compiler")
     with pytest.raises(SphshellError, match="no C compiler '/no/such/compiler': install one"):
         compiled_robot.compile_robot(arm())

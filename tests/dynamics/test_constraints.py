@@ -1,7 +1,5 @@
 """Contacts as constraints for Pinocchio's ADMM: rolling, sliding, and what they state."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -1,7 +1,5 @@
 """A contact keeps its number over elements and smooth edges, and no other gets it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

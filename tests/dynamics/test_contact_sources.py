@@ -1,7 +1,5 @@
 """Contact points of one's own: a Python callable per pair feeds the same forces into a scene."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -125,11 +123,6 @@ def test_a_wrong_answer_is_named(answer) -> None:
     scene = by_source(ball(), lambda pose_i, pose_j: answer)
     with pytest.raises(SphshellError, match="mine"):
         scene.external_forces(*START)
-
-
-def test_empty_lists_are_no_contacts() -> None:
-    scene = by_source(ball(), lambda pose_i, pose_j: ([], [], []))
-    assert len(scene.contacts(*START)) == 0
 
 
 def test_unknown_frames() -> None:

@@ -1,7 +1,5 @@
 """Where a controller finds what it needs of the scene."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

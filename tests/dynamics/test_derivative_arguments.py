@@ -1,7 +1,5 @@
 """Arguments and results of the derivatives of the dynamics."""
 
-from __future__ import annotations
-
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
@@ -24,13 +22,6 @@ from tests.dynamics.scenes import (
 SCENE = in_bowl(LAWS["impact"], COULOMB)
 
 
-def test_without_torques_they_are_zero() -> None:
-    scene, q, v = SCENE
-    one, other = scene.dynamics_derivatives(q, v), scene.dynamics_derivatives(q, v, np.zeros(3))
-    for name in ("acceleration", "by_q", "by_v", "by_tau", "by_parameters"):
-        assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
-
-
 def test_repeated_calls_give_the_same_bits_and_leave_the_scene_as_it_was() -> None:
     scene, q, v = in_bowl(LAWS["hertz, two materials"], FRICTIONS["mindlin"])
     names = differences.names_of(scene)
@@ -46,17 +37,6 @@ def test_repeated_calls_give_the_same_bits_and_leave_the_scene_as_it_was() -> No
         one.by_q = one.by_v  # type: ignore[misc]
     with pytest.raises(ValueError, match="read-only"):
         one.by_q[0, 0] = 1.0
-
-
-def test_the_order_of_the_columns_is_that_of_the_names() -> None:
-    scene, q, v = SCENE
-    names = differences.names_of(scene)
-    one = scene.dynamics_derivatives(q, v, parameters=names)
-    other = scene.dynamics_derivatives(q, v, parameters=names[::-1])
-    columns = dict(zip(one.parameters, one.by_parameters.T, strict=True))
-    for name, column in zip(other.parameters, other.by_parameters.T, strict=True):
-        np.testing.assert_allclose(column, columns[name], rtol=1e-12)
-    assert set(other.parameters) == set(columns)
 
 
 @pytest.mark.parametrize(
@@ -127,17 +107,6 @@ def test_names_that_are_refused(names: object, said: str) -> None:
         scene.dynamics_derivatives(q, v, parameters=STIFFNESS)
 
 
-def test_one_column_of_several() -> None:
-    scene, q, v = SCENE
-    whole = scene.dynamics_derivatives(q, v, parameters=["tip.placement", "tip.sphere.offset"])
-    some = ["tip.sphere.offset.z", "tip.placement.wy"]
-    got = scene.dynamics_derivatives(q, v, parameters=some)
-    assert list(got.parameters) == some
-    for name, column in zip(some, got.by_parameters.T, strict=True):
-        expected = whole.by_parameters[:, whole.parameters.index(name)]
-        np.testing.assert_allclose(column, expected, rtol=1e-12)
-
-
 def test_pairs_whose_names_begin_alike() -> None:
     """Names of pairs may have dots."""
     scene, q, v = SCENE
@@ -181,13 +150,6 @@ def test_a_number_that_no_side_allows_has_no_derivative() -> None:
         scene.dynamics_derivatives(q, v, parameters=["tip.friction.mu_dynamic"])
     d = scene.dynamics_derivatives(q, v, parameters=["tip.friction.mu_static"])
     assert np.isfinite(d.by_parameters).all()
-
-
-def test_names_may_be_an_array() -> None:
-    scene, q, v = SCENE
-    names = [STIFFNESS, "tip.sphere.radius"]
-    d = scene.dynamics_derivatives(q, v, parameters=np.array(names))  # type: ignore[arg-type]
-    assert d.parameters == tuple(names)
 
 
 def test_single_columns_of_the_start_of_a_run() -> None:

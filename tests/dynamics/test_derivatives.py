@@ -1,7 +1,5 @@
 """Derivatives of contact forces, accelerations, rows and bristles' rates, against differences."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from itertools import product
@@ -256,12 +254,6 @@ def test_rates_of_several_pairs_and_of_mimic_joints() -> None:
         assert_rate_jacobian(scene, q, v, stretched(scene, 1e-5))
 
 
-def test_rates_without_bristles() -> None:
-    assert_rate_jacobian(*moving(LAWS["hunt-crossley"], COULOMB), np.zeros(0))
-    q, v = two_free_state(depth=-0.2)
-    assert_rate_jacobian(two_free_bodies(IMPACT, COULOMB), q, v, np.zeros(0))
-
-
 def test_nothing_touches() -> None:
     """Then they are Pinocchio's own, to the last bits, and no parameter matters."""
     scene = two_free_bodies(IMPACT, COULOMB)
@@ -283,12 +275,6 @@ def test_nothing_touches() -> None:
         size = np.abs(expected).max()
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * size)
     assert not got.by_parameters.any()
-
-
-def test_at_rest_by_default() -> None:
-    scene = free_ball(models.plate(4.0), friction=COULOMB)
-    q = free_q([0.1, 0.2, 0.97])
-    assert np.array_equal(scene.contact_derivatives(q), scene.contact_derivatives(q, np.zeros(6)))
 
 
 def test_bristles_of_a_state() -> None:
@@ -320,15 +306,3 @@ def test_bristles_of_a_state() -> None:
         f = partial(differences.acceleration, state=state) if name[:2] in ("q.", "v.") else rates
         error = differences.off(column, lambda x, f=f, m=moved: f(*m(x)), scale, ahead=ahead)
         assert error <= 1e-6, name
-
-
-def test_a_state_without_stretch_is_none() -> None:
-    scene, q, v = in_bowl(IMPACT, BRISTLE)
-    names = differences.names_of(scene)
-    one = scene.dynamics_derivatives(q, v, parameters=names)
-    other = scene.dynamics_derivatives(q, v, parameters=names, state=scene.state(q, v))
-    for name in ("acceleration", "by_q", "by_v", "by_tau", "by_parameters"):
-        size = np.abs(getattr(one, name)).max()
-        np.testing.assert_allclose(
-            getattr(other, name), getattr(one, name), rtol=0, atol=1e-12 * size
-        )

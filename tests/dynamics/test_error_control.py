@@ -1,7 +1,5 @@
 """Error-controlled runs: rows, held torques, kinks, and what the arguments may be."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -82,23 +80,6 @@ def test_dense_rows_lie_on_the_motion(integrator) -> None:
     assert np.abs(rows.q - fine.q).max() < 2e-5
     assert np.abs(rows.v - fine.v).max() < 2e-3
     assert np.linalg.norm(rows.q[:, 3:], axis=1) == pytest.approx(1.0, abs=1e-12)
-
-
-@both
-def test_few_rows(integrator) -> None:
-    assert np.array_equal(run(bouncing(), integrator, *START, 0.1, record_dt=1.0).t, [0.0, 0.1])
-    nothing = run(bouncing(), integrator, *START, 0.0)
-    assert np.array_equal(nothing.t, [0.0])
-    assert np.array_equal(nothing.q[0], START[0])
-
-
-@both
-def test_a_later_start_is_the_same_motion(integrator) -> None:
-    early = run(bouncing(), integrator, *START, 0.3, record_dt=1e-2)
-    late = run(bouncing(), integrator, *START, 0.3, record_dt=1e-2, t0=7.0)
-    assert late.t == pytest.approx(early.t + 7.0, abs=1e-14)
-    assert late.q == pytest.approx(early.q, abs=1e-6)
-    assert [e.kind for e in late.events] == [e.kind for e in early.events]
 
 
 @every
@@ -184,28 +165,6 @@ def test_a_start_in_touch_and_at_rest(integrator) -> None:
     rows = run(scene, integrator, q, None, 2.0)
     assert [(e.t, e.kind) for e in rows.events] == [(0.0, "touch")]
     assert rows.q[-1] == pytest.approx(q, abs=1e-9)
-    assert rows.stats.steps < 3000
-
-
-@both
-def test_nothing_at_all(integrator) -> None:
-    """No contact pair, no gravity: straight on, in few steps."""
-    scene = sp.Scene(models.ball(gravity=0.0))
-    v = np.array([1.0, -2.0, 0.5, 0.0, 0.0, 0.0])
-    rows = run(scene, integrator, models.free_q([0, 0, 1]), v, 100.0)
-    assert rows.q[-1, :3] == pytest.approx([100.0, -200.0, 51.0], rel=1e-12)
-    assert rows.stats.steps < 60
-    still = run(scene, integrator, models.free_q([0, 0, 1]), None, 100.0)
-    assert np.array_equal(still.q[-1], models.free_q([0, 0, 1]))
-
-
-@both
-def test_a_graze_without_load_does_not_chatter(integrator) -> None:
-    """At depth 0 the sign of the depth is round-off."""
-    scene = models.on_plate(models.ball(gravity=0.0), models.linear_law(4000.0), BRISTLE)
-    q = models.free_q([-0.2, 0.01, R])
-    rows = run(scene, integrator, q, np.array([0.3, 0.1, 0, 3.0, 1.0, 2.0]), 1.0)
-    assert rows.q[-1, :3] == pytest.approx([0.1, 0.11, R], abs=1e-9)
     assert rows.stats.steps < 3000
 
 

@@ -1,7 +1,5 @@
 """Touch and lift-off: where they are, and what it costs to find them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,14 +1,12 @@
 """External forces through ABA are J^T f, for every joint type, with both bodies moving."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from sphshell_pin import CoulombFriction, ImpactLaw, Scene, Shell, Sphere
 from tests import meshes
-from tests.models import JOINTS, TURNING, add_body, ball, empty, free_q, on_plate
+from tests.models import JOINTS, TURNING, add_body, empty
 from tests.oracle import laws, mechanics
 
 RADIUS, DEPTH = 0.08, 0.01
@@ -153,34 +151,3 @@ def test_columns_of_contacts(joint_i: str, joint_j: str, tree: str, seed: int) -
     assert contacts.normal_force == pytest.approx([normal_force(DEPTH, rate)], rel=1e-10)
     force = contacts.normal_force[0] * case.normal + contacts.friction_force_world[0]
     assert force == pytest.approx(case.force, rel=1e-9, abs=1e-9)
-
-
-def test_nothing_in_reach_is_no_force() -> None:
-    scene = on_plate(ball(), ImpactLaw(K, E, C, D), FRICTION)
-    for force in scene.external_forces(free_q([0, 0, 0.2]), np.ones(6)):
-        assert not force.vector.any()
-    assert len(scene.contacts(free_q([0, 0, 0.2]), np.ones(6)).depth) == 0
-
-
-def test_turntable_slip_speed() -> None:
-    """Ball at rest 0.2 m off the axis of a table at 1 rev/s: 1.2566 m/s of slip."""
-    model = ball()
-    add_body(model, "table", pin.JointModelRUBZ(), inertia=pin.Inertia.FromSphere(5.0, 0.3))
-    scene = Scene(model)
-    scene.add_contact(
-        sphere=Sphere(0.05, frame="ball"),
-        shell=Shell(*meshes.random_plate(200, seed=1)),
-        frame="table",
-        law=ImpactLaw(1e4, 1.0, 0.0, 1e-3),
-        friction=CoulombFriction(0.3, 0.1, 0.1, 1.0),
-        method="facets",
-    )
-    q = np.concatenate([free_q([0.2, 0.0, 0.049]), [np.cos(0.4), np.sin(0.4)]])
-    v = np.concatenate([np.zeros(6), [2 * np.pi]])
-    contacts = scene.contacts(q, v)
-    assert np.linalg.norm(contacts.slip_velocity_world[0]) == pytest.approx(0.4 * np.pi, rel=1e-13)
-    assert 0.4 * np.pi == pytest.approx(1.2566, abs=5e-5)
-    # The table slides under the ball towards +y, so the ball is pushed that way.
-    assert contacts.friction_force_world[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-10)
-    fext = scene.external_forces(q, v)
-    assert fext[2].angular[2] == pytest.approx(-0.2, abs=1e-10)

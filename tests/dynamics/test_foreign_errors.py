@@ -1,7 +1,5 @@
 """Arguments that are far too large, of the wrong kind or masked are named in an own error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

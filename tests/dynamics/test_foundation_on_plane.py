@@ -1,7 +1,5 @@
 """A FoundationLaw beside a Plane: the volume below it, rest, friction and derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -1,7 +1,5 @@
 """A step allocates nothing: heap calls do not grow with the number of steps."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """One mass matrix for any tree: joints in any order, branches behind joints that mimic others."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mimic joints move exactly: against the full model reduced by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,7 +8,7 @@ import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import mimics, shortened
 from sphshell_pin.errors import SphshellError
-from tests import differences, meshes
+from tests import meshes
 
 # Two fingers of two links each, as those of Robotiq's 2F-85: the knuckles of both sides follow one
 # joint, and the fingertips turn back so that the pads stay parallel.
@@ -112,26 +110,6 @@ def test_acceleration_is_that_of_the_model_reduced_by_hand(name: str) -> None:
         expected = np.linalg.solve(matrix.T @ mass @ matrix, tau + matrix.T @ (added - bias))
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * abs(expected).max())
     assert touched
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_derivatives_without_contact_are_exact(name: str) -> None:
-    """Against differences of order 4; the acceleration is quadratic in v and linear in tau."""
-    model, _ = CASES[name][0]()
-    scene, random, h = sp.Scene(model), np.random.default_rng(6), 3e-4
-    for _ in range(3):
-        q = random.uniform(-0.3, 0.3, model.nq)
-        v, tau = random.standard_normal(model.nv), random.standard_normal(model.nv)
-        found = scene.dynamics_derivatives(q, v, tau)
-        moves = differences.moves(scene, q, v, tau)
-        for name_of, derivative in (("q", found.by_q), ("v", found.by_v), ("tau", found.by_tau)):
-            scale = abs(derivative).max() + abs(found.acceleration).max()
-            for k in range(model.nv):
-                moved = moves[f"{name_of}.{k}"].moved
-                slope = differences.derivative(
-                    lambda x, moved=moved: scene.dynamics_derivatives(*moved(x)[1:]).acceleration, h
-                )
-                np.testing.assert_allclose(derivative[:, k], slope, rtol=0, atol=1e-9 * scale)
 
 
 @pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-7, 1e-9)])

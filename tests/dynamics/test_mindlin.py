@@ -1,7 +1,5 @@
 """MindlinFriction: stiffness of two elastic bodies, energy, torsion, rolling, oblique impacts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

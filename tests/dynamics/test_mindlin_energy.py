@@ -1,7 +1,5 @@
 """MindlinFriction gives nothing back that it did not get."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise, product
 

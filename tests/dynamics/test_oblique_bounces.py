@@ -1,7 +1,5 @@
 """Oblique impacts with MindlinFriction against theory: Maw, Barber and Fawcett; gross sliding."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A run in pieces: against the same run in one, and against closed forms of pushes and changes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A scene is compiled with its model: a changed one is noticed, whatever was changed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -79,16 +77,6 @@ def test_an_untouched_model_is_one_object_and_equal_to_the_given_one() -> None:
     assert scene.model == model
     add_joint(model)
     assert len(scene.external_forces(pin.neutral(scene.model))) == scene.model.njoints
-
-
-def test_a_limit_that_is_not_a_number_says_nothing_of_a_change() -> None:
-    model = ball()
-    limits = np.array(model.velocityLimit)
-    limits[0] = np.nan
-    model.velocityLimit = limits
-    scene = on_plate(model, LAW)
-    assert scene.model.nq == 7
-    assert len(scene.contacts(Q)) == len(on_plate(ball(), LAW).contacts(Q))
 
 
 @pytest.mark.parametrize("change", [wrong_parent, mass_nan, negative_mass, placement_nan])

@@ -1,7 +1,5 @@
 """A shell on a plane in scenes: derivatives, energy, momentum, rows and events."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -1,7 +1,5 @@
 """The step that is recommended: time scales from the forces themselves, and what it resolves."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import replace

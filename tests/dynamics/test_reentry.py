@@ -1,7 +1,5 @@
 """Routines that call back into what has called them, and cycles through them."""
 
-from __future__ import annotations
-
 import gc
 import weakref
 

@@ -1,7 +1,5 @@
 """A run that goes on from a row of another one has its bits, and a state is a value."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Many runs over threads: against the same runs one by one, and against closed forms."""
 
-from __future__ import annotations
-
 import copy
 import os
 import pickle

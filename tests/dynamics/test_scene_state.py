@@ -1,7 +1,5 @@
 """A scene's state in the user's own loop: the memory of friction and of contacts."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 

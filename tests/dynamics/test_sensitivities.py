@@ -1,7 +1,5 @@
 """Sensitivities of runs, through touches, against differences of whole runs."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
@@ -311,13 +309,6 @@ def test_a_controller_with_a_memory_is_refused() -> None:
     with pytest.raises(InvalidParameter, match="controller"):
         case.run(names=["v0"])
     assert len(case.run().t) > 2
-
-
-def test_one_column_takes_no_longer_than_several() -> None:
-    """Of friction that sticks the coefficient hardly matters: that is no reason for short steps."""
-    case = thrown(IMPACT, BRISTLE, sp.Adaptive(1e-8))
-    plain = case.run().stats
-    assert case.run(names=["ball.friction.mu_static"]).stats.steps == plain.steps
 
 
 def test_a_controller_that_reads_sensors_is_refused() -> None:

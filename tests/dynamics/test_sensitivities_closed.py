@@ -1,7 +1,5 @@
 """Sensitivities of runs against closed forms and conserved quantities."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

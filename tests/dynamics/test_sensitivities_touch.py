@@ -3,8 +3,6 @@
 There the rise of the shell beyond its element comes on with the square of the depth.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

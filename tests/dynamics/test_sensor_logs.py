@@ -1,7 +1,5 @@
 """Readings of a run: saved, loaded, as columns, drawn."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

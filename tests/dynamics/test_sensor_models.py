@@ -1,7 +1,5 @@
 """Sensors on models of several origins: MJCF, joined robots, joints that follow others."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

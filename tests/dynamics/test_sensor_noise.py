@@ -1,7 +1,5 @@
 """The noise of sensors: normal, and the same bits everywhere."""
 
-from __future__ import annotations
-
 from math import erf
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What force-torque and joint torque sensors measure, against Newton's and Euler's laws by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -233,37 +231,6 @@ def test_a_joint_torque_at_rest_carries_the_weight():
         wrench = weight(model, q, name, parts)
         assert abs(result.sensors[name].values[0, 0] - wrench[3:] @ np.array(axis)) < 1e-10
         assert result.sensors[name].columns == ("torque [N m]",)
-
-
-def test_a_force_plate_on_the_world():
-    """A ball rests on a plate; the sensor is between the plate and the world."""
-    urdf = """<robot name="plate"><link name="world"/>
-    <link name="plate"><inertial><mass value="3"/><origin xyz="0.1 0 0"/>
-    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-    <link name="ball"><inertial><mass value="2"/>
-    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-    <joint name="legs" type="fixed"><parent link="world"/><child link="plate"/>
-    <origin xyz="0 0 -0.05"/></joint>
-    <joint name="up" type="prismatic"><parent link="world"/><child link="ball"/>
-    <origin xyz="0.2 0.1 0"/><axis xyz="0 0 1"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
-    model = pin.buildModelFromXML(urdf)
-    law = models.linear_law(1e5)
-    scene = sp.Scene(model)
-    scene.add_contact(
-        sp.Sphere(0.05, frame="ball"),
-        models.plate(),
-        frame="plate",
-        placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.05])),
-        law=law,
-        method="facets",
-        name="ball-plate",
-    )
-    rest = 0.05 - 2 * 9.81 / 1e5
-    result = read(scene, [rest], None, [sensor("legs")])
-    f = 5 * 9.81
-    expected = [0, 0, f, 2 * 9.81 * 0.1, -(2 * 9.81 * 0.2 + 3 * 9.81 * 0.1), 0]
-    assert np.allclose(result.sensors["wrist"].values[0], expected, rtol=0, atol=1e-9)
 
 
 def test_a_push_from_outside_is_felt():

@@ -1,7 +1,5 @@
 """What becomes of a signal on its way to the controller: filter, sampling, noise, range, delay."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -74,27 +72,6 @@ def test_the_filter_follows_a_parabola_exactly(steps_over_tau, slope):
     place = 0.1 + 1.5 * (t - tau * gone) + 0.5 * slope * (t**2 - 2 * tau * t + 2 * tau**2 * gone)
     assert len(t) > 15
     assert log.values[:, 4] == pytest.approx(-2.0 * 9.81 * place, abs=1e-11)
-
-
-@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.SemiImplicitEuler(1e-3)])
-def test_the_filter_follows_held_torques_exactly(integrator):
-    """Between the jumps of a staircase a filter of first order moves exponentially."""
-    stairs = np.array([2.0, -1.0, 4.0, 0.5])
-    cutoff, hold, rate = 30.0, 5e-3, 2000
-
-    def tau(t, q, v, contacts):
-        return [stairs[round(t / hold)]]
-
-    result = slider(integrator, [torque(cutoff=cutoff, rate=rate)]).run(
-        [0.0], None, 4 * hold - 1e-4, tau, control_dt=hold
-    )
-    log = result.sensors["torque"]
-    x, expected = stairs[0], []
-    for t in log.sampled:
-        expected.append(x)
-        step = stairs[int((t + 1e-9) / hold)]
-        x = step + (x - step) * np.exp(-2 * np.pi * cutoff / rate)
-    assert np.allclose(log.values[:, 0], expected, rtol=0, atol=1e-12)
 
 
 # A tip of a quarter of the mass, with a sensor between the two.

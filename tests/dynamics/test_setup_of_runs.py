@@ -1,7 +1,5 @@
 """What a run needs to know of its pairs at its start: found at once, the bits of each alone."""
 
-from __future__ import annotations
-
 import warnings
 from contextlib import suppress
 from dataclasses import astuple

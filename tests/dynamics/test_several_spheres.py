@@ -1,7 +1,5 @@
 """All spheres of a body or a robot in one entry: as one by one, but cheaper."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

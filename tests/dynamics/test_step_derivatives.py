@@ -1,7 +1,5 @@
 """State transition of the integrators of fixed step, against differences of runs of one step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

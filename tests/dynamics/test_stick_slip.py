@@ -1,7 +1,5 @@
 """The period of stick-slip, and what `v_stribeck` costs of it: the figures of docs/dynamics.md."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -3,8 +3,6 @@
 The programs run in processes of their own: what used to go wrong here killed the process.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The controller's torques in the rows of a run: what they are, and that nothing else changes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -1,7 +1,5 @@
 """Spheres on spheres: closed forms, symmetry, conservation, and the ball as a fine mesh."""
 
-from __future__ import annotations
-
 import math
 
 import coal

@@ -1,7 +1,5 @@
 """The report's study of integrators, coarse and fast: errors fall, stiffness costs no steps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -119,14 +119,6 @@ def test_every_kind_of_joint_has_columns():
         assert (found["q", kind], found["v", kind]) == (q.split(), v.split())
 
 
-def test_without_a_scene_coordinates_are_numbered(finger):
-    from dataclasses import replace
-
-    assert list(replace(finger, scene=None).row_columns())[:3] == ["t [s]", "q.0", "q.1"]
-    named = replace(finger, scene=None).row_columns(finger.scene)
-    assert list(named) == list(finger.row_columns())
-
-
 def test_names_of_columns_and_text():
     assert quantity_of(column("depth", "m")) == ("depth", "m")
     assert quantity_of(column("a [b]", "N m")) == ("a [b]", "N m")

@@ -3,8 +3,6 @@
 python -m tests.hard_cases [--quick] [--only WORD] [--write]
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import sys

@@ -1,7 +1,5 @@
 """Random impacts at the targets: where from, how fast, under which laws."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -5,8 +5,6 @@ about one axis, its motion is known: the axis goes round `L` at `|L| / I_1`, and
 about the axis at `(1 - I_3 / I_1) w_3` against that (Landau and Lifshitz, *Mechanics*, 35).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,6 +12,8 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.errors import MissingExtra
+from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.surfaces import Mesh, icosphere
 from tests import models
@@ -210,3 +210,29 @@ def on_turntable() -> Verdicts:
         tried = f"tilted spin of {SPIN:g} rad/s, table at 6 rad/s, 1 s, {integrator}"
         yield at_most("largest rise of energy", tried, "0", gain, 1e-8)
         yield at_most("residual of the energy", tried, "0", residual, 1e-8)
+
+
+AUDIT = 1e-4  # energy from nowhere in a shipped scenario, over what is exchanged
+
+
+@case("energy audit of the shipped scenarios", slow=True)
+def audits() -> Verdicts:
+    for name in shipped_scenarios():
+        try:
+            built = build(name)
+        except MissingExtra:
+            continue
+        run = built.scenario.run
+        result = built.simulation.run(
+            built.q0,
+            built.v0,
+            run.duration,
+            built.controller,
+            run.control_dt,
+            record_dt=run.record_dt,
+        )
+        energy = result.energy
+        share = float(np.abs(energy.residual).max() / energy.exchanged)
+        tried = f"{name}, {built.simulation.integrator}"
+        law = "energy from nowhere, of what is exchanged"
+        yield at_most("audit", tried, law, share, AUDIT)

@@ -6,8 +6,6 @@ Undamped, `F = k depth^e` gives back all energy; the largest depth is
 2.943 depth / v (Johnson, *Contact Mechanics*, 11.24). Times are those of the events.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -5,34 +5,26 @@ center is `r - depth`, and `b = I / (m (r - depth)^2)` stands where a hard ball 
 are large enough for the difference to show where the law says b.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.swing import ball_model
-from tests import models, rolling
 from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (
-    BALL,
     GRAVITY,
     INERTIA,
     MASS,
     PRECISE,
     RADIUS,
-    STIFF,
     beta,
     bristle,
     scene_of,
     spring,
     state,
     tilted,
-    turned,
     velocities,
 )
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
@@ -97,23 +89,6 @@ def sliding_to_rolling() -> Verdicts:
         )
 
 
-@case("turntable", slow=True)
-def turntable() -> Verdicts:
-    for turn in (2 * math.pi, 20.0):
-        run = rolling.on_turntable(
-            BALL,
-            surfaces.plate(),
-            turn,
-            place=(0.1, 0.0),
-            velocity=(0.0, 0.1),
-            stiffness=SOFT.stiffness,
-            bristles=STIFF,
-        )
-        law = "b / (1 + b), 2/7 (Weckesser, Am. J. Phys. 65 (1997) 736)"
-        tried = f"table at {turn:.3g} rad/s, two orbits"
-        yield compare("orbit / table", tried, law, run.expected, run.ratio, 1e-5)
-
-
 @case("V-groove")
 def v_groove() -> Verdicts:
     """Both contact points are at rest: the ball turns about the line through them.
@@ -141,68 +116,6 @@ def v_groove() -> Verdicts:
 
 
 ECCENTRIC, TOP_SPIN, TOP_TILT = 0.002, 150.0, 0.3
-TOP_MU = 0.1
-
-
-def jellett(result: Result) -> tuple[Array, Array]:
-    """Return -L . a at the rows [kg m^2/s], as it is and without the part of the changing depth.
-
-    L is about the center of mass, a leads from there to the contact; that part is the integral of
-    L_z d(height).
-    """
-    quaternions, height = result.q[:, 3:7], result.q[:, 2]
-    axis = turned(quaternions, np.tile([0.0, 0.0, 1.0], (len(height), 1)))
-    momentum = turned(quaternions, INERTIA * result.v[:, 3:6])
-    momentum_z = momentum[:, 2]
-    invariant = momentum_z * height - ECCENTRIC * (momentum * axis).sum(axis=1)
-    by_depth = 0.5 * (momentum_z[1:] + momentum_z[:-1]) * np.diff(height)
-    return invariant, invariant - np.append(0.0, np.cumsum(by_depth))
-
-
-def run_top(friction: sp.BristleFriction | sp.CoulombFriction) -> Result:
-    """Spin the eccentric sphere about the vertical, its center of mass at rest."""
-    model, law = models.empty(GRAVITY), spring(1e6)
-    inertia = pin.Inertia(MASS, np.array([0.0, 0.0, -ECCENTRIC]), INERTIA * np.eye(3))
-    models.add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=inertia)
-    scene = scene_of(surfaces.plate(), law, friction, model=model)
-    turn = pin.utils.rotate("x", TOP_TILT)
-    spin = turn.T @ [0.0, 0.0, TOP_SPIN]
-    height = RADIUS - law.depth_at(MASS * GRAVITY)
-    q0, v0 = state([0.0, 0.0, height], -np.cross(spin, [0.0, 0.0, -ECCENTRIC]), spin)
-    q0[3:7] = pin.Quaternion(turn).coeffs()
-    return sp.Simulation(scene, PRECISE).run(q0, v0, 2.0, record_dt=2e-4)
-
-
-def tilts(result: Result) -> Array:
-    """Return the angles of the axis from the vertical [rad]."""
-    angles: Array = np.arccos(1 - 2 * (result.q[:, 3:5] ** 2).sum(axis=1))
-    return angles
-
-
-@case("tippe top")
-def tippe_top() -> Verdicts:
-    """A sphere whose center of mass is off its center, spun up, slides and stands on its head.
-
-    L' = a x F and the symmetry of the inertia give (L . a)' = L_z height' for any force F at the
-    contact: zero at constant depth. It rises while it slides; how friction sticks plays no part.
-    """
-    law = "-L . a constant (Jellett 1872; Gray and Nickel, Am. J. Phys. 68 (2000) 821)"
-    runs = {make.__name__: run_top(make(TOP_MU)) for make in (bristle, coulomb)}
-    for name, result in runs.items():
-        raw, corrected = jellett(result)
-        end = math.degrees(tilts(result)[-1])
-        tried = f"{TOP_SPIN:g} rad/s, {name}; the tilt grew from 17 to {end:.0f} deg"
-        yield at_most("Jellett's invariant", tried, law, np.abs(raw / raw[0] - 1).max(), 1e-4)
-        yield at_most(
-            "... with the change of depth",
-            tried,
-            "-L . a - integral of L_z d(height) constant",
-            np.abs(corrected / corrected[0] - 1).max(),
-            1e-7,
-        )
-    after = [float(tilts(result)[len(result.t) // 2]) for result in runs.values()]
-    tried = "tilt after 1 s [rad], bristles against CoulombFriction"
-    yield compare("same slide", tried, "both push with mu N", after[1], after[0], 1e-3)
 
 
 MU_SLOPE, OF_CONE = 0.5, 0.9

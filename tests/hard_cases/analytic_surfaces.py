@@ -6,8 +6,6 @@ the axis of a hollow wall. The springs are stiff, the depth is about 1e-5 r: whe
 way, that of the start is taken.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -16,10 +14,8 @@ import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.swing import ball_model, downward_crossings, mean_period
-from tests import rolling
 from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (
-    BALL,
     GRAVITY,
     MASS,
     PRECISE,
@@ -41,59 +37,6 @@ BOWL = DOME = 0.040
 
 def period_along_x(result: Result, velocity: Array, periods: int) -> float:
     return mean_period(result.t, result.q[:, 0], velocity[:, 0], periods)
-
-
-@case("rolls in a bowl")
-def rolling_bowl() -> Verdicts:
-    for degrees in (2, 40):
-        angle = math.radians(degrees)
-        shell = surfaces.sphere(BOWL)
-        run = rolling.in_bowl(BALL, shell, BOWL, angle, stiffness=STIFF)
-        start = run.result.q[0, :3]
-        smooth = scene_of(shell, spring(), model=ball_model())
-        slides = sp.Simulation(smooth, PRECISE).run(
-            start, None, 2.35 * run.expected, record_dt=1e-3
-        )
-        without = period_along_x(slides, slides.v, 2)
-        tried = f"swing from {degrees} deg, R = 4 r"
-        yield compare(
-            "period of rolling",
-            tried,
-            "4 sqrt((1 + b) (R - r + depth) / g) K(sin(A / 2)); A -> 0: "
-            "2 pi sqrt(7 (R - r) / (5 g))",
-            run.expected,
-            run.period,
-            1e-5,
-        )
-        yield compare(
-            "(rolling / frictionless period)^2",
-            tried,
-            "1 + b, 7/5",
-            1 + beta(MASS * GRAVITY * math.cos(angle) / STIFF),
-            (run.period / without) ** 2,
-            1e-5,
-        )
-
-
-ORBIT = 40.0
-
-
-@case("rolls in a vertical cylinder", slow=True)
-def cylinder() -> Verdicts:
-    """The ball does not run down: it bobs at sqrt(2/7) of its orbit."""
-    run = rolling.in_cylinder(BALL, surfaces.cylinder(), surfaces.CYLINDER, ORBIT, stiffness=STIFF)
-    tried = f"R = 3 r, orbit {ORBIT:g} rad/s, three vertical periods"
-    yield compare(
-        "vertical / orbit frequency",
-        tried,
-        "sqrt(b / (1 + b)), sqrt(2/7)",
-        run.expected,
-        run.ratio,
-        1e-5,
-    )
-    yield at_most("loss of orbit speed", tried, "0", run.lost, 1e-5)
-    lowest = run.result.q[:, 2].min()
-    yield compare("lowest point", tried, "-m g / (b orbit^2)", -run.swing, lowest, 1e-4)
 
 
 @case("leaves a dome")

@@ -5,8 +5,6 @@ One point counts for both bodies, the contact point on the shell, so the ball ro
 I = 2/5 m r^2.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -3,8 +3,6 @@
 Stiffness 1e3 to 1e9 N/m, masses from 1 mg to 100 kg, radii from 10 um to 10 m, on a plate.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from typing import Any

@@ -5,8 +5,6 @@ steps are 0.1 to 10 ms, so that a step may be 1e5 radii long. The law can stop t
 0.3 r. Whether a center went through is decided from the recorded rows and the triangles alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

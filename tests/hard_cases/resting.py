@@ -4,8 +4,6 @@ In a groove, in a cone that it touches along a ring, on eight spikes, on a slope
 1000 s.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs the hard cases in processes of their own, which import this module."""
 
-from __future__ import annotations
-
 import importlib
 import multiprocessing
 import os

@@ -4,8 +4,6 @@ A start in overlap, a path that overlaps by 1e-12 m, a finger that presses along
 joint at its limit.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ Lengths in meters; `side` is that of the elements over the ball's radius (h / r)
 moved along the surface and diagonals drawn at random, so that no symmetry of a mesh hides an error.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """What spheres are thrown at, and geometry that shares nothing with the package: plain NumPy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

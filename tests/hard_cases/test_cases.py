@@ -1,7 +1,5 @@
 """Each hard case keeps its bounds; the slow ones are studies."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.hard_cases.running import collect, measure, row

@@ -5,8 +5,6 @@ the run the sphere keeps the side it came from, so that the law pushes it back u
 radius beyond the sheet, where contact ends.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

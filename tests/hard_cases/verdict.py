@@ -133,7 +133,6 @@ CASES: Register[Case] = Register(
         "extremes",
         "resting",
         "starts",
-        "repeats",
     ),
     Case,
 )

@@ -14,22 +14,16 @@ from typing import Any
 
 import numpy as np
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
-from OCP.BRepTools import BRepTools
+from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
-from OCP.gp import gp_Pnt2d
-from OCP.IntTools import IntTools_FClass2d
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_IN, TopAbs_OUT, TopAbs_REVERSED
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
 from sphshell_pin.base.arrays import Array
+from tests.joints.surfaces import Crossing, Surface
 from tests.parts.cad_mesh import Ints
 from tests.parts.occ import Solid, faces
-
-KINDS = ("Plane", "Cylinder", "Cone", "Sphere", "Torus")
-TRIMMING = 1e-9
-"""Closest points nearer to a border than this, in parameters, may be on either face."""
 
 PERSISTENCE = 1e-5
 """A minimum that is deeper by less than that than a place on an edge counts little [radii]."""
@@ -41,86 +35,6 @@ SAMPLES = 129
 STEPS = 12
 
 
-class Surface:
-    """The surface below a face [mm], without its trimming if it is of one of the five kinds."""
-
-    def __init__(self, face: Any) -> None:
-        self.face = TopoDS.Face(face.Oriented(TopAbs_FORWARD))
-        self.adaptor = BRepAdaptor_Surface(self.face)
-        number = int(self.adaptor.GetType())
-        self.kind = KINDS[number] if number < len(KINDS) else ""
-        self.inner = IntTools_FClass2d(self.face, TRIMMING)
-        self.radius = self.second = 0.0
-        if not self.kind:
-            return
-        shape = getattr(self.adaptor, self.kind)()
-        frame = shape.Position()
-        self.point = np.array(frame.Location().Coord())
-        self.x, self.y, self.axis = (
-            np.array(one().Coord()) for one in (frame.XDirection, frame.YDirection, frame.Direction)
-        )
-        # The surface's own normal is du x dv.
-        self.sense = 1.0 if frame.Direct() else -1.0
-        if self.kind in ("Cylinder", "Sphere"):
-            self.radius = shape.Radius()
-        elif self.kind == "Cone":
-            self.radius, self.second = shape.RefRadius(), shape.SemiAngle()
-        elif self.kind == "Torus":
-            self.radius, self.second = shape.MajorRadius(), shape.MinorRadius()
-
-    def closest(self, points: Array) -> tuple[Array, Array]:
-        """Signed distances (n,) of points (n, 3) and the normals (n, 3), which are du x dv."""
-        away = points - self.point
-        high = away @ self.axis
-        if self.kind == "Plane":
-            return self.sense * high, np.broadcast_to(self.sense * self.axis, points.shape)
-        if self.kind == "Sphere":
-            length = np.linalg.norm(away, axis=1)
-            normal = away / np.maximum(length, 1e-300)[:, None]
-            return self.sense * (length - self.radius), self.sense * normal
-        across = away - high[:, None] * self.axis
-        wide = np.linalg.norm(across, axis=1)
-        out = across / np.maximum(wide, 1e-300)[:, None]
-        if self.kind == "Cylinder":
-            return self.sense * (wide - self.radius), self.sense * out
-        if self.kind == "Cone":
-            c, s = np.cos(self.second), np.sin(self.second)
-            distance = (wide - self.radius) * c - high * s
-            return self.sense * distance, self.sense * (c * out - s * self.axis)
-        beside = wide - self.radius
-        length = np.hypot(beside, high)
-        normal = (beside[:, None] * out + high[:, None] * self.axis) / length[:, None]
-        return self.sense * (length - self.second), self.sense * normal
-
-    def parameters(self, points: Array) -> Array:
-        """Parameters (n, 2) of points (n, 3) on the surface."""
-        away = points - self.point
-        x, y, z = away @ self.x, away @ self.y, away @ self.axis
-        if self.kind == "Plane":
-            return np.column_stack([x, y])
-        turn = np.mod(np.arctan2(y, x), 2 * np.pi)
-        if self.kind == "Cylinder":
-            return np.column_stack([turn, z])
-        if self.kind == "Cone":
-            return np.column_stack([turn, z / np.cos(self.second)])
-        if self.kind == "Sphere":
-            return np.column_stack([turn, np.arctan2(z, np.hypot(x, y))])
-        return np.column_stack(
-            [turn, np.mod(np.arctan2(z, np.hypot(x, y) - self.radius), 2 * np.pi)]
-        )
-
-    def state(self, uv: Array) -> int:
-        """1 inside, 0 on the border, -1 outside."""
-        found = self.inner.Perform(gp_Pnt2d(*uv.tolist()))
-        return 1 if found == TopAbs_IN else -1 if found == TopAbs_OUT else 0
-
-    def samples(self, spacing: float) -> Array:
-        """Points (n, 3) of a grid within the bounds of the parameters."""
-        u0, u1, v0, v1 = BRepTools.UVBounds_s(self.face)
-        grid = np.stack(np.meshgrid(np.linspace(u0, u1, 30), np.linspace(v0, v1, 30)), -1)
-        return np.array([self.adaptor.Value(u, v).Coord() for u, v in grid.reshape(-1, 2).tolist()])
-
-
 @dataclass
 class Edge:
     """An edge with the rows of its faces, and whether each is on the left of its direction."""
@@ -130,6 +44,7 @@ class Edge:
     faces: list[int]
     left: list[bool]
     ends: tuple[int, int]
+    crossing: Crossing | None = None
 
     @cached_property
     def span(self) -> tuple[float, float]:
@@ -202,12 +117,14 @@ class Minima:
     """Local minima of the distance from one center, with depths above zero.
 
     `sure` says which are so beyond rounding: not within rounding of a border or of another one.
+    `off` is how far the file's curve of an edge is off its faces, at most.
     """
 
     points: Array
     depths: Array
     sure: Array
     plane: Array
+    off: float
 
 
 class TrimmedSolid:
@@ -245,6 +162,13 @@ class TrimmedSolid:
                 curve = BRepAdaptor_Curve(edge)
                 tolerance = BRep_Tool.Tolerance_s(edge)
                 self.edges.append(Edge(curve, tolerance, [row], [left], (numbers[0], numbers[1])))
+        for edge in self.edges:
+            pair = [self.surfaces[k] for k in edge.faces]
+            simple = edge.curve.GetType() in (GeomAbs_Line, GeomAbs_Circle)
+            if not simple and len(pair) == 2 and all(one.kind for one in pair):
+                along = edge.at(edge.grid[0])[1]
+                most = 10 * edge.tolerance
+                edge.crossing = Crossing.of(*pair, edge.grid[1], along, edge.closed, most)
         self.vertices = np.array([BRep_Tool.Pnt_s(one).Coord() for one in places]).reshape(-1, 3)
         self.size = float(
             np.linalg.norm(np.ptp(np.concatenate([e.grid[1] for e in self.edges]), 0))
@@ -260,7 +184,7 @@ class TrimmedSolid:
 
     def minima(self, centers: Array, radii: Array) -> list[Minima]:
         """Local minima of the distance of centers (n, 3) that are nearer than radii (n,)."""
-        found: list[list[tuple[Array, float, bool, bool]]] = [[] for _ in centers]
+        found: list[list[tuple[Array, float, bool, bool, float]]] = [[] for _ in centers]
         passes: list[list[float]] = [[] for _ in centers]
         for number, surface in enumerate(self.surfaces):
             if surface.kind:
@@ -278,7 +202,8 @@ class TrimmedSolid:
                 # As deep as a place on an edge: it ends there, or merges with another minimum.
                 apart = np.abs(depths[:, None] - np.array(saddles)).min(axis=1)
                 sure &= (apart > PERSISTENCE * r) | (depths == depths.max())
-            out.append(Minima(points, depths, sure, plane))
+            off = max((row[4] for row in rows), default=0.0)
+            out.append(Minima(points, depths, sure, plane, off))
         return out
 
     def _on_face(self, number: int, centers: Array, radii: Array, found: Any) -> None:
@@ -292,7 +217,7 @@ class TrimmedSolid:
         for row, state in zip(rows.tolist(), states.tolist(), strict=True):
             if state >= 0:
                 depth = radii[row] - abs(distance[row])
-                found[row].append((points[row], depth, state > 0, surface.kind == "Plane"))
+                found[row].append((points[row], depth, state > 0, surface.kind == "Plane", 0.0))
 
     def _beside_edges(self, number: int, points: Array, states: Ints) -> None:
         """Decide by the edges themselves about points (n, 3) of a face that are beside one.
@@ -308,10 +233,9 @@ class TrimmedSolid:
             rows = np.flatnonzero(reach < step)
             if not len(rows):
                 continue
-            which, at, inside = edge.closest(points[rows])
+            which, on, tangents, inside = self._nearest(edge, points[rows])
             rows = rows[which]
-            on, tangents = edge.at(at)
-            away = points[rows] - self._on_both(edge, on)
+            away = points[rows] - on
             off = np.linalg.norm(away, axis=1)
             into = self.inward(edge, edge.faces.index(number), on, tangents)
             within = np.einsum("nx,nx->n", away, into)
@@ -330,14 +254,14 @@ class TrimmedSolid:
         rows = np.flatnonzero(reach < radii + step)
         if not len(rows):
             return
-        which, at, inside = edge.closest(centers[rows])
-        rows, at = rows[which][inside], at[inside]
+        which, points, tangents, inside = self._nearest(edge, centers[rows])
+        rows, points, tangents = rows[which][inside], points[inside], tangents[inside]
         if not len(rows):
             return
-        points, tangents = edge.at(at)
-        points = self._on_both(edge, points)
         away = points - centers[rows]
         distance = np.linalg.norm(away, axis=1)
+        known = [self.surfaces[k] for k in edge.faces if self.surfaces[k].kind]
+        offs = [surface.closest(points)[0] for surface in known]
         # Into both faces the distance grows.
         rise = [
             np.einsum("nx,nx->n", away, self.inward(edge, k, points, tangents)) / distance
@@ -349,34 +273,18 @@ class TrimmedSolid:
             if distance[k] < radii[row]:
                 passes[row].append(radii[row] - distance[k])
             if distance[k] < radii[row] and least[k] > -1e-6:
+                off = max((float(abs(d[k])) for d in offs), default=0.0)
                 found[row].append(
-                    (points[k], radii[row] - distance[k], bool(least[k] > 1e-6), False)
+                    (points[k], radii[row] - distance[k], bool(least[k] > 1e-6), False, off)
                 )
 
-    def _on_both(self, edge: Edge, points: Array) -> Array:
-        """Points on the curve where both faces are zero, from those of the file's curve."""
-        pair = [self.surfaces[k] for k in edge.faces]
-        if edge.curve.GetType() in (GeomAbs_Line, GeomAbs_Circle):
-            return points
-        if len(pair) != 2 or not all(one.kind for one in pair):
-            return points
-        at = points.copy()
-        for k, start in enumerate(points):
-            x = start
-            for _ in range(STEPS):
-                (d, n), (e, m) = (one.closest(x[None]) for one in pair)
-                along = np.cross(n[0], m[0])
-                if np.linalg.norm(along) < 1e-4:
-                    break
-                along /= np.linalg.norm(along)
-                matrix = np.array([n[0], m[0], along])
-                move = np.linalg.solve(matrix, [-d[0], -e[0], 0.0])
-                x = x + move
-                if np.linalg.norm(move) < 1e-14 * self.size:
-                    break
-            if np.linalg.norm(x - start) < 10 * edge.tolerance:
-                at[k] = x
-        return at
+    def _nearest(self, edge: Edge, centers: Array) -> tuple[Ints, Array, Array, Array]:
+        """Rows of centers, the closest points of an edge, tangents, and whether inside it."""
+        if edge.crossing is not None:
+            return edge.crossing.closest(centers)
+        rows, at, inside = edge.closest(centers)
+        points, tangents = edge.at(at)
+        return rows, points, tangents, inside
 
     def _on_vertices(self, centers: Array, radii: Array, found: Any) -> None:
         leave: list[list[Array]] = [[] for _ in self.vertices]
@@ -391,7 +299,7 @@ class TrimmedSolid:
                 if rise.min(initial=0.0) > -1e-6:
                     depth = radii[row] - distance[row]
                     # Between two edges the distance may fall where they turn by more than half.
-                    found[row].append((vertex, depth, False, False))
+                    found[row].append((vertex, depth, False, False, 0.0))
 
 
 def _number(places: list[Any], vertex: Any) -> int:

@@ -79,9 +79,7 @@ def test_the_scene_is_the_one_that_ran(built: Built, result: sp.Result, tmp_path
 
 @pytest.mark.parametrize("method", ["facets", "smooth", "elements"])
 @pytest.mark.parametrize("name", ["plate", "valve"])
-def test_surfaces_are_the_same_bits(
-    built: Built, result: sp.Result, name: str, method: str
-) -> None:
+def test_surfaces_are_the_same_bits(built, result, name, method):
     before, after = built.shells[name], None
     for pair in Replay(result).scene.pairs:
         if pair.shell is not None and pair.shell.name == name:
@@ -99,9 +97,7 @@ def test_surfaces_are_the_same_bits(
     assert len(before.faces) == len(after.faces)
 
 
-def test_meshes_beyond_the_limit_are_named(
-    result: sp.Result, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_meshes_beyond_the_limit_are_named(result, monkeypatch):
     monkeypatch.setattr(kept, "MOST_FILES", 100)
     few = kept_of(result)
     assert not [name for name in few.arrays if name.startswith("file.") and len(name) > 100]

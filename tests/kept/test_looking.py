@@ -51,9 +51,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scope="module",
     params=mostly_studies(["beside their scenario", "alone"], lambda place: place != "alone"),
 )
-def seen(
-    home: Path, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
-) -> dict[str, dict[str, object]]:
+def seen(home, tmp_path_factory, request):
     """What was noticed while the results were looked at, and what failed."""
     work = tmp_path_factory.mktemp("looking")
     (work / "temporary").mkdir()
@@ -85,9 +83,7 @@ def seen(
     return noticed
 
 
-def test_looking_reads_nothing_else_and_executes_nothing(
-    seen: dict[str, dict[str, object]], home: Path
-) -> None:
+def test_looking_reads_nothing_else_and_executes_nothing(seen, home):
     failed, found = seen["failed"], seen["found"]
     if "Chromium" in str(failed.get("render", "")):
         del failed["render"]

@@ -5,8 +5,6 @@ foot lies inside the trimming, and along the edges, whose ends are the vertices.
 BRepExtrema misses the nearest point on real files.) Seeds are points of a tessellation made here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

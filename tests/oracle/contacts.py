@@ -9,8 +9,6 @@ must be found, and what may be found: what a center moved by rounding (NUDGE) wo
 the borders they are equal.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

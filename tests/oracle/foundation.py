@@ -1,7 +1,5 @@
 """The elastic foundation by its definition: integrals of the pressure over the overlap's volume."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Closest points on triangles, in extended precision, by trying everything."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Hertz's theory written from Johnson, Contact Mechanics (1985), 4.26, by plain quadrature."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

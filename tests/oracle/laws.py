@@ -1,7 +1,5 @@
 """Contact laws as their documents print them, scalar by scalar."""
 
-from __future__ import annotations
-
 
 def step(x: float, x0: float, h0: float, x1: float, h1: float) -> float:
     """ADAMS STEP: cubic from h0 at x0 to h1 at x1, constant outside."""

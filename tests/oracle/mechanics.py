@@ -1,7 +1,5 @@
 """Forces of one contact on two rigid bodies, written with plain vectors in the world."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -16,8 +16,6 @@ chi = kappa (1 + 1 / K^2) / 2, with kappa = 4 G* / E* and K^2 = 2/5 of a solid b
 Lengths are in units of the largest depth, times in those of that depth over the normal speed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array

@@ -6,8 +6,6 @@ which it begins to that at which it joins another, deeper one. Triangles are con
 sphere holds of one is connected, and two are joined where the sphere reaches what they share.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import numpy as np

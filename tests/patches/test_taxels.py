@@ -117,13 +117,6 @@ def test_what_lies_beyond_a_border_is_outside():
     assert images.outside[0] == pytest.approx(0.5 * total_force(result)[0], rel=1e-6)
 
 
-def test_arrays_are_saved(tmp_path, slid):
-    images = TaxelGrid("tip", (4, 4), axis=DOWN).images(slid)
-    with np.load(images.save(tmp_path / "taxels.npz")) as file:
-        assert np.array_equal(file["forces"], images.forces)
-        assert np.array_equal(file["t"], slid.t)
-
-
 def test_films(tmp_path):
     image = pytest.importorskip("PIL.Image")
     t = np.linspace(0.0, 0.05, 51)

@@ -1,7 +1,5 @@
 """What users of other engines reported in public, tried here: each a figure beside its truth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

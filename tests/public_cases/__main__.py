@@ -3,8 +3,6 @@
 python -m tests.public_cases [NAME ...] [--write]
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

@@ -1,7 +1,5 @@
 """Reports about files of robots and assemblies: masses, joints that mimic, parts used twice."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

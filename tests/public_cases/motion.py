@@ -1,7 +1,5 @@
 """Reports about motion: balls that follow seams, creep, sink, fall through."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

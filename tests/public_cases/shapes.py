@@ -1,7 +1,5 @@
 """Meshes of the public cases."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Reports about surfaces: distances, depths, holes, units, files of other programs."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

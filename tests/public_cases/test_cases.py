@@ -1,7 +1,5 @@
 """Each public case gives the figure that is its truth, and the page says what was measured."""
 
-from __future__ import annotations
-
 import warnings
 
 import pytest

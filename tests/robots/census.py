@@ -33,6 +33,7 @@ import numpy as np
 from benchmarks.measured import Measured, write
 from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots.packages import Folders
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.study.robot_check import QUICK, check_robot
 
@@ -44,6 +45,7 @@ _LATE = f"it takes more than {LIMIT} s of the processor"
 _ENDS = (".urdf", ".xacro", ".xml")
 _BUILT_IN = {"include", "property", "arg", "macro", "if", "unless", "insert_block", "element"}
 _INCLUDED = re.compile(r"<xacro:include\s+filename=[\"'](?:[^\"']*/)?([^/\"']+)[\"']")
+_FOUND = re.compile(r"<xacro:include\s+filename=[\"']\$\(find (\w+)\)/([^\"']+)[\"']")
 _ADVICE: dict[str, dict[str, Any]] = {
     "--density 2700": {"density": 2700.0},
     "--no-mimic": {"mimic": False},
@@ -52,8 +54,20 @@ _ADVICE: dict[str, dict[str, Any]] = {
 }
 """What a refusal says to do, and how."""
 _ARGUMENT = re.compile(r"--xacro-arg (?!NAME)(\w+)=VALUE")
-_VALUES = {"dof": "7", "ur_type": "ur5e", "robot_model": "ur5", "foot_collision": "default"}
-"""Of arguments that a file does not run without, as its repository's launch files have them."""
+_VALUES = {
+    "dof": "7",
+    "ur_type": "ur5e",
+    "robot_model": "ur5",
+    "foot_collision": "default",
+    "rotors_description_dir": "{rotors_description}",
+    "joint_limit_params": "{ur_description}/config/ur5/joint_limits.yaml",
+    "kinematics_params": "{ur_description}/config/ur5/default_kinematics.yaml",
+    "physical_params": "{ur_description}/config/ur5/physical_parameters.yaml",
+    "visual_params": "{ur_description}/config/ur5/visual_parameters.yaml",
+}
+"""Of arguments that a file does not run without, as its repository's launch files have them.
+
+Names of packages in braces stand for their folders."""
 _KINDS = (
     ("mesh cannot be loaded", "a collision mesh is not in the repository"),
     ("there is no package", "a package is in none of the repositories"),
@@ -94,7 +108,10 @@ def robot_files(folder: Path) -> Iterator[Path]:
     files = [one for one in sorted(folder.rglob("*")) if one.suffix in _ENDS and one.is_file()]
     texts = {one: one.read_text(errors="replace") for one in files if one.suffix == ".xacro"}
     parts = {(one.parent, name) for one in texts for name in _INCLUDED.findall(texts[one])}
+    ends = tuple({"/".join(("", *one)) for text in texts.values() for one in _FOUND.findall(text)})
     for file in files:
+        if str(file).endswith(ends):
+            continue
         if (file.parent, file.name) in parts or re.search(r"\.(srdf|gazebo)\b", file.name):
             continue
         try:
@@ -121,6 +138,12 @@ def ask(file: Path, part: Path | None, row: Row) -> Row:
         robots.load_file(file, **{"mimic": True, **row.options})
         return ""
 
+    def value(name: str) -> str | None:
+        given = _VALUES.get(name)
+        package = re.match(r"\{(\w+)\}", given or "")
+        place = Folders.of(file).package(package[1]) if package else None
+        return given if package is None or given is None else given.replace(package[0], str(place))
+
     def check(row: Row) -> str:
         report = check_robot(file, sizes=QUICK, **row.options)
         return "" if report.verdict == "pass" else "; ".join(report.remarks)
@@ -135,17 +158,22 @@ def ask(file: Path, part: Path | None, row: Row) -> Row:
         return ""
 
     warnings.simplefilter("ignore")
-    row = _advised(row, "load", load)
+    row = _advised(row, "load", load, value)
     if not row.load:
-        row = _advised(row, "check", check)
+        row = _advised(row, "check", check, value)
         began = time.process_time()
-        row = row if part is None else _advised(row, "new", new)
+        row = row if part is None else _advised(row, "new", new, value)
         row.seconds = time.process_time() - began
     return row
 
 
-def _advised(row: Row, step: str, way: Callable[[Row], str]) -> Row:
-    """Return `row` with the reason of a step's refusal, after what refusals say to add."""
+def _advised(
+    row: Row, step: str, way: Callable[[Row], str], value: Callable[[str], str | None]
+) -> Row:
+    """Return `row` with the reason of a step's refusal, after what refusals say to add.
+
+    `value(name)` is that of an argument of a xacro file, where it is known.
+    """
     while True:
         try:
             reason = way(row)
@@ -156,10 +184,9 @@ def _advised(row: Row, step: str, way: Callable[[Row], str]) -> Row:
         setattr(row, step, reason)
         more = {k: v for word, one in _ADVICE.items() if word in reason for k, v in one.items()}
         listed = reason.partition("sets:")[2]
-        given = {name: value for name, value in _VALUES.items() if f" {name}" in listed}
-        if argument := _ARGUMENT.search(reason):
-            name = argument[1]
-            given = {name: _VALUES.get(name, "robot" if "name" in name else "false")}
+        asked = [name for name in _VALUES if f" {name}" in listed]
+        asked += [] if (one := _ARGUMENT.search(reason)) is None else [one[1]]
+        given = {name: value(name) or ("robot" if "name" in name else "false") for name in asked}
         if given:
             more["xacro_args"] = row.options.get("xacro_args", {}) | given
         if not more or row.options.items() >= more.items():

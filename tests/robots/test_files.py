@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin import robots
+from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import NameNotFound, RobotWarning
 from tests.studies import mostly_studies
@@ -64,7 +65,7 @@ def test_packages_are_found(tmp_path, monkeypatch, place, manifest, variable, fo
     given = [tmp_path / folder]
     if variable:
         full = folder.format(tmp_path) if "{}" in folder else str(tmp_path / folder)
-        with pytest.raises(robots.RobotError, match="package_dirs"):
+        with pytest.warns(RobotWarning, match="--package-dir"):
             robots.load_file(file)
         monkeypatch.setenv(variable, full)
         given = []
@@ -104,7 +105,8 @@ def test_tags_may_have_letters_of_any_language(tmp_path):
     assert robots.load_file(path).model.nq == 3
 
 
-def test_a_visual_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
+def test_a_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
+    """Motion needs none; a collision mesh that is there and broken ends, as it would touch."""
     file = arm(tmp_path, visual=URI)
     text = file.read_text()
     part = f"<visual>{MESH.format(URI)}</visual>"
@@ -113,8 +115,24 @@ def test_a_visual_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
         robot = robots.load_file(file)
     assert len(caught) == 1
     assert robot.visual_model.ngeoms == 0
-    with pytest.raises(robots.RobotError, match=r"cube\.stl is not there.*--package-dir"):
-        robots.load_file(arm(tmp_path, collision=URI))
+    file = arm(tmp_path, collision=URI)
+    with pytest.warns(RobotWarning, match=r"cube\.stl; what lacks its .* touches nothing"):
+        assert robots.load_file(file).model.nv == 1
+    folder = tmp_path / "arm_meshes" / "meshes"
+    folder.mkdir(parents=True)
+    (folder / "cube.stl").write_text("no mesh")
+    with pytest.raises(robots.RobotError, match=r"a mesh cannot be loaded.*cube\.stl"):
+        robots.load_file(file)
+
+
+def test_a_joint_without_a_limit_element_has_no_limits(tmp_path):
+    file = arm(tmp_path)
+    text = re.sub(r"<limit[^>]*/>", "", file.read_text())
+    file.write_text(text.replace("continuous", "revolute"))
+    with pytest.warns(RobotWarning, match="they have no <limit>"):
+        model = robots.load_file(file).model
+    assert model.nv == 1
+    assert not JointComponents.from_model(model).limits
 
 
 @pytest.mark.parametrize(

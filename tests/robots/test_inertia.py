@@ -185,3 +185,19 @@ def test_a_collada_mesh_has_the_unit_that_it_states(tmp_path: Path, kind: str) -
     )
     mass = robots.load_file(file, density=2700.0).model.inertias[1].mass
     assert mass == pytest.approx(2 * 2700.0 * 0.05**3 / 6, rel=1e-6)
+
+
+def test_a_speck_of_collision_geometry_is_no_mass_where_the_link_is_drawn(tmp_path: Path) -> None:
+    box = '<geometry><box size="{0} {0} {0}"/></geometry>'
+    links = "".join(
+        f'<link name="{name}"><collision>{box.format(size)}</collision>'
+        f"<visual>{box.format(0.1)}</visual></link>"
+        for name, size in (("a", 1.0), ("b", 1e-3))
+    )
+    file = tmp_path / "arm.urdf"
+    file.write_text(
+        f'<robot name="arm">{links}<joint name="j" type="continuous"><parent link="a"/>'
+        '<child link="b"/></joint></robot>'
+    )
+    model = robots.load_file(file, density=1000.0).model
+    assert model.inertias[1].mass == pytest.approx(1.0)

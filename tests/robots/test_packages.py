@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 
 from sphshell_pin import robots
+from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.robots.workspace import find_robots
 from tests.command import call
@@ -82,6 +84,13 @@ def test_the_search_ends_at_the_workspace(tmp_path: Path) -> None:
     folders = Folders.of(file)
     assert folders.package("arm_resources") is None
     assert str(tmp_path / "one" / "src") in folders.searched()
+
+
+def test_a_uri_of_a_file_is_that_file_wherever_it_is(tmp_path: Path) -> None:
+    file, mesh = workspace(tmp_path / "one", "src/arm_resources"), tmp_path / "far off" / "a b.stl"
+    mesh.parent.mkdir()
+    mesh.touch()
+    assert Folders.of(file).find(f"file://{quote(str(mesh))}") == mesh
 
 
 def test_a_workspace_lists_its_robots(tmp_path: Path) -> None:
@@ -161,8 +170,23 @@ def test_a_mesh_of_another_folder_is_not_taken_for_a_missing_one(
     mesh.rename(file.parents[1] / other)
     uri = "meshes" if other.startswith("urdf") else "folder"
     file.write_text(file.read_text().replace("resources/meshes/", f"resources/{uri}/"))
-    with pytest.raises(robots.RobotError, match=rf"a mesh cannot be loaded.*{uri}/one\.obj"):
+    with pytest.warns(RobotWarning, match=rf"missing or broken: .*{uri}/one\.obj"):
         robots.load_file(file)
+
+
+def test_a_package_whose_meshes_were_put_into_more_folders_and_the_nearer_of_two(
+    tmp_path: Path,
+) -> None:
+    file = workspace(tmp_path, "src/vendor/arm_resources")
+    package(tmp_path / "src" / "another" / "arm_resources")
+    mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
+    for name in ("collision/large/one.obj", "visual/large/one.obj"):
+        (mesh.parent / name).parent.mkdir(parents=True)
+        (mesh.parent / name).write_bytes(mesh.read_bytes())
+    mesh.unlink()
+    file.write_text(file.read_text().replace("/one.obj", "/collision/one.obj"))
+    (geometry,) = robots.load_file(file).collision_model.geometryObjects
+    assert geometry.meshPath.endswith("vendor/arm_resources/meshes/collision/large/one.obj")
 
 
 @pytest.mark.parametrize(

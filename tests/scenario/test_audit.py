@@ -84,16 +84,6 @@ def test_audit_agrees_with_formulas(name, tmp_path):
     assert pair.normal_largest < 1e-7
 
 
-def test_flat_elements_are_off_by_their_chord_error(tmp_path):
-    path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
-    path.write_text(
-        path.read_text().replace('shell = "plate"', 'shell = "plate"\nmethod = "facets"')
-    )
-    (pair,) = run_built(build(path), tmp_path / "out", recording=False, audit_cad=True).audit.pairs
-    assert 1e-5 < pair.depth_largest < 2e-4
-    assert pair.normal_largest > 1e-3
-
-
 @pytest.mark.parametrize(
     ("center", "contact", "foot"),
     [
@@ -151,14 +141,6 @@ def test_files_and_table_have_the_audit(tmp_path):
     assert figures["unmatched"] == 0
     assert figures["depth_error"]["largest"] == np.abs(depth).max()
     assert figures["normal_error"]["rms"] == pytest.approx(np.sqrt(np.mean(normal**2)))
-
-
-def test_without_the_option_nothing_is_audited(tmp_path):
-    path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
-    report = run_built(build(path), tmp_path / "out", recording=False)
-    assert report.audit is None
-    assert "cad_audit" not in json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert "cad_depth" not in (tmp_path / "out" / "contacts.csv").read_text()
 
 
 def test_a_scenario_without_cad_is_refused_before_it_runs(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.errors import ScenarioError
+from sphshell_pin.errors import RobotWarning, ScenarioError
 from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.format.reading import read_scenario
 from tests.scenario.files import pose_of, write
@@ -110,13 +110,6 @@ def test_locking_keeps_the_other_joints_values(tmp_path):
     assert max(g.parentJoint for g in visual.geometryObjects) == reduced.njoints - 1
 
 
-def test_one_robot_keeps_its_names_and_a_continuous_joint_takes_an_angle(tmp_path):
-    text = 'title = "x"\nrobot.name = "turntable"\nrobot.start = { axle = 0.7 }\nrun.duration = 1\n'
-    assembly = assembled(tmp_path, text)
-    assert list(assembly.model.names) == ["universe", "axle"]
-    np.testing.assert_allclose(assembly.q0, [np.cos(0.7), np.sin(0.7)])
-
-
 FAULTS = {
     "unknown joint": (
         "knuckle = 0.3",
@@ -167,7 +160,7 @@ def test_a_missing_mesh_names_the_searched_folders(tmp_path):
         '<mesh filename="package://arm/a.stl"/></geometry></collision></link></robot>'
     )
     text = 'title = "x"\nrobot.urdf = "r.urdf"\nrun.duration = 1\n'
-    with pytest.raises(ScenarioError, match=r"package://arm/a.stl.*package_dirs"):
+    with pytest.warns(RobotWarning, match=r"package://arm/a.stl.*--package-dir"):
         assembled(tmp_path, text)
     with pytest.raises(ScenarioError, match="does not exist"):
         assembled(tmp_path, text + 'robot.package_dirs = ["meshes"]\n')

@@ -11,18 +11,6 @@ from tests.scenario.files import DROP, write
 LAW_LINE = next(line for line in DROP.splitlines() if line.startswith("law"))
 
 
-def test_the_example_is_built(tmp_path):
-    built = build(write(tmp_path))
-    assert built.name == "drop"
-    (pair,) = built.scene.pairs
-    assert pair.name == "ball-plate"
-    assert pair.sphere.radius == 0.012
-    assert pair.friction is None
-    np.testing.assert_allclose(pair.placement.translation, [0, 0, -0.01])
-    np.testing.assert_allclose(built.q0[:3], [0.01, 0.02, 0.0125])
-    assert built.controller is None
-
-
 @pytest.mark.parametrize(
     ("law", "kind", "attribute", "value"),
     [
@@ -44,13 +32,6 @@ def test_laws(law, kind, attribute, value, tmp_path):
     found = built.scene.pairs[0].law
     assert type(found).__name__ == kind
     assert getattr(found, attribute) == pytest.approx(value, rel=1e-12)
-
-
-def test_a_half_space_is_a_square_sheet(tmp_path):
-    old = 'type = "box", size = [0.2, 0.2, 0.02]'
-    text = DROP.replace(old, 'type = "half-space", extent = 0.5')
-    shell = build(write(tmp_path, text)).scene.pairs[0].shell
-    np.testing.assert_allclose(shell.box, [[-0.25, -0.25, 0], [0.25, 0.25, 0]], atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -189,12 +170,6 @@ def test_a_smooth_bowl_touches_once_where_a_faceted_one_pushes_twice(tmp_path):
     assert counts["smooth"] == 1 < counts["facets"]
 
 
-def test_an_unknown_method_is_answered_with_the_valid_ones(tmp_path):
-    text = DROP.replace(LAW_LINE, f'method = "smoth"\n{LAW_LINE}')
-    with pytest.raises(ScenarioError, match=r"'facets', 'smooth' or 'elements'"):
-        build(write(tmp_path, text))
-
-
 @pytest.mark.parametrize(
     ("keys", "integrator"),
     [
@@ -210,9 +185,3 @@ def test_the_integrator_is_adaptive_unless_dt_is_given(keys, integrator, tmp_pat
     if not keys:
         fixed = build(path, {"run.dt": "1e-3"}).simulation.integrator
         assert fixed == SemiImplicitEuler(1e-3)
-
-
-def test_a_key_that_only_python_has_is_refused(tmp_path):
-    table = '[controller]\ntype = "gravity-compensation"\njoints = ["x"]\n[run]'
-    with pytest.raises(ScenarioError, match=r"controller\.joints: unknown key"):
-        build(write(tmp_path, DROP.replace("[run]", table)))

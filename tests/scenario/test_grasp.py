@@ -8,14 +8,14 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.contact.materials import find_material
-from sphshell_pin.errors import ScenarioError, SphshellError
+from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.hand_text import GAP
 from sphshell_pin.scenario.drafting.new import new_scenario
-from sphshell_pin.scenario.drafting.part import Part
+from sphshell_pin.scenario.drafting.part import Part, word_primitive
 from sphshell_pin.scenario.format.shape_tables import Box, Cylinder
 from tests.scenario.files import run_well
 from tests.studies import mostly_studies
@@ -46,14 +46,6 @@ def test_two_fingers_hold_where_their_line_is_in_both_cones(angle):
     points = np.array([[0.03, 0, 0], [-0.03, 0, 0]])
     mu, _ = least_friction(points, normals, NO_WEIGHT, 10.0, 1.0)
     assert mu == pytest.approx(np.tan(angle), abs=1 / 2**8)
-
-
-def test_three_fingers_round_a_disc_need_no_friction():
-    angles = 2 * np.pi * np.arange(3) / 3
-    normals = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
-    mu, forces = least_friction(0.03 * normals + 0.5, normals, NO_WEIGHT, 9.0, 0.5)
-    assert mu < 2e-3
-    assert np.allclose(forces, -3 * normals, atol=0.02)
 
 
 def test_a_part_weighs_what_its_material_weighs():
@@ -238,14 +230,6 @@ def test_what_cannot_be_held_is_refused(options, why, tmp_path):
     assert not (tmp_path / "made_part.urdf").exists()
 
 
-def test_a_part_that_is_there_is_not_replaced(tmp_path):
-    (tmp_path / "made_part.urdf").write_text("mine", encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r"made_part\.urdf: .*is there already"):
-        new_scenario(gripper(tmp_path), "box", tips="all", against="plastic", out=out(tmp_path))
-    assert (tmp_path / "made_part.urdf").read_text(encoding="utf-8") == "mine"
-    assert not out(tmp_path).exists()
-
-
 @pytest.mark.parametrize(
     ("side", "surface"),
     mostly_studies(
@@ -262,3 +246,10 @@ def test_an_allegro_hand_holds(side, surface, tmp_path):
     assert {name.rpartition("/")[2] for name in result.pairs} == {
         f"link_{k}.0_tip" for k in (3, 7, 11, 15)
     }
+
+
+@pytest.mark.parametrize("word", ["sphere", "cylinder", "box"])
+def test_a_part_of_one_word_is_five_radii_wide(word):
+    corners = word_primitive(word, 0.01).shell().vertices
+    height = 0.05 if word == "sphere" else 0.1
+    np.testing.assert_allclose(np.ptp(corners, axis=0), [0.05, 0.05, height], rtol=1e-2)

@@ -31,14 +31,6 @@ def test_what_is_left_out_follows_from_the_key(tmp_path):
     assert (found.label, found.unit) == ("stiffness", "N/m^1.5")
 
 
-def test_what_is_given_stands(tmp_path):
-    found = the_knob(
-        tmp_path, STIFFNESS, 'label = "k"\nunit = "x"\nmin = 9e5\nmax = 2e6\nlog = true'
-    )
-    assert (found.label, found.unit, found.low, found.high) == ("k", "x", 9e5, 2e6)
-    assert found.log
-
-
 @pytest.mark.parametrize(
     ("key", "more", "unit", "value", "restart"),
     [
@@ -59,11 +51,6 @@ def test_any_number_may_be_a_knob(key, more, unit, value, restart, tmp_path):
     assert (found.unit, found.value, found.restart) == (unit, value, restart)
     assert found.low <= value <= found.high
     assert found.label
-
-
-def test_several_contacts_are_told_apart():
-    labels = [one.label for one in live_parameters(build("allegro_hand_object"))]
-    assert len(set(labels)) == len(labels)
 
 
 @pytest.mark.parametrize(
@@ -87,12 +74,6 @@ def test_a_wrong_knob_is_told_when_the_scenario_is_built(text, match, tmp_path):
     with pytest.raises(ScenarioError, match=match) as caught:
         build(write(tmp_path, DROP + text))
     assert "\n" not in str(caught.value)
-
-
-def test_a_value_set_from_outside_widens_the_range(tmp_path):
-    path = write(tmp_path, DROP + knob(STIFFNESS, "min = 9e5\nmax = 2e6"))
-    (found,) = live_parameters(build(path, {STIFFNESS: "5e6"}))
-    assert (found.low, found.value, found.high) == (9e5, 5e6, 5e6)
 
 
 @pytest.mark.parametrize(
@@ -130,15 +111,6 @@ def test_a_rebuild_keeps_what_did_not_change(tmp_path):
     # What was there before is as it was.
     assert built.scene.pairs[0].law.stiffness == 1e6
     assert built.scenario.contact[0].law.stiffness == 1e6
-
-
-def test_changes_add_up(tmp_path):
-    once = rebuild(build(write(tmp_path)), {STIFFNESS: "2e6"})
-    twice = rebuild(once, {"gravity.2": "-3.7"})
-    assert twice.scene.pairs[0].law.stiffness == 2e6
-    np.testing.assert_array_equal(twice.scene.model.gravity.linear, [0, 0, -3.7])
-    np.testing.assert_array_equal(once.scene.model.gravity.linear, [0, 0, -9.81])
-    assert twice.visual_model is once.visual_model
 
 
 def test_a_rebuild_makes_anew_what_changed(tmp_path):

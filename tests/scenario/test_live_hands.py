@@ -35,25 +35,6 @@ def body_mass(live: LiveRun) -> float:
     return float(live.scene.model.inertias[1].mass)
 
 
-def test_a_ball_that_is_dragged_hangs_where_the_spring_carries_it(ball) -> None:
-    assert ball.drag is None
-    target = np.array([0.02, -0.01, 0.2])
-    ball.pull("ball", [0.0, 0.0, 0.0], target, 400.0)
-    settle(ball)
-    # A free body hangs g / stiffness below the cursor, whatever its mass.
-    np.testing.assert_allclose(ball.q[:3], target - [0, 0, G / 400.0], atol=1e-6)
-    shown = ball.drag
-    np.testing.assert_allclose(shown.force_world, [0, 0, body_mass(ball) * G], atol=1e-6)
-    np.testing.assert_allclose(shown.point_world, ball.q[:3], atol=1e-12)
-    np.testing.assert_array_equal(shown.target_world, target)
-    assert abs(ball.residual) < 1e-2 * ball.exchanged
-    ball.release()
-    assert ball.drag is None
-    height, t = ball.q[2], ball.time
-    ball.advance(0.05)
-    assert height - ball.q[2] == pytest.approx(0.5 * G * (ball.time - t) ** 2, rel=1e-2)
-
-
 def test_the_cursor_moves_and_the_same_spring_follows(ball) -> None:
     ball.change("gravity.2", 0.0)
     ball.pull("ball", [0.0, 0.0, 0.0], [0.0, 0.0, 0.1], 100.0)

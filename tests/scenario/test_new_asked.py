@@ -1,17 +1,11 @@
 """The first picture of a new scenario, and what a user may ask of it: the place and the path."""
 
-from __future__ import annotations
-
-import re
-
 import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from typer.testing import CliRunner
 
 import sphshell_pin as sp
-from sphshell_pin.cli import app
 from sphshell_pin.errors import InvalidParameter, SphshellError
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.touch_points import sides
@@ -197,25 +191,3 @@ def test_what_cannot_be_asked(options, error, match, arm, plate, tmp_path):
         new_scenario(arm, plate, radius=0.01, out=tmp_path / "a.toml", **options)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "a.toml").exists()
-
-
-def test_what_fails_is_told_while_others_are_tried(tmp_path):
-    """Dry friction keeps the force off: the first run says so."""
-    text = arm_urdf(tmp_path).read_text(encoding="utf-8")
-    stated = '<dynamics friction="2.0"/></joint>'
-    (tmp_path / "arm.urdf").write_text(text.replace("</joint>", stated), encoding="utf-8")
-    told: list[str] = []
-    new_scenario(
-        tmp_path / "arm.urdf", "plane", radius=0.01, out=tmp_path / "a.toml", tell=told.append
-    )
-    assert told
-    assert re.fullmatch(r"tried, run 1: the force of .* N is not held: .*", told[0])
-
-
-def test_the_command_takes_place_and_path(arm, plate, tmp_path):
-    call = ["new", "--robot", arm, "--surface", plate, "--radius", "10mm", "--at", "plane"]
-    call += ["--path", "circle", "--length", "60mm", "--out", tmp_path / "a.toml"]
-    done = CliRunner().invoke(app, [str(one) for one in call])
-    assert done.exit_code == 0, done.output
-    assert "the tip slides over 59" in done.output
-    assert "upright, as in its file, on the floor" in done.output

@@ -14,7 +14,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, shipped_scenarios
-from sphshell_pin.scenario.drafting.clearance import Links
+from sphshell_pin.scenario.drafting.clearance import Links, _fixed_to
 from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
@@ -23,6 +23,7 @@ from tests.scenario.files import center_of, run_well
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
 BLADE_STEP = BLADE.with_name("blade.step")
+FINGER = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
 PLACES = ("below", "above", "+x", "-x", "+y", "-y")
 
 
@@ -140,16 +141,22 @@ def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(tmp_pa
     assert held(built, result) == pytest.approx(built.scenario.controller.normal_force, rel=0.05)
 
 
-def test_half_the_force_is_tried_where_the_whole_is_not_held(tmp_path):
-    told = []
-    path = tmp_path / "a.toml"
-    made = new_scenario("three_link_finger", BLADE_STEP, out=path, tell=told.append)
-    first, last = (float(re.search(r"force of (\S+) N", said)[1]) for said in (told[0], told[-1]))
-    assert last == pytest.approx(first / 2, rel=0.1)
-    assert any(why.startswith("half the force that suits its joints: ") for why in made.why)
-    built = build(path)
-    assert built.scenario.controller.normal_force == last
-    assert held(built, simulate(built)[0]) == pytest.approx(last, rel=0.05)
+def test_efforts_that_do_not_carry_the_robot_are_left_out_and_said_so(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_text(FINGER.replace('effort="2"', 'effort="1e-3"'))
+    made = new_scenario(file, out=tmp_path / "weak.toml")
+    assert "effort" not in made.built.scenario.robot[0].joints
+    assert any("effort limits" in why and "own weight" in why for why in made.why)
+
+
+def test_a_tip_of_two_joints_begins_at_the_gap(tmp_path):
+    """They do not move it along the approach alone: the part comes to the tip."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(re.sub(r'(<joint name="\w+" type=)"revolute"', r'\1"fixed"', FINGER, count=1))
+    made = new_scenario(file, out=tmp_path / "two.toml")
+    result, _ = simulate(made.built)
+    (pair,) = result.stats.pairs.values()
+    assert pair.peak_force < 1.5 * made.built.scenario.controller.normal_force
 
 
 @pytest.mark.study
@@ -280,3 +287,21 @@ def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
     frame, *offset, radius = command.groups()
     offset = [float(one) for one in offset]
     new_scenario(PROBE, frame=frame, offset=offset, radius=float(radius), out=tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("joint", "held", "fixed"),
+    [
+        (1, {2, 3}, {1, 2, 3}),
+        (3, {2, 3}, {1, 2, 3}),
+        (3, {3}, {2, 3}),
+        (2, {4}, {2}),
+        (3, {4}, {3, 4}),
+    ],
+)
+def test_links_beyond_locked_joints_are_fixed_to_one_another(joint, held, fixed):
+    """Of a chain of four joints."""
+    model = pin.Model()
+    for k in range(4):
+        model.addJoint(k, pin.JointModelRX(), pin.SE3.Identity(), f"joint{k}")
+    assert _fixed_to(model, joint, held) == fixed

@@ -222,13 +222,6 @@ def test_what_somebody_else_puts_beside_the_folder_is_left_alone(tmp_path):
     assert (tmp_path / "theirs" / "files" / "bad.html").exists()
 
 
-def test_a_name_as_long_as_can_be(tmp_path):
-    with atomic_file(tmp_path / ("x" * 255)) as file:
-        file.write(b"new")
-    (tmp_path / ("y" * 255)).mkdir()
-    assert put(tmp_path / ("y" * 255), "new") == {"a": "new", LAST: "new"}
-
-
 def test_a_folder_called_like_a_result_is_told(no_pictures, tmp_path):
     built = build(write(tmp_path))
     (tmp_path / "out" / "energy.png" / "mine").mkdir(parents=True)

@@ -95,12 +95,6 @@ def check_whole(folder):
     }
 
 
-def test_a_summary_lists_the_files_with_their_contents(results, place):
-    results("old")
-    check_whole(place / "out")
-    assert len(json.loads((place / "out" / "summary.json").read_text())["files"]) == 5
-
-
 def ends(place, keep, write, act=None, *, once=True):
     """Yield n, once `write` has ended at its n-th file operation in a fresh copy of `keep`.
 
@@ -213,16 +207,6 @@ def test_killed_while_it_writes_what_stopped_early_it_leaves_nothing_behind(
             pass
         assert contents(place) == visible(place), n
         assert not list(place.rglob(".*")), n
-
-
-def test_killed_in_its_first_run_a_folder_is_empty_or_whole(results, place, tmp_path):
-    keep = tmp_path / "keep"
-    keep.mkdir()
-    for n in ends(place, keep, lambda: results("new")):
-        if visible(place):
-            check_whole(place / "out")
-        results("new")
-        assert os.listdir(place) == ["out"], n
 
 
 def of_report(title):

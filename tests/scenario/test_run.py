@@ -143,25 +143,6 @@ def test_a_run_that_stops_early_spares_complete_results(fault, built, tmp_path, 
     assert (out / "notes.txt").read_text() == "mine"
 
 
-def test_partial_results_are_replaced_in_place(built, tmp_path, monkeypatch):
-    out = tmp_path / "out"
-    stop_early(monkeypatch)
-    assert run_built(built, out, recording=False).folder == out
-    assert run_built(built, out, recording=False).folder == out
-    monkeypatch.undo()
-    assert run_built(built, out, recording=False).folder == out
-    assert not (out / "stopped").exists()
-
-
-def test_results_without_a_summary_count_as_complete(built, tmp_path, monkeypatch):
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "run.npz").write_text("somebody's")
-    stop_early(monkeypatch)
-    assert run_built(built, out, recording=False).folder == out / "stopped"
-    assert contents(out) == {"run.npz": b"somebody's"}
-
-
 def test_a_refused_start_leaves_no_folder(tmp_path):
     deep = build(write(tmp_path), {"robot.start.root_joint": "[0.01, 0.02, 0.0, 0, 0, 0, 1]"})
     with pytest.raises(DeepStart):

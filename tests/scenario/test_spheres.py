@@ -93,13 +93,6 @@ def test_collision_spheres_of_a_hand(tmp_path):
     assert {pair.group for pair in scene.pairs} == {"tips"}
 
 
-def test_collision_spheres_of_several_robots(tmp_path):
-    start = TWO_BALLS.index("spheres = [")
-    text = f"{TWO_BALLS[:start]}spheres = 'collision'\n{TWO_BALLS[TWO_BALLS.index('shell = ') :]}"
-    scene = build(write(tmp_path, text)).scene
-    assert [pair.frame_i for pair in scene.pairs[1:]] == ["upper/ball", "lower/ball"]
-
-
 def test_collision_spheres_of_frames_and_others(tmp_path):
     names = [one.frame for one in robots.collision_spheres(robots.load("allegro_right_hand"))]
     own = '{ frame = "palm", radius = 0.03 }'

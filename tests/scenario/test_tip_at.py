@@ -1,7 +1,5 @@
 """A start that states where the tip is: joints follow by inverse kinematics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -88,12 +86,6 @@ def test_places_are_those_of_the_world(tmp_path):
         pose_of(built, "one/link_5").act(np.array([0, 0, 0.2])), XYZ, atol=1e-6
     )
     np.testing.assert_allclose(pose_of(built, "two/link_5").translation, [0.8, 0.2, 0.3], atol=1e-6)
-
-
-def test_it_can_be_set(tmp_path):
-    path = scenario(tmp_path, f"{{ tip_at = {XYZ} }}")
-    built = build(path, {"robot.arm.urdf.start.tip_at": "[0.3, 0.0, 0.2]"})
-    np.testing.assert_allclose(pose_of(built).act(np.array([0, 0, 0.2])), [0.3, 0, 0.2], atol=1e-6)
 
 
 @pytest.mark.parametrize(

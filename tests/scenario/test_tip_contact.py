@@ -1,7 +1,5 @@
 """What is drafted for a tip that presses, against Hertz's law."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which frame carries the sphere of a new scenario: tools before jaws; fingers without spheres."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -53,9 +51,7 @@ def arm(*, jaws: str | None, tool: str | None, mimic: str = "") -> str:
         ("revolute", '<mimic joint="left_jaw" multiplier="-1"/>'),
     ],
 )
-def test_the_tool_frame_comes_before_the_jaws(
-    tmp_path: Path, tool: str, jaws: str, mimic: str
-) -> None:
+def test_the_tool_frame_comes_before_the_jaws(tmp_path, tool, jaws, mimic):
     file = tmp_path / "arm.urdf"
     file.write_text(arm(jaws=jaws, tool=tool, mimic=mimic))
     robot = robots.load_file(file, mimic=True)

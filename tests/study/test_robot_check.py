@@ -401,3 +401,18 @@ def test_the_command_takes_xacro_arguments_and_package_folders(
     assert "--xacro-arg = 'fingers' must be NAME=VALUE" in told
     result = call("run", "x.toml", "--package-dir", tmp_path / "nix")
     assert result.exit_code == 2
+
+
+def test_the_armature_of_a_free_joint_is_named_and_no_momentum_is_missed(tmp_path):
+    """MuJoCo's joint of type free takes the armature of the defaults, an inertia of no body."""
+    file = tmp_path / "leg.xml"
+    file.write_text(
+        '<mujoco><default><joint armature="0.01"/></default><worldbody><body>'
+        '<joint type="free"/><geom type="box" size=".1 .1 .1"/><body pos="0 0 -.1">'
+        '<joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.3" size=".02"/>'
+        '<body pos="0 0 -.3"><geom type="sphere" size=".03"/></body></body></body>'
+        "</worldbody></mujoco>"
+    )
+    report = check_robot(file, sizes=QUICK)
+    assert report.verdict == "pass"
+    assert any("<freejoint/>" in note for note in report.remarks)

@@ -1,7 +1,5 @@
 """The assertions hold where contact is right, and fail where it was broken on purpose."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pytest plugin, in suites of its own: it checks what it should, and is not there otherwise."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -5,8 +5,6 @@ python -m tests.validation [CASE ...]
 That is docs/measured/validation.json and the pictures in docs/pictures/validation.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

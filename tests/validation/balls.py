@@ -1,7 +1,5 @@
 """Free balls that collide: what the cases of impacts share. No gravity; all in the world frame."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A circular cam lifts a flat follower: Altair MotionSolve's verification problem 7."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

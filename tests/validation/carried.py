@@ -4,8 +4,6 @@ The box slides, F - mu (M + 25 m) g - 25 f = M a, and the balls roll on it, f = 
 a - a_ball = 5/2 a_ball. So f = (F - mu (M + 25 m) g) / (M 7/2 + 25 m) m, whatever the direction.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

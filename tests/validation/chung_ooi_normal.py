@@ -1,7 +1,5 @@
 """Chung and Ooi (2011), tests 1 to 3: normal impacts."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import sphshell_pin as sp

@@ -1,7 +1,5 @@
 """Chung and Ooi (2011), tests 5 to 8: impacts at an angle, and of balls that spin."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Elliptical contacts at rest: half axes, approach and pressure under a published load."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A finger pad against a plate: what measurements say, and what two laws make of it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import sphshell_pin as sp

@@ -3,8 +3,6 @@
 The same impacts as Chung and Ooi (2011, test 4) and MFIX (test DEM05) computed them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ At the angle a from the top N / m = g (cos(a) - w), w = (R + r) a'^2 / g. It rol
 slips with w' = 2 (sin(a) - mu (cos(a) - w)), which is linear. It leaves where w = cos(a).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

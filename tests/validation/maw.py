@@ -5,8 +5,6 @@ dimensionality reduction, a row of independent springs on a parabola, which is e
 Hess, Method of Dimensionality Reduction in Contact Mechanics and Friction, 2015).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

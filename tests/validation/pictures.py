@@ -1,7 +1,5 @@
 """What the pictures of the cases share: published points, our lines over them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

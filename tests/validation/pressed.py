@@ -1,7 +1,5 @@
 """Balls pressed together at rest."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -6,8 +6,6 @@ center of mass to the lowest point, rolling is v = -w x r: the force is known, a
 Newton and Euler are ones for n and w alone.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ depth, u = -x, the right side adds up to zero: c - ln(1 + c) = -x - ln(1 - x). R
 it depends on c = b v alone.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

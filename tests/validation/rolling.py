@@ -3,8 +3,6 @@
 The runs are those of the hard cases (benchmarks/rolling.py), with other balls.
 """
 
-from __future__ import annotations
-
 import math
 
 import coal

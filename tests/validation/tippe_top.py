@@ -5,8 +5,6 @@ L' = r x F. As L . (w x k) = 0 of a symmetric top, (L . r)' = 0: Jellett's integ
 whatever the friction. Upright J = C w (R - e), turned over C w (R + e).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 python -m tests.validation.tosses   # fits again, 20 minutes; needs the extra `fit`
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from functools import cache

@@ -12,7 +12,6 @@ from sphshell_pin.view.display import Display
 from sphshell_pin.view.distance import RAMP, check_coloring, draw_distance
 from sphshell_pin.view.recording import render_recording
 from sphshell_pin.view.surface import FACE_COLORS, hex_colors, ramp_colors
-from tests.shell.surfaces import plate
 from tests.shell.test_curvature import ball
 from tests.view.drawn import Film, attribute
 
@@ -84,17 +83,6 @@ def test_all_shells_share_one_range():
     expected = ramp_colors(np.array([0.25]), RAMP)[0, 1]
     assert min(lightest) == pytest.approx(expected, abs=0.03)
     assert max(lightest) > 0.85
-
-
-@pytest.mark.parametrize(("shell", "method"), [(plate(3), "smooth"), (plate(3), "facets")])
-def test_flat_shells_have_one_colour(shell, method):
-    sheet = Sheet(scene_of(sp.Shell(*shell), method=method))
-    sheet.display.show("distance", True)
-    assert sheet.display.largest_distance == 0.0
-    found = sheet.drawn("distance")
-    assert len(found) == (method == "smooth")
-    for _, colors in found:
-        assert np.ptp(colors, axis=0).max() == 0.0
 
 
 def test_many_elements_have_one_colour_each(monkeypatch):

@@ -1,7 +1,7 @@
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.view.contact_path import ContactRows, contact_paths, spaced
+from sphshell_pin.view.contact_path import contact_paths, spaced
 from tests.view.stand_ins import (
     a_result,
     a_scene,
@@ -51,16 +51,6 @@ def test_of_several_contacts_the_hardest_marks_the_path():
     (path,) = contact_paths(a_result([0.0], np.zeros((1, 8)), rows), None)
     np.testing.assert_array_equal(path.points, [[3.0, 0, 0]])
     assert not path.on_shell
-
-
-def test_rows_are_found_whatever_their_order():
-    log = a_result([0, 1, 2], np.zeros((3, 8)), [{"row": 2}, {"row": 0}, {"row": 2}]).contacts
-    contacts = ContactRows.of(log)
-    assert [len(contacts.at(row).row) for row in range(3)] == [1, 0, 2]
-
-
-def test_no_contact_no_path():
-    assert contact_paths(a_result([0.0], np.zeros((1, 8))), None) == []
 
 
 def test_spacing_keeps_the_ends_and_drops_the_crowd():

@@ -148,13 +148,6 @@ def test_wrong_arguments_are_named():
         display.update(np.zeros(3))
 
 
-def test_a_trail_needs_two_places():
-    display = Display(turntable_scene(), visualizer=Film().canvas)
-    assert display.draw_trail("still", np.ones((5, 3))) is None
-    node = display.draw_trail("moved", [[0, 0, 0], [0.1, 0, 0]], pair=0)
-    assert node.path.lower() == "/meshcat/shells/0_disc/trail/moved"
-
-
 def test_a_stock_meshcat_page_takes_the_scene():
     page = meshcat.Visualizer()
     try:

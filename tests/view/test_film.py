@@ -174,20 +174,3 @@ def test_the_command(request, tmp_path, no_pictures):
     assert done.exit_code == 0, done.output
     assert done.output.split() == [str(tmp_path / "end.png")]
     assert pixels(tmp_path / "end.png").shape == (64, 96, 3)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["nowhere", "--out", "a.png"], "nowhere is no finished run"),
-        (["nowhere.npz", "--out", "a.png"], "nowhere.npz"),
-        (["nowhere.npz", "--out", "a.png", "--size", "wide"], "must be WIDTHxHEIGHT"),
-    ],
-)
-def test_the_command_refuses_in_one_sentence(arguments, said, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    done = call("render", *arguments)
-    assert done.exit_code == 2
-    assert said in done.output
-    assert "\n" not in done.output.strip()
-    assert list(tmp_path.iterdir()) == []

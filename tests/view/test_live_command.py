@@ -44,12 +44,6 @@ def started(*arguments):
     return process, process.stdout.readline().split()[0]
 
 
-def test_the_help_has_an_example():
-    told = view("--help")
-    assert told.exit_code == 0
-    assert "Example: sphshell-pin view" in told.output
-
-
 @pytest.mark.parametrize("kind", ["scenario", "folder"])
 def test_it_serves_a_page_and_ctrl_c_ends_it(kind, tmp_path, finished):
     what = {"scenario": write(tmp_path), "folder": finished}[kind]

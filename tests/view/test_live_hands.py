@@ -174,13 +174,6 @@ def test_patches_are_computed_when_they_are_switched_on(ball):
     assert ball._state()["pressure"] is None
 
 
-def test_parts_without_anything_to_show_have_no_switch(ball, make):
-    # A box has patches, one a side; its elements are flat.
-    assert {"patches", "pressure", "robot"} < set(ball._state()["show"])
-    plain = make()._state()["show"]
-    assert not {"patches", "pressure", "distance"} & set(plain)
-
-
 def test_a_finished_run_and_other_players_offer_neither_drags_nor_targets(make):
     for player in (FilmPlayer(), BallPlayer()):
         live = make(player)
@@ -203,8 +196,3 @@ def test_a_picture_in_somebody_elses_window_offers_no_drag(make, tmp_path):
     drag(live, [1.0, 0.0, 0.5])
     frames(live, 1)
     assert len(live.told) == 1
-
-
-def test_without_a_drag_nothing_of_it_is_drawn(arm):
-    frames(arm, 10)
-    assert drawn(arm) == [None, None, None]

@@ -33,14 +33,6 @@ def test_time_runs_as_fast_as_asked(make):
     assert live.player.time == pytest.approx(2.5, rel=1e-6)
 
 
-def test_the_speed_keeps_to_its_limits(make):
-    live = make()
-    for given, kept in ((0.0, 0.01), (1e9, 10.0), (3.0, 3.0)):
-        say(live, "speed", value=given)
-        live.frame(0.0)
-        assert live.speed == kept
-
-
 def test_pause_step_run_reset(make):
     live = make()
     say(live, "run", on=False)
@@ -101,16 +93,6 @@ def test_a_slider_that_is_dragged_is_one_change(make):
         say(live, "parameter", key="radius", value=value / 4e4)
     live.frame(0.0)
     assert changes == [2e3, 0.05]
-
-
-def test_whatever_a_knob_does_the_run_goes_on(make):
-    live = make()
-
-    live.player.change = Mock(side_effect=ZeroDivisionError("a defect"))
-    say(live, "parameter", key="stiffness", value=1.0)
-    live.frame(1 / 60)
-    assert live.told == [(TAB, "ZeroDivisionError: a defect")]
-    assert live.player.time > 0.0
 
 
 def test_a_push_has_its_direction_force_and_time(make):
@@ -229,16 +211,6 @@ def test_a_script_may_end_without_stopping_it():
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_in_slow_motion_the_chart_has_a_point_a_frame(make):
-    live = make(speed=0.01)
-    say(live, "charts", keys=["normal"])
-    advance = live.player.advance
-    live.player.advance = lambda *given: advance(*given).select(slice(0, 0))
-    frames(live, 30)
-    assert len(live._points) >= 28
-    assert live._points[0][1] == pytest.approx(5e3 * 1e-3, rel=0.05)
-
-
 def test_a_state_that_is_no_number_is_not_drawn(make):
     live = make(watched=True)
     live.player.q = np.full(3, np.nan)
@@ -277,18 +249,6 @@ def test_a_picture_in_somebody_elses_window(make):
     told = [(c["type"], c["path"]) for c in window.commands]
     assert ("set_object", "/Cameras/default/rotated") in told
     assert ("set_property", "/Background") in told
-
-
-def test_pinocchios_visualizer_is_taken_too(make):
-    window = ForeignWindow()
-
-    class Visualizer:
-        viewer = meshcat.Visualizer(window=window)
-
-    make(visualizer=Visualizer())
-    assert window.commands
-    with pytest.raises(InvalidParameter, match="visualizer"):
-        Live(BallPlayer(), visualizer="http://127.0.0.1:7000")
 
 
 def test_what_can_be_previewed():

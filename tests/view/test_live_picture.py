@@ -255,15 +255,6 @@ def test_the_curved_surface_of_contact_can_be_compared_with_the_flat_one(tmp_pat
     assert "curved" not in Easel(BallPlayer()).picture.switches(BallPlayer(), False)
 
 
-def test_the_first_camera_of_a_finished_run_has_all_of_its_part():
-    seen = Easel(FilmPlayer()).picture.view
-    assert np.abs(in_picture(seen, plate().vertices)).max() < 1.0
-    player = FilmPlayer()
-    player.seek(0.7)
-    Easel(player)
-    assert player.time == 0.7
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_what_is_moved_down_below_the_figures_stays_in_the_picture(seed):
     random = np.random.default_rng(seed)

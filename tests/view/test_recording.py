@@ -44,13 +44,6 @@ def test_a_touch_between_two_frames_is_shown_at_its_peak():
     assert np.count_nonzero(rows == 342) == 1
 
 
-@pytest.mark.parametrize("t", [[0.0], [3.0, 3.5], [0.0, 1e-9]])
-def test_a_run_of_hardly_any_rows_has_frames(t):
-    rows, times = rows_of(t)
-    assert len(rows) == len(times) >= 2
-    assert set(rows) <= set(range(len(t)))
-
-
 def test_the_page_holds_the_run(tmp_path):
     scene, result = ball_on_plate()
     threads = threading.active_count()

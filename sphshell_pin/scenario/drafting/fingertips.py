@@ -199,8 +199,8 @@ def _ends(model: pin.Model, held: Collection[int]) -> list[tuple[str, str]]:
     if not names and len(leaves) == 1 and leaves <= jaws:
         (joint,) = leaves
         return [(frame_on_joint(model, joint) or model.names[joint], "what carries the gripper")]
-    if len(names) == 1:
-        return [(names[0], "the only end of the robot")]
+    if len(names) == 1 or (names and model.njoints == 2):
+        return [(names[0], "the only end of the robot" if len(names) == 1 else "its only body")]
     for word in _END_WORDS:
         found = [name for name in names if word in name.lower()]
         if len(found) == 1 or (found and floats(model)):

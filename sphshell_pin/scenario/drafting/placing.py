@@ -44,14 +44,16 @@ class Place:
     """Side of the part (3,), which is turned to the tip."""
 
     def with_gap(self, gap: float) -> Place:
-        """Return the place with the sphere at the `gap` [m] to the part, which stays."""
+        """Return the place with the sphere at the `gap` [m] to the part, which stays if it can."""
         touch, stance = self.touch, self.stance
         away = (stance.radius + gap) * touch.normal - (touch.center - touch.point)
         center = touch.center + away
-        moved = stance.at(self.placement.act(center))
-        if moved is None:
-            return self
-        return replace(self, stance=moved, touch=replace(touch, center=center))
+        moved, touched = stance.at(self.placement.act(center)), replace(touch, center=center)
+        if moved is None:  # its joints do not move the tip that way
+            way = self.placement.rotation @ (center - touch.center)
+            part, raised = nearer(self.placement, way), self.raised - float(way[2])
+            return replace(self, touch=touched, placement=part, raised=raised)
+        return replace(self, stance=moved, touch=touched)
 
     @property
     def told(self) -> str:

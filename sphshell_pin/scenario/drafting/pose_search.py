@@ -31,7 +31,7 @@ from sphshell_pin.scenario.drafting.plan import (
     press_gap,
     press_plan,
 )
-from sphshell_pin.scenario.drafting.poses import home_approach, joints_aside
+from sphshell_pin.scenario.drafting.poses import NO_LIMIT, home_approach, joints_aside
 from sphshell_pin.scenario.drafting.refusals import Tried, cannot_stand, refusal
 from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
@@ -45,6 +45,8 @@ from sphshell_pin.scenario.format.schema import RobotSection
 _MOST_RUNS, _MOST_SLIDES, _MOST_DROPS = 10, 6, 3
 # Places at which the tip cannot slide, before one of them is taken.
 _MOST_STILL = 12
+# Places at which efforts do not carry the robot, before they are taken for wrong.
+_MOST_WEAK = 4
 # Heights of the part above the floor, in turn, as parts of the robot's reach.
 _LIFTS = (0.0, 0.1, 0.25)
 # Between links and part at the start, along the approach, in radii of the sphere.
@@ -134,13 +136,6 @@ def find_working(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) 
         return _drop(asked, built, tips, draft)
     search = _Search(asked, built, tips[0], draft)
     found = search.find()
-    faults = search.tried.faults
-    if found is None and asked.press is None and faults and faults[-1].kind == "force":
-        # What gives way turns less under a smaller force.
-        note = f"half the force that suits its joints: {faults[-1].text}"
-        half = replace(asked, press=rounded(search.tried.force / 2))
-        search = _Search(half, built, tips[0], draft, note)
-        found = search.find()
     if found is None:
         raise refusal(tips[0].frame, asked, search.tried)
     return found
@@ -167,9 +162,9 @@ class Candidate(NamedTuple):
 class _Search:
     """The search for a place where the tip of a robot with a fixed base presses."""
 
-    def __init__(self, asked: Asked, built: Built, tip: Tip, draft: Draft, *notes: str) -> None:
+    def __init__(self, asked: Asked, built: Built, tip: Tip, draft: Draft) -> None:
         self.asked, self.built, self.tip, self.draft = asked, built, tip, draft
-        (self.section,), self.notes, self.tried = built.scenario.robot, notes, Tried()
+        (self.section,), self.tried = built.scenario.robot, Tried()
         self.model = model = built.assembly.model
         (self.shell,) = built.shells.values()
         if int(model.frames[find_frame(model, tip.frame)].parentJoint) == 0:
@@ -211,9 +206,15 @@ class _Search:
     def _candidates(self) -> Iterator[Candidate]:
         asked, tip = self.asked, self.tip
         for found in self._places():
-            pair = chosen_materials(asked, [tip], found.stance.mass)
+            stance = found.stance
+            pair = chosen_materials(asked, [tip], stance.mass)
+            if "effort" in self.tried.without:
+                stance = replace(stance, force=NO_LIMIT)
+            elif not stance.force and len(self.tried.errors) == _MOST_WEAK:
+                self.tried.leave_out("effort", "they do not carry the robot's own weight")
+                stance = replace(stance, force=NO_LIMIT)
             try:
-                force = press_force(found.stance, tip, pair, asked.press)
+                force = press_force(stance, tip, pair, asked.press)
             except SphshellError as error:  # of this posture: another one may do
                 self.tried.errors.append(error)
                 continue
@@ -223,7 +224,6 @@ class _Search:
             yield Candidate(place, way, pair, force, gap)
 
     def _planned(self, one: Candidate) -> tuple[RobotSection, Plan]:
-        self.tried.force = one.force
         stance = one.place.stance
         stands = {
             "lock": list(stance.lock),
@@ -278,7 +278,7 @@ class _Search:
             fault = try_out(built, one, self.links)
             tried.runs += 1
             if fault is None:
-                return Working(text, built, (*one.why, *self.notes, one.contact.note))
+                return Working(text, built, (*one.why, one.contact.note))
             tried.faults.append(fault)
             if self.asked.tell is not None:
                 self.asked.tell(f"tried, run {tried.runs}: {fault.text}")
@@ -292,7 +292,7 @@ class _Search:
             if repair is None:
                 break
             if repair.change is None or press is None:
-                tried.leave_out(repair.name, fault)
+                tried.leave_out(repair.name, f"with it {fault.text}")
                 changed = plan
             else:
                 changed = replace(one, control=repair.change(press), repair=repair.name)

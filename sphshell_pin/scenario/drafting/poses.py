@@ -22,8 +22,8 @@ _MOBILE, _EASY = 2e-3, 0.1
 _SEEDS, _APART, _MOST = 32, 0.3, 4
 # Cosine between limb and approach below which the limb is beside the tip or before it.
 _BESIDE = 0.3
-# Effort limits beyond this stand for none.
-_NO_LIMIT = 1e9
+NO_LIMIT = 1e9
+"""Efforts [N m] and forces [N] beyond this stand for none."""
 # Distance of a joint at ease from its nearer limit, as a part of its range.
 _AT_EASE = 0.2
 # Tolerances: of a height that is asked for, as a part of the reach; of a path that is followed, as
@@ -59,7 +59,9 @@ class Stance:
     joint_inertia: Array
     """Diagonal of the mass matrix (k,), of the joints that move."""
     force: float
-    """Largest push along the approach that the joints' effort limits allow [N]; inf if unknown."""
+    """Largest push along the approach that the joints' effort limits allow [N].
+
+    0 where they do not carry the robot's own weight, NO_LIMIT where none is stated."""
     reach: float
     """From the tip to the farthest joint that moves it [m]."""
     mobility: float
@@ -158,7 +160,8 @@ def stances(
         if not usable(at):
             continue
         rank = one.mobility * one.ahead * _ease(reach, at) * one.dexterity
-        found.append((rank + (k == 0 and one.mobility > _EASY < one.dexterity), one))
+        rank += k == 0 and one.mobility > _EASY < one.dexterity
+        found.append((rank * (one.force > 0), one))
     found.sort(key=lambda one: -one[0])
     yield from (one for _, one in found[:_MOST])
 
@@ -203,10 +206,12 @@ def _stance(
     slide = _upright(slides[:, -1]) if sideways[-1] > _MOBILE * top else None
     pushes = linear.T @ approach
     limits = np.array(model.upperEffortLimit)[columns]
-    limited = (np.abs(pushes) > 1e-9) & (limits < _NO_LIMIT) & (limits > 0)
     # What the weight of the links leaves of the efforts.
     weight = pin.computeGeneralizedGravity(model, model.createData(), q)[columns]
+    stated = (limits < NO_LIMIT) & (limits > 0)
+    limited = stated & (np.abs(pushes) > 1e-9)
     room = (limits - np.sign(pushes) * weight)[limited]
+    carried = bool((np.abs(weight) <= limits)[stated].all())
     turning = float(np.trace(angular @ response[:, 3:]))
     turns = int(np.linalg.matrix_rank(angular, tol=1e-6))
     spare = len(columns) - int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max()))
@@ -224,7 +229,8 @@ def _stance(
         slide_mass=1 / max(float(sideways[-1]) if slide is not None else along, 1e-9),
         inertia=turns / turning if spare and turning > 1e-9 else 0.0,
         joint_inertia=np.diag(mass).copy(),
-        force=float(np.clip(room / np.abs(pushes[limited]), 0, None).min(initial=np.inf)),
+        force=carried
+        * float(np.clip(room / np.abs(pushes[limited]), 0, NO_LIMIT).min(initial=NO_LIMIT)),
         reach=reach_length,
         mobility=usable / top,
         dexterity=float(values[-1] / values[0]) if values[0] > 0 else 0.0,

@@ -41,8 +41,6 @@ class Tried(Searched):
     """What a search came across, for the sentence that refuses."""
 
     runs: int = 0
-    force: float = 0.0
-    """Force of the last draft [N]."""
     faults: list[Fault] = field(default_factory=list)
     without: tuple[str, ...] = ()
     """Kinds of what acts in the joints that are left out."""
@@ -54,12 +52,14 @@ class Tried(Searched):
     ways: list[str] = field(default_factory=list)
     """Why a path that was asked for could not be taken."""
 
-    def leave_out(self, kind: str, fault: Fault) -> None:
-        """Leave one more kind of what the file states of the joints out, for this `fault`."""
+    def leave_out(self, kind: str, why: str) -> None:
+        """Leave one more kind of what the file states of the joints out: `why` is a clause."""
         self.without = (*self.without, kind)
+        kinds = " and ".join(self.without).replace("effort", "effort limits")
+        be = "are" if kinds.endswith("s") else "is"
         self.note = (
-            f"the {' and '.join(self.without)} that the robot's file states for its joints is not "
-            f"modeled, because with it {fault.text}"
+            f"the {kinds} that the robot's file states for its joints {be} not modeled, because "
+            f"{why}"
         )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 
@@ -54,7 +56,10 @@ def find_sphere(
     if radius is None:
         on_mesh = _on_mesh(subject, model, end, why)
         if on_mesh is not None:
-            return on_mesh, [on_mesh.source]
+            # In a wheel it is as large as the circle on which its center moves.
+            most = _lever(model, _sphere(on_mesh), rng) / _FEWEST
+            small = replace(on_mesh, radius=most) if 0.0 < most < on_mesh.radius else on_mesh
+            return small, [small.source]
     said = f"{why}: the sphere sits at '{end}', the end of the longest limb"
     return Tip(end, radius or size, np.zeros(3), said), [said]
 

@@ -95,6 +95,11 @@ def setting_of(
             raise
         raise SphshellError(fault) from None
     notes += said + shifted
+    if any(model.armature[one.idx_v] for one in model.joints if _flies(one)):
+        notes.append(
+            "the file gives its free joint an armature, an inertia without momentum, which is left "
+            "out where momentum is checked: make it a <freejoint/>, which takes no defaults"
+        )
     return Setting(model, sphere, patch(tip.radius), tuple(notes))
 
 
@@ -292,6 +297,8 @@ def _floating(model: pin.Model, sphere: Sphere) -> pin.Model:
         values = np.array(getattr(whole, name))
         of = np.asarray(getattr(model, name))
         for j in joints:
+            if name == "armature" and _flies(model.joints[j]):
+                continue  # an inertia that no body has: it conserves no momentum
             old, new = model.joints[j], whole.joints[anew[j]]
             at, to, n = old.idx_q, new.idx_q, old.nq
             if len(of) == model.nv and name == "armature":

@@ -6,6 +6,7 @@
 
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/query/closest_on_side.hpp"
+#include "shell/curved/face_search.hpp"
 #include "shell/faces/face_cells.hpp"
 
 namespace sphshell {
@@ -13,78 +14,77 @@ namespace {
 
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
-constexpr double kNearAxis = 1e-6;
 constexpr int kMostRepeats = 20;
 }  // namespace
 
-void FaceFeet::clear(const CurvedShell& surface) {
-  // Feet of earlier rounds count as unknown; cleared only for another surface, or where the counter
-  // wraps around.
-  if (feet_.size() != surface.faces().shapes.size() || of_ != &surface || ++round_ == 0) {
-    feet_.assign(surface.faces().shapes.size(), Foot());
-    of_ = &surface;
-    round_ = 1;
-  }
-}
-
-void FaceFeet::add(const Shell& shell, int f, const Sphere& sphere, bool want_dn_dc,
-                   std::vector<Minimum>& minima) {
+// The facets near the point are looked through; where it may be anywhere around an axis, those near
+// the sphere, and towards each of them.
+void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, bool want_dn_dc,
+                           std::vector<Minimum>& minima) {
   const CurvedShell& surface = *shell.curved();
-  const FaceCell& cell = surface.face_cells()[f];
-  const Primitive& shape = surface.faces().shapes[cell.face];
-  Foot& foot = feet_[cell.face];
-  // The first facet of the face in this query: the closest point of the whole surface, in closed
-  // form.
-  if (foot.round != round_) {
-    foot.round = round_;
-    foot.distance = shape.distance(sphere.center, foot.normal);
-    foot.anywhere = shape.singular(sphere.center, kOnAxis);
-    foot.point = sphere.center - foot.distance * foot.normal;
-    foot.claimed = !(std::abs(foot.distance) < sphere.radius) || !(shape.radius_at(foot.point) > 0);
-    if (!foot.claimed && shape.has_parameters())
-      foot.place = shape.parameters(foot.point, shell.size());
-  }
-  if (foot.claimed) return;
-  const NormalCone& cone = surface.cones()[f];
-  // The facet's ball excludes most facets before the exact test.
-  const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
-  Vec3 point = foot.point, normal = foot.normal;
-  Eigen::Vector2d place = foot.place;
-  // On the axis any direction will do: towards this facet.
-  if (foot.anywhere) {
-    shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
-    point = sphere.center - foot.distance * normal;
-    if (shape.has_parameters()) place = shape.parameters(point, shell.size());
-  }
-  const double reach = cone.reach + 1e-6 * shell.size();
-  if ((point - middle).squaredNorm() > reach * reach) return;
-  const Vec3 outward = cell.sign < 0 ? Vec3(-normal) : normal;
-  const Facet& facet = shell.facets()[f];
-  if (!holds(shell, f, {point, outward, sphere.center, place}, sphere.tolerance + surface.gap()))
+  const Primitive& shape = surface.faces().shapes[face];
+  Vec3 normal;  // as the shape has it
+  const double distance = shape.distance(sphere.center, normal);
+  Vec3 point = sphere.center - distance * normal;
+  if (!(std::abs(distance) < sphere.radius) || !(shape.radius_at(point) > 0)) return;
+  const bool anywhere = shape.singular(sphere.center, kOnAxis);
+  const double slack = surface.face_search()->slack;
+  const Region& region = surface.face_search()->of_face[face];
+  if (!anywhere && !region.holds(point, slack)) return;
+  facets_.clear();
+  shell.bvh().find_overlapping(anywhere ? sphere.center : point,
+                               (anywhere ? sphere.radius : slack) + region.reach, facets_,
+                               [&](int first) { prefetch(&surface.cones()[first]); });
+  Eigen::Vector2d place(0, 0);
+  if (!anywhere && shape.has_parameters()) place = shape.parameters(point, shell.size());
+  for (const int f : facets_) {
+    const NormalCone& cone = surface.cones()[f];
+    const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
+    // The facet's ball excludes most facets before the exact test.
+    const double reach = cone.reach + slack;
+    const auto is_far = [&] { return (point - middle).squaredNorm() > reach * reach; };
+    if (!anywhere && is_far()) continue;
+    const FaceCell& cell = surface.face_cells()[f];
+    if (!cell.closed || cell.face != face) continue;
+    if (anywhere) {
+      shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
+      point = sphere.center - distance * normal;
+      if (shape.has_parameters()) place = shape.parameters(point, shell.size());
+    }
+    if (anywhere && is_far()) continue;
+    const Vec3 outward = cell.sign < 0 ? Vec3(-normal) : normal;
+    if (!holds(shell, f, {point, outward, sphere.center, place}, sphere.tolerance + surface.gap()))
+      continue;
+    // Away from the face; where the center is on it, to the facet's side.
+    const Vec3 away = distance == 0 ? outward : distance < 0 ? Vec3(-normal) : normal;
+    Contact contact{point, away, sphere.radius - std::abs(distance), shell.facets()[f].element,
+                    Feature::Face};
+    // All around an axis the normal has no derivative.
+    if (want_dn_dc && !anywhere)
+      contact.dn_dc = (distance < 0 ? -1 : 1) * shape.hessian(sphere.center);
+    minima.push_back({contact, f, 0, distance * cell.sign < 0});
     return;
-  foot.claimed = true;
-  // Away from the face; where the center is on it, to the facet's side.
-  const bool within = foot.distance < 0;
-  const Vec3 away = foot.distance == 0 ? outward : within ? Vec3(-normal) : normal;
-  Contact contact{point, away, sphere.radius - std::abs(foot.distance), facet.element,
-                  Feature::Face};
-  // All around an axis the normal has no derivative.
-  if (want_dn_dc && !foot.anywhere)
-    contact.dn_dc = (within ? -1 : 1) * shape.hessian(sphere.center);
-  minima.push_back({contact, f, 0, foot.distance * cell.sign < 0});
+  }
 }
 
-void FaceFeet::add(const Shell& shell, int f, const Plane& plane, bool want_dx_dn,
-                   std::vector<Minimum>& minima) {
+// Claims of earlier rounds do not count; cleared only for another surface, or where the counter
+// wraps around.
+void FaceFeet::clear(const CurvedShell& surface) {
+  if (claimed_.size() == surface.faces().shapes.size() && of_ == &surface && ++round_ != 0) return;
+  claimed_.assign(surface.faces().shapes.size(), 0);
+  of_ = &surface;
+  round_ = 1;
+}
+
+void FaceFeet::add_lowest(const Shell& shell, int f, const Plane& plane, bool want_dx_dn,
+                          std::vector<Minimum>& minima) {
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
   const Primitive& shape = surface.faces().shapes[cell.face];
   const Vec3 &n = plane.normal, &axis = shape.axis;
   const bool torus = shape.kind == FaceKind::Torus;
   if (!torus && shape.kind != FaceKind::Sphere) return;
-  Foot& foot = feet_[cell.face];
-  if (foot.round != round_) foot.round = round_, foot.claimed = false;
-  if (foot.claimed) return;
+  if (claimed_[cell.face] == round_) return;
   const NormalCone& cone = surface.cones()[f];
   const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
   Vec3 down = axis.dot(n) * axis - n;  // of a torus: from the axis to where it is lowest
@@ -101,7 +101,7 @@ void FaceFeet::add(const Shell& shell, int f, const Plane& plane, bool want_dx_d
   const Eigen::Vector2d place =
       torus ? shape.parameters(point, shell.size()) : Eigen::Vector2d(0, 0);
   if (!holds(shell, f, {point, outward, point, place}, plane.tolerance + surface.gap())) return;
-  foot.claimed = !anywhere;
+  if (!anywhere) claimed_[cell.face] = round_;
   const int element = shell.facets()[f].element;
   Contact contact = contact_at(point, outward, plane, element, Feature::Face);
   if (want_dx_dn) {
@@ -266,9 +266,7 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
   // A line or circle has its closest point in closed form, but from the axis.
   constexpr bool sphere = std::is_same_v<Probe, Sphere>;
   bool closed = false;
-  if constexpr (sphere)
-    closed = border && known->kind != FaceJoint::Kind::Crossing &&
-             known->axis.cross(probe.center - known->point).norm() > kNearAxis * known->radius;
+  if constexpr (sphere) closed = border && known->has_one_nearest(probe.center);
   if (!closed) {
     const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
     out.t = nearest_on_side(side, probe);

@@ -9,30 +9,21 @@
 
 namespace sphshell {
 
-// The closest point of each face is found once a query, whatever the number of its facets; the
-// facet that holds it claims it.
 class FaceFeet {
  public:
-  // Before each query; in constant time.
+  // Adds the closest point of a face, if one of its facets holds it.
+  void add_closest(const Shell& shell, int face, const Sphere& sphere, bool want_dn_dc,
+                   std::vector<Minimum>& minima);
+  // Before each query with a plane; in constant time.
   void clear(const CurvedShell& surface);
-  // Adds the closest point of the face that a facet lies on, if it is in the facet and no other has
-  // claimed it.
-  void add(const Shell& shell, int facet, const Sphere& sphere, bool want_dn_dc,
-           std::vector<Minimum>& minima);
-  // The same of the lowest point of a face; of planes, cylinders and cones it is on a border.
-  void add(const Shell& shell, int facet, const Plane& plane, bool want_dx_dn,
-           std::vector<Minimum>& minima);
+  // Adds the lowest point of the face that a facet lies on, if it is in the facet and no other has
+  // claimed it; of planes, cylinders and cones it is on a border.
+  void add_lowest(const Shell& shell, int facet, const Plane& plane, bool want_dx_dn,
+                  std::vector<Minimum>& minima);
 
  private:
-  struct Foot {
-    std::uint32_t round = 0;
-    bool claimed;   // or out of reach
-    bool anywhere;  // all around the axis, or the center
-    double distance;
-    Vec3 point, normal;     // the normal as the shape has it
-    Eigen::Vector2d place;  // the point's Primitive::parameters()
-  };
-  std::vector<Foot> feet_;  // beside the faces
+  std::vector<int> facets_;             // that may hold a point
+  std::vector<std::uint32_t> claimed_;  // beside the faces: the last round in which one claimed it
   std::uint32_t round_ = 0;
   const CurvedShell* of_ = nullptr;
 };

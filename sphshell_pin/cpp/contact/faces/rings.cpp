@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/query/broad_phase.hpp"
 #include "shell/curved/curved.hpp"
 #include "shell/faces/face_cells.hpp"
 
@@ -38,9 +39,11 @@ bool circle_of_face(const Primitive& shape, const Vec3& foot, const Vec3& center
 }
 
 // Whether the circle is on the face all around: no border cuts it.
-bool is_whole(const Shell& shell, int face, const Circle& circle, const Vec3& foot,
-              const Vec3& normal, const std::vector<int>& facets) {
+bool is_whole(const Shell& shell, int face, const Circle& circle, const Sphere& sphere,
+              const Vec3& foot, const Vec3& normal) {
   const CurvedShell& surface = *shell.curved();
+  BroadPhase near(false);
+  near.find(shell, surface.cones(), surface.bulge(), sphere);
   // In the half-plane through the axis: the normal, and the tangent across the circle.
   const Vec3 outward = (foot - circle.middle) / circle.radius;
   const double n_off = normal.dot(outward), n_along = normal.dot(circle.axis);
@@ -51,7 +54,7 @@ bool is_whole(const Shell& shell, int face, const Circle& circle, const Vec3& fo
     away = n_off * (off - circle.radius) + n_along * along;
     return n_off * along - n_along * (off - circle.radius);
   };
-  for (const int f : facets) {
+  for (const int f : near.candidates) {
     const FaceCell& cell = surface.face_cells()[f];
     if (cell.face != face) continue;
     for (int k = 0; k < 3; ++k) {
@@ -107,8 +110,7 @@ void mark(Minimum& minimum, const Circle& circle) {
 
 }  // namespace
 
-void find_rings(const Shell& shell, const Sphere& sphere, const std::vector<int>& facets,
-                std::vector<Minimum>& minima) {
+void find_rings(const Shell& shell, const Sphere& sphere, std::vector<Minimum>& minima) {
   // Faces of revolution by their own axis; borders by the circle that their sides share.
   constexpr double kTurn = 6.283185307179586;
   const CurvedShell& surface = *shell.curved();
@@ -119,7 +121,7 @@ void find_rings(const Shell& shell, const Sphere& sphere, const std::vector<int>
     const FaceCell& cell = surface.face_cells()[at.facet];
     if (at.contact.feature == Feature::Face && cell.closed &&
         circle_of_face(surface.faces().shapes[cell.face], foot, sphere.center, circle) &&
-        is_whole(shell, cell.face, circle, foot, at.contact.normal, facets))
+        is_whole(shell, cell.face, circle, sphere, foot, at.contact.normal))
       mark(at, circle);
     if (!is_border(at) || at.off_axis < 1) continue;
     if (!circle_of_border(shell, at, sphere.center, circle)) continue;

@@ -8,10 +8,8 @@
 namespace sphshell {
 
 // Marks the minima that stand for a whole circle about an axis: those on cylinders, cones and tori
-// that no border cuts there, and those whose sides are all of a round border. `facets`: all that
-// the sphere reaches.
-void find_rings(const Shell& shell, const Sphere& sphere, const std::vector<int>& facets,
-                std::vector<Minimum>& minima);
+// that no border cuts there, and those whose sides are all of a round border.
+void find_rings(const Shell& shell, const Sphere& sphere, std::vector<Minimum>& minima);
 
 // What is shown of a minimum that is marked. The depth is that of the nearest point, so that its
 // gradient jumps as the center crosses the axis: on the axis it is the mean of the normals all

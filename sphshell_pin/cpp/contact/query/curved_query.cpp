@@ -20,10 +20,19 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
   const CellBounds* cells = surface.bulge() > 0 ? surface.cells().data() : nullptr;
   // All zero: a facet whose element is its flat triangle.
   const CellBounds flat{};
-  broad.find(shell, surface.cones(), surface.bulge(), probe, cells);
-  outlooks_.clear(), borders_.clear();
   const LargeArray<FaceCell>& faces = surface.face_cells();
-  if (!faces.empty()) feet_.clear(surface);
+  outlooks_.clear(), borders_.clear();
+  if constexpr (sphere) {
+    if (faces.empty()) {
+      broad.find(shell, surface.cones(), surface.bulge(), probe, cells);
+    } else {
+      broad.find(shell, *surface.face_search(), probe, cells);
+      for (const int face : broad.faces) feet_.add_closest(shell, face, probe, want_dn_dc, minima);
+    }
+  } else {
+    broad.find(shell, surface.cones(), surface.bulge(), probe, cells);
+    if (!faces.empty()) feet_.clear(surface);
+  }
   const auto prefetch_cell = [&](int f) {
     for (int line = 0; line < int(sizeof(CurvedFacet)); line += 64)
       prefetch(reinterpret_cast<const char*>(&surface.facets()[f]) + line);
@@ -31,7 +40,7 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
   if (!sphere) std::for_each(broad.candidates.begin(), broad.candidates.end(), prefetch_cell);
   for (int f : broad.candidates) {
     if (!faces.empty() && faces[f].closed) {
-      feet_.add(shell, f, probe, want_dn_dc, minima);
+      if constexpr (!sphere) feet_.add_lowest(shell, f, probe, want_dn_dc, minima);
       borders_.push_back(f);
       continue;
     }
@@ -65,7 +74,12 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
   }
   for (const int f : borders_) add_border(task, f);
   if constexpr (sphere)
-    if (!faces.empty() && !minima.empty()) find_rings(shell, probe, broad.candidates, minima);
+    if (!faces.empty()) {
+      for (const int joint : broad.joints) add_joint(task, joint);
+      for (const int c : broad.corners) add_vertex(task, triangle_of(c), side_of(c));
+    }
+  if constexpr (sphere)
+    if (!faces.empty() && !minima.empty()) find_rings(shell, probe, minima);
   if (minima.size() > 1) components_.merge(shell, probe, want_dn_dc, minima);
 }
 
@@ -235,13 +249,37 @@ void CurvedQuery::add_border(const Task<Probe>& task, int f) {
   const Owned& owned = shell.curved()->facets()[f].owned;
   const FaceCell& cell = shell.curved()->face_cells()[f];
   for (int k = 0; k < 3; ++k) {
-    if (owned.vertex[k] >= 0) add_vertex(task, f, k);
+    // A sphere looks for corners and joints by themselves. Beside its axis a face has one closest
+    // point, and none on a line within it.
+    constexpr bool sphere = std::is_same_v<Probe, Sphere>;
+    if (!sphere && owned.vertex[k] >= 0) add_vertex(task, f, k);
     if (owned.twin[k] == kNotOwned) continue;
-    // Beside its axis a face has one closest point, and none on a line within it.
-    if (std::is_same_v<Probe, Sphere> && cell.side[k] == FaceCell::Side::Inner) continue;
+    if (sphere && (cell.side[k] == FaceCell::Side::Inner || is_on_joint(*shell.curved(), f, k)))
+      continue;
     const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
     if (probe.bound_along(facet.corner[k], d, double(cell.bulge[k])) > 0) add_edge(task, f, k);
   }
+}
+
+// The sides near the closest point of a line or circle are looked at; about its axis, those near
+// the sphere.
+void CurvedQuery::add_joint(const Task<Sphere>& task, int joint) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const CurvedShell& surface = *shell.curved();
+  const FaceSearch& search = *surface.face_search();
+  const FaceJoint& curve = surface.faces().joints[joint];
+  const Region& region = search.of_joint[joint];
+  sides_.clear();
+  if (!curve.has_one_nearest(sphere.center)) {
+    search.sides.find(sphere.center, sphere.radius + region.reach, sides_);
+  } else {
+    const Vec3 point = curve.nearest(sphere.center);
+    if (!sphere.reaches(point) || !region.holds(point, search.slack)) return;
+    search.sides.find(point, search.slack + region.reach, sides_);
+  }
+  for (const int h : sides_)
+    if (surface.face_cells()[triangle_of(h)].joint[side_of(h)] == joint)
+      add_edge(task, triangle_of(h), side_of(h));
 }
 
 // The closest point of a side between its ends, if the distance falls into none of the elements

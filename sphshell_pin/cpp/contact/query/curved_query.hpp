@@ -46,12 +46,13 @@ class CurvedQuery {
   };
 
   // Each adds the minimum of one feature, if there is one: within a flat or a bent cell, on the
-  // border of a face, on a side, at a corner.
+  // border of a face, on the joint of two, on a side, at a corner.
   void add_flat(const Task<Sphere>& task, const Outlook& outlook);
   template <class Probe>
   void add_bent(const Task<Probe>& task, const Outlook& outlook);
   template <class Probe>
   void add_border(const Task<Probe>& task, int facet);
+  void add_joint(const Task<Sphere>& task, int joint);
   template <class Probe>
   void add_edge(const Task<Probe>& task, int facet, int side);
   template <class Probe>
@@ -59,6 +60,7 @@ class CurvedQuery {
 
   std::vector<Outlook> outlooks_;
   std::vector<int> borders_;  // facets that lie on faces
+  std::vector<int> sides_;    // half-edges of a joint
   FaceFeet feet_;
   Components components_;
 };

@@ -145,6 +145,7 @@ void CurvedShell::build_cones(const Shell& shell) {
     return topology.planar_face[t] == topology.planar_face[u] && is_flat(t) && is_flat(u);
   });
   for (std::size_t f = 0; f < facets_.size(); ++f) facets_[f].owned = owned[f];
+  if (!face_cells_.empty()) leave_joints_whole(shell);
   cones_ = shell.cones();
   for_each_in_parallel(cones_.size(), [&](std::size_t f) {
     const Facet& facet = flat[f];
@@ -201,6 +202,27 @@ void CurvedShell::build_cones(const Shell& shell) {
     facets_[f].bulge = static_cast<float>(std::max(largest * (8.0 / 9 + 1e-6), sagitta));
   });
   for (const CurvedFacet& curved : facets_) bulge_ = std::max<double>(bulge_, curved.bulge);
+}
+
+// A vertex where a line or circle passes through is no corner: its closest point is that of the
+// joint, if anything.
+void CurvedShell::leave_joints_whole(const Shell& shell) {
+  constexpr int kCorner = -1, kNone = -2;
+  std::vector<int> joint_at(shell.vertices().size(), kNone);
+  std::vector<char> sides(shell.vertices().size(), 0);
+  for (int f = 0; f < static_cast<int>(facets_.size()); ++f)
+    for (int k = 0; k < 3; ++k) {
+      if (facets_[f].owned.twin[k] == kNotOwned) continue;
+      const int joint = is_on_joint(*this, f, k) ? face_cells_[f].joint[k] : kCorner;
+      const Triangle& triangle = shell.triangles()[shell.triangle_of_facet(f)];
+      for (const int v : {triangle[k], triangle[next_corner(k)]}) {
+        if (joint_at[v] == kNone) joint_at[v] = joint;
+        if (joint_at[v] != joint || ++sides[v] > 2) joint_at[v] = kCorner;
+      }
+    }
+  for (CurvedFacet& facet : facets_)
+    for (int& v : facet.owned.vertex)
+      if (v >= 0 && joint_at[v] >= 0 && sides[v] == 2) v = kNotOwned;
 }
 
 // Bounds of each element, and what lies beyond its sides.

@@ -25,7 +25,7 @@ constexpr double kOfRounding = 1.8;
 // found there.
 constexpr double kMostMoved = 3;
 // Systems write CAD files whose edges are off the faces by this share of the size.
-constexpr double kFileTolerance = 2e-5;
+constexpr double kFileTolerance = 1e-4;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
@@ -290,6 +290,7 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
     face_cells_ = {};
   build_cones(shell);
   bound_cells(shell);
+  if (!face_cells_.empty()) face_search_ = std::make_unique<FaceSearch>(shell, *this);
 }
 
 // Why an element is flat: its normals were set aside at a crease, or do not lean.

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "shell/curved/cell_bounds.hpp"
+#include "shell/curved/face_search.hpp"
 #include "shell/faces/face_cells.hpp"
 #include "shell/faces/recognition.hpp"
 #include "shell/shell.hpp"
@@ -136,6 +138,8 @@ class CurvedShell {
   const Faces& faces() const { return faces_; }
   // Per facet what it is of its face; empty where there are no faces.
   const LargeArray<FaceCell>& face_cells() const { return face_cells_; }
+  // Of spheres' queries; null where there are none.
+  const FaceSearch* face_search() const { return face_search_.get(); }
   // FaceCells::intruders, and why faces do not give closest points.
   const std::vector<std::pair<int, int>>& intruders() const { return intruders_; }
   const std::vector<Inexact>& inexact() const { return inexact_; }
@@ -158,7 +162,8 @@ class CurvedShell {
   std::size_t bytes() const {
     return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone) + sizeof(CellBounds)) +
            tangents_.spoke_.size() * sizeof(int) + divided_.size() +
-           faces_.of.size() * sizeof(int) + face_cells_.size() * sizeof(FaceCell);
+           faces_.of.size() * sizeof(int) + face_cells_.size() * sizeof(FaceCell) +
+           (face_search_ ? face_search_->bytes() : 0);
   }
 
  private:
@@ -168,10 +173,12 @@ class CurvedShell {
   void raise_centers(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
+  void leave_joints_whole(const Shell& shell);
   void bound_cells(const Shell& shell);
 
   Faces faces_;
   LargeArray<FaceCell> face_cells_;
+  std::unique_ptr<const FaceSearch> face_search_;
   std::vector<std::pair<int, int>> intruders_;
   std::vector<Inexact> inexact_;
   double gap_ = 0;

@@ -15,10 +15,41 @@ constexpr double kTurn = 6.283185307179586;
 constexpr double kMostCut = 4 * kMostGap;
 // Facets of one face overlap by this share of their parameters: one of them has each point.
 constexpr double kOverlap = 1e-9;
+// Facets whose corners are off their plane by more than this share of the size are not flat on it.
+constexpr double kFlat = 1e-13;
+// Faces whose numbers differ by less than this share of the size are one.
+constexpr double kEqual = 1e-12;
 
 // The difference of two parameters, of angles by the shorter way.
 double difference(double from, double to, bool angle) {
   return angle ? to - from - kTurn * std::round((to - from) / kTurn) : to - from;
+}
+
+// Per round shape the first that is the same surface, to `most` [m] within about the size.
+std::vector<int> first_of_equals(const std::vector<Primitive>& shapes, double size, double most) {
+  // Places on the second are on the first: that holds whatever their numbers refer to.
+  const auto equal = [&](const Primitive& a, const Primitive& b) {
+    if (a.kind != b.kind || !(std::abs(a.second - b.second) * size <= most)) return false;
+    if (a.kind == FaceKind::Cone && !(a.axis.dot(b.axis) > 0)) return false;
+    if (a.kind != FaceKind::Cone && !(std::abs(a.radius - b.radius) <= most)) return false;
+    for (int i = 0; i < 8; ++i) {
+      const Vec3 aside(i & 1 ? 0.9 : -1.1, i & 2 ? 1.3 : -0.8, i & 4 ? 0.7 : -1.2);
+      if (!(std::abs(a.distance(b.onto(b.point + size * aside))) <= most)) return false;
+    }
+    return true;
+  };
+  std::vector<int> out(shapes.size()), round;
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    out[i] = static_cast<int>(i);
+    if (shapes[i].kind == FaceKind::Plane) continue;
+    const auto first = std::find_if(round.begin(), round.end(),
+                                    [&](int j) { return equal(shapes[j], shapes[i]); });
+    if (first == round.end())
+      round.push_back(out[i]);
+    else
+      out[i] = *first;
+  }
+  return out;
 }
 
 }  // namespace
@@ -78,6 +109,7 @@ class CellMaker {
     out_.of.resize(facets_.size());
     open_.assign(facets_.size(), 0);
     told_.assign(faces_.shapes.size(), 0);
+    one_of_ = first_of_equals(faces_.shapes, shell_.size(), kEqual * shell_.size());
     for (std::size_t f = 0; f < facets_.size(); ++f) place(static_cast<int>(f));
     for (std::size_t f = 0; f < facets_.size(); ++f)
       for (int k = 0; k < 3; ++k) decide(static_cast<int>(f), k);
@@ -87,7 +119,11 @@ class CellMaker {
   }
 
  private:
-  int face_of_facet(int f) const { return faces_.of_triangle(shell_.triangle_of_facet(f)); }
+  // Faces of one shape, as the halves of a tube are, are one.
+  int face_of_facet(int f) const {
+    const int face = faces_.of_triangle(shell_.triangle_of_facet(f));
+    return face < 0 ? face : one_of_[face];
+  }
   bool is_round(int face) const { return face >= 0 && faces_.shapes[face].kind != FaceKind::Plane; }
 
   // The half-edge of the facet beyond a side, if the surface goes on there; else -1.
@@ -100,7 +136,7 @@ class CellMaker {
 
   // Leaves a facet to its cubic: its border to another face (its own: a vertex) is off its face.
   void give_up(int f, int other, double off) {
-    const int face = out_.of[f].face;
+    const int face = faces_.of_triangle(shell_.triangle_of_facet(f));
     if (!told_[face]) out_.inexact.push_back({face, other, off});
     told_[face] = 1;
     if (!open_[f]) opened_.push_back(f);
@@ -156,11 +192,21 @@ class CellMaker {
     return normal.dot(facet.normal);
   }
 
+  // Whether a facet is not on its face as it is.
+  bool is_off(int f) const {
+    const int face = out_.of[f].face;
+    if (is_round(face) || !facets_[f].flat) return true;
+    const Vec3* p = shell_.facets()[f].corner;
+    return std::any_of(p, p + 3, [&](const Vec3& x) {
+      return std::abs(faces_.shapes[face].distance(x)) > kFlat * shell_.size();
+    });
+  }
+
   // Flat facets of planes far from anything round stay as they are.
   bool is_bent(int f) const {
     const int face = out_.of[f].face;
     if (face < 0) return false;
-    if (is_round(face) || !facets_[f].flat) return true;
+    if (is_off(f)) return true;
     for (int k = 0; k < 3; ++k) {
       const int h = beyond(f, k);
       if (h >= 0 && is_round(out_.of[triangle_of(h)].face)) return true;
@@ -294,11 +340,12 @@ class CellMaker {
         if (const double off = off_face(f, k); off > cut_) give_up(f, out_.of[g].face, off);
       }
     }
+    std::vector<char> asked(faces_.shapes.size(), 0);
     for (std::size_t f = 0; f < out_.of.size(); ++f) {
       FaceCell& cell = out_.of[f];
       if (cell.face < 0) continue;
       // A face is asked for closest points where it, its elements or a neighbor is curved.
-      bool needed = is_round(cell.face) || !facets_[f].flat;
+      bool needed = is_off(static_cast<int>(f));
       for (int k = 0; k < 3; ++k)
         if (cell.side[k] == FaceCell::Side::Border) {
           const FaceJoint& joint = faces_.joints[cell.joint[k]];
@@ -306,6 +353,15 @@ class CellMaker {
         }
       cell.exact = !needed || !open_[f];
       cell.closed = needed && !open_[f];
+      if (cell.closed) asked[cell.face] = 1;
+    }
+    // And then within it, too: one question for all of its facets.
+    for (std::size_t f = 0; f < out_.of.size(); ++f) {
+      FaceCell& cell = out_.of[f];
+      if (cell.face < 0 || cell.closed) continue;
+      cell.closed = asked[cell.face] && !open_[f] &&
+                    std::all_of(cell.side, cell.side + 3,
+                                [](FaceCell::Side side) { return side == FaceCell::Side::Inner; });
       for (int k = 0; k < 3 && !cell.closed; ++k) cell.side[k] = FaceCell::Side::Cubic;
     }
   }
@@ -375,7 +431,8 @@ class CellMaker {
   FaceCells out_;
   std::vector<char> open_;   // facets that are left to their cubics
   std::vector<int> opened_;  // those whose neighbors do not know of it yet
-  std::vector<char> told_;   // faces of which it is said why
+  std::vector<int> one_of_;
+  std::vector<char> told_;  // faces of which it is said why
   std::map<std::pair<int, int>, std::vector<int>> joints_;
 };
 

@@ -303,6 +303,11 @@ void find_branches(const std::vector<Primitive>& shapes, const std::vector<Vec3>
   }
 }
 
+bool FaceJoint::has_one_nearest(const Vec3& x) const {
+  constexpr double kNearAxis = 1e-6;  // of the radius: nearer to the axis nothing has a direction
+  return kind != Kind::Crossing && axis.cross(x - point).norm() > kNearAxis * radius;
+}
+
 Vec3 FaceJoint::nearest(const Vec3& x) const {
   const Vec3 y = x - point, along = y.dot(axis) * axis;
   if (kind == Kind::Line) return point + along;

@@ -37,6 +37,8 @@ struct FaceJoint {
 
   int which(int of_face) const { return of_face == face[0] ? 0 : 1; }
   const Primitive& across_of(int of_face) const { return across[tangent ? 0 : which(of_face)]; }
+  // Whether it is a line, or a circle on whose axis x is not.
+  bool has_one_nearest(const Vec3& x) const;
   // The point of a line or circle nearest to x.
   Vec3 nearest(const Vec3& x) const;
   // How far a center (of crossings: a point of the face) is on one side of the border of a face,

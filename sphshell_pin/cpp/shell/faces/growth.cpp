@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <queue>
 #include <utility>
 
 #include "shell/faces/recognizer.hpp"
@@ -81,37 +80,6 @@ Vec3 Faces::normal(const Shell& shell, int t, int k) const {
   const double along = n.dot(shell.topology().face_normal[t]);
   const int turned = std::abs(along) > std::cos(kMostLeanOnFace) ? 0 : turned_on(shape, corners, 0);
   return (turned == 0 ? along < 0 : turned < 0) ? Vec3(-n) : n;
-}
-
-// Triangles around the seed until they have so many vertices: ring by ring, what turns most first,
-// or over the longest sides first, which lead along a strip.
-std::vector<int> Recognizer::patch(int seed, std::size_t vertices, bool along) {
-  std::vector<int> out, seen;
-  using Entry = std::pair<double, int>;
-  std::priority_queue<Entry> open;
-  open.push({0, seed});
-  mark({seed});
-  // A heap by priority: the next triangle is the largest.
-  const auto add_vertices = [&](int t) {
-    for (int v : corners(t))
-      if (std::find(seen.begin(), seen.end(), v) == seen.end()) seen.push_back(v);
-  };
-  int ring = 0;
-  while (!open.empty() && seen.size() < vertices && out.size() < 2 * vertices) {
-    const int t = open.top().second;
-    open.pop();
-    out.push_back(t);
-    add_vertices(t);
-    ++ring;
-    for (int k = 0; k < 3; ++k) {
-      const int u = beside_[3 * t + k];
-      if (u < 0 || is_marked(u) || of_[u] >= 0 || !curved_[u]) continue;
-      mark_[u] = round_;
-      const double side = (point(corners(t)[next_corner(k)]) - point(corners(t)[k])).norm();
-      open.push({along ? side : -double(ring) + 0.1 * turn_[u], u});
-    }
-  }
-  return out;
 }
 
 // The largest angle [rad] between a facet and the shape's normals at its corners.
@@ -228,20 +196,22 @@ Growth Recognizer::grow_and_refit(int seed, const Primitive& shape) {
 void Recognizer::leave_own_faces_out(Growth& growth) {
   std::vector<int>& all = growth.triangles;
   if (all.empty()) return;
-  std::vector<double> leans, off;
+  std::vector<double> leans, off, told;
   std::vector<char> needle;
   for (const int t : all) {
     const Explained one = explain(t, growth.shape, growth.window);
     leans.push_back(lean(t, growth.shape));
     off.push_back(one.deviation);
     needle.push_back(one.leans);
+    if (!one.leans) told.push_back(leans.back());
   }
-  if (quantile(leans, 0.5) > kMostMeanLean) {
+  // Of those whose normals say something.
+  if (told.empty() || quantile(told, 0.5) > kMostMeanLean) {
     all.clear();
     return;
   }
   // 0.009 rad is half a degree.
-  const double most_lean = 2 * quantile(leans, 0.75) + 0.009, most_off = 5 * quantile(off, 0.75);
+  const double most_lean = 2 * quantile(told, 0.75) + 0.009, most_off = 5 * quantile(off, 0.75);
   std::vector<std::pair<int, int>> by_region;  // region, place in `all`
   for (std::size_t i = 0; i < all.size(); ++i)
     if (regions_.count(regions_.of(all[i])) >= kFewOfBand)
@@ -249,7 +219,9 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
   std::sort(by_region.begin(), by_region.end());
   std::vector<char> keep(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
-    keep[i] = (needle[i] || leans[i] <= most_lean) && off[i] <= most_off;
+    // A flat on a ring ends on a curve of many vertices: one triangle is none.
+    keep[i] = ((needle[i] || leans[i] <= most_lean) && off[i] <= most_off) ||
+              (growth.shape.kind == FaceKind::Torus && regions_.count(regions_.of(all[i])) == 1);
     if (!keep[i]) growth.left_out.push_back(all[i]);
   }
   for (std::size_t i = 0, j; i < by_region.size(); i = j) {

@@ -1,4 +1,4 @@
-#include "shell/faces/primitive.hpp"
+#include "shell/faces/recognizer.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -49,37 +49,6 @@ struct AboutAxis {
     e = across / std::max(off, 1e-300);
   }
 };
-
-// The primitive of a kind with a known axis through `point`: its radii follow from points.
-Primitive with_axis(FaceKind kind, const Vec3& point, const Vec3& axis,
-                    const std::vector<Vec3>& points) {
-  const auto n = static_cast<Eigen::Index>(points.size());
-  Eigen::ArrayXd along(n), off(n);
-  Primitive out{kind, point, axis, 0, 0};
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const AboutAxis at(out, points[i]);
-    along[i] = at.h, off[i] = at.off;
-  }
-  out.radius = off.mean();
-  if (kind == FaceKind::Cone) {
-    const Eigen::ArrayXd from_mean = along - along.mean();
-    const double slope = (from_mean * off).sum() / std::max(from_mean.square().sum(), 1e-300);
-    // Linear regression of the distance from the axis over the place along it; radius at `point`,
-    // second: half-angle.
-    out.radius -= slope * along.mean();
-    out.second = std::atan(slope);
-  } else if (kind == FaceKind::Torus) {
-    // A circle in the half-plane through the axis.
-    Eigen::MatrixXd a(n, 3);
-    a << 2 * off, 2 * along, Eigen::ArrayXd::Ones(n);
-    const Eigen::Vector3d x = least_squares(a, (off.square() + along.square()).matrix());
-    out.point += x[1] * axis;
-    out.radius = x[0];
-    // (off - R)^2 + (h - h0)^2 = r^2 is linear in R, h0 and r^2 - R^2 - h0^2.
-    out.second = radius_or_zero(x[2] + x[0] * x[0] + x[1] * x[1]);
-  }
-  return out;
-}
 
 // One row of the Jacobian: how the distance of a point changes with shifts of `point` along two
 // directions across the axis (and along it), with turns of the axis towards both, and the radii.
@@ -325,6 +294,36 @@ std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets
   for (int k = 0; k < 2; ++k) {
     const Vec3 a = directions.col(k);
     add(a.cross(-solved * a), a);
+  }
+  return out;
+}
+
+Primitive with_axis(FaceKind kind, const Vec3& point, const Vec3& axis,
+                    const std::vector<Vec3>& points) {
+  const auto n = static_cast<Eigen::Index>(points.size());
+  Eigen::ArrayXd along(n), off(n);
+  Primitive out{kind, point, axis, 0, 0};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const AboutAxis at(out, points[i]);
+    along[i] = at.h, off[i] = at.off;
+  }
+  out.radius = off.mean();
+  if (kind == FaceKind::Cone) {
+    const Eigen::ArrayXd from_mean = along - along.mean();
+    const double slope = (from_mean * off).sum() / std::max(from_mean.square().sum(), 1e-300);
+    // Linear regression of the distance from the axis over the place along it; radius at `point`,
+    // second: half-angle.
+    out.radius -= slope * along.mean();
+    out.second = std::atan(slope);
+  } else if (kind == FaceKind::Torus) {
+    // A circle in the half-plane through the axis.
+    Eigen::MatrixXd a(n, 3);
+    a << 2 * off, 2 * along, Eigen::ArrayXd::Ones(n);
+    const Eigen::Vector3d x = least_squares(a, (off.square() + along.square()).matrix());
+    out.point += x[1] * axis;
+    out.radius = x[0];
+    // (off - R)^2 + (h - h0)^2 = r^2 is linear in R, h0 and r^2 - R^2 - h0^2.
+    out.second = radius_or_zero(x[2] + x[0] * x[0] + x[1] * x[1]);
   }
   return out;
 }

@@ -18,8 +18,6 @@ constexpr std::size_t kPatience = 60, kTrianglesPerSeed = 3000;
 // Growths that lead to nothing look at so many triangles in all, and at so many times those that
 // there are: else seeds on a large free shape cost the square of its size.
 constexpr std::size_t kFewVisits = 300'000, kMostVisits = 4;
-// Vertices to guess from: enough for the kinds of up to six parameters, and for a torus.
-constexpr std::size_t kFewVertices = 8, kManyVertices = 12;
 // A plane is so many times wider across a smooth side than what goes on beyond it there, if that
 // was not recognized; one of fewer triangles more.
 constexpr int kFewOfPlane = 4;
@@ -34,8 +32,6 @@ constexpr double kNoTurn = 1e-5;
 // A zone of a free shape is less than so many shortest sides of its triangles long; or an arc over
 // its triangles rises by less than so many deviations of its flat sides.
 constexpr double kShort = 6, kMostRise = 4;
-// Simpler kinds win ties (cylinder, cone, sphere, torus).
-constexpr double kSimpler[] = {0, 1, 0.98, 0.97, 0.95};
 
 }  // namespace
 
@@ -152,76 +148,6 @@ void Recognizer::find_candidates() {
     const bool wall = few && regions_.area(r) > kFarLarger * around[r];
     curved_[t] = turn_[t] > kNoTurn && (few || !straight[r]) && !wall;
   }
-}
-
-// The best of the kinds that the patch lies on. False where it lies on none.
-bool Recognizer::try_kinds(int seed, const std::vector<int>& patch, bool torus, bool others,
-                           Growth& best, double& score) {
-  bool any = false;
-  const FacetSample facets = sample(patch);
-  for (const FaceKind kind :
-       {FaceKind::Cylinder, FaceKind::Cone, FaceKind::Sphere, FaceKind::Torus}) {
-    if (!(kind == FaceKind::Torus ? torus : others) ||
-        facets.vertices.size() < std::size_t(num_parameters(kind)) + 1)
-      continue;
-    for (Primitive guess : guess_primitives(kind, facets)) {
-      // A guess, its least-squares fit to the patch, then growth over all that it explains.
-      if (!fit_primitive(facets.vertices, tolerance_, guess)) continue;
-      any = true;
-      Growth growth = grow_and_refit(seed, guess);
-      const Primitive shape = growth.shape;
-      leave_own_faces_out(growth);
-      if (!is_over_determined(growth)) {
-        // Fine meshes stand off so little that only the closest vertices count.
-        growth = grow(seed, shape, tolerance_);
-        leave_own_faces_out(growth);
-        if (!is_over_determined(growth)) continue;
-      }
-      // The kind that explains most triangles wins.
-      const double worth = double(growth.triangles.size()) * kSimpler[static_cast<int>(kind)];
-      if (worth > score) score = worth, best = std::move(growth);
-      break;
-    }
-  }
-  return any;
-}
-
-bool Recognizer::recognize_from(int seed) {
-  Growth best;
-  double score = 0;
-  std::vector<int> tried;
-  for (const bool along : {false, true}) {
-    const std::vector<int> few = patch(seed, kFewVertices, along);
-    if (few.size() < 3) return false;
-    const std::vector<int> many = patch(seed, kManyVertices, along);
-    // What no kind fits it fits no better with more triangles.
-    const bool fits = try_kinds(seed, few, false, true, best, score);
-    if (fits) try_kinds(seed, many, false, true, best, score);
-    try_kinds(seed, many, true, false, best, score);
-    if (best.triangles.size() > 2 * many.size()) break;
-    tried = many;
-  }
-  // What one kind explains is a better sample for the others than the patch was.
-  for (std::size_t size = 0; best.triangles.size() > size;) {
-    size = best.triangles.size();
-    std::vector<int> region = best.triangles;
-    try_kinds(seed, region, true, true, best, score);
-    if (!is_weak(best)) continue;
-    // A strip may be a zone of something rounder: with the strips beside it.
-    mark(region);
-    for (std::size_t i = 0; i < size; ++i)
-      for (int k = 0; k < 3; ++k) {
-        const int u = beside_[3 * region[i] + k];
-        if (u < 0 || is_marked(u) || !curved_[u]) continue;
-        mark_[u] = round_;
-        region.push_back(u);
-      }
-    try_kinds(seed, region, true, true, best, score);
-  }
-  if (take(std::move(best))) return true;
-  tries_[seed] = 2;
-  for (const int t : tried) ++tries_[t];
-  return false;
 }
 
 // What lies on faces found before is taken from them as a whole, or not at all.
@@ -425,6 +351,7 @@ Faces Recognizer::run() {
     failures = found ? 0 : failures + 1;
     fruitless += found ? 0 : visits_ - before;
   }
+  for (std::size_t f = 0; f < faces_.size(); ++f) recognize_rims(int(f));
   drop_zones_of_free_shapes();
   for (std::size_t f = 0; f < faces_.size(); ++f) absorb(int(f));
   Faces out;
@@ -438,6 +365,7 @@ Faces Recognizer::run() {
     out.of[t] = at;
   }
   add_planes(out);
+  agree_on_borders(shell_, out, 2 * tolerance_);
   if (out.shapes.empty()) out.of.clear();
   return out;
 }

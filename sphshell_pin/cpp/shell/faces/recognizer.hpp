@@ -1,5 +1,5 @@
-// Inside of recognition.cpp, growth.cpp, evidence.cpp, steps.cpp and snapping.cpp: the search for
-// faces in a mesh.
+// Inside of recognition.cpp, guesses.cpp, growth.cpp, evidence.cpp, steps.cpp and snapping.cpp: the
+// search for faces in a mesh.
 #pragma once
 
 #include <algorithm>
@@ -29,6 +29,13 @@ inline double quantile(std::vector<double> values, double share) {
 // normal of a needle may lie in the surface; that its corners are counter-clockwise in the
 // parameters holds for each facet of a mesh.
 int turned_on(const Primitive& shape, const std::array<Vec3, 3>& corners, double tolerance);
+
+// The cylinder, cone or torus with a known axis through `point`: its radii follow from points.
+Primitive with_axis(FaceKind kind, const Vec3& point, const Vec3& axis,
+                    const std::vector<Vec3>& points);
+
+// Fits tangent round faces once more so that they agree on their borders; planes stay.
+void agree_on_borders(const Shell& shell, Faces& faces, double tolerance);
 
 // A connected part of the mesh that a primitive explains.
 struct Growth {
@@ -76,7 +83,6 @@ class Recognizer {
   bool is_marked(int t) const { return mark_[t] == round_; }
 
   // growth.cpp
-  std::vector<int> patch(int seed, std::size_t vertices, bool along);
   Explained explain(int t, const Primitive& shape, double tolerance) const;
   double lean(int t, const Primitive& shape) const;
   // The connected triangles that a shape explains; the shape fitted to them; both in turn.
@@ -99,14 +105,20 @@ class Recognizer {
   bool is_over_determined(const Growth& growth);
   bool is_weak(const Growth& growth);
 
+  // guesses.cpp
+  std::vector<int> patch(int seed, std::size_t vertices, bool along, int beside = -1);
+  bool try_shape(int seed, const Primitive& guess, Growth& best, double& score);
+  bool try_kinds(int seed, const std::vector<int>& patch, bool torus, bool others, Growth& best,
+                 double& score);
+  // Whether a face was found from this triangle.
+  bool recognize_from(int seed);
+  void recognize_rims(int face);
+
   // recognition.cpp
   void list_neighbors();
   // Fills curved_: the triangles that a face other than a plane may have.
   void find_candidates();
-  bool try_kinds(int seed, const std::vector<int>& patch, bool torus, bool others, Growth& best,
-                 double& score);
-  // Whether a face was found from this triangle; whether it was taken.
-  bool recognize_from(int seed);
+  // Whether it was taken.
   bool take(Growth growth);
   void drop_zones_of_free_shapes();
   void add_planes(Faces& faces) const;

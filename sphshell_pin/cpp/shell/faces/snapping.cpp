@@ -1,5 +1,6 @@
 #include "shell/faces/snapping.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 
@@ -42,6 +43,48 @@ bool onto_all(const std::vector<Primitive>& shapes, const std::vector<int>& face
   return true;
 }
 
+// Moves the control points of an edge as little as puts four points of it onto a shape: Newton's
+// method. Of what remains between them, of order 6 in the turn, a cubic is free in order 4 only
+// where its handles may change as well.
+void settle_on_one(const Primitive& shape, const Vec3& begin, const Vec3& d,
+                   std::array<Vec3, 2>& offset) {
+  constexpr double kLeastShare = 1e-5;  // of the largest singular value
+  for (int repeat = 0; repeat < kMostSettlings; ++repeat) {
+    Eigen::Matrix<double, 4, 6> by;
+    Eigen::Vector4d off;
+    for (int i = 0; i < 4; ++i) {
+      const double t = (i + 1) / 5.0, b1 = 3 * t * (1 - t) * (1 - t), b2 = 3 * t * t * (1 - t);
+      Vec3 n;
+      off[i] = shape.distance(begin + t * d + b1 * offset[0] + b2 * offset[1], n);
+      by.row(i) << b1 * n.transpose(), b2 * n.transpose();
+    }
+    Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix<double, 4, 6>> solver;
+    solver.setThreshold(kLeastShare);
+    const Eigen::Matrix<double, 6, 1> step = solver.compute(by).solve(off);
+    for (int k = 0; k < 2; ++k) offset[k] -= step.segment<3>(3 * k);
+  }
+}
+
+// Moves them so that the points at a third of the edge are on all faces; planes have the last word.
+void settle_on_all(const Faces& faces, const std::vector<int>& around, const Vec3& begin,
+                   const Vec3& d, std::array<Vec3, 2>& offset) {
+  for (int repeat = 0; repeat < kMostSettlings; ++repeat)
+    for (const bool flat : {false, true})
+      for (const int face : around) {
+        if (face < 0) continue;
+        const Primitive& shape = faces.shapes[face];
+        if ((shape.kind == FaceKind::Plane) != flat) continue;
+        Vec3 off[2];
+        for (int k = 0; k < 2; ++k) {
+          // Bernstein's polynomials at a third are 4/9 and 2/9.
+          const Vec3 x = begin + (k + 1) / 3.0 * d + (4 * offset[k] + 2 * offset[1 - k]) / 9;
+          const double distance = shape.distance(x, off[k]);
+          off[k] *= distance;
+        }
+        for (int k = 0; k < 2; ++k) offset[k] -= 3 * off[k] - 1.5 * off[1 - k];
+      }
+}
+
 }  // namespace
 
 std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, double tolerance) {
@@ -62,9 +105,15 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
     // Planes first: they are exact, and the other faces give way.
     std::stable_partition(around[v].begin(), around[v].end(),
                           [&](int f) { return flat(faces.shapes[f]); });
+    if (onto_all(faces.shapes, around[v], tolerance, out[v])) continue;
+    around[v].erase(std::find_if_not(around[v].begin(), around[v].end(),
+                                     [&](int f) { return flat(faces.shapes[f]); }),
+                    around[v].end());
+    out[v] = before[v];
     if (!onto_all(faces.shapes, around[v], tolerance, out[v])) out[v] = before[v];
-    any = any || (out[v] - before[v]).norm() > kMostGap * shell.size();
   }
+  for (std::size_t v = 0; v < out.size(); ++v)
+    any = any || (out[v] - before[v]).norm() > kMostGap * shell.size();
   if (!any) return {};
   for (bool changed = true; changed;) {
     changed = false;
@@ -75,7 +124,11 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
         return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).normalized();
       };
       const auto turned = [&](const std::vector<Vec3>& p) {
-        return face < 0 ? 0 : turned_on(faces.shapes[face], {p[t[0]], p[t[1]], p[t[2]]}, 0);
+        if (face < 0) return 0;
+        if (!flat(faces.shapes[face]))
+          return turned_on(faces.shapes[face], {p[t[0]], p[t[1]], p[t[2]]}, 0);
+        return faces.shapes[face].axis.dot((p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]])) < 0 ? -1
+                                                                                             : 1;
       };
       const bool moved =
           out[t[0]] != before[t[0]] || out[t[1]] != before[t[1]] || out[t[2]] != before[t[2]];
@@ -90,40 +143,30 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
   return out;
 }
 
-// Planes have the last word.
 void settle_on_faces(const Shell& shell, const Edge& edge, const Faces& faces, const Vec3& begin,
                      const Vec3& d, std::array<Vec3, 2>& offset) {
   if (faces.of.empty() || edge.kind == EdgeClass::Boundary) return;
-  const auto face_at = [&](int i) {
-    return faces.of_triangle(triangle_of(shell.topology().incidence[edge.begin + i]));
-  };
+  std::vector<int> around;
+  for (int i = 0; i < edge.count; ++i)
+    around.push_back(faces.of_triangle(triangle_of(shell.topology().incidence[edge.begin + i])));
   // Within a face the curve has the face's own normals at its ends, which it keeps, but at the tip
   // of a cone there are none; between planes it is straight.
   bool border = false, curved = false;
-  for (int i = 0; i < edge.count; ++i) {
-    border = border || face_at(i) != face_at(0);
-    curved = curved || face_at(i) < 0 || faces.shapes[face_at(i)].kind != FaceKind::Plane;
+  int only = -1;  // beside free-form elements
+  for (const int face : around) {
+    if (face >= 0) only = only == -1 || only == face ? face : -2;
+    border = border || face != around[0];
+    curved = curved || face < 0 || faces.shapes[face].kind != FaceKind::Plane;
   }
-  const bool at_tip = face_at(0) >= 0 && faces.shapes[face_at(0)].kind == FaceKind::Cone;
+  const bool at_tip = around[0] >= 0 && faces.shapes[around[0]].kind == FaceKind::Cone;
   if (!curved) offset = {Vec3::Zero(), Vec3::Zero()};
   if (!(border || at_tip) || !curved) return;
   const std::array<Vec3, 2> before = offset;
-  for (int repeat = 0; repeat < kMostSettlings; ++repeat)
-    for (const bool flat : {false, true})
-      for (int i = 0; i < edge.count; ++i) {
-        const int face = face_at(i);
-        if (face < 0) continue;
-        const Primitive& shape = faces.shapes[face];
-        if ((shape.kind == FaceKind::Plane) != flat) continue;
-        Vec3 off[2];
-        for (int k = 0; k < 2; ++k) {
-          // Bernstein's polynomials at a third are 4/9 and 2/9.
-          const Vec3 x = begin + (k + 1) / 3.0 * d + (4 * offset[k] + 2 * offset[1 - k]) / 9;
-          const double distance = shape.distance(x, off[k]);
-          off[k] *= distance;
-        }
-        for (int k = 0; k < 2; ++k) offset[k] -= 3 * off[k] - 1.5 * off[1 - k];
-      }
+  if (only >= 0 && faces.shapes[only].kind != FaceKind::Plane) {
+    settle_on_one(faces.shapes[only], begin, d, offset);
+  } else {
+    settle_on_all(faces, around, begin, d, offset);
+  }
   // An edge that is nowhere near its faces stays as it is.
   for (int k = 0; k < 2; ++k)
     if (!((offset[k] - before[k]).norm() <= kMostSettled * d.norm())) offset = before;
