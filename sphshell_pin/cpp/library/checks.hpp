@@ -1,4 +1,5 @@
-// Checks of what users of the library hand over, as sphshell_pin/base/checks.py has them for Python.
+// Checks of what users of the library hand over, as sphshell_pin/base/checks.py has them for
+// Python.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,6 @@
 // Stands for libGL.so.1 and libX11.so.6 where a machine has none. OpenCASCADE's libraries name the
-// functions below in tables that are filled when they are loaded; reading a file calls none of them.
+// functions below in tables that are filled when they are loaded; reading a file calls none of
+// them.
 extern "C" void sphshell_pin_no_display() { __builtin_trap(); }
 
 #define S(name) extern "C" void name() __attribute__((alias("sphshell_pin_no_display")));
@@ -33,4 +34,4 @@ S(glXGetCurrentContext) S(glXGetCurrentDisplay) S(glXGetCurrentDrawable) S(glXGe
 S(glXGetVisualFromFBConfig) S(glXIsDirect) S(glXMakeCurrent) S(glXQueryExtension)
 S(glXQueryExtensionsString) S(glXQueryServerString) S(glXQueryVersion) S(glXSwapBuffers)
 S(glXWaitGL)
-// clang-format on
+    // clang-format on

@@ -103,7 +103,7 @@ void CompiledRobot::check(const pinocchio::Model& model) const {
   char text[16];
   std::snprintf(text, sizeof text, "%.1e", worst);
   throw std::domain_error("'" + path_ + "' differs from Pinocchio by " + text +
-                           " of the largest number of an answer");
+                          " of the largest number of an answer");
 }
 
 }  // namespace sphshell
