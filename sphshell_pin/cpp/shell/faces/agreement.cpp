@@ -17,7 +17,7 @@ namespace {
 constexpr double kNearlyTangent = 0.1;
 // That faces agree counts so many times more than where vertices are.
 constexpr double kAgreement = 1e6;
-constexpr int kMostRounds = 6;
+constexpr int kMostTurns = 6;
 // Unknowns that nothing determines, as turns about an axis, stay.
 constexpr double kDamping = 1e-11;
 // More faces in a chain of tangent ones, and more vertices of one, are left as they are.
@@ -25,13 +25,13 @@ constexpr std::size_t kMostFaces = 120, kMostPoints = 300;
 
 // How the distance of a point changes with a motion of the shape, a turn about `center` (in lengths
 // at one size from there), and with both of its numbers (an angle also times the size).
-using Row = Eigen::Matrix<double, 8, 1>;
-Row row_of(const Primitive& p, const Vec3& center, double size, const Vec3& x, const Vec3& n) {
+using Slopes = Eigen::Matrix<double, 8, 1>;
+Slopes row_of(const Primitive& p, const Vec3& center, double size, const Vec3& x, const Vec3& n) {
   const Vec3 y = x - p.point;
   const double h = y.dot(p.axis);
   const Vec3 out = (y - h * p.axis).normalized();
   const bool turned = p.kind == FaceKind::Cone || p.kind == FaceKind::Torus;
-  Row row;
+  Slopes row;
   row << -n, -(x - center).cross(n) / size, turned ? -n.dot(out) : -1, 0;
   if (p.kind == FaceKind::Torus) row[7] = -1;
   if (p.kind == FaceKind::Cone) {
@@ -74,7 +74,7 @@ class Agreement {
     }
     const auto unknowns = Eigen::Index(8 * faces.size());
     double worst = disagreement(contacts), first = worst;
-    for (int round = 0; round < kMostRounds; ++round) {
+    for (int round = 0; round < kMostTurns; ++round) {
       Eigen::MatrixXd square = Eigen::MatrixXd::Zero(unknowns, unknowns);
       Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
       const auto row_at = [&](int f, const Vec3& x, double& off) {
@@ -85,16 +85,17 @@ class Agreement {
       double off = 0, other = 0;
       for (const int f : faces)
         for (const Vec3& x : points_[f]) {
-          const Row row = row_at(f, x, off);
+          const Slopes row = row_at(f, x, off);
           square.block<8, 8>(at[f], at[f]) += row * row.transpose();
           right.segment<8>(at[f]) -= off * row;
         }
       for (const Contacts* one : contacts)
         for (const Vec3& x : one->points) {
           // The first may be a plane, which stays.
-          const Row row = row_at(one->b, x, off);
+          const Slopes row = row_at(one->b, x, off);
           const bool plane = shapes_[one->a].kind == FaceKind::Plane;
-          const Row back = plane ? Row(Row::Zero()) : Row(one->sign * row_at(one->a, x, other));
+          const Slopes back =
+              plane ? Slopes(Slopes::Zero()) : Slopes(one->sign * row_at(one->a, x, other));
           if (plane) other = shapes_[one->a].distance(x);
           const double apart = off - one->sign * other;
           const int i = at[one->b], j = plane ? i : at[one->a];

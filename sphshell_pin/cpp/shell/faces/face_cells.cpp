@@ -16,7 +16,7 @@ constexpr double kMostCut = 4 * kMostGap;
 // Facets of one face overlap by this share of their parameters: one of them has each point.
 constexpr double kOverlap = 1e-9;
 // Facets whose corners are off their plane by more than this share of the size are not flat on it.
-constexpr double kFlat = 1e-13;
+constexpr double kOffPlane = 1e-13;
 // Faces whose numbers differ by less than this share of the size are one.
 constexpr double kEqual = 1e-12;
 
@@ -198,7 +198,7 @@ class CellMaker {
     if (is_round(face) || !facets_[f].flat) return true;
     const Vec3* p = shell_.facets()[f].corner;
     return std::any_of(p, p + 3, [&](const Vec3& x) {
-      return std::abs(faces_.shapes[face].distance(x)) > kFlat * shell_.size();
+      return std::abs(faces_.shapes[face].distance(x)) > kOffPlane * shell_.size();
     });
   }
 
