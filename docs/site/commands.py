@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Iterator
 from typing import Any
 
 import typer
 
+from sphshell_pin.base.parameters import described
 from sphshell_pin.cli import app
 
 
@@ -18,7 +18,7 @@ def all_commands() -> str:
 
 
 def _section(name: str, command: Any) -> str:
-    text = inspect.cleandoc(command.callback.__doc__)
+    text, _ = described(command.callback.__doc__, "Options")
     paragraphs = [" ".join(one.split()) for one in text.split("\n\n")]
     examples = [one for one in paragraphs if one.startswith("Example: ")]
     texts = [one for one in paragraphs if one not in examples]

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from sphshell_pin.base.parameters import Component, parameters_of
+from sphshell_pin.base.parameters import Component, parameters_of, type_name
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 AXES = ("x", "y", "z")
@@ -53,7 +53,8 @@ def names_of_sensors(sensors: Iterable[Any]) -> dict[str, NamedNumber]:
         f"sensors.{sensor.name}.{field.name}": NamedNumber(at, (field.name,), None, None)
         for at, sensor in enumerate(sensors)
         for field in fields(sensor)
-        if field.name in parameters_of(sensor) and field.type in ("float", "float | None", "int")
+        if field.name in parameters_of(sensor)
+        and type_name(field) in ("float", "float | None", "int")
     }
 
 

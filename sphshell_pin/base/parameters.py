@@ -130,6 +130,12 @@ def flat_fields(fields: Mapping[str, ArrayLike]) -> dict[str, Array]:
     return {name: np.ravel(np.asarray(value, np.float64)) for name, value in fields.items()}
 
 
+def type_name(one: dataclasses.Field[Any]) -> str:
+    """Return the annotation of a field as text, whether its module keeps annotations as text."""
+    kind: object = one.type
+    return kind if isinstance(kind, str) else getattr(kind, "__name__", str(kind))
+
+
 def same_parameter(kind: type, name: str, default: object = None) -> Any:
     """Return the field of a dataclass that is the parameter `name` of `kind`.
 
@@ -188,9 +194,9 @@ class Component:
             about, value = one.metadata.get(_KEY), getattr(self, one.name)
             if about is None or (value is None and one.default is None):
                 continue
-            if one.type in ("float", "float | None"):
+            if type_name(one) in ("float", "float | None"):
                 object.__setattr__(self, one.name, about.check(one.name, value))
-            elif one.type == "bool":
+            elif type_name(one) == "bool":
                 check_type(one.name, value, bool, "must be True or False")
 
     def unit_of(self, name: str) -> str:

@@ -158,10 +158,11 @@ def test_an_expression_that_escapes_is_in_a_process_that_does_nothing(tmp_path, 
         "os.execv, '/bin/true', ['true']",
         "os.fork",
     )
-    links = "".join(f'<link name="a{k}_${{attempt({call})}}"/>' for k, call in enumerate(calls))
-    description = robots.read(xacro(tmp_path, links))
-    names = [link.get("name") for link in description.root.iter("link")]
-    assert names == [f"a{k}_PermissionError" for k in range(len(calls))]
+    attempts = ", ".join(f"attempt({call})" for call in calls)
+    link = f"""<link name="${{' '.join([{attempts}])}}"/>"""
+    description = robots.read(xacro(tmp_path, link))
+    (name,) = (link.get("name") for link in description.root.iter("link"))
+    assert name == " ".join(["PermissionError"] * len(calls))
     assert kept.read_text() == "precious"
 
 
