@@ -89,7 +89,7 @@ COMMANDS = {
         f"fit ../{{value}}.csv {SCENE} --param gravity.2 --out out", ("9.8", "9.7"), "fit.json"
     ),
     "render": Command(
-        "render ../run --to {value} --fps 400 --size 320x240 --out out",
+        "render ../drawn --to {value} --fps 400 --size 320x240 --out out",
         ("0.02", "0.03"),
         "frame_0001.png",
     ),
@@ -122,7 +122,7 @@ def prepare(folder: Path) -> None:
         rows = [f"{k / 1000},{0.073 - float(gravity) * k**2 / 2e6:.6f}" for k in range(0, 41, 2)]
         text = "\n".join(["t [s],q.root_joint.2 [m]", *rows])
         (folder / f"{gravity}.csv").write_text(text)
-    words = COMMANDS["run"].words.format(value="1e5").replace("--out out", "--out run")
+    words = COMMANDS["run"].words.format(value="1e5").replace("--out out", "--out drawn")
     subprocess.run([*MAIN, *words.split()], cwd=folder, check=True, capture_output=True)
 
 
