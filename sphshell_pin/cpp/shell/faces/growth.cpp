@@ -221,7 +221,8 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     // A flat on a ring ends on a curve of many vertices: one triangle is none.
     keep[i] = ((needle[i] || leans[i] <= most_lean) && off[i] <= most_off) ||
-              (growth.shape.kind == FaceKind::Torus && regions_.count(regions_.of(all[i])) == 1);
+              (is_precise() && growth.shape.kind == FaceKind::Torus &&
+               regions_.count(regions_.of(all[i])) == 1);
     if (!keep[i]) growth.left_out.push_back(all[i]);
   }
   for (std::size_t i = 0, j; i < by_region.size(); i = j) {

@@ -351,9 +351,7 @@ Faces Recognizer::run() {
     failures = found ? 0 : failures + 1;
     fruitless += found ? 0 : visits_ - before;
   }
-  // Vertices that are rounded more coarsely than in single precision do not tell rims from strips.
-  const bool precise = tolerance_ < 3e-7 * shell_.size();
-  for (std::size_t f = 0; precise && f < faces_.size(); ++f) recognize_rims(int(f));
+  for (std::size_t f = 0; is_precise() && f < faces_.size(); ++f) recognize_rims(int(f));
   drop_zones_of_free_shapes();
   for (std::size_t f = 0; f < faces_.size(); ++f) absorb(int(f));
   Faces out;
@@ -367,7 +365,7 @@ Faces Recognizer::run() {
     out.of[t] = at;
   }
   add_planes(out);
-  if (precise) agree_on_borders(shell_, out, 2 * tolerance_);
+  if (is_precise()) agree_on_borders(shell_, out, 2 * tolerance_);
   if (out.shapes.empty()) out.of.clear();
   return out;
 }

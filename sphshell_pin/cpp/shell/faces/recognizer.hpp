@@ -113,6 +113,8 @@ class Recognizer {
   // Whether a face was found from this triangle.
   bool recognize_from(int seed);
   void recognize_rims(int face);
+  // Vertices that are rounded more coarsely than in single precision do not tell rims from strips.
+  bool is_precise() const { return tolerance_ < 3e-7 * shell_.size(); }
 
   // recognition.cpp
   void list_neighbors();
