@@ -14,6 +14,7 @@ import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, shipped_scenarios
+from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.surfaces import Mesh, icosphere
 from tests import models
@@ -222,16 +223,7 @@ def audits() -> Verdicts:
             built = build(name)
         except MissingExtra:
             continue
-        run = built.scenario.run
-        result = built.simulation.run(
-            built.q0,
-            built.v0,
-            run.duration,
-            built.controller,
-            run.control_dt,
-            record_dt=run.record_dt,
-        )
-        energy = result.energy
+        energy = simulate(built)[0].energy
         share = float(np.abs(energy.residual).max() / energy.exchanged)
         tried = f"{name}, {built.simulation.integrator}"
         law = "energy from nowhere, of what is exchanged"

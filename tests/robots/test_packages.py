@@ -141,8 +141,8 @@ def test_names_of_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyP
         "package://renamed/meshes/one.obj",
         "package://no/urdf/one.obj",
         "package://no/folder/one.obj",
-        "file:///home/another/arm%20support/meshes/one.obj",
-        "/home/another/arm_support/meshes/one.obj",
+        "file:///elsewhere/another/arm%20support/meshes/one.obj",
+        "/elsewhere/another/arm_support/meshes/one.obj",
         "file:///opt/ros/share/arm_resources/folder/one.obj",
     ],
 )

@@ -40,18 +40,16 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
   for (const int f : facets_) {
     const NormalCone& cone = surface.cones()[f];
     const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
-    // The facet's ball excludes most facets before the exact test.
-    const double reach = cone.reach + slack;
-    const auto is_far = [&] { return (point - middle).squaredNorm() > reach * reach; };
-    if (!anywhere && is_far()) continue;
-    const FaceCell& cell = surface.face_cells()[f];
-    if (!cell.closed || cell.face != face) continue;
     if (anywhere) {
       shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
       point = sphere.center - distance * normal;
       if (shape.has_parameters()) place = shape.parameters(point, shell.size());
     }
-    if (anywhere && is_far()) continue;
+    // The facet's ball excludes most facets before the exact test.
+    const double reach = cone.reach + slack;
+    if ((point - middle).squaredNorm() > reach * reach) continue;
+    const FaceCell& cell = surface.face_cells()[f];
+    if (!cell.closed || cell.face != face) continue;
     const Vec3 outward = cell.sign < 0 ? Vec3(-normal) : normal;
     if (!holds(shell, f, {point, outward, sphere.center, place}, sphere.tolerance + surface.gap()))
       continue;

@@ -9,6 +9,7 @@
 
 namespace sphshell {
 
+// Finds the points of faces that are nearest to a sphere's center, or lowest over a plane.
 class FaceFeet {
  public:
   // Adds the closest point of a face, if one of its facets holds it.

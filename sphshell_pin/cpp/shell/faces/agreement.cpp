@@ -17,7 +17,7 @@ namespace {
 constexpr double kNearlyTangent = 0.1;
 // That faces agree counts so many times more than where vertices are.
 constexpr double kAgreement = 1e6;
-constexpr int kMostTurns = 6;
+constexpr int kMostJointFits = 6;
 // Unknowns that nothing determines, as turns about an axis, stay.
 constexpr double kDamping = 1e-11;
 // More faces in a chain of tangent ones, and more vertices of one, are left as they are.
@@ -74,7 +74,7 @@ class Agreement {
     }
     const auto unknowns = Eigen::Index(8 * faces.size());
     double worst = disagreement(contacts), first = worst;
-    for (int round = 0; round < kMostTurns; ++round) {
+    for (int round = 0; round < kMostJointFits; ++round) {
       Eigen::MatrixXd square = Eigen::MatrixXd::Zero(unknowns, unknowns);
       Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
       const auto row_at = [&](int f, const Vec3& x, double& off) {
