@@ -214,7 +214,7 @@ def _names(names: list[str]) -> str:
 def explain_pairs(
     scene: Scene, q: Array, v: Array, cores: list[_core.Pair] | None = None
 ) -> tuple[PairExplanation, ...]:
-    """Work out the explanation of each pair of `scene` at q (nq,), v (nv,); `cores`: its C++ pairs."""
+    """Work out the explanation of each pair at q (nq,), v (nv,); `cores`: its C++ pairs."""
     pairs = scene.pairs
     if not pairs:
         return ()
