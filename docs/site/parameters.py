@@ -1,7 +1,5 @@
 """Tables of parameters, from the classes that describe them, as Markdown."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

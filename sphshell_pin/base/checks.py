@@ -1,7 +1,5 @@
 """Argument checks of the public functions and classes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar

@@ -5,8 +5,6 @@ corners, and where these do not represent the whole side, as beside a joint that
 a curved side may leave a face that the straight one is on.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
