@@ -42,7 +42,8 @@ def png(figure: Figure, dpi: int = RESOLUTION) -> bytes:
     # Its places are found once: `savefig` would draw it twice to find them, and find them twice.
     layout = figure.get_layout_engine()
     figure.set_dpi(dpi)
-    layout.execute(figure)
+    if layout is not None:
+        layout.execute(figure)
     figure.set_layout_engine("none")
     figure.savefig(stream, format="png", dpi=dpi, pil_kwargs={"compress_level": 1})
     figure.set_layout_engine(layout)
