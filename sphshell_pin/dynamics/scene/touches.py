@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import mass_matrix
+from sphshell_pin.dynamics.scene.sides import SourceSide, SphereSide
 from sphshell_pin.dynamics.scene.sources import checked_source
 
 if TYPE_CHECKING:
@@ -63,16 +64,16 @@ def _places(pairs: tuple[ContactPair, ...], data: pin.Data) -> list[_Place | Non
     on_shells: dict[tuple[int, str], list[tuple[int, Array, pin.SE3, Array]]] = {}
     for k, pair in enumerate(pairs):
         pose_j = data.oMi[pair.joint_j] * pair.placement_j
-        if pair.sphere is None or pair.shell is None:
+        if not pair.sphere_on_shell:
             places[k] = _other_place(pair, data.oMi[pair.joint_i] * pair.placement_i, pose_j)
-            continue
-        center = data.oMi[pair.joint_i].act(pair.placement_i.translation)
-        found = k, center, pose_j, pose_j.actInv(center)
-        on_shells.setdefault((id(pair.shell), pair.method), []).append(found)
+        for _, on_shell in pair.sphere_on_shell:
+            center = data.oMi[pair.joint_i].act(pair.placement_i.translation)
+            found = k, center, pose_j, pose_j.actInv(center)
+            on_shells.setdefault((id(on_shell.shell), on_shell.method), []).append(found)
     for spheres in on_shells.values():
-        shell, method = pairs[spheres[0][0]].shell, pairs[spheres[0][0]].method
-        assert shell is not None
-        at = shell.closest_points(np.array([local for *_, local in spheres]), method=method)
+        on_shell = pairs[spheres[0][0]].shells[0]
+        shell, centers = on_shell.shell, np.array([local for *_, local in spheres])
+        at = shell.closest_points(centers, method=on_shell.method)
         sides = {"both": np.abs, "outside": np.positive, "inside": np.negative}
         signed = sides[shell.side](at.distances)
         for row, (k, center, pose_j, _) in enumerate(spheres):
@@ -85,24 +86,24 @@ def _places(pairs: tuple[ContactPair, ...], data: pin.Data) -> list[_Place | Non
 
 def _other_place(pair: ContactPair, pose_i: pin.SE3, pose_j: pin.SE3) -> _Place | None:
     """Find where a pair touches that is no sphere on a shell."""
-    if pair.find is not None:
-        points, normals, depths = checked_source(pair.find, pair.name)(pose_i, pose_j)
+    side_i, side_j = pair.side_i, pair.side_j
+    if isinstance(side_i, SourceSide):
+        points, normals, depths = checked_source(side_i.find, pair.name)(pose_i, pose_j)
         if not len(depths):
             return None
         deepest = int(np.argmax(depths))
         return _Place(-float(depths[deepest]), points[deepest], normals[deepest])
-    if pair.other_sphere is not None and pair.sphere is not None:
+    if isinstance(side_i, SphereSide) and isinstance(side_j, SphereSide):
         away, length = _apart(pose_i.translation, pose_j.translation)
         normal = away / length if length > 0 else np.array([0.0, 0.0, 1.0])
-        point = pose_j.translation + pair.other_sphere.radius * normal
-        return _Place(length - pair.other_sphere.radius - pair.sphere.radius, point, normal)
-    if pair.plane is not None and pair.shell is not None:
-        over = pose_i.actInv(pose_j)  # the shell from the plane
-        heights = pair.shell.vertices @ over.rotation[2] + over.translation[2]
-        lowest = int(np.argmin(heights))
-        point = pose_j.act(pair.shell.vertices[lowest])
-        return _Place(float(heights[lowest]), point, -pose_i.rotation[:, 2])
-    return None
+        point = pose_j.translation + side_j.radius * normal
+        return _Place(length - side_j.radius - side_i.radius, point, normal)
+    (on_shell,) = pair.shells  # beside a plane
+    vertices = on_shell.shell.vertices
+    over = pose_i.actInv(pose_j)  # the shell from the plane
+    heights = vertices @ over.rotation[2] + over.translation[2]
+    lowest = int(np.argmin(heights))
+    return _Place(float(heights[lowest]), pose_j.act(vertices[lowest]), -pose_i.rotation[:, 2])
 
 
 def _apart(a: Array, b: Array) -> tuple[Array, float]:
