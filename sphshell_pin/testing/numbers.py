@@ -8,7 +8,8 @@ import pinocchio as pin
 
 from sphshell_pin.base.named_numbers import with_value
 from sphshell_pin.base.parameters import parameters_of
-from sphshell_pin.dynamics import ContactPair, Scene
+from sphshell_pin.dynamics import Scene
+from sphshell_pin.dynamics.scene.pairs import ContactPair
 
 _AXES = {"offset": ("x", "y", "z"), "placement": ("vx", "vy", "vz", "wx", "wy", "wz")}
 

@@ -202,7 +202,7 @@ def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     scene = sp.Scene(models.slider(9.81, 0.3))
     scene.add_contact(sp.Sphere(R, "ball"), models.plate(1.0), law=HUNT, name="ball")
 
-    def tau(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:
+    def tau(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
         return np.array([4.0 + 2.0 * v[0] if len(contacts.depth) else 0.5])
 
     case = Case(scene, [R + 0.004], [-0.3], 0.06, INTEGRATORS[integrator], controller=tau)
