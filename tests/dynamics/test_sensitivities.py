@@ -2,7 +2,6 @@
 
 import pickle
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.named_numbers import with_value
 from sphshell_pin.errors import Interrupted, InvalidParameter, ResultError
 from tests import differences, meshes, models
 from tests.dynamics.scenes import FRICTIONS
@@ -170,10 +170,9 @@ def test_a_controller_of_the_package(control_dt: float | None, integrator: str) 
     q0 = models.ARM_Q.copy()
     pin.framesForwardKinematics(scene.model, data, q0)
     height = data.oMf[scene.model.getFrameId("ball")].translation[2]
-    place = replace(
-        scene.pairs[0], placement=pin.SE3(np.eye(3), np.array([0, 0, height - R - 1e-3]))
-    )
-    scene = scene.with_pairs((place,))
+    place = pin.SE3(np.eye(3), np.array([0, 0, height - R - 1e-3]))
+    pair = with_value(scene.pairs[0], ("side_j", "placement"), place)
+    scene = scene.with_pairs((pair,))
     control = sp.JointPD(80.0, 4.0, q_ref=q0 + [0.0, 0.1, 0.05])
     case = Case(
         scene,
