@@ -7,9 +7,6 @@ import sphshell_pin as sp
 from sphshell_pin.base.parameters import parameters_of, type_name
 from sphshell_pin.scenario.format import shape_tables as primitives
 
-# Annotations of parameters that are numbers; see sphshell_pin.base.parameters.
-NUMBERS = ("float",)
-
 
 def kinds(name: str) -> str:
     """Return what a scenario file may state of the family of a class."""
@@ -24,7 +21,7 @@ def parameters(name: str) -> str:
     about = parameters_of(kind)
     for one in dataclasses.fields(kind):
         if one.name in about:
-            unit = about[one.name].general_unit or ("1" if type_name(one) in NUMBERS else "")
+            unit = about[one.name].general_unit or ("1" if type_name(one) == "float" else "")
             lines.append(f"| `{one.name}` | {unit} | {default_of(one)} | {about[one.name].help} |")
     return "\n".join(lines) + "\n"
 
