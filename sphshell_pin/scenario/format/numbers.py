@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pydantic import BaseModel
 
 import sphshell_pin as sp
 from sphshell_pin.base.named_numbers import with_value
@@ -77,11 +79,13 @@ def _is_number(stated: object, name: str) -> bool:
 
 
 def _changed_entry(entry: Entry, parts: Mapping[str, Mapping[str, float]]) -> Entry:
-    new: dict[str, Any] = {}
+    new: dict[str, object] = {}
     for part, values in parts.items():
-        stated = getattr(entry, part)
-        changed = stated.changed if isinstance(stated, Component) else None
-        new[part] = changed(**values) if changed else stated.model_copy(update=values)
+        stated: Component | BaseModel = getattr(entry, part)
+        if isinstance(stated, Component):
+            new[part] = stated.changed(**values)
+        else:
+            new[part] = stated.model_copy(update=values)
     return entry.model_copy(update=new)
 
 
