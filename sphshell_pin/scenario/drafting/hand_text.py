@@ -31,7 +31,7 @@ from sphshell_pin.scenario.format.schema import ShellSection
 GAP = 1e-4
 """Gap of each fingertip at the start [m]."""
 
-DURATION, HELD = 1.5, 0.05
+DURATION, HELD = 1.5, 0.15
 """Duration of the run [s], and how well the largest force is held in it."""
 
 _TEMPLATE = Path(__file__).with_name("hand.template").read_text("utf-8")

@@ -32,6 +32,8 @@ class End:
     offset: Array
     radius: float
     source: str
+    ahead: Array | None = None
+    """Unit (3,) out of a flat end, on which a ball of any size may stand; None of a round one."""
 
 
 def gripper_joints(model: pin.Model) -> set[int]:
@@ -106,8 +108,8 @@ class LinkGeometry:
         if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
             return End(center, rounded(covers), f"it covers the end of link '{self.link}'")
         ball = rounded(_BALL * covers) if radius is None else radius
-        front = center + (before + ball) * ahead
-        return End(front, ball, f"a ball on the end of link '{self.link}'")
+        front, source = center + (before + ball) * ahead, f"a ball on the end of link '{self.link}'"
+        return End(front, ball, source, ahead if radius is None else None)
 
     def _carries(self, link: str) -> bool:
         """Whether `link` moves with the frame, and has geometry."""

@@ -96,6 +96,7 @@ class Bench:
         self._depth, self._searched = depth, searched
         self._touching = SelfContact(self._model, self._geometry, q)
         self._floor = _floor(self._geometry)
+        self._found: dict[tuple[float | None, ...], list[Stance]] = {}
 
     def places(
         self,
@@ -121,16 +122,7 @@ class Bench:
                 return None
             return self._floor + lift - lowest + float(facing[2] @ spot.center)
 
-        limit = self._floor if lift is not None else None
-        postures = stances(
-            self._model,
-            self._q,
-            self._tip,
-            approach,
-            height(spots[0]),
-            lambda q: self._usable(q, limit),
-        )
-        for posture in postures:
+        for posture in self._stances(approach, height(spots[0])):
             self._searched.postures += 1
             offered = 0
             for spot in spots:
@@ -167,6 +159,21 @@ class Bench:
             if tried >= _MOST_TRIED:
                 break
         yield from uneven
+
+    def _stances(self, approach: Array, height: float | None) -> list[Stance]:
+        """Return postures for an approach, at a `height` [m] above the floor if it is given."""
+        key = (*approach, height)
+        if key not in self._found:
+            limit = None if height is None else self._floor
+            self._found[key] = stances(
+                self._model,
+                self._q,
+                self._tip,
+                approach,
+                height,
+                lambda q: self._usable(q, limit),
+            )
+        return self._found[key]
 
     def _usable(self, q: Array, floor: float | None) -> bool:
         """Whether links are free of each other and above the `floor` [m] at q (nq,)."""

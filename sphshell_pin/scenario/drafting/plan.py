@@ -26,7 +26,6 @@ from sphshell_pin.scenario.drafting.tip_contact import (
 from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
 from sphshell_pin.scenario.drafting.wording import (
     axis_name,
-    counted,
     listed,
     mm,
     rounded,
@@ -224,7 +223,7 @@ def press_plan(
     why.append("the joints are bent to a posture in which the tip moves well and can press")
     why.append(place.told)
     if stance.lock:
-        why.append(f"{counted(len(stance.lock), 'joint')} that do not move the tip are locked")
+        why.append(f"joints that do not move the tip are locked: {len(stance.lock)}")
     why.append(
         f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
     )

@@ -31,7 +31,7 @@ from sphshell_pin.scenario.drafting.plan import (
     press_gap,
     press_plan,
 )
-from sphshell_pin.scenario.drafting.poses import NO_LIMIT, home_approach, joints_aside
+from sphshell_pin.scenario.drafting.poses import NO_LIMIT, approaches, joints_aside
 from sphshell_pin.scenario.drafting.refusals import Tried, cannot_stand, refusal
 from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
@@ -242,12 +242,8 @@ class _Search:
         q_work = np.array(known) if len(known) == model.nq else self.built.assembly.q0
         gap = TIP_GAP * tip.radius
         bench = Bench(self.built, tip, self.links, q_work, 2 * gap, self.tried)
-        directions = [
-            PLACES["below"],
-            tuple(home_approach(model, q_work, tip) + 0.0),
-            *PLACES.values(),
-        ]
-        approaches = [PLACES[asked.place]] if asked.place else list(dict.fromkeys(directions))
+        directions = [PLACES[asked.place]] if asked.place else list(PLACES.values())
+        pressed = approaches(model, q_work, tip, directions)
         lifts = [part * model_reach(model) for part in _LIFTS]
         if asked.fixed:
             spots = asked_touches(asked, shell, tip.radius, gap)
@@ -258,7 +254,7 @@ class _Search:
                 (one, list(touch_points(shell, tip.radius, gap, toward=one, inside=asked.inside)))
                 for one in (sides(shell) if side is None else [side])
             ]
-        for approach in map(np.array, approaches):
+        for approach in pressed[:1] if asked.place else pressed:
             # Upright ones first, as they stand in their file.
             ordered = sorted(choices, key=lambda one: abs(one[0][2] + approach[2]) > 1e-3)
             for room in (self.room, 0.0):
