@@ -39,7 +39,8 @@ class End:
 def gripper_joints(model: pin.Model) -> set[int]:
     """Return the joints of grippers: behind a joint, two limbs or more that slide or are coupled.
 
-    They have two coordinates at most. A run holds them, where the tip is on what carries them.
+    They have two coordinates at most, or are called grippers. A run holds them, where the tip is on
+    what carries them.
     """
     rules, found = mimics(model), set[int]()
     coupled = {*rules, *(rule.of for rule in rules.values())}
@@ -50,7 +51,9 @@ def gripper_joints(model: pin.Model) -> set[int]:
             model.names[one] in coupled or model.joints[one].shortname().startswith("JointModelP")
             for one in behind
         )
-        if len(ends) > 1 and jaws and len({model.joints[one].idx_v for one in behind}) <= 2:
+        few = len({model.joints[one].idx_v for one in behind}) <= 2
+        named = all("gripper" in model.names[one].lower() for one in behind)
+        if len(ends) > 1 and (named or (jaws and few)):
             found |= set(behind)
     return found
 
