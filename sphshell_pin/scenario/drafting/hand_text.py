@@ -17,12 +17,7 @@ from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.scenario.drafting.draft_text import toml
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.part import Part, part_file
-from sphshell_pin.scenario.drafting.tip_contact import (
-    Contact,
-    bearable,
-    hertz_stiffness,
-    sticking,
-)
+from sphshell_pin.scenario.drafting.tip_contact import Contact, bearable, hertz_stiffness, sticking
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built

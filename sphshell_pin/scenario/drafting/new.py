@@ -304,10 +304,7 @@ def _relative(file: Path, path: Path) -> str:
 
 
 def _build_bare(
-    section: RobotSection,
-    path: Path,
-    shell: ShellSection | None = None,
-    reuse: Built | None = None,
+    section: RobotSection, path: Path, shell: ShellSection | None = None, reuse: Built | None = None
 ) -> Built:
     """Build robot and surface without contacts.
 

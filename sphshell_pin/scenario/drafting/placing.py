@@ -165,12 +165,7 @@ class Bench:
         if key not in self._found:
             limit = None if height is None else self._floor
             self._found[key] = stances(
-                self._model,
-                self._q,
-                self._tip,
-                approach,
-                height,
-                lambda q: self._usable(q, limit),
+                self._model, self._q, self._tip, approach, height, lambda q: self._usable(q, limit)
             )
         return self._found[key]
 
