@@ -1,7 +1,5 @@
 """Where a robot carries its sphere: known fingertips and feet, or the end of its only limb."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection
@@ -37,7 +35,7 @@ class Tip:
     ahead: Array | None = None
     """Direction (3,) in which a smaller one is drawn back; None of a sphere that has one size."""
 
-    def at_most(self, radius: float) -> Tip:
+    def at_most(self, radius: float) -> "Tip":
         """Return it with a `radius` [m] that is no larger, where its size is free."""
         if self.ahead is None or self.radius <= radius:
             return self
