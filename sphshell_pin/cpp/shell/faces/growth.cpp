@@ -101,7 +101,7 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
     if (!(std::abs(shape.distance(point(v))) <= tolerance)) return out;
   const std::array<Vec3, 3> at = {point(c[0]), point(c[1]), point(c[2])};
   const std::array<Vec3, 3> normals = normals_at(shape, at);
-  double flat[3], curved[3], sum = 0;
+  double flat[3], curved[3], beyond[3] = {0, 0, 0}, sum = 0;
   for (int k = 0; k < 3; ++k) {
     const int l = next_corner(k);
     const Vec3 d = at[l] - at[k], middle = (at[k] + at[l]) / 2;
@@ -111,6 +111,12 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
     flat[k] = std::abs(shape.distance(middle)), curved[k] = std::abs(shape.distance(middle + rise));
     out.deviation = std::max(out.deviation, flat[k]);
     sum += normals[k].dot(facet_normal(t));
+    // A chord around a torus may cross its crest, and its cubic side lies beyond: where the tube
+    // has turned off by the chord's sagitta.
+    if (shape.kind != FaceKind::Torus) continue;
+    const Vec3 y = middle - shape.point;
+    const double sagitta = d.squaredNorm() / (8 * (y - y.dot(shape.axis) * shape.axis).norm());
+    beyond[k] = std::min(sagitta * sagitta / (2 * shape.second), kMostOfFlat * shape.second);
   }
   out.sign = sum < 0 ? -1 : 1;
   const double least = std::cos(kMostLeanOnFace);
@@ -120,7 +126,7 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
   bool closer = true, no_farther = true;
   for (int k = 0; k < 3; ++k) {
     closer = closer && curved[k] <= most + 1.5 * tolerance;
-    no_farther = no_farther && curved[k] <= std::max(most, flat[k]) + 1.5 * tolerance;
+    no_farther = no_farther && curved[k] <= std::max({most, flat[k], beyond[k]}) + 1.5 * tolerance;
   }
   // A chord along the crest of a torus is as near to it as its cubic side. But so are the ears of a
   // plane that is tangent there, whose corners are on one line of the parameters.
