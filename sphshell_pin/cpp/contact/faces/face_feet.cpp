@@ -15,6 +15,9 @@ namespace {
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
 constexpr int kMostRepeats = 20;
+// Faces that cross at less than this (sine) overlap as if it were this.
+constexpr double kLeastSlope = 1e-4;
+
 }  // namespace
 
 // The facets near the point are looked through; where it may be anywhere around an axis, those near
@@ -139,7 +142,10 @@ bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tol
     Vec3 towards;
     const double away =
         joint.divide(surface.faces().shapes, cell.face, crossing ? at.point : at.center, towards);
-    return !(cell.turn[k] * away < -tolerance);
+    // The overlap is along the face: where both are nearly tangent the other one hardly falls
+    // there.
+    const double slope = crossing ? std::max(towards.cross(at.outward).norm(), kLeastSlope) : 1.0;
+    return !(cell.turn[k] * away < -tolerance * slope);
   }
   const CubicCurve side = surface.facets()[f].side(facet, k);
   const double t = nearest_on_side(side, at.point);
