@@ -113,9 +113,8 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
     sum += normals[k].dot(facet_normal(t));
     // A chord around a torus may cross its crest, and its cubic side lies beyond: where the tube
     // has turned off by the chord's sagitta.
-    if (shape.kind != FaceKind::Torus) continue;
-    const Vec3 y = middle - shape.point;
-    const double sagitta = d.squaredNorm() / (8 * (y - y.dot(shape.axis) * shape.axis).norm());
+    if (shape.kind != FaceKind::Torus || shape.radius < shape.second) continue;
+    const double sagitta = d.squaredNorm() / (8 * shape.radius);
     beyond[k] = std::min(sagitta * sagitta / (2 * shape.second), kMostOfFlat * shape.second);
   }
   out.sign = sum < 0 ? -1 : 1;
@@ -274,8 +273,8 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
   all.resize(kept);
 }
 
-// What was left out of a face, or was taken for a strip before the face was known, goes to it where
-// it lies on it and stands off no more than the rest.
+// What was left out of a face, was taken for a strip before the face was known or is another part of
+// it goes to it where it lies on it and stands off no more than the rest.
 void Recognizer::absorb(int face) {
   Growth& growth = faces_[face];
   const auto fits = [&](int t) {
@@ -304,7 +303,9 @@ void Recognizer::absorb(int face) {
         asked[other] = 1;
         for (const int one : faces_[other].triangles)
           if (of_[one] == other) gained.push_back(one);
-        if (3 * gained.size() > own || !std::all_of(gained.begin(), gained.end(), fits))
+        const bool strip = 3 * gained.size() <= own;
+        if (!(strip || faces_[other].shape.kind == growth.shape.kind) ||
+            !std::all_of(gained.begin(), gained.end(), fits))
           gained.clear();
       }
       for (const int one : gained) {
