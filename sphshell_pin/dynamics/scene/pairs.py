@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ import pinocchio as pin
 from sphshell_pin import _core
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.contact import (
+    BristleFriction,
     FoundationLaw,
     Friction,
     FunctionFriction,
@@ -146,13 +147,19 @@ class ContactPair(Summarized):
         return self.pose_j * self.placement
 
     def _check_plane(self) -> None:
-        """Refuse what follows from the radius of a sphere, and flat elements."""
+        """Refuse what follows from the radius of a sphere, and flat elements.
+
+        A bristle on the area of a foundation resists spin: else a part would spin on its face
+        without end.
+        """
         why = "beside a Plane: it follows from the radius of a Sphere"
         if self.law.needs_shape and not isinstance(self.law, FoundationLaw):
             must = "take law.on_plane(radius), or a FoundationLaw, which needs no radius"
             raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}; {must}")
         friction = self.friction
-        if friction is not None and (
+        if isinstance(friction, BristleFriction) and isinstance(self.law, FoundationLaw):
+            object.__setattr__(self, "friction", replace(friction, torsional=True))
+        elif friction is not None and (
             isinstance(friction, MindlinFriction) or friction._binding.torsional
         ):
             raise InvalidParameter("friction", friction, f"must have no disc of contact {why}")
