@@ -22,7 +22,6 @@ from tests.scenario.files import center_of, run_well
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
-BLADE_STEP = BLADE.with_name("blade.step")
 FINGER = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
 PLACES = ("below", "above", "+x", "-x", "+y", "-y")
 
