@@ -15,7 +15,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.atomic import AtomicFolder, write_whole
-from sphshell_pin.base.atomic.files import held_folder
+from sphshell_pin.base.atomic.files import held_folder, write_folder
+from sphshell_pin.cli import fit
 from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
@@ -26,7 +27,7 @@ from sphshell_pin.study.report import making
 from sphshell_pin.study.report.contents import Column, Section, Table
 from sphshell_pin.study.sweep.table import write_table
 from tests import meshes
-from tests.scenario.files import write
+from tests.scenario.files import DROP, write
 from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
 from tests.studies import mostly_studies
 
@@ -226,6 +227,19 @@ def of_sweep(seed):
     return lambda place: write_table(place / "table.parquet", columns, {"scenario": "drop"})
 
 
+def of_fit(value):
+    found = SimpleNamespace(to_json=lambda: value, scenario_text=lambda *_: DROP + f"# {value}")
+    return lambda place: fit._write(found, Path("s.toml"), place / "fit", {}, picture=False)
+
+
+def of_pictures(count):
+    def write_pictures(place):
+        files = ((f"frame_{k}.png", bytes([k]) * count) for k in range(count))
+        write_folder(place / "film", files, ["frame_0.png", "frame_1.png", "frame_2.png"])
+
+    return write_pictures
+
+
 def of_shell(side):
     shell = sp.Shell(*meshes.cube(side))
     return lambda place: shell.to_file(place / "box.obj")
@@ -234,6 +248,8 @@ def of_shell(side):
 WRITERS = {
     "report": (of_report("old"), of_report("new")),
     "sweep": (of_sweep(1), of_sweep(2)),
+    "fit": (of_fit("old"), of_fit("new")),
+    "render": (of_pictures(2), of_pictures(3)),
     "shell": (of_shell(1.0), of_shell(2.0)),
     "convert": tuple(
         lambda place, unit=unit: convert(MESH, place / "mesh.shl", unit) for unit in ("m", "mm")
