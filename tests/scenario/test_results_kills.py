@@ -9,13 +9,14 @@ import shutil
 import tempfile
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.atomic import AtomicFolder, write_whole
-from sphshell_pin.base.atomic.files import held_folder, write_folder
+from sphshell_pin.base.atomic.files import held_folder
 from sphshell_pin.cli import fit
 from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
@@ -26,6 +27,7 @@ from sphshell_pin.shell.converting import convert
 from sphshell_pin.study.report import making
 from sphshell_pin.study.report.contents import Column, Section, Table
 from sphshell_pin.study.sweep.table import write_table
+from sphshell_pin.view.film import render_film
 from tests import meshes
 from tests.scenario.files import DROP, write
 from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
@@ -232,12 +234,18 @@ def of_fit(value):
     return lambda place: fit._write(found, Path("s.toml"), place / "fit", {}, picture=False)
 
 
-def of_pictures(count):
-    def write_pictures(place):
-        files = ((f"frame_{k}.png", bytes([k]) * count) for k in range(count))
-        write_folder(place / "film", files, ["frame_0.png", "frame_1.png", "frame_2.png"])
+def of_film(count):
+    """Writes a folder of as many pictures, which no browser draws."""
+    pictures = [b"picture" * (k + count) for k in range(count)]
+    drawn = Mock(opened=lambda _: contextlib.nullcontext(), all=lambda _: iter(pictures))
+    stands_in = {"_Stage": lambda *_: drawn, "Shown": Mock(of=lambda *_: Mock(speed=1.0))}
+    run = SimpleNamespace(t=[0.0, 1.0], q=np.zeros((2, 1)))
 
-    return write_pictures
+    def write_film(place):
+        with patch.multiple("sphshell_pin.view.film", **stands_in):
+            render_film(place / "film", run)
+
+    return write_film
 
 
 def of_shell(side):
@@ -249,7 +257,7 @@ WRITERS = {
     "report": (of_report("old"), of_report("new")),
     "sweep": (of_sweep(1), of_sweep(2)),
     "fit": (of_fit("old"), of_fit("new")),
-    "render": (of_pictures(2), of_pictures(3)),
+    "render": (of_film(3), of_film(2)),
     "shell": (of_shell(1.0), of_shell(2.0)),
     "convert": tuple(
         lambda place, unit=unit: convert(MESH, place / "mesh.shl", unit) for unit in ("m", "mm")
