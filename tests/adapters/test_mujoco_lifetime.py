@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import gc
 import pickle
-import subprocess
 import sys
 import weakref
 
@@ -19,6 +18,7 @@ mujoco = pytest.importorskip("mujoco")
 
 from sphshell_pin.adapters.mujoco import attach  # noqa: E402
 from tests.adapters.mujoco_models import model_of, on_slab, plate, slab  # noqa: E402
+from tests.programs import python  # noqa: E402
 
 
 def test_contacts_end_with_their_model_and_touch_no_stranger():
@@ -197,7 +197,5 @@ print("done")
 
 @pytest.mark.parametrize("program", [REFUSED, AT_ONCE], ids=["refused", "at once"])
 def test_a_first_attach_that_is_refused_and_laws_of_python_in_new_threads(program):
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False
-    )
+    done = python(program)
     assert done.stdout == "done\n", done.stderr
