@@ -3,8 +3,6 @@
 Run it with `python -m benchmarks.in_mujoco`.
 """
 
-from __future__ import annotations
-
 import timeit
 import warnings
 from collections.abc import Callable

@@ -5,8 +5,6 @@ of each run its own; prints the memory, and the time with one thread and with al
 turn, and whether both have the same bits.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 

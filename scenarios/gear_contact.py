@@ -11,8 +11,6 @@ so the contact points are a matter of school geometry:
 The tips are relieved a little, as on real gears, so that a pair of teeth takes its load gradually.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -3,8 +3,6 @@
 The public names are loaded when they are first used.
 """
 
-from __future__ import annotations
-
 from sphshell_pin._interrupts import interrupts_delayed
 
 # isort: split

@@ -6,7 +6,7 @@ import json
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.base.parameters import parameters_of
+from sphshell_pin.base.parameters import parameters_of, type_name
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError
@@ -125,7 +125,7 @@ def test_the_numbers_of_all_kinds_are_tried(family, part):
         numbers = {
             one.name
             for one in dataclasses.fields(stating)
-            if one.name in parameters_of(stating) and "float" in one.type
+            if one.name in parameters_of(stating) and "float" in type_name(one)
         }
         tried = {name for table in STATED[part] if table["type"] == kind for name in table}
         if tried:

@@ -5,8 +5,6 @@ of the contact "tip". In files it stands behind the name of its table, "contact.
 scene takes that spelling, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any

@@ -4,8 +4,6 @@ Imports go down the layers alone. Where a value offers a picture or a file of it
 names the function, and its module is imported when the method is called.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any

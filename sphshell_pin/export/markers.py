@@ -1,7 +1,5 @@
 """What viewers draw: shells, spheres and the robot's skeleton once, the contacts at every row."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array

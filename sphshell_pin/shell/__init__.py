@@ -1,7 +1,5 @@
 """A clean shell from a file, from arrays or from a geometry, and the record of its cleaning."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from sphshell_pin.shell.cleaned import CleanedSurface

@@ -1,7 +1,5 @@
 """Results over each other: figures, curves over time and settings, with their differences."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """No contact missed, none made up, nobody passes through: against every triangle, one by one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

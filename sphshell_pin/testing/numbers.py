@@ -1,7 +1,5 @@
 """The numbers of a scene's contact pairs, one by one, and the scene with one of them changed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

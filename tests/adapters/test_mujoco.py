@@ -1,7 +1,5 @@
 """Contacts in MuJoCo's steps: against the scene's own forces and motions, energy and momentum."""
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np

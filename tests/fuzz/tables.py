@@ -1,7 +1,5 @@
 """Damaged results, scenarios, sweep journals and robots."""
 
-from __future__ import annotations
-
 import functools
 import io
 import json

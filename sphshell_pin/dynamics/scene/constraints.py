@@ -1,7 +1,5 @@
 """Contacts as constraints of Pinocchio's own solvers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

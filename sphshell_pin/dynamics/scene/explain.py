@@ -19,7 +19,6 @@ from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
 from sphshell_pin.dynamics.scene.sphere_arguments import corner_warning, seam_warning
-from sphshell_pin.dynamics.scene.touches import Touch, touches_at
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair
@@ -212,16 +211,18 @@ def _names(names: list[str]) -> str:
     return shown if len(names) <= 4 else f"{shown}, ... ({len(names)} joints)"
 
 
-def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:
-    """Work out the explanation of each pair of `scene` at q (nq,), v (nv,)."""
+def explain_pairs(
+    scene: Scene, q: Array, v: Array, cores: list[_core.Pair] | None = None
+) -> tuple[PairExplanation, ...]:
+    """Work out the explanation of each pair at q (nq,), v (nv,); `cores`: its C++ pairs."""
     pairs = scene.pairs
     if not pairs:
         return ()
     model = scene.model
-    gravity = float(np.linalg.norm(model.gravity.linear))
-    touches = touches_at(model, pairs, q, v)
+    gravity = math.hypot(*model.gravity.linear)
+    touches = _core.touches_at(model, cores or [pair._bind() for pair in pairs], q, v)
     return tuple(
-        _explain_pair(pair, touch, gravity) for pair, touch in zip(pairs, touches, strict=True)
+        _explain_pair(pair, gravity, *touch) for pair, touch in zip(pairs, touches, strict=True)
     )
 
 
@@ -246,12 +247,20 @@ def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
     return min(0.02 * shortest, LONGEST_RELAXATION)
 
 
-def core_pairs(scene: Scene, figures: tuple[PairExplanation, ...]) -> list[_core.Pair]:
-    """Build the C++ pairs of `scene`, with the time in which their bristles relax."""
+def core_pairs(
+    scene: Scene, q: Array, v: Array, *, explained: bool = False
+) -> tuple[list[_core.Pair], tuple[PairExplanation, ...]]:
+    """Build the C++ pairs of `scene` for a motion from q (nq,), v (nv,), with the explanation.
+
+    That is left out, (), where neither bristles need it, which relax by it, nor it is asked for.
+    """
     cores = [pair._bind() for pair in scene.pairs]
-    for pair, core, figure in zip(scene.pairs, cores, figures, strict=False):
+    if not explained and not has_state(scene):
+        return cores, ()
+    figures = explain_pairs(scene, q, v, cores)
+    for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
         core.relaxation = relaxation_time(pair, figure)
-    return cores
+    return cores, figures
 
 
 def has_state(scene: Scene) -> bool:
@@ -269,12 +278,13 @@ def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
     )
 
 
-def _explain_pair(pair: ContactPair, touch: Touch | None, gravity: float) -> PairExplanation:
-    gap = mass = slip_mass = speed = math.nan
-    if touch is not None:
-        gap, mass, slip_mass, closing = touch
-        fall = math.sqrt(2 * gravity * max(gap, 0.0))
-        speed = max(closing, fall) or DEFAULT_SPEED
+def _explain_pair(
+    pair: ContactPair, gravity: float, gap: float, mass: float, slip_mass: float, closing: float
+) -> PairExplanation:
+    # Of what the core finds where a pair touches, or would: nan where there is nothing.
+    speed = closing
+    if math.isfinite(gap):
+        speed = max(closing, math.sqrt(2 * gravity * max(gap, 0.0))) or DEFAULT_SPEED
     law = pair.plane_law
     weight = mass * gravity
     load = depth = contact_time = resting_depth = limit = math.nan

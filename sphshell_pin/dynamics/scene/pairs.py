@@ -1,7 +1,5 @@
 """Two bodies that may touch, as constant descriptions."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Arguments of Scene.add_contact and add_contacts: spheres or a plane, and what they touch."""
 
-from __future__ import annotations
-
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Sensors: what a robot's computer knows of its forces, sampled, filtered, noisy and late."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """A draft of a scenario, tried: it touches, holds its force, and keeps links off the part."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """From a scenario file to what runs: the scene, its start state, its controller, its simulation."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence

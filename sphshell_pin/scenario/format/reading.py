@@ -1,7 +1,5 @@
 """From a scenario file to a Scenario: find it, read it, change values, report what is wrong."""
 
-from __future__ import annotations
-
 import functools
 import importlib
 import os

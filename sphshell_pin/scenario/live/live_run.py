@@ -1,7 +1,5 @@
 """A scenario that keeps running while its parameters are changed and its bodies pushed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from dataclasses import replace

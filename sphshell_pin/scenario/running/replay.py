@@ -1,7 +1,5 @@
 """A finished run, played again in the scene that it came from."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from os import PathLike

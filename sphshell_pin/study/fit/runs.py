@@ -1,7 +1,5 @@
 """The runs of a fit: what the scenario says at values of the parameters, and its derivatives."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace

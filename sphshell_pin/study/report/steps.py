@@ -6,8 +6,6 @@ alone, in a compiled loop. What a component adds is a difference to the scene wi
 step is ABA, continuous collision detection, the energy audit and summaries.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

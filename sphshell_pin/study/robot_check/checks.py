@@ -1,7 +1,5 @@
 """The checks of one robot, each by the functions that `sphshell_pin.testing` asserts with."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What happens in a worker: the scenario is built once, then changed and run again and again."""
 
-from __future__ import annotations
-
 import os
 import socket
 import threading
