@@ -13,7 +13,7 @@ import numpy as np
 import sphshell_pin as sp
 from benchmarks.processes import resident
 from sphshell_pin import robots, scenarios
-from sphshell_pin.dynamics import Rollout
+from sphshell_pin.results import Rollout
 
 RADIUS = 0.012
 

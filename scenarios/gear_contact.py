@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from sphshell_pin import Result, Scene
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics import SceneContacts
+from sphshell_pin.results import SceneContacts
 
 TEETH_1, TEETH_2 = 20, 40
 MODULE = 0.005  # pitch diameter / teeth [m]

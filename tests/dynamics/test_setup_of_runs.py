@@ -63,8 +63,7 @@ def test_the_effective_mass_is_that_of_the_jacobian_of_the_place() -> None:
     pin.forwardKinematics(model, data, q)
     center = (data.oMi[pair.joint_i] * pair.placement_i).translation
     local = pair.placement_j.actInv(center)
-    assert pair.shell is not None
-    point = pair.placement_j.act(pair.shell.closest_points([local]).points[0])
+    point = pair.placement_j.act(pair.side_j.shell.closest_points([local]).points[0])
     normal = (center - point) / np.linalg.norm(center - point)
     in_joint = data.oMi[pair.joint_i].actInv(point)
     row = np.empty(model.nv)

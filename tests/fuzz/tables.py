@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sphshell_pin import robots
-from sphshell_pin.dynamics import Sensitivities
+from sphshell_pin.results import Sensitivities
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.sweep.job import Outcome

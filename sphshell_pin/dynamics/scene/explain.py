@@ -228,9 +228,12 @@ def explain_pairs(
 
 def _with_curvature(pair: ContactPair, figures: PairExplanation) -> PairExplanation:
     """Say how far the curved elements of a pair, if it has any, stand off the flat ones."""
-    if pair.shell is None or pair.method != "smooth":
-        return figures
-    said = [f"{label}: {text}" for label, text in pair.shell.curvature_report().rows()]
+    said = [
+        f"{label}: {text}"
+        for one in pair.shells
+        if one.is_smooth
+        for label, text in one.shell.curvature_report().rows()
+    ]
     return replace(figures, modelled=(*figures.modelled, *said))
 
 
@@ -259,13 +262,18 @@ def core_pairs(
         return cores, ()
     figures = explain_pairs(scene, q, v, cores)
     for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
-        core.relaxation = relaxation_time(pair, figure)
+        if _has_bristles(pair):
+            core.relaxation = relaxation_time(pair, figure)
     return cores, figures
 
 
 def has_state(scene: Scene) -> bool:
     """Whether a pair has bristles: only they need to know how fast an impact is."""
-    return any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
+    return any(map(_has_bristles, scene.pairs))
+
+
+def _has_bristles(pair: ContactPair) -> bool:
+    return pair.friction is not None and pair.friction.has_state
 
 
 def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
@@ -323,8 +331,8 @@ def _disc(pair: ContactPair, depth: float) -> float:
 def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:
     out: list[str] = []
     where = f"contact '{pair.name}'"
-    radius, shell = pair.least_radius, pair.shell
-    if shell is not None:
+    radius = pair.least_radius
+    for shell in (one.shell for one in pair.shells):
         sentence = unit_warning(scene.model, radius, shell.size) if pair.spheres else None
         out += [f"{where}: {sentence}"] if sentence else []
         out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
@@ -346,17 +354,18 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
         out.append(f"{where}: starts at depth {-figures.gap * 1e3:.4g} mm, deep inside")
     if not math.isfinite(figures.effective_mass):
         out.append(f"{where}: neither body can move along the normal at this q")
-    if shell is not None and shell.side != "both" and not shell.is_closed:
-        out.append(
-            f"{where}: shell '{shell.name}' is open and one-sided: a sphere that goes round its "
-            "rim is thrown out on the other side and gains energy"
-        )
+    out += [
+        f"{where}: shell '{one.shell.name}' is open and one-sided: a sphere that goes round its "
+        "rim is thrown out on the other side and gains energy"
+        for one in pair.shells
+        if one.shell.side != "both" and not one.shell.is_closed
+    ]
     if pair.friction is not None and (creep := pair.friction.creep_speed) > radius:
         out.append(
             f"{where}: under half of what friction can hold, the sphere creeps at {creep:.2g} m/s, "
             "more than its radius per second: a smaller v_static, or BristleFriction, which sticks"
         )
-    if pair.method == "elements":
+    if any(one.method == "elements" for one in pair.shells):
         out.append(f"{where}: method 'elements' counts a place of touch once per touched element")
     return out
 

@@ -145,7 +145,7 @@ def measure(rounds: int, progress: Progress = silent) -> Times:
     def plain() -> sp.Scene:
         return touching(UNDAMPED, None)
 
-    def zero(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:
+    def zero(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
         return np.zeros_like(v)
 
     second = "... and a {} second sphere"
