@@ -8,8 +8,6 @@ Needs nothing but Python. The wheel is installed in a new environment, whose pro
 on their PATH but that environment's own. There the main job is run, and the tests of TESTS.
 """
 
-from __future__ import annotations
-
 import argparse
 import fnmatch
 import os

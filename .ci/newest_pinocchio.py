@@ -8,8 +8,6 @@ Needs nothing but Python. The core is compiled against one minor version of both
 are part of it.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import re

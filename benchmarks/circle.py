@@ -7,8 +7,6 @@ The wheels of Crocoddyl 3.2.1 misread frames of Pinocchio 4.1, so its own contac
 another interpreter, and the torques are replayed here.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import runpy

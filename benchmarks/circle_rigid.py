@@ -6,8 +6,6 @@ for which its wheels are built.
 python benchmarks/circle_rigid.py PROBLEM.npz SOLUTION.npz
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from typing import Any

@@ -5,8 +5,6 @@ step, the ratio, and how far the motions are apart; what the robot took to be co
 of one's own in C++ over the same, tests/cpp/press.cpp, which `make test` builds.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

@@ -3,8 +3,6 @@
 python -m benchmarks.creases [FILE ...]    # files in millimeters
 """
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -5,8 +5,6 @@ compiled code: of Scene.dynamics_derivatives by repeating it inside the core, of
 pin.computeABADerivatives by taking the Python call off, which is timed with a model of one joint.
 """
 
-from __future__ import annotations
-
 import time
 import timeit
 from collections.abc import Callable, Sequence

@@ -9,8 +9,6 @@ on a tetrahedral mesh of the ball, ours kappa (R^2 - rho^2) / (2 rho): they agre
 the depth with E = kappa R.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

@@ -8,8 +8,6 @@ in turn to time their queries. One that gets too slow or too big is left out of 
 python -m benchmarks.growth [--quick]    # prints the table; needs libigl, fcpw, rtree
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import time

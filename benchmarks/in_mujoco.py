@@ -3,8 +3,6 @@
 Run it with `python -m benchmarks.in_mujoco`.
 """
 
-from __future__ import annotations
-
 import timeit
 import warnings
 from collections.abc import Callable
@@ -67,17 +65,16 @@ def panda(rng: np.random.Generator) -> None:
     """Print the largest difference of forces, and what a step takes longer."""
     built = build("fingertip_on_blade")
     pair = built.scene.pairs[0]
-    assert pair.shell is not None
-    assert pair.sphere is not None
-    model = mujoco.MjModel.from_xml_string(mjcf_of(built.scene.model, pair.sphere))
+    ((on_sphere, on_shell),) = pair.sphere_on_shell
+    model = mujoco.MjModel.from_xml_string(mjcf_of(built.scene.model, on_sphere.sphere))
     data = mujoco.MjData(model)
     for stiffness in (5e6, 5e4):
         law = sp.ImpactLaw(stiffness, 1.5, 300.0, 5e-5)
         scene = sp.Scene(built.scene.model)
         placed = {"placement": pair.placement_j, "law": law, "friction": pair.friction}
-        scene.add_contact(pair.sphere, pair.shell, **placed)
+        scene.add_contact(on_sphere.sphere, on_shell.shell, **placed)
         worst, touched = 0.0, 0
-        with attach(model, pair.shell, ["tip"], **placed) as contacts:
+        with attach(model, on_shell.shell, ["tip"], **placed) as contacts:
             while touched < STATES:
                 q = built.q0 + 0.02 * rng.standard_normal(7)
                 v = 0.5 * rng.standard_normal(7)

@@ -1,7 +1,5 @@
 """Cost of a step of 64 spheres over 200 k triangles: python -m benchmarks.many_spheres."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -6,8 +6,6 @@ factor, and the milliseconds a frame takes in the loop's thread: all of it, and 
 (its share without the physics).
 """
 
-from __future__ import annotations
-
 import argparse
 import multiprocessing
 import socket

@@ -1,7 +1,5 @@
 """Work in a process of its own: for its memory, or because it may crash or hang."""
 
-from __future__ import annotations
-
 import math
 import multiprocessing
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Sizes of the recordings: python -m benchmarks.recordings [SCENARIO or ROBOT ...]."""
 
-from __future__ import annotations
-
 import re
 import sys
 import tempfile

@@ -5,8 +5,6 @@ of each run its own; prints the memory, and the time with one thread and with al
 turn, and whether both have the same bits.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 
@@ -15,7 +13,7 @@ import numpy as np
 import sphshell_pin as sp
 from benchmarks.processes import resident
 from sphshell_pin import robots, scenarios
-from sphshell_pin.dynamics import Rollout
+from sphshell_pin.results import Rollout
 
 RADIUS = 0.012
 

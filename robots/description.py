@@ -1,7 +1,5 @@
 """Descriptions of robots, and what pinocchio may read: its parser calls itself for every link."""
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict

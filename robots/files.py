@@ -1,7 +1,5 @@
 """Robots' files of all formats: read into one description, then into Pinocchio's models."""
 
-from __future__ import annotations
-
 import copy
 import os
 import re

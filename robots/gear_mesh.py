@@ -1,7 +1,5 @@
 """Draw the meshes of the robot gear_pair (python -m sphshell_pin.robots.gear_mesh)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Masses of links whose URDF states none, from their geometry, and what to do without them."""
 
-from __future__ import annotations
-
 import copy
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Sequence

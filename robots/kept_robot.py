@@ -4,8 +4,6 @@ Kept are the description as it was read (a xacro file expanded, an MJCF with wha
 the meshes that show the robot. Both may have been changed since.
 """
 
-from __future__ import annotations
-
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Robots by the names of the package robot_descriptions, if it is installed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module

@@ -1,7 +1,5 @@
 """A URDF that needs no options: masses, prefixes, mimic joints and names of meshes set right."""
 
-from __future__ import annotations
-
 import copy
 import re
 import xml.etree.ElementTree as ET

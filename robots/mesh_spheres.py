@@ -1,7 +1,5 @@
 """A closed mesh approximated by spheres inside it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

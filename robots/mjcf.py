@@ -7,8 +7,6 @@ the world but the first, includes, ranges' `limited`, visual geoms' masses, orie
 without `pos`, damping of ball joints and equalities, and makes one nameless joint of several.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from functools import partial

@@ -1,7 +1,5 @@
 """Models that an MJCF attaches, put in their places."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as ET
 from pathlib import Path

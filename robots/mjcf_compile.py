@@ -1,7 +1,5 @@
 """What MuJoCo makes of an MJCF: it gets numbers and names, of meshes their corners, and no file."""
 
-from __future__ import annotations
-
 import copy
 import io
 import xml.etree.ElementTree as ET

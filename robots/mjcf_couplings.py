@@ -1,7 +1,5 @@
 """Equalities of MJCF: those that are mimic joints, and what the others couple."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Files that an MJCF includes, put in their places."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as ET
 from pathlib import Path

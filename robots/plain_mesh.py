@@ -5,8 +5,6 @@ assimp finds such names in more places than a filter would: what is written here
 takes time in proportion to the size.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import xml.etree.ElementTree as ET

@@ -1,7 +1,5 @@
 """The links and joints of a URDF, as elements: what readers of it leave unchecked or ask for."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator

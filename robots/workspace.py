@@ -1,7 +1,5 @@
 """The robots in a folder: files that describe one, with what they need."""
 
-from __future__ import annotations
-
 import os
 import re
 import warnings

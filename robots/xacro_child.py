@@ -3,8 +3,6 @@
 The answer is JSON: a xacro file is code, so nothing that comes from its process is unpickled.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -5,8 +5,6 @@ module. Here a node of the tree has a rule or is refused, a value is data or a f
 below, and an attribute is a name of a namespace, a key of a YAML mapping or a method listed.
 """
 
-from __future__ import annotations
-
 import ast
 import builtins
 import datetime

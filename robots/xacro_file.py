@@ -4,8 +4,6 @@ A xacro file is code: its expressions are Python's. They are checked (`xacro_exp
 process that evaluates them has limits of time and memory.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

@@ -1,7 +1,5 @@
 """Figures of the grasp in its last half second: what a held body must show."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Figures of the lifted part: how high, by what force, and how far it moves in the hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """The forces on the ball of ball_in_seat at the end."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

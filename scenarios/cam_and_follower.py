@@ -1,7 +1,5 @@
 """How far the follower of cam_and_follower is lifted, and how far it is from the law of the cam."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin import Result, Scene

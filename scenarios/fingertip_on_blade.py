@@ -1,7 +1,5 @@
 """What the press of fingertip_on_blade is judged by: the force after the touch."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -11,14 +11,12 @@ so the contact points are a matter of school geometry:
 The tips are relieved a little, as on real gears, so that a pair of teeth takes its load gradually.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import Result, Scene
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics import SceneContacts
+from sphshell_pin.results import SceneContacts
 
 TEETH_1, TEETH_2 = 20, 40
 MODULE = 0.005  # pitch diameter / teeth [m]

@@ -1,7 +1,5 @@
 """How the ball of oblique_impact leaves the plate."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """What the polishing of polished_valve is judged by: what Preston's law removes in the raster."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin import Result, Scene

@@ -1,7 +1,5 @@
 """When the rattleback turns round."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

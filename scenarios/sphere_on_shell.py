@@ -1,7 +1,5 @@
 """The figure that sphere_on_shell is known for."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin import Result, Scene

@@ -3,8 +3,6 @@
 The public names are loaded when they are first used.
 """
 
-from __future__ import annotations
-
 from sphshell_pin._interrupts import interrupts_delayed
 
 # isort: split
@@ -15,6 +13,7 @@ with interrupts_delayed():
     from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
 
 if TYPE_CHECKING:
+    from sphshell_pin import results as results
     from sphshell_pin.contact import *  # noqa: F403
     from sphshell_pin.contact.laws import *  # noqa: F403
     from sphshell_pin.dynamics import *  # noqa: F403
@@ -24,12 +23,9 @@ if TYPE_CHECKING:
     from sphshell_pin.errors import InvalidParameter as InvalidParameter
     from sphshell_pin.errors import SphshellError as SphshellError
     from sphshell_pin.patches import *  # noqa: F403
-    from sphshell_pin.shell import CleanedSurface as CleanedSurface
-    from sphshell_pin.shell import ClosestPoints as ClosestPoints
-    from sphshell_pin.shell import Face as Face
     from sphshell_pin.shell import Shell as Shell
-    from sphshell_pin.shell import ShellHealth as ShellHealth
-    from sphshell_pin.study.fit import *  # noqa: F403
+    from sphshell_pin.study.fit import Experiment as Experiment
+    from sphshell_pin.study.fit import fit as fit
 
 __version__ = "0.3.0.dev0"  # what is released next; the only place
 
@@ -38,6 +34,7 @@ _PARTS = (
     "dynamics",
     "errors",
     "patches",
+    "results",
     "robots",
     "scenario",
     "shell",
@@ -46,23 +43,21 @@ _PARTS = (
 )
 # What a type checker sees above; tests compare the two.
 _NAMES = {
-    "contact": "BristleFriction BristleState ContactSet CoulombFriction Feature FoundationLaw "
-    "Friction FunctionFriction FunctionLaw HertzLaw MATERIALS Material Method "
-    "MindlinFriction NormalLaw Plane Sphere TableLaw contact_wrench find_material "
-    "foundation_pressure friction_between restitution_between",
+    "contact": "BristleFriction BristleState CoulombFriction Feature FoundationLaw Friction "
+    "FunctionFriction FunctionLaw HertzLaw MATERIALS Material Method MindlinFriction NormalLaw "
+    "Plane Sphere TableLaw contact_wrench find_material foundation_pressure "
+    "friction_between restitution_between",
     "contact.laws": "HuntCrossleyLaw ImpactLaw",
-    "dynamics": "CartesianImpedance ContactForceDerivatives ContactLog ContactPair "
-    "DynamicsDerivatives EnergyAudit Event JointComponents JointFigures JointFriction "
-    "JointLimits PairFigures Readings Result Rollout RunStats Scene SceneContacts "
-    "SceneState Sensitivities SensorLog Simulation StepDerivatives",
+    "dynamics": "CartesianImpedance JointComponents JointFriction JointLimits Result Scene "
+    "Simulation",
     "dynamics.control.controllers": "GravityCompensation JointPD",
     "dynamics.run.integrators": "Adaptive Implicit LinearlyImplicitEuler RungeKutta4 "
     "SemiImplicitEuler",
     "dynamics.sensing.sensors": "ContactSwitch ForceTorqueSensor JointTorqueSensor",
     "errors": "InvalidParameter SphshellError",
-    "patches": "ShellTaxels TaxelGrid TaxelImages",
-    "shell": "CleanedSurface ClosestPoints Face Shell ShellHealth",
-    "study.fit": "Experiment Fit Fitted Series fit",
+    "patches": "ShellTaxels TaxelGrid",
+    "shell": "Shell",
+    "study.fit": "Experiment fit",
 }
 _HOME = {name: part for part, names in _NAMES.items() for name in names.split()}
 

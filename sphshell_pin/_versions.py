@@ -5,8 +5,6 @@ Their shared objects carry no version in their names, so the core would load wit
 read memory in another layout than theirs. `_built_against` is written by CMake beside the core.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path

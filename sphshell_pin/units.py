@@ -4,8 +4,6 @@ The package uses meters, kilograms, seconds, newtons and radians. A file's unit 
 its user, never guessed.
 """
 
-from __future__ import annotations
-
 from sphshell_pin.errors import InvalidParameter
 
 METERS_PER_UNIT: dict[str, float] = {

@@ -92,7 +92,7 @@ def acceleration(
     q: Array,
     v: Array,
     tau: Array,
-    state: sp.SceneState | None = None,
+    state: sp.results.SceneState | None = None,
 ) -> Array:
     """ABA with `Scene.external_forces`; of mimic joints, which ABA has not, M^-1 (tau - rnea)."""
     model = scene.model

@@ -142,17 +142,15 @@ def ask(robot: str, part: Path, place: str) -> Case:
 def wrong_start(built: Built) -> str:
     """Return what is wrong with the posture and the side that is touched; "" if nothing."""
     scene, (pair,) = built.scene, built.scene.pairs
-    assert pair.sphere is not None
-    assert pair.shell is not None
-    reach = Reach(scene.model, pair.sphere.frame, pair.sphere.offset)
-    center = pair.placement.actInv(reach.center(built.q0))
+    reach = Reach(scene.model, pair.side_i.sphere.frame, pair.side_i.sphere.offset)
+    center = pair.side_j.placement.actInv(reach.center(built.q0))
     jacobian = reach.jacobian(built.q0)
     if scene.model.nv > 2:
         values = np.linalg.svd(jacobian[:3], compute_uv=False)
         rank = min(3, scene.model.nv, int(np.linalg.matrix_rank(jacobian[:3], tol=1e-9)))
         if values[rank - 1] < _SINGULAR * values[0]:
             return "the start is near a singular posture"
-    shell = pair.shell
+    shell = pair.side_j.shell
     if not shell.is_closed:
         return ""
     outside = float(shell.closest_points(center[None], method="facets").distances[0])

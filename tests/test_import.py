@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
@@ -89,7 +88,7 @@ def test_what_is_listed_is_public() -> None:
     import sphshell_pin as sp
 
     assert set(dir(sp)) == {*sp.__all__, *sp._PARTS, "__version__"}
-    for part in ("contact", "dynamics", "patches", "study.fit"):  # as type checkers see them
+    for part in ("contact", "dynamics", "patches"):  # as type checkers see them
         module = importlib.import_module(f"sphshell_pin.{part}")
         inner = {part: set(names.split()) for part, names in sp._NAMES.items()}
         families = {one for name in inner if name.startswith(f"{part}.") for one in inner[name]}
@@ -197,7 +196,7 @@ LAYERS = (
     ("dynamics",),
     ("adapters",),
     ("patches", "robots"),
-    ("sphshell_pin",),  # its public names are those of the folders above
+    ("sphshell_pin", "results"),  # its public names are those of the folders above
     ("scenario", "scenarios"),
     ("plot", "view", "export"),
     ("testing",),
@@ -209,16 +208,22 @@ LEVEL = {folder: k for k, folders in enumerate(LAYERS) for folder in folders}
 BESIDE = ("robots", "scenarios")
 
 
-def imports_of(file: Path, modules: set[str]) -> set[str]:
-    """Return which of `modules` are imported anywhere in `file`, but for type hints alone."""
-    nodes = [ast.parse(file.read_text(encoding="utf-8"))]
+def imports_of(file: Path, modules: set[str], *, inside: bool) -> set[str]:
+    """Return which of `modules` are imported in `file`, but for type hints alone.
+
+    They are those imported `inside` functions, or those imported with the module.
+    """
+    nodes: list[ast.AST] = [ast.parse(file.read_text(encoding="utf-8"))]
+    if inside:
+        nodes = [node for node in ast.walk(nodes[0]) if isinstance(node, ast.FunctionDef)]
     found: set[str] = set()
     while nodes:
         node = nodes.pop()
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             nodes += node.orelse
             continue
-        nodes += ast.iter_child_nodes(node)
+        within = ast.iter_child_nodes(node)
+        nodes += [one for one in within if inside or not isinstance(one, ast.FunctionDef)]
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -244,10 +249,31 @@ def files_of(package: Path) -> dict[str, Path]:
 
 
 @pytest.fixture(scope="module")
-def graph() -> dict[str, set[str]]:
-    """What each module of the package imports, imports inside functions included."""
+def called() -> dict[str, set[str]]:
+    """What functions of each module of the package import when they are called."""
     modules = files_of(PACKAGE)
-    return {name: imports_of(file, set(modules)) - {name} for name, file in modules.items()}
+    return {name: imports_of(file, set(modules), inside=True) for name, file in modules.items()}
+
+
+def shown_above(name: str, others: set[str]) -> set[str]:
+    """Return the modules of upper layers among `others` that a value may show itself by."""
+    shows = ("dynamics.result.", "patches.taxels")
+    above = {one for one in others if level(one) > level(name)}
+    return above if name.removeprefix("sphshell_pin.").startswith(shows) else set()
+
+
+@pytest.fixture(scope="module")
+def graph(called: dict[str, set[str]]) -> dict[str, set[str]]:
+    """What each module of the package imports, at once or later.
+
+    The pictures and files of themselves that values offer as methods, such as `Result.plot`, are no
+    part of it: they are imported when the method is called.
+    """
+    return {
+        name: imports_of(file, set(called), inside=False) - {name}
+        | called[name] - {name} - shown_above(name, called[name])
+        for name, file in files_of(PACKAGE).items()
+    }
 
 
 def level(module: str) -> int:
@@ -282,19 +308,6 @@ def test_no_two_layers_import_each_other(graph: dict[str, set[str]]) -> None:
         TopologicalSorter({name: edges[name] - {name} for name in LEVEL}).prepare()
     except CycleError as error:
         pytest.fail(" imports ".join(reversed(error.args[1])))
-
-
-def test_what_a_value_offers_of_upper_layers_exists(graph: dict[str, set[str]]) -> None:
-    """Such functions are named and not imported: `sphshell_pin.base.offered`."""
-    named = {}
-    for module, file in files_of(PACKAGE).items():
-        for name in re.findall(r'offered\(\s*"([\w.]+:\w+)"', file.read_text(encoding="utf-8")):
-            named[name] = module
-    assert {folder(module) for module in named.values()} == {"dynamics", "patches"}
-    for name, module in named.items():
-        owner, _, function = name.partition(":")
-        assert level(owner) > level(module), f"{module} can import {name}"
-        assert callable(getattr(import_module(owner), function)), name
 
 
 def test_values_have_types() -> None:

@@ -6,7 +6,7 @@ import json
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.base.parameters import parameters_of
+from sphshell_pin.base.parameters import parameters_of, type_name
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError
@@ -88,12 +88,18 @@ def test_a_number_has_one_name(part, table, name, tmp_path):
     where = name.split(".")
 
     def value_in(scene: sp.Scene, sensors: tuple[Sensor, ...]) -> object:
-        return inner(sensors[0] if part == "sensor" else getattr(scene.pairs[0], part), where)
+        return inner(
+            sensors[0]
+            if part == "sensor"
+            else inner(scene.pairs[0], [*scene.pairs[0].parts[part]]),
+            where,
+        )
 
     before = value_in(built.scene, built.simulation.sensors)
     assert before == knob.value == table.get(name, before)
     after = before * 0.875 if name != "seed" else 3
     set_ = rebuild(built, {key: repr(after)})
+    assert set_.scenario == build(path, {key: repr(after)}).scenario
     assert value_in(set_.scene, set_.simulation.sensors) == after
     assert [axis.key for axis in plan_sweep(path, {key: [after]}).axes] == [key]
     if name != "seed":
@@ -108,7 +114,9 @@ def test_a_number_has_one_name(part, table, name, tmp_path):
     run = rollout[0]
     if part == "sensor":
         return
-    assert inner(getattr(run.scene.pairs[0], part), where) == pytest.approx(after)
+    assert inner(
+        inner(run.scene.pairs[0], [*run.scene.pairs[0].parts[part]]), where
+    ) == pytest.approx(after)
     column = f"{in_scene}.z" if name == "offset.2" else in_scene
     for one in (key, column):
         state = (built.q0, built.v0)
@@ -125,7 +133,7 @@ def test_the_numbers_of_all_kinds_are_tried(family, part):
         numbers = {
             one.name
             for one in dataclasses.fields(stating)
-            if one.name in parameters_of(stating) and "float" in one.type
+            if one.name in parameters_of(stating) and "float" in type_name(one)
         }
         tried = {name for table in STATED[part] if table["type"] == kind for name in table}
         if tried:

@@ -69,7 +69,7 @@ def test_scenes_simulations_and_results(trip: Trip) -> None:
     assert run(trip(simulation)) == bits
     assert run(sp.Simulation(trip(simulation.scene), simulation.integrator)) == bits
     pairs = trip(simulation.scene.pairs)
-    assert pairs[0].shell is pairs[1].shell
+    assert pairs[0].side_j.shell is pairs[1].side_j.shell
     result = trip(simulation.run(START, None, 0.01))
     assert run(sp.Simulation(result.scene, simulation.integrator)) == bits
 
@@ -110,7 +110,7 @@ def test_an_open_run_says_why_not(trip: Trip) -> None:
 
 def test_a_compiled_core_says_why_not(trip: Trip) -> None:
     with pytest.raises(NotPicklable, match="send its Shell"):
-        trip(bumpy_scene().pairs[0].shell._binding)
+        trip(bumpy_scene().pairs[0].side_j.shell._binding)
 
 
 def test_a_copy_of_a_scene_is_independent(trip: Trip) -> None:

@@ -142,8 +142,8 @@ def test_the_links_of_the_site_lead_somewhere(pages):
 def test_every_public_name_is_in_the_api(built, pages):
     site, _ = built
     anchors = set().union(*(pages[file].anchors for file in (site / "api").glob("*.html")))
-    for name in sphshell_pin.__all__:
-        home = getattr(getattr(sphshell_pin, name), "__module__", "sphshell_pin")
+    for name in {*sphshell_pin.__all__, *sphshell_pin.results.__all__}:
+        home = getattr(getattr(sphshell_pin, name, None), "__module__", "sphshell_pin.results")
         assert f"{home}.{name}" in anchors or any(
             anchor.startswith("sphshell_pin.") and anchor.endswith(f".{name}") for anchor in anchors
         ), f"sphshell_pin.{name} is on no page"

@@ -9,7 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.summary import show_value
-from sphshell_pin.study.fit.report import Fitted
+from sphshell_pin.study.fit import Fit, Fitted
 from tests.models import ball
 
 RADIUS = 0.01
@@ -35,7 +35,7 @@ def shown() -> dict[str, object]:
     state = scene.state(start)
     low = start.copy()
     low[2] = RADIUS - 1e-4
-    fit = sp.Fit(
+    fit = Fit(
         scenario="drop.toml",
         parameters=(Fitted("contact.0.law.k", "N/m", 1.0, 2.0, 1.5, 2.5, True),),
         correlation=np.eye(1),

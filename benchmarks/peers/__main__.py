@@ -3,8 +3,6 @@
 python -m benchmarks.peers [--engine E]... [--scene S]... [--quick] [--write]
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

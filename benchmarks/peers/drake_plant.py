@@ -1,7 +1,5 @@
 """Plants of Drake: built, stepped, and read afterwards."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The scenes in EXUDYN: one sphere against all triangles in its GeneralContact."""
 
-from __future__ import annotations
-
 import math
 from importlib import import_module
 from typing import Any

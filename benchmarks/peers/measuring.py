@@ -1,7 +1,5 @@
 """Runs engines over scenes; the ratios of their costs to ours."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterable

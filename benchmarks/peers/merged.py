@@ -1,7 +1,5 @@
 """The arm of the press with its fixed links merged: what the engines without Pinocchio load."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

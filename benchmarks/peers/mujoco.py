@@ -1,7 +1,5 @@
 """The scenes in MuJoCo: height fields and boxes, since it takes meshes by their convex hulls."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The scenes in this package."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Any

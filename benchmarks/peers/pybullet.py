@@ -1,7 +1,5 @@
 """The scenes in PyBullet: its triangle meshes in a world ten times larger."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property

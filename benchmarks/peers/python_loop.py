@@ -1,7 +1,5 @@
 """The loop that one writes oneself: pinocchio.aba and coal.collide, from Python."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Eight scenes as plain numbers, one of them with two meshes; truths.py judges them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

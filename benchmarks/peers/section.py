@@ -7,8 +7,6 @@ stepping. In the swing each peer is taken at its best error and this package at 
 that is at least as good in period and energy; ratios are measured in turns.
 """
 
-from __future__ import annotations
-
 import math
 
 from benchmarks.measured import Measured

@@ -1,7 +1,5 @@
 """The surfaces of the scenes: a mesh, and what engines without concave meshes may take instead."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

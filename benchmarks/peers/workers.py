@@ -1,7 +1,5 @@
 """Every engine in a process of its own, pinned to one core: a crash is an answer, not the end."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import os

@@ -4,8 +4,6 @@ NumPy's convention takes what follows the colon for a type. Here types stand in 
 `name : meaning` says shape, unit and meaning.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

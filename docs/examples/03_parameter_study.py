@@ -11,7 +11,7 @@ import numpy as np
 
 import sphshell_pin as sp
 from sphshell_pin import robots
-from sphshell_pin.dynamics import PairFigures
+from sphshell_pin.results import PairFigures
 
 RADIUS, SPEED, GRAVITY = 0.012, 1.0, 9.81
 ball = robots.load("ball")

@@ -30,7 +30,7 @@ steps = round(duration / dt)
 # starts and ends at rest.
 
 # %%
-blade, world_from_blade = pair.shell, pair.pose_j * pair.placement
+blade, world_from_blade = pair.side_j.shell, pair.placement_j
 middle = blade.closest_points([[0.053, 0.012, -0.242]])
 normal = middle.normals[0]
 along = np.cross(normal, [0.0, 0.0, 1.0])
@@ -39,7 +39,7 @@ s = np.linspace(0.0, 1.0, steps + 1)
 angle = 2.0 * np.pi * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 circle = np.outer(np.cos(angle), along) + np.outer(np.sin(angle), np.cross(normal, along))
 touched = blade.closest_points(middle.points + 0.01 * normal + radius * circle)
-centers = touched.points + (pair.sphere.radius - pair.law.depth_at(force)) * touched.normals
+centers = touched.points + (pair.side_i.radius - pair.law.depth_at(force)) * touched.normals
 centers = centers @ world_from_blade.rotation.T + world_from_blade.translation
 
 # %% [markdown]

@@ -1,7 +1,5 @@
 """The help of the command line as Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

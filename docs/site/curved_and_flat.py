@@ -3,8 +3,6 @@
 The main run twice on the same triangles, once curved and once flat, and what the force does.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from sphshell_pin.plot.figure import new_figure, write_figure

@@ -5,8 +5,6 @@ or of all. The pictures are those of `sphshell-pin render`, cut to the middle. M
 file as a hook: the site has the scenario files, too.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import sys

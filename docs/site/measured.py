@@ -3,8 +3,6 @@
 benchmarks/measured.py writes them; the blocks of a report are those of quote.py.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence

@@ -5,8 +5,6 @@ MkDocs loads this file as a hook: each example has a page, with the outputs of t
 build/notebooks where there are some; `make docs` writes them before.
 """
 
-from __future__ import annotations
-
 import html
 import os
 import re

@@ -1,16 +1,11 @@
 """Tables of parameters, from the classes that describe them, as Markdown."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 
 import sphshell_pin as sp
-from sphshell_pin.base.parameters import parameters_of
+from sphshell_pin.base.parameters import parameters_of, type_name
 from sphshell_pin.scenario.format import shape_tables as primitives
-
-# Annotations of parameters that are numbers; see sphshell_pin.base.parameters.
-NUMBERS = ("float",)
 
 
 def kinds(name: str) -> str:
@@ -26,7 +21,7 @@ def parameters(name: str) -> str:
     about = parameters_of(kind)
     for one in dataclasses.fields(kind):
         if one.name in about:
-            unit = about[one.name].general_unit or ("1" if one.type in NUMBERS else "")
+            unit = about[one.name].general_unit or ("1" if type_name(one) == "float" else "")
             lines.append(f"| `{one.name}` | {unit} | {default_of(one)} | {about[one.name].help} |")
     return "\n".join(lines) + "\n"
 

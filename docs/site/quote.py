@@ -6,8 +6,6 @@ Copies the sections of these folders' report.json to docs/measured/report.json, 
 docs/site/tables.py writes the pages.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

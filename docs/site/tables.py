@@ -10,8 +10,6 @@ repository sees them:
     <!-- end KIND -->
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

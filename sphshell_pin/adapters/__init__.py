@@ -1,7 +1,5 @@
 """Scenes in other packages: CasADi, Crocoddyl, MuJoCo."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -7,8 +7,6 @@
 Keep the object (here `f`) as long as an expression or a solver uses it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 

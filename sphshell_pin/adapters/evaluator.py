@@ -1,7 +1,5 @@
 """A scene as a function of q, v and tau alone, for those who differentiate it."""
 
-from __future__ import annotations
-
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_type

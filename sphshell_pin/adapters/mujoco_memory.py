@@ -1,7 +1,5 @@
 """Room for friction's memory in the states of a MuJoCo model, and where its structs have what."""
 
-from __future__ import annotations
-
 import ctypes
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The arrays of numbers that the package computes with; shapes are stated where they are used."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Files that can be made again, kept between processes: compiled robots, surfaces of CAD files."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import stat

@@ -1,7 +1,5 @@
 """Argument checks of the public functions and classes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
@@ -217,7 +215,10 @@ def off_unit_length(model: pin.Model, q: Array, called: str = "q") -> InvalidPar
 
 def check_moved_mass(model: pin.Model) -> None:
     """Raise InvalidParameter for a joint that moves no mass: its acceleration would be infinite."""
-    moved = [inertia.mass + float(np.trace(inertia.inertia)) for inertia in model.inertias]
+    inertias = list(model.inertias)
+    if all(inertia.mass > 0 for inertia in inertias[1:]):
+        return
+    moved = [inertia.mass + float(np.trace(inertia.inertia)) for inertia in inertias]
     for joint in range(model.njoints - 1, 0, -1):
         if moved[joint] <= 0 and model.joints[joint].nv:
             raise InvalidParameter(

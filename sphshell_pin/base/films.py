@@ -1,7 +1,5 @@
 """Pictures in a row as one file: .gif by Pillow, .mp4 by the ffmpeg of imageio-ffmpeg."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import subprocess

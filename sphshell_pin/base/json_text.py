@@ -1,7 +1,5 @@
 """Values as JSON, which has no infinity and no nan: null stands for them."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

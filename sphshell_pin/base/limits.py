@@ -1,7 +1,5 @@
 """Child processes for what may crash or ask for too much: their start, limits and last words."""
 
-from __future__ import annotations
-
 import os
 import resource
 import sys

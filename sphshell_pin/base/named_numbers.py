@@ -5,8 +5,6 @@ of the contact "tip". In files it stands behind the name of its table, "contact.
 scene takes that spelling, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -41,9 +39,9 @@ Names = Mapping[str, NamedNumber]
 def names_of_pairs(pairs: Iterable[Any]) -> dict[str, NamedNumber]:
     """Return what can be said of the pairs of a scene, by name: their numbers, laws, placements."""
     return {
-        ".".join((pair.name, *one.path)): one
+        f"{pair.name}.{name}": one
         for at, pair in enumerate(pairs)
-        for one in _of_pair(at, pair)
+        for name, one in _of_pair(at, pair)
     }
 
 
@@ -64,19 +62,20 @@ def names_of_start(nv: int) -> dict[str, NamedNumber]:
     return {name: NamedNumber(at, (name,), (nv,), ends) for at, name in enumerate(START)}
 
 
-def _of_pair(at: int, pair: Any) -> Iterator[NamedNumber]:
-    for part in ("law", "friction"):
-        yield NamedNumber(at, (part,), None, None)
-        whole = getattr(pair, part)
-        for name in parameters_of(whole):
-            if isinstance(getattr(whole, name), float):
-                yield NamedNumber(at, (part, name))
-    for end in ("sphere", "other_sphere"):
-        if getattr(pair, end) is not None:
-            yield NamedNumber(at, (end, "radius"))
-            yield NamedNumber(at, (end, "offset"), (3,), tuple(f".{one}" for one in AXES))
-    if pair.shell is not None:
-        yield NamedNumber(at, ("placement",), None, tuple(f".{one}" for one in TWIST))
+def _of_pair(at: int, pair: Any) -> Iterator[tuple[str, NamedNumber]]:
+    for part, path in pair.parts.items():
+        if part == "placement":
+            yield part, NamedNumber(at, path, None, tuple(f".{one}" for one in TWIST))
+        elif part in ("law", "friction"):
+            yield part, NamedNumber(at, path, None, None)
+            whole = getattr(pair, part)
+            for name in parameters_of(whole):
+                if isinstance(getattr(whole, name), float):
+                    yield f"{part}.{name}", NamedNumber(at, (*path, name))
+        else:
+            ends = tuple(f".{one}" for one in AXES)
+            yield f"{part}.radius", NamedNumber(at, (*path, "radius"))
+            yield f"{part}.offset", NamedNumber(at, (*path, "offset"), (3,), ends)
 
 
 def find_name(name: str, known: Names, kind: str = "parameter") -> str:

@@ -133,7 +133,7 @@ def flat_fields(fields: Mapping[str, ArrayLike]) -> dict[str, Array]:
 def type_name(one: dataclasses.Field[Any]) -> str:
     """Return the annotation of a field as text, whether its module keeps annotations as text."""
     kind: object = one.type
-    return kind if isinstance(kind, str) else getattr(kind, "__name__", str(kind))
+    return kind.__name__ if isinstance(kind, type) else str(kind)
 
 
 def same_parameter(kind: type, name: str, default: object = None) -> Any:

@@ -3,8 +3,6 @@
 A pipe makes its reader wait for ever, and a device may never end.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import os

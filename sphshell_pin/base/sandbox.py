@@ -7,8 +7,6 @@ but itself. Landlock, on any architecture, refuses the file operations and TCP o
 that has neither leaves it to the limits that each child sets.
 """
 
-from __future__ import annotations
-
 import ctypes
 import fcntl
 import os

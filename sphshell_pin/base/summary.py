@@ -4,8 +4,6 @@ Both come from one list of facts, `Summarized._facts`. By default these are the 
 dataclass, arrays by their shapes; a class that knows better lists what matters.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import textwrap

@@ -1,7 +1,5 @@
 """Tables of named columns, units in their names, and the files that hold them."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

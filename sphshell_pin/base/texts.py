@@ -1,7 +1,5 @@
 """Texts of strangers: what of them may be printed, and what is a number."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """The command list: what is shipped."""
 
-from __future__ import annotations
-
 import typer
 
 from sphshell_pin.cli.app import command, make_table, plain, say, terminal

@@ -1,7 +1,5 @@
 """The command render: a finished run as a picture or a film."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The command taxels: tactile images of a finished run."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The command view: a scenario that runs, or a finished run, in a page to play with."""
 
-from __future__ import annotations
-
 from sphshell_pin.cli.app import (
     OfOption,
     PackageDirOption,

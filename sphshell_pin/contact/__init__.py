@@ -19,13 +19,12 @@ from sphshell_pin.contact.plane import Plane
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.contact.table_law import TableLaw
 from sphshell_pin.contact.wrench import BristleState, contact_wrench
-from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
+from sphshell_pin.shell.contact_set import Feature, Method
 
 __all__ = [
     "MATERIALS",
     "BristleFriction",
     "BristleState",
-    "ContactSet",
     "CoulombFriction",
     "Feature",
     "FoundationLaw",

@@ -1,7 +1,5 @@
 """Friction that sticks: springs between sphere and shell, whose stretch is a state."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, Self

@@ -1,7 +1,5 @@
 """An elastic foundation over the true overlap of a sphere with a shell."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Friction of one's own: its force is a C function, or for trying a Python function."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

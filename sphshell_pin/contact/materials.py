@@ -1,7 +1,5 @@
 """Materials to start from, and those of sphere and shell in the laws that follow from them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What laws of one's own have in common: C functions, or for trying Python functions."""
 
-from __future__ import annotations
-
 import copy
 import ctypes
 import dataclasses

@@ -1,7 +1,5 @@
 """A plane on a link of the robot, or on the ground."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

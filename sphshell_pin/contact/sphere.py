@@ -1,7 +1,5 @@
 """A sphere on a link of the robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from sphshell_pin.base.checks import check_name, check_positive, check_vector

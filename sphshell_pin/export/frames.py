@@ -10,7 +10,6 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame
-from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.dynamics.scene.scene import Scene
 
 Message = Mapping[str, object]
@@ -44,8 +43,8 @@ class Frames:
 
     `moving`: one for each moving joint, in the world; `fixed`: all others,
     in one of those or in the world. `spheres`, `other_spheres` name the frames of the spheres by
-    the name of their pair, `shells` those of the shells by `shell_key`; `contacts` are names for
-    frames of the contacts of each pair.
+    the name of their pair, `shells` those of the shells by the key of their side; `contacts` are
+    names for frames of the contacts of each pair.
     """
 
     moving: tuple[Moving, ...]
@@ -93,15 +92,14 @@ class Frames:
         shells: dict[tuple[int, int, bytes], str] = {}
         for pair in scene.pairs:
             contacts[pair.name] = free_name(f"contact/{pair.name}", taken)
-            if pair.sphere is not None:
-                name = spheres[pair.name] = free_name(f"sphere/{pair.name}", taken)
-                fixed.append(_hung(name, pair.joint_i, pair.placement_i, moving))
-            if pair.other_sphere is not None:
-                name = others[pair.name] = free_name(f"sphere/{pair.name}/other", taken)
-                fixed.append(_hung(name, pair.joint_j, pair.placement_j, moving))
-            if pair.shell is not None and shell_key(pair) not in shells:
-                name = shells[shell_key(pair)] = free_name(f"shell/{pair.shell.name}", taken)
-                fixed.append(_hung(name, pair.joint_j, pair.placement_j, moving))
+            ends = (spheres, ""), (others, "/other")
+            for ball, (known, end) in zip(pair.spheres, ends, strict=False):
+                name = known[pair.name] = free_name(f"sphere/{pair.name}{end}", taken)
+                fixed.append(_hung(name, ball.joint, ball.in_joint, moving))
+            for one in pair.shells:
+                if one.key not in shells:
+                    name = shells[one.key] = free_name(f"shell/{one.shell.name}", taken)
+                    fixed.append(_hung(name, one.joint, one.in_joint, moving))
         return cls(tuple(moving.values()), tuple(fixed), spheres, others, contacts, shells)
 
 

@@ -1,11 +1,8 @@
 """What viewers draw: shells, spheres and the robot's skeleton once, the contacts at every row."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.export.frames import WORLD, Frames, Message, xyz
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR, POINT_COLOR, ArrowScale, pushing
@@ -54,11 +51,10 @@ def stamp_of(stamp: Stamp) -> Message:
 
 def shell_markers(scene: Scene, frames: Frames, stamp: Stamp) -> Message:
     """Return the shells as triangles in their own frames; curved ones as they touch."""
-    drawn = {shell_key(pair): pair for pair in scene.pairs if pair.shell is not None}
+    drawn = {one.key: one for pair in scene.pairs for one in pair.shells}
     markers = []
-    for number, (key, pair) in enumerate(drawn.items()):
-        assert pair.shell is not None
-        mesh = SurfaceMesh.of(pair.shell, curved=pair.method == "smooth")
+    for number, (key, one) in enumerate(drawn.items()):
+        mesh = SurfaceMesh.of(one.shell, curved=one.is_smooth)
         points = mesh.vertices[mesh.triangles].reshape(-1, 3)
         color = SURFACE_COLORS[number % len(SURFACE_COLORS)]
         name, size = frames.shells[key], (1.0, 1.0, 1.0)
@@ -69,10 +65,10 @@ def shell_markers(scene: Scene, frames: Frames, stamp: Stamp) -> Message:
 def body_markers(scene: Scene, frames: Frames, stamp: Stamp) -> Message:
     """Return the spheres, and a rod from each joint to the joints on it."""
     markers = []
-    for of, names in (("sphere", frames.spheres), ("other_sphere", frames.other_spheres)):
+    for of, names in enumerate((frames.spheres, frames.other_spheres)):
         for pair in scene.pairs:
             if pair.name in names:
-                size = (2 * getattr(pair, of).radius,) * 3
+                size = (2 * pair.spheres[of].radius,) * 3
                 name = names[pair.name]
                 markers.append(_marker(stamp, name, name, 0, SPHERE, size, SPHERE_COLOR, 0.6))
     model, width = scene.model, ROD * least_radius(scene)

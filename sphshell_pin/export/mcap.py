@@ -1,7 +1,5 @@
 """A result as an MCAP file of ROS 2 messages; the page docs/export.md lists the topics."""
 
-from __future__ import annotations
-
 import heapq
 import json
 import re

@@ -5,8 +5,6 @@ The file messages.txt has them, each behind its type. They are those of ROS 2 Ja
 branch jazzy; licenses Apache 2.0 and BSD); `tests/export/test_messages.py` compares their hashes.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A result as a folder of tables: rows, contacts, events, energy and sensors."""
 
-from __future__ import annotations
-
 import io
 import json
 from os import PathLike

@@ -1,5 +1,8 @@
 """What the recorded patches of a run did to tactile sensors."""
 
-from sphshell_pin.patches.taxels import ShellTaxels, TaxelGrid, TaxelImages
+from sphshell_pin.patches.taxels import ShellTaxels, TaxelGrid
 
-__all__ = ["ShellTaxels", "TaxelGrid", "TaxelImages"]
+__all__ = [
+    "ShellTaxels",
+    "TaxelGrid",
+]

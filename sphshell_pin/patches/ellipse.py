@@ -4,8 +4,6 @@ Coordinates are normalized: u = (x / a, y / b), so that the ellipse is the unit 
 pressure over the peak is sqrt(1 - |u|^2) in it, zero outside.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def has_foundation(pair: ContactPair) -> bool:
     """Whether the pressure is that of an elastic foundation on a shell."""
-    return pair.law.kind == "foundation" and pair.shell is not None and pair.sphere is not None
+    return pair.law.kind == "foundation" and bool(pair.sphere_on_shell)
 
 
 def foundation_loads(
@@ -33,8 +33,8 @@ def foundation_loads(
     is smaller than a piece. Damping is shared out as the elastic pressure is.
     """
     pair = scene.pairs[index]
-    shell = pair.shell
-    assert shell is not None
+    (on_shell,) = pair.shells
+    shell = on_shell.shell
     patches = patches_on(result, scene, [index], pair.joint_j, pair.placement_j)
     if not len(patches.row):
         return
@@ -43,7 +43,7 @@ def foundation_loads(
     centers, radius = np.einsum("kij,ki->kj", turns, places - origins), pair.least_radius
     reach = 2.0 * float(patches.half_axes.max())
     fine = min(resolution, float(np.median(patches.half_axes[:, 1])) / 8.0)
-    samples = divide(shell, patches.points, reach + fine, fine, curved=pair.method == "smooth")
+    samples = divide(shell, patches.points, reach + fine, fine, curved=on_shell.is_smooth)
     if not len(samples.areas):
         return
     # Imported where it is used: it takes as long as all else of a short run.

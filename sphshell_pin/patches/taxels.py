@@ -13,10 +13,8 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_name, check_positive, check_vector, read_only
-from sphshell_pin.base.offered import offered
 from sphshell_pin.base.summary import Summarized
 from sphshell_pin.dynamics.result.result_scene import scene_of
-from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
@@ -59,10 +57,9 @@ class TaxelImages(Summarized):
 
     def save_film(self, path: str | PathLike[str], *, fps: float = 30, speed: float = 1.0) -> Path:
         """Write a film of the images of a grid, .gif or .mp4: see `sphshell_pin.plot.taxels`."""
-        film: Path = offered("sphshell_pin.plot.taxels:save_film")(
-            Path(path), self, fps=fps, speed=speed
-        )
-        return film
+        from sphshell_pin.plot.taxels import save_film
+
+        return save_film(Path(path), self, fps=fps, speed=speed)
 
 
 @dataclass(frozen=True)
@@ -139,7 +136,7 @@ class TaxelGrid:
         """
         scene = scene_of(result, scene)
         pair = _pair(scene, self.pair)
-        if pair.sphere is None:
+        if not pair.spheres:
             raise InvalidParameter("pair", self.pair, "must have a sphere for taxels to be on")
         own = pair.spheres[0]
         alike = [
@@ -147,11 +144,11 @@ class TaxelGrid:
             for k, other in enumerate(scene.pairs)
             for number, one in enumerate(other.spheres)
             if (one.joint, one.radius) == (own.joint, own.radius)
-            and np.array_equal(one.placement.homogeneous, own.placement.homogeneous)
+            and np.array_equal(one.in_joint.homogeneous, own.in_joint.homogeneous)
         ]
         on_j = {k for k, second in alike if second}
         pairs = [k for k, _ in alike if not has_foundation(scene.pairs[k])]
-        patches = patches_on(result, scene, pairs, own.joint, own.placement)
+        patches = patches_on(result, scene, pairs, own.joint, own.in_joint)
         forces, outside = np.zeros((len(result.t), *self.shape)), np.zeros(len(result.t))
         if len(patches.row):
             # From the sphere's center to the contact: of the second of two spheres the normal leads
@@ -165,7 +162,7 @@ class TaxelGrid:
             shell = scene.pairs[k]
             for row, force, points, _, loads in foundation_loads(result, scene, k, fine):
                 pin.forwardKinematics(model, data, np.asarray(result.q[row], dtype=float))
-                ball = data.oMi[own.joint] * own.placement
+                ball = data.oMi[own.joint] * own.in_joint
                 move = ball.actInv(data.oMi[shell.joint_j] * shell.placement_j)
                 i, j, on_grid = self._cells(points @ move.rotation.T + move.translation)
                 np.add.at(forces[row], (i[on_grid], j[on_grid]), loads[on_grid])
@@ -246,9 +243,9 @@ class ShellTaxels:
         """
         scene = scene_of(result, scene)
         pair = _pair(scene, self.pair)
-        shell = pair.shell
-        if shell is None:
+        if not pair.shells:
             raise InvalidParameter("pair", self.pair, "must have a shell for taxels to be on")
+        shell = pair.shells[0].shell
         owner = np.asarray(shell.triangle_element, dtype=np.int64)
         count = len(shell.elements)
         if self.of == "faces":
@@ -284,7 +281,8 @@ class ShellTaxels:
 
 def same_shell(scene: Scene, pair: ContactPair) -> list[int]:
     """Return the numbers of the pairs that have the shell of `pair` in the same place."""
-    return [k for k, other in enumerate(scene.pairs) if shell_key(other) == shell_key(pair)]
+    keys = [one.key for one in pair.shells]
+    return [k for k, other in enumerate(scene.pairs) if [one.key for one in other.shells] == keys]
 
 
 def _pair(scene: Scene, name: str) -> ContactPair:

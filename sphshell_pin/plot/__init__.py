@@ -91,7 +91,7 @@ def save_figures(
         "contact_path.png": plot_contact_path(result, scene),
     }
     touched = {int(pair) for pair in result.contacts.pair}
-    if scene is not None and any(scene.pairs[pair].shell is not None for pair in touched):
+    if scene is not None and any(scene.pairs[pair].shells for pair in touched):
         figures["contact_map.png"] = plot_contact_map(result, scene)
     if result.sensors:
         figures["sensors.png"] = plot_sensors(result)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Longs, Mask
-from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.plot.figure import INK, new_figure, reading_unit
 from sphshell_pin.view.contact_path import ContactPath, contact_paths, spaced
 
@@ -50,9 +49,8 @@ def group_paths(result: Result, scene: Scene | None) -> list[PathGroup]:
     for path in contact_paths(result, scene):
         key, shell = None, None
         if path.on_shell and scene is not None:
-            pair = scene.pairs[path.pair]
-            shell = pair.shell
-            key = shell_key(pair)
+            (side,) = scene.pairs[path.pair].shells
+            shell, key = side.shell, side.key
         groups.setdefault(key, PathGroup(shell, [])).paths.append(path)
     return list(groups.values())
 

@@ -1,7 +1,5 @@
 """Curves over time, thinned for drawing."""
 
-from __future__ import annotations
-
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.view.curves import extremes
 

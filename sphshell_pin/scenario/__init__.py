@@ -1,7 +1,5 @@
 """Scenarios: TOML files that build a scene, a controller and a run."""
 
-from __future__ import annotations
-
 from sphshell_pin.scenario.format.build import Built, build, explain_built, rebuild
 from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.schema import Scenario

@@ -1,7 +1,5 @@
 """The arrays of a shell and its compiled core."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from functools import cached_property
 from typing import Any, Self

@@ -6,8 +6,6 @@ planar quads can be wound alike. Dropping the slivers a triangulation may leave 
 so these steps run until none changes anything.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from dataclasses import replace
 

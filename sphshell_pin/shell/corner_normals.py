@@ -1,7 +1,5 @@
 """Normals given with a surface, carried through its cleaning."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

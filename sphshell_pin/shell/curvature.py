@@ -4,8 +4,6 @@ The shape of a curved element follows from normals alone. Where these contradict
 it, as averaged normals on a box do, it leaves the surface that was meant.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Bytes, Ints, Longs, Mask

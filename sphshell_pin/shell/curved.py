@@ -1,7 +1,5 @@
 """Curved elements as fine triangles: what the method "smooth" touches, for pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Ints, Longs

@@ -1,7 +1,5 @@
 """The planes, cylinders, cones, spheres and tori of a surface, of CAD or recognized in its mesh."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field

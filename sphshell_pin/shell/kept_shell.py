@@ -1,7 +1,5 @@
 """Shells as arrays, to be kept in a file, and shells of such arrays, which may be anybody's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A surface file in meters: its reader, its unit, and the SCALE of .shl files."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

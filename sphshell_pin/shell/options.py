@@ -1,7 +1,5 @@
 """Options of all constructors and queries of a shell, and their checks."""
 
-from __future__ import annotations
-
 import math
 import numbers
 import os

@@ -1,7 +1,5 @@
 """The winding of elements: consistent in a component, outward where it is closed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -5,8 +5,6 @@ applied, as it is where the shell is mounted. Nor is its `meshScale`: Pinocchio 
 loads a mesh, and it is meant for viewers of the file.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

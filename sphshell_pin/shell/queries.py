@@ -1,7 +1,5 @@
 """Queries of a shell: contacts with spheres, and closest points."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Surfaces of revolution about z, tessellated with their exact normals."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

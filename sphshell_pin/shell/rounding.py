@@ -1,7 +1,5 @@
 """To how much the coordinates of a file are known: single precision, few digits, a grid."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array

@@ -1,7 +1,5 @@
 """Tangent joints between CAD faces: where two faces have the same normal, they get one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin import _core

@@ -1,7 +1,5 @@
 """Two files of one part, pressed by the same spheres: which faces differ, and by how much."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """Results over each other: figures, curves over time and settings, with their differences."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -289,7 +287,7 @@ def _curves(result: Result, titles: list[str], scene: Scene | None, count: int) 
 def _paths(result: Result, scene: Scene, count: int) -> dict[str, Array]:
     """Return where the center of each pair's sphere is in the world, (count, 3) [m]."""
     model, data = scene.model, scene.model.createData()
-    carried = [pair for pair in scene.pairs if pair.sphere is not None]
+    carried = [pair for pair in scene.pairs if pair.spheres]
     joints = sorted({pair.joint_i for pair in carried})
     turned, moved = np.empty((count, len(joints), 3, 3)), np.empty((count, len(joints), 3))
     for row, q in enumerate(result.q[:count]):

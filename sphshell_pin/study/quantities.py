@@ -1,7 +1,5 @@
 """What of a run can be measured: quantities by the names of the columns that exports have."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

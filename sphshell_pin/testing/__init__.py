@@ -5,8 +5,6 @@ with what, where and how much, and returns the error that it measured. With pyte
 `pytest_sphshell_pin` adds fixtures that use them.
 """
 
-from __future__ import annotations
-
 from numpy.typing import ArrayLike
 
 from sphshell_pin.dynamics import Result, Scene

@@ -1,7 +1,5 @@
 """What a run must keep: momentum of a closed system, and energy; measured with Pinocchio."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -1,7 +1,5 @@
 """Analytic derivatives against central differences on the tangent space."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

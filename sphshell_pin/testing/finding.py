@@ -1,7 +1,5 @@
 """What a measurement found: how much, and where."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ equations of motion are solved with the mass matrix: a way apart from `Scene.ext
 ABA.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """No contact missed, none made up, nobody passes through: against every triangle, one by one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -14,6 +12,7 @@ from sphshell_pin.base.checks import check_points, check_positive
 from sphshell_pin.dynamics import Result, Scene
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.dynamics.scene.scene import ContactPair
+from sphshell_pin.dynamics.scene.sides import ShellSide, SphereSide
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 from sphshell_pin.testing.conservation import scene_of
@@ -71,26 +70,25 @@ def contacts_of_scene(scene: Scene, q: ArrayLike, data: pin.Data | None = None) 
     findings = []
     for k, pair in enumerate(scene.pairs):
         mine = contacts.pair == k
-        if pair.sphere is not None and pair.other_sphere is not None:
+        if len(pair.spheres) == 2:
             finding = _of_two_spheres(model, data, pair, contacts.depth[mine])
             findings.append(Finding(finding.error, f"contact '{pair.name}': {finding.where}"))
-        if pair.shell is None or pair.sphere is None:
-            continue
-        if pair.shell.side != "both":
-            raise InvalidParameter("scene", pair.name, "must have a shell with side 'both'")
-        placement, center = _places(model, pair)(data)
-        points = np.array([placement.actInv(p) for p in contacts.point_world[mine]]).reshape(-1, 3)
-        query = _Query(pair.shell, center, pair.sphere.radius, points, contacts.depth[mine])
-        finding = query.compare(whole=pair.method == "facets")
-        findings.append(Finding(finding.error, f"contact '{pair.name}': {finding.where}"))
+        for on_sphere, on_shell in pair.sphere_on_shell:
+            if on_shell.shell.side != "both":
+                raise InvalidParameter("scene", pair.name, "must have a shell with side 'both'")
+            place, center = _places(model, on_sphere, on_shell)(data)
+            points = np.array([place.actInv(p) for p in contacts.point_world[mine]]).reshape(-1, 3)
+            depths = contacts.depth[mine]
+            query = _Query(on_shell.shell, center, on_sphere.radius, points, depths)
+            finding = query.compare(whole=on_shell.method == "facets")
+            findings.append(Finding(finding.error, f"contact '{pair.name}': {finding.where}"))
     return worst(findings, "the scene has no pair of a sphere and a shell or another one")
 
 
 def _of_two_spheres(model: pin.Model, data: pin.Data, pair: ContactPair, depths: Array) -> Finding:
     """Compare the depths (1,) or (0,) of two spheres to the distance of their centers."""
     centers, radii = [], []
-    for sphere in (pair.sphere, pair.other_sphere):
-        assert sphere is not None  # the caller has looked
+    for sphere in (one.sphere for one in pair.spheres):
         frame = data.oMf[find_frame(model, sphere.frame)]
         centers.append(frame.act(np.array(sphere.offset)))
         radii.append(sphere.radius)
@@ -113,17 +111,17 @@ def passage(result: Result) -> Finding:
     passed = [
         f"'{e.pair}' by its event at t = {e.t:.6g} s" for e in result.events if e.kind == "through"
     ]
-    for pair in scene.pairs:
-        if pair.shell is None or pair.sphere is None:
-            continue
-        corners, places = pair.shell.vertices[pair.shell.triangles], _places(model, pair)
+    of_shells = [(pair.name, *sides) for pair in scene.pairs for sides in pair.sphere_on_shell]
+    for name, on_sphere, on_shell in of_shells:
+        shell, places = on_shell.shell, _places(model, on_sphere, on_shell)
+        corners = shell.vertices[shell.triangles]
         before: Array | None = None
         for t, q in zip(result.t, result.q, strict=True):
             pin.framesForwardKinematics(model, data, q)
             _, center = places(data)
             if before is not None and len(hit := crossed(before, center, corners)):
-                element = int(pair.shell.triangle_element[hit[0]])
-                passed.append(f"'{pair.name}', element {element}, before t = {t:.6g} s")
+                element = int(shell.triangle_element[hit[0]])
+                passed.append(f"'{name}', element {element}, before t = {t:.6g} s")
             before = center
     return Finding(float(len(passed)), f"through the shell: {'; '.join(passed[:3]) or 'never'}")
 
@@ -144,16 +142,18 @@ def sphere_centers(corners: Array, radius: float, count: int, rng: np.random.Gen
     return np.asarray(points + away[:, None] * direction)
 
 
-def _places(model: pin.Model, pair: ContactPair) -> Callable[[pin.Data], tuple[pin.SE3, Array]]:
+def _places(
+    model: pin.Model, on_sphere: SphereSide, on_shell: ShellSide
+) -> Callable[[pin.Data], tuple[pin.SE3, Array]]:
     """Return a function of placed data: the pose of a pair's shell, and the sphere's center (3,).
 
     The pose is that in the world, the center is in the shell's frame.
     """
-    offset = np.zeros(3) if pair.sphere is None else np.array(pair.sphere.offset)
-    frame_i, frame_j = find_frame(model, pair.frame_i), find_frame(model, pair.frame_j)
+    offset = np.array(on_sphere.sphere.offset)
+    frame_i, frame_j = find_frame(model, on_sphere.frame), find_frame(model, on_shell.frame)
 
     def at(data: pin.Data) -> tuple[pin.SE3, Array]:
-        shell = data.oMf[frame_j] * pair.placement
+        shell = data.oMf[frame_j] * on_shell.placement
         return shell, np.asarray(shell.actInv(data.oMf[frame_i].act(offset)))
 
     return at

@@ -1,15 +1,15 @@
 """The numbers of a scene's contact pairs, one by one, and the scene with one of them changed."""
 
-from __future__ import annotations
-
-from dataclasses import replace
+import functools
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.named_numbers import with_value
 from sphshell_pin.base.parameters import parameters_of
-from sphshell_pin.dynamics import ContactPair, Scene
+from sphshell_pin.dynamics import Scene
+from sphshell_pin.dynamics.scene.pairs import ContactPair
 
 _AXES = {"offset": ("x", "y", "z"), "placement": ("vx", "vy", "vz", "wx", "wy", "wz")}
 
@@ -25,11 +25,9 @@ def names_of(scene: Scene) -> list[str]:
                 for field in parameters_of(whole)
                 if isinstance(getattr(whole, field), float)
             ]
-        for end in ("sphere", "other_sphere"):
-            if getattr(pair, end) is not None:
-                names += [f"{pair.name}.{end}.radius", f"{pair.name}.{end}.offset"]
-        if pair.shell is not None:
-            names.append(f"{pair.name}.placement")
+        for end, _ in zip(("sphere", "other_sphere"), pair.spheres, strict=False):
+            names += [f"{pair.name}.{end}.radius", f"{pair.name}.{end}.offset"]
+        names += [f"{pair.name}.placement" for _ in pair.shells]
     return names
 
 
@@ -62,14 +60,16 @@ def changed(scene: Scene, column: str, by: float) -> Scene:
     A placement is multiplied by pinocchio.exp6 of a twist, from the right.
     """
     pair, part, field = _found(scene, column)
-    if part == "placement":
+    path = pair.parts[part]
+    whole: Any = functools.reduce(getattr, path, pair)
+    if isinstance(whole, pin.SE3):
         twist = pin.Motion(by * np.eye(6)[_AXES[part].index(field)])
-        new = replace(pair, placement=pair.placement * pin.exp6(twist))
+        new = with_value(pair, path, whole * pin.exp6(twist))
     elif field in _AXES["offset"]:
-        x, y, z = np.asarray(getattr(pair, part).offset) + by * np.eye(3)["xyz".index(field)]
-        new = with_value(pair, (part, "offset"), (float(x), float(y), float(z)))
+        x, y, z = np.asarray(whole.offset) + by * np.eye(3)["xyz".index(field)]
+        new = with_value(pair, (*path, "offset"), (float(x), float(y), float(z)))
     else:
-        new = with_value(pair, (part, field), getattr(getattr(pair, part), field) + by)
+        new = with_value(pair, (*path, field), getattr(whole, field) + by)
     return scene.with_pairs(tuple(new if one is pair else one for one in scene.pairs))
 
 

@@ -1,7 +1,5 @@
 """Distances by trying every triangle: slow, obvious, and nothing of the compiled core."""
 
-from __future__ import annotations
-
 import numpy as np
 import trimesh
 from scipy.sparse import coo_array

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.dynamics.scene.pairs import shell_key
 from sphshell_pin.view.distance import draw_distance
 from sphshell_pin.view.nodes import (
     OnJoint,
@@ -28,7 +27,8 @@ from sphshell_pin.view.surface import draw_faces, draw_patches, draw_shell, grea
 if TYPE_CHECKING:
     from meshcat import Visualizer
 
-    from sphshell_pin.dynamics.scene.pairs import ContactPair, PlacedSphere
+    from sphshell_pin.dynamics.scene.pairs import ContactPair
+    from sphshell_pin.dynamics.scene.sides import ShellSide, SphereSide
 
 SPHERE_COLOR = 0x2F6FDE
 PLANE_COLOR = 0x7A8794
@@ -38,14 +38,14 @@ COLORINGS = ("distance", "faces", "patches")
 """Ways to color a shell; of several that are on the first is seen."""
 
 
-def drawn_key(pair: ContactPair) -> Hashable:
-    """Return a key: pairs with equal keys share the picture of their shell."""
-    return shell_key(pair), pair.method == "smooth"
+def drawn_key(side: ShellSide) -> Hashable:
+    """Return a key: shells with equal keys share a picture."""
+    return side.key, side.is_smooth
 
 
-def sphere_key(sphere: PlacedSphere) -> Hashable:
+def sphere_key(sphere: SphereSide) -> Hashable:
     """Return a key: spheres with equal keys share a picture."""
-    return sphere.joint, sphere.placement.homogeneous.tobytes(), sphere.radius
+    return sphere.joint, sphere.in_joint.homogeneous.tobytes(), sphere.radius
 
 
 def plane_key(pair: ContactPair) -> Hashable:
@@ -54,15 +54,14 @@ def plane_key(pair: ContactPair) -> Hashable:
 
 
 class DrawnShell(OnJoint):
-    """The shell of `pair`, drawn below `visualizer`; `index` numbers the shells of the scene."""
+    """The shell of `side`, drawn below `visualizer`; `index` numbers the shells of the scene."""
 
-    def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
-        shell = pair.shell
-        assert shell is not None
+    def __init__(self, visualizer: Visualizer, side: ShellSide, index: int) -> None:
+        shell = side.shell
         node = visualizer[f"{index}_{node_name(shell.name)}"]
-        super().__init__(node, pair.joint_j, pair.placement_j)
+        super().__init__(node, side.joint, side.in_joint)
         self.shell = shell
-        self._curved = pair.method == "smooth"
+        self._curved = side.is_smooth
         self._index = index
         self._colorings: dict[str, bool] = {}
         draw_shell(node, shell, index, curved=self._curved)
@@ -102,10 +101,9 @@ class DrawnShell(OnJoint):
 class DrawnSphere(OnJoint):
     """A sphere of the pair `name`, drawn below `visualizer`; `index` numbers those of the scene."""
 
-    def __init__(self, visualizer: Visualizer, name: str, drawn: PlacedSphere, index: int) -> None:
-        joint, placement, radius = drawn
-        node = visualizer[f"{index}_{node_name(name)}"]
-        super().__init__(node, joint, placement)
+    def __init__(self, visualizer: Visualizer, name: str, drawn: SphereSide, index: int) -> None:
+        radius, node = drawn.radius, visualizer[f"{index}_{node_name(name)}"]
+        super().__init__(node, drawn.joint, drawn.in_joint)
         set_object(
             node["ball"],
             sphere(radius, 48),
@@ -139,7 +137,7 @@ class DrawnPlane:
     """The plane of `pair`: a square of cells of half the shell's size, where the shell is."""
 
     def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
-        low, high = np.asarray(pair.shell.box) if pair.shell is not None else np.zeros((2, 3))
+        low, high = np.asarray(pair.shells[0].shell.box)
         self._cell = 0.5 * float(np.linalg.norm(high - low))
         self._plane = pair.joint_i, pair.placement_i
         self._shell = pair.joint_j, pair.placement_j

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics.scene.sides import PlaneSide
 from sphshell_pin.view.nodes import Command
 from sphshell_pin.view.robot import check_geometry_model
 
@@ -145,14 +146,14 @@ def choose_view(
     for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
         pin.forwardKinematics(model, data, configurations[row])
         around += [np.array(data.oMi[k].translation) for k in range(1, model.njoints)]
-        centers += [data.oMi[one.joint].act(one.placement.translation) for one in spheres]
+        centers += [data.oMi[one.joint].act(one.in_joint.translation) for one in spheres]
         if row == 0:
             for joint, placement, box in boxes:
                 around += list(_corners(data.oMi[joint] * placement, box))
             for pair in scene.pairs:
-                if pair.shell is not None:
-                    where = data.oMi[pair.joint_j] * pair.placement_j
-                    shells.append(_corners(where, np.asarray(pair.shell.box)))
+                for one in pair.shells:
+                    where = data.oMi[one.joint] * one.in_joint
+                    shells.append(_corners(where, np.asarray(one.shell.box)))
     action = np.array(centers or around or [np.zeros(3)])
     if points_world is not None and len(points_world):
         action = np.vstack((action, points_world)) if centers else points_world
@@ -176,7 +177,7 @@ def choose_view(
     if normals_world is not None and len(normals_world):
         mean = normals_world.mean(axis=0)
         # Normals on a plane lead into it; the eye stays on the side of the shells.
-        below = all(pair.plane is not None for pair in scene.pairs)
+        below = all(isinstance(pair.side_i, PlaneSide) for pair in scene.pairs)
         normal = (-mean if below else mean) / max(float(np.linalg.norm(mean)), 1e-9)
     return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
 

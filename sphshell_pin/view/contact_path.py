@@ -94,15 +94,15 @@ def contact_paths(result: Result, scene: Scene | None) -> list[ContactPath]:
         own = own.select(order[np.unique(own.row[order], return_index=True)[1]])
         pair = None if scene is None else scene.pairs[index]
         points, normals = own.point_world, own.normal_world
-        on_shell = pair is not None and pair.shell is not None
+        on_shell = pair is not None and bool(pair.shells)
         if scene is not None and pair is not None and on_shell:
             turn, origin = poses_along(result, scene, own.row, pair.joint_j, pair.placement_j)
             points = np.einsum("kij,ki->kj", turn, points - origin)
             normals = np.einsum("kij,ki->kj", turn, normals)
         jump = np.zeros(max(0, len(points) - 1), dtype=bool)
-        if pair is not None and pair.sphere is not None:
+        if pair is not None and pair.spheres:
             steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-            jump = steps > 0.5 * pair.sphere.radius
+            jump = steps > 0.5 * pair.spheres[0].radius
         breaks = np.flatnonzero((np.diff(own.row) > 1) | jump) + 1
         runs = tuple(np.split(np.arange(len(points)), breaks))
         paths.append(

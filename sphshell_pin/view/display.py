@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.dynamics.result.contact_patches import Patches
+from sphshell_pin.dynamics.scene.sides import PlaneSide
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, Contacts, pushing
 from sphshell_pin.view.bodies import (
@@ -215,7 +216,8 @@ class Display:
         """Return the parent node of trails: on the shell of a `pair`, or in the world."""
         if pair is None:
             return self.visualizer["trail"]
-        return self._shells[drawn_key(self.scene.pairs[pair])].node["trail"]
+        (side,) = self.scene.pairs[pair].shells
+        return self._shells[drawn_key(side)].node["trail"]
 
     def replace_scene(self, scene: Scene, visual_model: pin.GeometryModel | None) -> bool:
         """Take `scene`, whose model has the same joints, for the one shown; draw what differs.
@@ -292,7 +294,7 @@ class Display:
     def _draw_bodies(self) -> bool:
         """Draw the bodies of the scene where they differ; return whether shells are drawn anew."""
         pairs = self.scene.pairs
-        shells = ((drawn_key(pair), pair) for pair in pairs if pair.shell is not None)
+        shells = ((drawn_key(one), one) for pair in pairs for one in pair.shells)
         anew = self._draw("shells", DrawnShell, self._shells, shells)
         for part in PARTS:
             if anew and part in OF_SHELLS and part in self._hidden ^ HIDDEN_AT_FIRST:
@@ -301,7 +303,7 @@ class Display:
         spheres = ((sphere_key(one), pair.name, one) for pair in pairs for one in pair.spheres)
         if self._draw("spheres", DrawnSphere, self._spheres, spheres) and "spheres" in self._hidden:
             show(self.visualizer["spheres"], False)
-        planes = ((plane_key(pair), pair) for pair in pairs if pair.plane is not None)
+        planes = ((plane_key(pair), pair) for pair in pairs if isinstance(pair.side_i, PlaneSide))
         self._draw("planes", DrawnPlane, self._planes, planes)
         return anew
 
@@ -331,7 +333,7 @@ class Display:
         if visual_model is not None and len(visual_model.geometryObjects):
             return GeometryRobot(self.visualizer, self._model, visual_model)
         tips = [
-            (one.joint, one.placement.translation)
+            (one.joint, one.in_joint.translation)
             for pair in self.scene.pairs
             for one in pair.spheres
         ]

@@ -51,9 +51,7 @@ class FrameAxes:
         model = scene.model
         places = [(joint, pin.SE3.Identity()) for joint in range(model.njoints)]
         for pair in scene.pairs:
-            places += [(one.joint, one.placement) for one in pair.spheres]
-            if pair.shell is not None:
-                places.append((pair.joint_j, pair.placement_j))
+            places += [(one.joint, one.in_joint) for one in (*pair.spheres, *pair.shells)]
         length = (0.05 if len(places) <= FEW else 0.025) * size
         looks = [on_top(color) for color in AXIS_COLORS]
         self._drawn: dict[tuple[int, bytes], OnJoint] = {}
@@ -81,14 +79,13 @@ def floor_height(scene: Scene, data: pin.Data) -> float:
     The shells are where forward kinematics left the joints in `data`.
     """
     lowest = 0.0
-    for pair in scene.pairs:
-        if pair.shell is not None:
-            placement = data.oMi[pair.joint_j] * pair.placement_j
-            low, high = np.asarray(pair.shell.box)
-            down = placement.rotation[2]
-            reach = 0.5 * np.abs(down) @ (high - low)
-            height = placement.translation[2] + 0.5 * down @ (low + high) - reach
-            lowest = min(lowest, float(height))
+    for one in (one for pair in scene.pairs for one in pair.shells):
+        placement = data.oMi[one.joint] * one.in_joint
+        low, high = np.asarray(one.shell.box)
+        down = placement.rotation[2]
+        reach = 0.5 * np.abs(down) @ (high - low)
+        height = placement.translation[2] + 0.5 * down @ (low + high) - reach
+        lowest = min(lowest, float(height))
     return lowest
 
 

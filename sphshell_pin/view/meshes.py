@@ -5,8 +5,6 @@ Collada files everything else (materials, nodes, units) stays as it is, so that 
 loader draws what it would have drawn.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -71,7 +71,7 @@ def _focus(scene: Scene, contacts: ContactRows, frames: Array) -> Json | None:
     points, spread = np.empty((len(frames), 3)), 0.0
     for frame, q in enumerate(frames):
         pin.forwardKinematics(model, data, q)
-        centers = np.array([data.oMi[one.joint].act(one.placement.translation) for one, _ in parts])
+        centers = np.array([data.oMi[one.joint].act(one.in_joint.translation) for one, _ in parts])
         points[frame] = shares @ centers
         if contacts.row.size:
             # The root of the mean square: a sphere that hardly pressed does not count.

@@ -1,7 +1,5 @@
 """Models of MuJoCo for the tests of its adapter."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

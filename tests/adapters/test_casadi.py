@@ -1,7 +1,5 @@
 """Scenes in CasADi: values and Jacobians against the scene's own, and a program solved."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

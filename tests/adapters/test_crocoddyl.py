@@ -1,7 +1,5 @@
 """Scenes in Crocoddyl: derivatives against differences, steps against Simulation, refusals."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

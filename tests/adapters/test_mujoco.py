@@ -1,7 +1,5 @@
 """Contacts in MuJoCo's steps: against the scene's own forces and motions, energy and momentum."""
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np
@@ -26,10 +24,10 @@ RNG = np.random.default_rng(0)
 def test_a_panda_on_the_blade_feels_the_forces_of_its_scene():
     built = build("fingertip_on_blade")
     scene, pair = built.scene, built.scene.pairs[0]
-    model, data = model_of(mjcf_of(scene.model, pair.sphere))
+    model, data = model_of(mjcf_of(scene.model, pair.side_i.sphere))
     placed = {"placement": pair.placement_j, "law": pair.law, "friction": pair.friction}
     with pytest.warns(SetupWarning, match="timestep of 0.002 s is too long"):
-        contacts = attach(model, pair.shell, ["tip"], **placed)
+        contacts = attach(model, pair.side_j.shell, ["tip"], **placed)
     touched = 0
     with contacts:
         for _ in range(300):

@@ -1,7 +1,5 @@
 """Contacts in MuJoCo end with their model, act on no other, and say what goes wrong."""
 
-from __future__ import annotations
-
 import copy
 import gc
 import pickle

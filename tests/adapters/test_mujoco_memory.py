@@ -1,7 +1,5 @@
 """Friction's memory is a part of MuJoCo's state: copies, restored states and rollouts have it."""
 
-from __future__ import annotations
-
 import copy
 import sys
 

@@ -173,7 +173,7 @@ def test_no_faces_no_closed_forms():
     assert abs(curved.contacts(center, 0.02).depth[0] - 1e-3) > 1e-9
 
 
-def touch(shell: sp.Shell, center, radius: float) -> sp.ContactSet:
+def touch(shell: sp.Shell, center, radius: float) -> sp.results.ContactSet:
     found = shell.contacts(center, radius)
     assert len(found) == 1, found
     return found

@@ -210,7 +210,7 @@ def test_a_scene_that_is_changed_during_its_run_has_no_result() -> None:
     def controller(t, q, v, contacts):
         if t > 0.005 and len(scene.pairs) == 1:
             pair = scene.pairs[0]
-            scene.add_contact(pair.sphere, pair.shell, law=TWIN, name="later")
+            scene.add_contact(pair.side_i.sphere, pair.side_j.shell, law=TWIN, name="later")
         return [0.0]
 
     scene = models.on_plate(models.slider(), TWIN)

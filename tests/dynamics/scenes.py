@@ -230,7 +230,7 @@ def in_touch(seed: int, depth: float = 0.004, spin: float = 20.0) -> tuple[Array
     return np.concatenate([pin.SE3ToXYZQUAT(one), pin.SE3ToXYZQUAT(two)]), v
 
 
-def stuck() -> tuple[State, sp.SceneState]:
+def stuck() -> tuple[State, sp.results.SceneState]:
     """An arm whose bristles have been stretched by ten steps, far below the limit."""
     scene, q, v = on_plate(LAWS["undamped"], BRISTLE)
     v = 0.01 * v

@@ -220,7 +220,7 @@ def test_a_rounded_placement_passes() -> None:
     rounded = pin.SE3(np.round(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), 8), np.ones(3))
     pair = Scene(ball()).add_contact(Sphere(0.05, "ball"), plate(), placement=rounded, law=LAW)
     rounded.translation = np.zeros(3)
-    assert pair.placement.translation == pytest.approx(np.ones(3))
+    assert pair.side_j.placement.translation == pytest.approx(np.ones(3))
 
 
 def mimicking() -> pin.Model:

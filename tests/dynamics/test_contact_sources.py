@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin import CoulombFriction, RungeKutta4, Scene, SemiImplicitEuler, Simulation
+from sphshell_pin.dynamics.scene.sides import SourceSide, SphereSide
 from sphshell_pin.errors import FrameNotFound, SphshellError
 from tests.models import add_body, ball, empty, free_q, linear_law, on_plate
 
@@ -86,7 +87,7 @@ def test_source_beside_a_shell() -> None:
     one, two, sum_ = (s.external_forces(q, v)[1].vector for s in (shell, source, both))
     assert one == pytest.approx(two, abs=1e-10)
     assert sum_ == pytest.approx(one + two, abs=1e-10)
-    assert [p.kind for p in both.pairs] == ["sphere-shell", "source"]
+    assert [type(p.side_i) for p in both.pairs] == [SphereSide, SourceSide]
 
 
 def test_an_error_in_the_callable_comes_through() -> None:

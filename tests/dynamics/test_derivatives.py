@@ -289,7 +289,7 @@ def test_bristles_of_a_state() -> None:
     force, normal = resting.force_world[0], resting.normal_world[0]
     along = force - normal * (normal @ force)
     z = np.zeros(scene._binding.bristle_size)
-    z[:3] = -scene.pairs[0].placement.rotation.T @ along / BRISTLE.stiffness
+    z[:3] = -scene.pairs[0].side_j.placement.rotation.T @ along / BRISTLE.stiffness
 
     def rates(scene: sp.Scene, q: Array, v: Array, tau: Array) -> Array:
         return scene._binding.rates(q, v, z, tau)[:3]

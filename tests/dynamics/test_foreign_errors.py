@@ -30,7 +30,9 @@ def test_arguments_are_named(tmp_path) -> None:
     path = tmp_path / "run.mcap"
     for said, use in {
         "lower, upper = .* must be a range": lambda: sp.JointLimits("x", 1.0, LAW),
-        "scale = .* makes the shell too large": lambda: scene.pairs[0].shell.transformed(1e308),
+        "scale = .* makes the shell too large": lambda: scene.pairs[0].side_j.shell.transformed(
+            1e308
+        ),
         "name = .* must be a name": lambda: scene.replace_pair(NAMES, law=LAW),
         "kind = .* must be a name": lambda: result.plot(NAMES),
         "pair = .* must be a name": lambda: ShellTaxels(NAMES),

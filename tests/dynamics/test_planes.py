@@ -36,7 +36,7 @@ def touching(scene: sp.Scene, depth: float = 2e-4, seed: int = 0) -> tuple[np.nd
     """A state of `egg` with the egg `depth` deep in the plane."""
     rng = np.random.default_rng(seed)
     q = pin.neutral(scene.model)
-    plane = scene.pairs[0].plane.placement
+    plane = scene.pairs[0].side_i.plane.placement
     if scene.model.nq > 7:
         q = pin.integrate(scene.model, q, 0.3 * rng.normal(size=scene.model.nv))
         data = scene.model.createData()
@@ -118,7 +118,7 @@ def test_an_egg_falls_and_is_an_event_of_touch() -> None:
     q, v = touching(scene, -0.01)
     result = sp.Simulation(scene, sp.Adaptive(rtol=1e-8)).run(q, 0 * v, 0.1)
     first = next(event for event in result.events if event.kind == "touch")
-    plane = scene.pairs[0].plane.placement
+    plane = scene.pairs[0].side_i.plane.placement
     fall = 0.01 / plane.rotation[2, 2]
     assert first.t == pytest.approx(np.sqrt(2 * fall / 9.81), rel=1e-5)
 

@@ -273,7 +273,7 @@ def test_bodies_that_turn_and_are_met_off_their_centers(seed: int) -> None:
     scene, (q, v) = two_spheres(ELASTIC["linear"], friction), in_touch(seed)
     pair = scene.explain(q, v).pairs[0]
     places = [models.pin.XYZQUATToSE3(q[k : k + 7]) for k in (0, 7)]
-    spheres = (scene.pairs[0].sphere, scene.pairs[0].other_sphere)
+    spheres = (scene.pairs[0].side_i.sphere, scene.pairs[0].side_j.sphere)
     one, two = (at * np.array(sphere.offset) for at, sphere in zip(places, spheres, strict=True))
     normal = (one - two) / np.linalg.norm(one - two)
     point = two + spheres[1].radius * normal

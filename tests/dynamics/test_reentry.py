@@ -167,7 +167,7 @@ def test_many_contacts_of_a_source_cost_in_proportion() -> None:
 
 def test_the_core_refuses_arrays_of_other_lengths() -> None:
     scene = on_plate(ball(), LAW)
-    shell = scene.pairs[0].shell._binding
+    shell = scene.pairs[0].side_j.shell._binding
     with pytest.raises(InvalidParameter, match="radii"):
         shell.contacts_batch(np.zeros((5, 3)), np.ones(2), 0, 1)
     with pytest.raises(InvalidParameter, match=r"curve\(\)"):

@@ -2,7 +2,6 @@
 
 import pickle
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.named_numbers import with_value
 from sphshell_pin.errors import Interrupted, InvalidParameter, ResultError
 from tests import differences, meshes, models
 from tests.dynamics.scenes import FRICTIONS
@@ -170,10 +170,9 @@ def test_a_controller_of_the_package(control_dt: float | None, integrator: str) 
     q0 = models.ARM_Q.copy()
     pin.framesForwardKinematics(scene.model, data, q0)
     height = data.oMf[scene.model.getFrameId("ball")].translation[2]
-    place = replace(
-        scene.pairs[0], placement=pin.SE3(np.eye(3), np.array([0, 0, height - R - 1e-3]))
-    )
-    scene = scene.with_pairs((place,))
+    place = pin.SE3(np.eye(3), np.array([0, 0, height - R - 1e-3]))
+    pair = with_value(scene.pairs[0], ("side_j", "placement"), place)
+    scene = scene.with_pairs((pair,))
     control = sp.JointPD(80.0, 4.0, q_ref=q0 + [0.0, 0.1, 0.05])
     case = Case(
         scene,
@@ -202,7 +201,7 @@ def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     scene = sp.Scene(models.slider(9.81, 0.3))
     scene.add_contact(sp.Sphere(R, "ball"), models.plate(1.0), law=HUNT, name="ball")
 
-    def tau(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:
+    def tau(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
         return np.array([4.0 + 2.0 * v[0] if len(contacts.depth) else 0.5])
 
     case = Case(scene, [R + 0.004], [-0.3], 0.06, INTEGRATORS[integrator], controller=tau)

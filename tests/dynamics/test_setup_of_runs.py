@@ -12,7 +12,6 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.dynamics.scene.explain import explain_pairs
 from sphshell_pin.dynamics.scene.sphere_arguments import seam_warning
-from sphshell_pin.shell import Shell
 from tests import models
 
 LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
@@ -64,8 +63,7 @@ def test_the_effective_mass_is_that_of_the_jacobian_of_the_place() -> None:
     pin.forwardKinematics(model, data, q)
     center = (data.oMi[pair.joint_i] * pair.placement_i).translation
     local = pair.placement_j.actInv(center)
-    assert pair.shell is not None
-    point = pair.placement_j.act(pair.shell.closest_points([local]).points[0])
+    point = pair.placement_j.act(pair.side_j.shell.closest_points([local]).points[0])
     normal = (center - point) / np.linalg.norm(center - point)
     in_joint = data.oMi[pair.joint_i].actInv(point)
     row = np.empty(model.nv)
@@ -81,23 +79,6 @@ def test_the_effective_mass_is_that_of_the_jacobian_of_the_place() -> None:
     figures = next(one for one in explain_pairs(scene, q, v) if one.name == pair.name)
     expected = 1 / (row @ np.linalg.solve(mass, row))
     assert figures.effective_mass == pytest.approx(expected, rel=1e-7)
-
-
-def test_a_start_asks_each_shell_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
-    find = Shell.closest_points
-
-    def counted(self, points, *args, **kwargs):  # type: ignore[no-untyped-def]
-        asked.append(len(points))
-        return find(self, points, *args, **kwargs)
-
-    monkeypatch.setattr(Shell, "closest_points", counted)
-    scene = sp.Scene(models.ball())
-    spheres = [sp.Sphere(0.006, "ball", (0.01 * k, 0.0, 0.0)) for k in range(20)]
-    scene.add_contacts(spheres, models.plate(), law=LAW, method="facets")
-    q = models.free_q([0.0, 0.0, 0.006])
-    sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(q, duration=1e-5)
-    assert asked == [20]
 
 
 def test_what_is_kept_of_a_pair_goes_with_it() -> None:

@@ -38,7 +38,7 @@ def scene_of(spheres, *, together: bool, shell=None, model=None, **more) -> sp.S
 def test_together_they_are_the_same_pairs() -> None:
     spheres = pad()
     together, alone = (scene_of(spheres, together=one) for one in (True, False))
-    assert [pair.sphere for pair in together.pairs] == spheres
+    assert [pair.side_i.sphere for pair in together.pairs] == spheres
     assert {pair.group for pair in together.pairs} == {"shell"}
     assert [pair.name for pair in together.pairs[:2]] == ["shell/ball-0", "shell/ball-1"]
     q = models.free_q([0.01, 0.02, 0.005])
@@ -171,7 +171,7 @@ def test_names_tell_frames() -> None:
     assert [pair.name for pair in made] == ["hand/ball", "hand/other-0", "hand/other-1"]
     ball = scene.add_contacts(spheres[1:], sp.Sphere(0.1, "ball"), law=LAW)
     assert [pair.name for pair in ball] == ["ball/other-0", "ball/other-1"]
-    assert {pair.kind for pair in ball} == {"sphere-sphere"}
+    assert {len(pair.spheres) for pair in ball} == {2}
     assert scene.pairs == (*made, *ball)
 
 

@@ -50,7 +50,7 @@ def one_step(
 
 
 def assert_columns(
-    got: sp.StepDerivatives,
+    got: sp.results.StepDerivatives,
     end: tuple[Array, Array],
     moves: dict[str, differences.Move],
     after: Callable[..., tuple[Array, Array]],
@@ -86,7 +86,9 @@ def assert_columns(
     assert not wrong
 
 
-def assert_step(scene: sp.Scene, integrator: object, q: Array, v: Array) -> sp.StepDerivatives:
+def assert_step(
+    scene: sp.Scene, integrator: object, q: Array, v: Array
+) -> sp.results.StepDerivatives:
     """Compare the derivatives of a step with those of runs of one step."""
     model, nv = scene.model, scene.model.nv
     tau = np.random.default_rng(1).normal(size=nv)

@@ -156,7 +156,7 @@ DAEMONS = {
 lambda: sim.run(Q, None, 100.0, record_dt=1),
 lambda: sim.rollout([Q] * 9, None, 100.0, 2, record_dt=10),
 lambda: [sim.rollout([Q] * 99, None, 1e-5, 2) for _ in range(9999)],
-lambda: scene.pairs[0].shell.contacts_batch(np.random.rand(10**7, 3) - 0.5, 0.3),
+lambda: scene.pairs[0].side_j.shell.contacts_batch(np.random.rand(10**7, 3) - 0.5, 0.3),
 """,
     "with Python routines": """
 lambda: sim.run(Q, None, 100.0, still, record_dt=1),

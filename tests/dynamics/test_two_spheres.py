@@ -33,7 +33,7 @@ def test_depth_normal_and_point_have_closed_forms(turned: bool) -> None:
     q, _ = in_touch(1)
     data = scene.model.createData()
     pin.framesForwardKinematics(scene.model, data, q)
-    first, second = scene.pairs[0].sphere, scene.pairs[0].other_sphere
+    first, second = scene.pairs[0].side_i.sphere, scene.pairs[0].side_j.sphere
     centers = [
         data.oMf[scene.model.getFrameId(s.frame)] * np.array(s.offset) for s in (first, second)
     ]
@@ -243,8 +243,7 @@ def test_a_ball_agrees_with_its_fine_mesh(friction: str) -> None:
 def test_scene_says_what_it_models() -> None:
     scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
     pair = scene.pairs[0]
-    assert pair.kind == "sphere-sphere"
-    assert pair.shell is None
+    assert pair.shells == ()
     assert [one.radius for one in pair.spheres] == [R, OTHER]
     q, v = in_touch(5)
     explained = scene.explain(q, v)

@@ -9,8 +9,6 @@ crash, more than 10 s or 1 GB for one file, any other exception. Input k of seed
 same. The files that broke a reader are kept in the folder --out.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

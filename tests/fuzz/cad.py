@@ -5,8 +5,6 @@ reads them as an error of the package, within the limits of time and memory. It 
 else and keeps the file: the last one is always in the folder, should this process itself crash.
 """
 
-from __future__ import annotations
-
 import argparse
 import faulthandler
 import random

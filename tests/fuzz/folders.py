@@ -1,7 +1,5 @@
 """Inputs of several files, each folder packed into one zip archive; they are damaged apart."""
 
-from __future__ import annotations
-
 import functools
 import io
 import json

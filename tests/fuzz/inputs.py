@@ -1,7 +1,5 @@
 """Input k of seed s: always the same bytes, so that two numbers are enough to have it again."""
 
-from __future__ import annotations
-
 import functools
 import random
 import warnings

@@ -1,7 +1,5 @@
 """Damaged surfaces, written in every mesh format."""
 
-from __future__ import annotations
-
 import random
 import struct
 from collections.abc import Callable

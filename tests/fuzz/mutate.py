@@ -1,7 +1,5 @@
 """Ways to damage bytes, texts and trees of tables; each change is drawn from the `rng` alone."""
 
-from __future__ import annotations
-
 import copy
 import random
 import re

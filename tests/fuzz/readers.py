@@ -1,7 +1,5 @@
 """What is done with each damaged file: it is read, and a little is done with what came of it."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import tempfile

@@ -1,7 +1,5 @@
 """Things that are no regular files, in the place of one that a reader opens."""
 
-from __future__ import annotations
-
 import functools
 import os
 import random

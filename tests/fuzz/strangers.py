@@ -1,7 +1,5 @@
 """Expressions of xacro files from a grammar, and meshes that results hold."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import random

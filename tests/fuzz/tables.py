@@ -1,7 +1,5 @@
 """Damaged results, scenarios, sweep journals and robots."""
 
-from __future__ import annotations
-
 import functools
 import io
 import json
@@ -18,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sphshell_pin import robots
-from sphshell_pin.dynamics import Sensitivities
+from sphshell_pin.results import Sensitivities
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.sweep.job import Outcome

@@ -1,7 +1,5 @@
 """Damaged files are read or refused in a sentence; every file that ever broke a reader is here."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """A process that reads damaged files, and one that watches it for crashes and hangs."""
 
-from __future__ import annotations
-
 import faulthandler
 import importlib
 import multiprocessing

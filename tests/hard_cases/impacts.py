@@ -112,10 +112,10 @@ def _should_touch(impact: ImpactTest, scene: sp.Scene, at: Array, v: Array) -> b
     if not 0 < _until_touch(impact, at, v) < impact.duration:
         return False
     pair = scene.pairs[0]
-    if pair.method != "smooth" or pair.shell is None:
+    if not any(one.is_smooth for one in pair.shells):
         return True
     # Curved elements stand off the flat ones, and may do so on the far side of them.
-    points, triangles, _ = curved_mesh(pair.shell, 8)
+    points, triangles, _ = curved_mesh(pair.side_j.shell, 8)
     corners = np.array([pair.placement_j.act(p) for p in points])[triangles]
     speed = float(np.linalg.norm(v))
     return sweep(at, v / speed, 0.999 * impact.aim.radius, corners) < speed * impact.duration

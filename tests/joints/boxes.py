@@ -1,7 +1,5 @@
 """Boxes, trays, slots and tees whose fillets meet at corners [mm]."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -7,8 +7,6 @@ many components as the outline inside a circle, a problem in one dimension. Ever
 closed form.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Walks over one part: as a file, and back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

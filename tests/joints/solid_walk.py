@@ -1,7 +1,5 @@
 """Spheres over the edges, corners and seams of any solid, judged by its trimmed faces."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

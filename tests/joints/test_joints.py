@@ -1,7 +1,5 @@
 """Spheres over every joint of parts: none lost, none counted twice, depths and forces exact."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import ndimage, sparse

@@ -6,8 +6,6 @@ lines nor circles are approximations in files: from there Newton's method goes o
 which both faces are zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

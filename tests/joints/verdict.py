@@ -1,7 +1,5 @@
 """What is wrong with the contacts of spheres."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field
 

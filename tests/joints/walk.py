@@ -1,7 +1,5 @@
 """Spheres over and around joints, and what is wrong with the contacts that a shell finds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,7 +8,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
-from sphshell_pin.patches import ShellTaxels, TaxelGrid, TaxelImages
+from sphshell_pin.patches import ShellTaxels, TaxelGrid
+from sphshell_pin.results import TaxelImages
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider, total_force
 
 DOWN = (0.0, 0.0, -1.0)

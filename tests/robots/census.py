@@ -8,8 +8,6 @@ limit, first without options, then with those that the refusals name. `--pairs` 
 for a scenario, too. `--kept` are rows of earlier runs: files in it are not asked again.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import multiprocessing

@@ -1,7 +1,5 @@
 """The gears' meshes and the scenario's own routine describe the same teeth."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Masses that a file does not state, and files that need mending."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

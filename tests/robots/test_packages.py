@@ -1,7 +1,5 @@
 """Packages of a workspace, found from a file in it without ROS and without options."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

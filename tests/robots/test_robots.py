@@ -1,7 +1,5 @@
 """Robots by name: sound inertias, fingertips where they should be, clear faults."""
 
-from __future__ import annotations
-
 import builtins
 
 import numpy as np

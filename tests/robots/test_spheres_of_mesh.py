@@ -1,7 +1,5 @@
 """Spheres inside a mesh: nowhere beyond it, near it as measured apart, and nearer the more."""
 
-from __future__ import annotations
-
 import coal
 import numpy as np
 import pinocchio as pin

@@ -96,8 +96,8 @@ def pose_of(model, q, frame):
 def center_of(built, q):
     """Return the center (3,) [m] of the only pair's sphere at q (nq,), in its shell's frame."""
     (pair,) = built.scene.pairs
-    pose = pose_of(built.scene.model, q, pair.sphere.frame)
-    return pair.placement.actInv(pose.act(np.array(pair.sphere.offset)))
+    pose = pose_of(built.scene.model, q, pair.side_i.sphere.frame)
+    return pair.side_j.placement.actInv(pose.act(np.array(pair.side_i.sphere.offset)))
 
 
 def without_pictures():

@@ -47,7 +47,7 @@ def test_laws(law, kind, attribute, value, tmp_path):
 )
 def test_primitives_are_closed_shells_of_their_size(primitive, tmp_path):
     old = 'type = "box", size = [0.2, 0.2, 0.02]'
-    shell = build(write(tmp_path, DROP.replace(old, primitive))).scene.pairs[0].shell
+    shell = build(write(tmp_path, DROP.replace(old, primitive))).scene.pairs[0].side_j.shell
     assert shell.is_closed
     assert 0.1 <= shell.size <= 0.8
 
@@ -55,7 +55,7 @@ def test_primitives_are_closed_shells_of_their_size(primitive, tmp_path):
 def test_magnify_scales_the_shell(tmp_path):
     text = DROP.replace('name = "plate"', 'name = "plate"\nmagnify = 2.5', 1)
     small, large = build(write(tmp_path)), build(write(tmp_path, text, "large.toml"))
-    ratio = large.scene.pairs[0].shell.size / small.scene.pairs[0].shell.size
+    ratio = large.scene.pairs[0].side_j.shell.size / small.scene.pairs[0].side_j.shell.size
     assert ratio == pytest.approx(2.5)
 
 
@@ -150,7 +150,7 @@ def test_faults_name_the_key(fault, tmp_path):
 def test_methods(method, tmp_path):
     built = build(write(tmp_path, DROP.replace(LAW_LINE, f'method = "{method}"\n{LAW_LINE}')))
     (pair,) = built.scene.pairs
-    assert pair.method == method
+    assert pair.side_j.method == method
     assert len(built.scene.contacts(built.q0, built.v0)) == 0
     built.q0[2] = 0.0119
     contacts = built.scene.contacts(built.q0, built.v0)

@@ -29,7 +29,7 @@ def test_no_joint_stands_behind_the_surface(axes, tmp_path):
     data = model.createData()
     pin.framesForwardKinematics(model, data, built.q0)
     origins = np.array([one.translation for one in list(data.oMi)[1:]])
-    plane = pair.placement
+    plane = pair.side_j.placement
     tip = data.oMf[model.getFrameId(f"link_{len(axes) - 1}")].translation
     outward = plane.rotation[:, 2] * np.sign((tip - plane.translation) @ plane.rotation[:, 2])
     heights = (origins - plane.translation) @ outward

@@ -103,11 +103,11 @@ def test_a_rebuild_keeps_what_did_not_change(tmp_path):
     built = build(write(tmp_path))
     turned = rebuild(built, {STIFFNESS: "2e6", "contact.ball-plate.sphere.radius": "0.01"})
     assert turned.shells["plate"] is built.shells["plate"]
-    assert turned.scene.pairs[0].shell is built.scene.pairs[0].shell
+    assert turned.scene.pairs[0].side_j.shell is built.scene.pairs[0].side_j.shell
     assert turned.assembly is built.assembly
     assert turned.visual_model is built.visual_model
     assert turned.scene.pairs[0].law.stiffness == 2e6
-    assert turned.scene.pairs[0].sphere.radius == 0.01
+    assert turned.scene.pairs[0].side_i.sphere.radius == 0.01
     # What was there before is as it was.
     assert built.scene.pairs[0].law.stiffness == 1e6
     assert built.scenario.contact[0].law.stiffness == 1e6
@@ -119,7 +119,7 @@ def test_a_rebuild_makes_anew_what_changed(tmp_path):
     assert larger.shells["plate"].size == pytest.approx(2 * built.shells["plate"].size, rel=1e-12)
     moved = rebuild(built, {"shell.plate.placement.xyz.2": "-0.02"})
     assert moved.shells["plate"] is built.shells["plate"]
-    assert moved.scene.pairs[0].placement.translation[2] == -0.02
+    assert moved.scene.pairs[0].side_j.placement.translation[2] == -0.02
     started = rebuild(built, {"robot.start": "{ root_joint = [0, 0, 0.5, 0, 0, 0, 1] }"})
     assert started.q0[2] == 0.5
 
@@ -152,7 +152,7 @@ def test_the_users_functions_are_loaded_once(tmp_path):
     built = build("gear_contact")
     turned = rebuild(built, {"source.gears.law.stiffness": "1e9"})
     assert turned.controller is built.controller
-    assert turned.scene.pairs[0].find is built.scene.pairs[0].find
+    assert turned.scene.pairs[0].side_i.find is built.scene.pairs[0].side_i.find
     # A file is run once for all its functions, which share what it keeps.
     assert len({id(one.__globals__) for one in built.functions.values()}) == 1
     assert len(built.functions) > 1
@@ -212,7 +212,7 @@ def test_a_word_acts_on_the_run_under_way(tmp_path):
     live.advance(0.02)
     time, q = live.time, live.q.copy()
     live.change(METHOD, "facets")
-    assert live.scene.pairs[0].method == "facets"
+    assert live.scene.pairs[0].side_j.method == "facets"
     assert [one.value for one in live.parameters] == ["facets", 1e6]
     assert live.time == time
     np.testing.assert_array_equal(live.q, q)
@@ -225,4 +225,4 @@ def test_a_word_acts_on_the_run_under_way(tmp_path):
             live.change(key, word)
     with pytest.raises(ScenarioError):
         live.change(METHOD, 1.0)
-    assert live.scene.pairs[0].method == "facets"
+    assert live.scene.pairs[0].side_j.method == "facets"

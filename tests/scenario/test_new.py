@@ -97,7 +97,7 @@ def test_what_is_written_works(robot, surface, options, tmp_path):
     run_well(built)
     assert made.explanation.warnings == ()
     gaps = [pair.gap for pair in built.scene.explain(built.q0, built.v0).pairs]
-    radius = built.scene.pairs[0].sphere.radius
+    radius = built.scene.pairs[0].side_i.sphere.radius
     assert 0 < min(gaps) <= 2.01 * radius
 
 
@@ -150,9 +150,9 @@ def test_the_surface_stands_where_it_was_asked_for(place, tmp_path):
     tip = pose_of(built.scene.model, built.q0, "link_5").translation
     k = {"below": 2, "above": 2}.get(place, "xyz".find(place[-1]))
     sign = -1 if place in ("below", "-x", "-y") else 1
-    away = pair.placement.translation - tip
+    away = pair.side_j.placement.translation - tip
     expected = np.zeros(3)
-    expected[k] = sign * 1.02 * pair.sphere.radius
+    expected[k] = sign * 1.02 * pair.side_i.sphere.radius
     np.testing.assert_allclose(away, expected, atol=2e-6)
 
 
@@ -320,7 +320,7 @@ def test_the_command(tmp_path, monkeypatch):
     assert "sphshell-pin run ball_on_bowl.toml" in result.output
     assert "verdict" in result.output
     assert "Recommended dt" in result.output
-    assert build("ball_on_bowl.toml").scene.pairs[0].sphere.radius == pytest.approx(
+    assert build("ball_on_bowl.toml").scene.pairs[0].side_i.sphere.radius == pytest.approx(
         0.012, rel=1e-12
     )
     again = call(*command)

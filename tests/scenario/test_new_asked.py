@@ -33,8 +33,11 @@ def arm(tmp_path):
 def placed(built):
     """Return the vertices of the surface in the world, and its placement."""
     (pair,) = built.scene.pairs
-    corners = pair.shell.vertices @ pair.placement.rotation.T + pair.placement.translation
-    return corners, pair.placement
+    corners = (
+        pair.side_j.shell.vertices @ pair.side_j.placement.rotation.T
+        + pair.side_j.placement.translation
+    )
+    return corners, pair.side_j.placement
 
 
 def way(built):

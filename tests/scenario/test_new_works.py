@@ -43,14 +43,14 @@ def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, tmp_pa
     control = built.scenario.controller
     assert held(built, result) == pytest.approx(control.normal_force, rel=0.05)
     (pair,) = built.scene.pairs
-    assert pair.sphere.frame == "link_5"
-    for offset in (control.offset, pair.sphere.offset):
+    assert pair.side_i.sphere.frame == "link_5"
+    for offset in (control.offset, pair.side_i.sphere.offset):
         np.testing.assert_allclose(offset, [0, 0, 0.08])
     # The sphere's center ends over the path's last point.
     away = center_of(built, result.q[-1]) - control.path[-1]
-    normal = pair.shell.closest_points([control.path[-1]]).normals[0]
-    assert abs(away @ normal) == pytest.approx(pair.sphere.radius, rel=0.03)
-    assert np.linalg.norm(away - normal * (away @ normal)) < 0.25 * pair.sphere.radius
+    normal = pair.side_j.shell.closest_points([control.path[-1]]).normals[0]
+    assert abs(away @ normal) == pytest.approx(pair.side_i.sphere.radius, rel=0.03)
+    assert np.linalg.norm(away - normal * (away @ normal)) < 0.25 * pair.side_i.sphere.radius
 
 
 def test_no_link_is_in_a_closed_part(tmp_path):
@@ -76,7 +76,7 @@ def test_no_link_is_in_a_closed_part(tmp_path):
                 ring = one.geometry.radius * np.array([np.cos(turns), np.sin(turns), 0 * turns]).T
                 for z in np.linspace(-1, 1, 9) * one.geometry.halfLength:
                     rim = [pose.act(p + [0, 0, z]) for p in ring]
-                    local = np.array([pair.placement.actInv(p) for p in rim])
+                    local = np.array([pair.side_j.placement.actInv(p) for p in rim])
                     assert shell.closest_points(local).distances.min() > -1e-6
 
 
@@ -248,10 +248,10 @@ def test_a_sphere_is_put_where_it_is_asked_for(tmp_path):
     offset = (0.0, 0.01, 0.09)
     made = new_scenario(PROBE, frame="link_5", offset=offset, radius=0.008, out=tmp_path / "a.toml")
     (pair,) = made.built.scene.pairs
-    assert pair.sphere.radius == 0.008
-    np.testing.assert_allclose(pair.sphere.offset, offset)
+    assert pair.side_i.sphere.radius == 0.008
+    np.testing.assert_allclose(pair.side_i.sphere.offset, offset)
     made = new_scenario(PROBE, offset=offset, radius=0.008, out=tmp_path / "b.toml")
-    assert made.built.scene.pairs[0].sphere == pair.sphere
+    assert made.built.scene.pairs[0].side_i.sphere == pair.side_i.sphere
 
 
 def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():

@@ -80,8 +80,8 @@ def test_a_press_on_nothing_and_a_target_out_of_reach(scenario):
     assert nothing.startswith("nothing was touched, though the controller presses with")
     # Across the normal, as the force acts along it.
     (pair,) = built.scene.pairs
-    tip = pair.placement.actInv(pose_of(built.scene.model, built.q0, "tip").translation)
-    at = pair.shell.closest_points(built.scenario.controller.path[:1])
+    tip = pair.side_j.placement.actInv(pose_of(built.scene.model, built.q0, "tip").translation)
+    at = pair.side_j.shell.closest_points(built.scenario.controller.path[:1])
     away, normal = tip - at.points[0], at.normals[0]
     expected = np.linalg.norm(away - normal * (normal @ away))
     assert far.startswith("the controller's target was never in reach: frame 'tip'")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sphshell_pin.shell import CleanedSurface
+from sphshell_pin.results import CleanedSurface
 from tests import meshes
 
 DATA = Path(__file__).parents[1] / "data" / "corpus"

@@ -254,7 +254,7 @@ def test_a_scenario_takes_a_body_of_a_cad_file_without_a_unit(tmp_path):
     file = 'file = "two.step"\nchord_error = 1e-5\nbodies = ["pin"]'
     text = DROP.replace('primitive = { type = "box", size = [0.2, 0.2, 0.02] }', file)
     (pair,) = build(write(tmp_path, text)).scene.pairs
-    assert pair.shell.box[0, 0] == pytest.approx(0.095, abs=1e-5)
-    assert pair.shell.is_closed
+    assert pair.side_j.shell.box[0, 0] == pytest.approx(0.095, abs=1e-5)
+    assert pair.side_j.shell.is_closed
     with pytest.raises(Exception, match="no body 'nut'"):
         build(write(tmp_path, text.replace('"pin"', '"nut"')))

@@ -1,7 +1,5 @@
 """Surfaces of CAD files in the cache: the same, or read again."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from dataclasses import fields

@@ -3,8 +3,6 @@
 python -m tests.study.fitted_sets [--sets 1000] [--first 0]
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

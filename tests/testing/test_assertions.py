@@ -94,8 +94,10 @@ def test_a_wrong_wrench_is_told() -> None:
     right = two_free_bodies(LAW, FRICTION)
     wrong = Weaker(right.model)
     pair = right.pairs[0]
-    frame, placement = pair.frame_j, pair.placement
-    wrong.add_contact(pair.sphere, pair.shell, frame, placement, LAW, FRICTION, "facets")
+    frame, placement = pair.frame_j, pair.side_j.placement
+    wrong.add_contact(
+        pair.side_i.sphere, pair.side_j.shell, frame, placement, LAW, FRICTION, "facets"
+    )
     with pytest.raises(AssertionError, match=r"action and reaction differ.*leave a force of \("):
         testing.assert_wrenches_cancel(wrong, *two_free_state())
 

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 
+import sphshell_pin as sp
 from sphshell_pin.dynamics.result.run_stats import RunStats
-from sphshell_pin.dynamics.scene.pairs import PlacedSphere
+from sphshell_pin.dynamics.scene.sides import ShellSide, SphereSide
 from tests.shell.surfaces import CUBE, CUBE_QUADS
 
 CUBE_VERTICES, CUBE_ELEMENTS = CUBE - 0.5, np.array(CUBE_QUADS)
@@ -51,19 +52,19 @@ def contact_pair(model, frame, radius, shell, shell_frame="universe", placement=
     shell_body = model.frames[model.getFrameId(shell_frame)]
     placement = placement or pin.SE3.Identity()
     joint, center = sphere_frame.parentJoint, sphere_frame.placement
+    ends = shell_body.parentJoint, shell_body.placement, shell, placement, "facets"
     return SimpleNamespace(
-        spheres=() if radius is None else (PlacedSphere(joint, center, radius),),
+        spheres=()
+        if radius is None
+        else (SphereSide(frame, joint, center, sp.Sphere(radius, frame)),),
+        shells=() if shell is None else (ShellSide(shell_frame, *ends),),
+        side_i=None,
         name=name,
-        plane=None,
         frame_i=frame,
-        sphere=None if radius is None else SimpleNamespace(radius=radius),
-        shell=shell,
-        placement=placement,
         placement_i=center,
         placement_j=shell_body.placement * placement,
         joint_i=joint,
         joint_j=shell_body.parentJoint,
-        method="facets",
     )
 
 

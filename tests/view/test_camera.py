@@ -58,7 +58,7 @@ def test_the_whole_robot_is_in_the_picture_of_a_short_run():
     pin.forwardKinematics(scene.model, data, q)
     joints = np.array([data.oMi[k].translation for k in range(1, scene.model.njoints)])
     tip = scene.pairs[0].spheres[0]
-    point = data.oMi[tip.joint].act(tip.placement.translation)[None, :]
+    point = data.oMi[tip.joint].act(tip.in_joint.translation)[None, :]
     seen = (scene, q[None, :], point, np.array([[0.0, 0.0, 1.0]]))
     whole = choose_view(*seen, whole=True)
     assert np.abs(in_picture(whole, joints)).max() < 1.0

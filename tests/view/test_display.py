@@ -38,7 +38,7 @@ def turntable_scene():
 def test_shells_and_spheres_move_with_their_bodies():
     scene = turntable_scene()
     where, _ = filmed(scene, ball_configuration([1.0, 2.0, 3.0], 0.7))
-    expected = pin.SE3(pin.utils.rotate("z", 0.7), np.zeros(3)) * scene.pairs[0].placement
+    expected = pin.SE3(pin.utils.rotate("z", 0.7), np.zeros(3)) * scene.pairs[0].shells[0].placement
     np.testing.assert_allclose(where["shells/0_disc"], expected.homogeneous, atol=1e-12)
     np.testing.assert_allclose(where["spheres/0_tip"][:3, 3], [1.0, 2.0, 3.0])
 
@@ -182,7 +182,7 @@ def test_a_plane_is_drawn_where_its_shell_is_and_the_eye_above_it():
     assert abs((square[:3, 3] - [0.0, 0.0, -0.5]) @ up) < 1e-12  # on the plane
     # Below the shell, to a cell.
     away = square[:3, 3] - [30.0, 2.0, 3.0]
-    low, high = scene.pairs[0].shell.box
+    low, high = scene.pairs[0].shells[0].shell.box
     assert np.linalg.norm(away - (away @ up) * up) < np.linalg.norm(high - low)
     assert sum(path.endswith("/square") for path in drawn) == 1
     # Normals of contacts lead into the plane.

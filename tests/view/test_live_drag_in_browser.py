@@ -173,4 +173,4 @@ def test_a_word_is_a_menu_and_views_have_switches(opened, tmp_path):  # noqa: F8
     tab.wait("state.parameters['contact.ball-plate.method'] === 'facets'")
     tab.wait("!('distance' in state.show)")
     assert not tab.page.locator(visible).is_visible()
-    assert live.player.scene.pairs[0].method == "facets"
+    assert live.player.scene.pairs[0].side_j.method == "facets"

@@ -1,7 +1,5 @@
 """The system call that exchanges two names in one step, which Python does not have."""
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import os

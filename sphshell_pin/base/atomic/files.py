@@ -1,7 +1,5 @@
 """Several files of one folder, written together."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike

@@ -6,8 +6,6 @@ cannot be exchanged (see `AtomicFolder.replace`) the files are replaced one by o
 as in a redo log, lets the next process complete what a killed one began.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import json

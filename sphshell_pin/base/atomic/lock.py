@@ -1,7 +1,5 @@
 """Locks on files; the kernel releases them when their process ends, however it ends."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os

@@ -13,12 +13,14 @@
 #include "dynamics/scene/model_fault.hpp"
 #include "dynamics/derivatives/linearization.hpp"
 #include "dynamics/run/simulation.hpp"
+#include "dynamics/run/touches.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 namespace sphshell {
@@ -238,6 +240,18 @@ void bind_dynamics(nanobind::module_& m) {
         return nb::make_tuple(fault->name, fault->value, fault->must);
       },
       "model"_a);
+
+  m.def(
+      "touches_at",
+      [](nb::handle model, const std::vector<Pair>& pairs, const VectorX& q, const VectorX& v) {
+        check_state(model_of(model), q, v);
+        Multibody body(model_of(model));
+        std::vector<std::tuple<double, double, double, double>> out;
+        for (const Touch& one : touches_at(body, pairs, q, v))
+          out.emplace_back(one.gap, one.mass, one.slip_mass, one.speed);
+        return out;
+      },
+      "model"_a, "pairs"_a, "q"_a, "v"_a);
 
   // Evaluations at single states, from any thread.
   nb::class_<Evaluations> scene(m, "Scene", slots<Evaluations, visit_evaluations>());

@@ -78,9 +78,8 @@ void PythonSource::operator()(const SE3& pose_i, const SE3& pose_j,
   const std::vector<double> points = doubles_of(answer[0]), normals = doubles_of(answer[1]),
                             depths = doubles_of(answer[2]);
   for (std::size_t i = 0; i < depths.size(); ++i)
-    if (depths[i] > 0)
-      out.push_back({Vec3(&points[3 * i]), Vec3(&normals[3 * i]), depths[i], static_cast<int>(i),
-                     Feature::Face});
+    out.push_back({Vec3(&points[3 * i]), Vec3(&normals[3 * i]), depths[i], static_cast<int>(i),
+                   Feature::Face});
 }
 
 PythonController::~PythonController() {

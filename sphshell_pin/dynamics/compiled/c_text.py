@@ -1,7 +1,5 @@
 """C text of expressions of CasADi, block by block."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

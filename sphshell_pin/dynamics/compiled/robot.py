@@ -1,7 +1,5 @@
 """A robot compiled once: generated, compiled, kept in the cache, and checked against Pinocchio."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os

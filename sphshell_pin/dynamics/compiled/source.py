@@ -1,7 +1,5 @@
 """The C source of a robot: forward dynamics and kinematics with the constants of its model."""
 
-from __future__ import annotations
-
 import pinocchio as pin
 
 from sphshell_pin.dynamics.compiled.c_text import Storage, functions

@@ -1,7 +1,5 @@
 """What a user's own controller must take."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 

@@ -191,9 +191,9 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         if self.shell_frame is not None or self.placement is not None:
             return self.shell_frame or "universe", placement
         places: list[tuple[str, pin.SE3]] = []
-        for pair in scene.pairs if self.shell is not None else ():
-            place = pair.frame_j, pair.placement
-            if pair.shell is self.shell and place not in places:
+        for one in (one for pair in scene.pairs for one in pair.shells):
+            place = one.frame, one.placement
+            if one.shell is self.shell and place not in places:
                 places.append(place)
         if len(places) > 1:
             frames = ", ".join(f"'{frame}'" for frame, _ in places)

@@ -1,7 +1,5 @@
 """The patches in which bodies touch, as runs record them where they are asked to."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Any
 

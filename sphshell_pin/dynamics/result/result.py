@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack, get_args
@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_finite, read_only
-from sphshell_pin.base.offered import offered
 from sphshell_pin.base.summary import Detail, Fact, Summarized
 from sphshell_pin.dynamics.result import result_columns
 from sphshell_pin.dynamics.result.contact_patches import PATCH, Patches
@@ -128,11 +127,9 @@ class Result(Summarized):
         sensors: SensorSet,
     ) -> Result:
         """Build from the rows that the core has recorded."""
-        row = whole["contact_row"].astype(np.int64)
-        log = {**columns(whole["contacts"]), "t": whole["t"][row], "row": row}
-        energy = {
-            f.name: read_only(whole["energy"][:, i]) for i, f in enumerate(fields(EnergyAudit))
-        }
+        row = read_only(whole["contact_row"].astype(np.int64))
+        log = {**columns(whole["contacts"]), "t": read_only(whole["t"][row]), "row": row}
+        energies = read_only(whole["energy"]).T
         owners, patches = _owners(pairs, scene), whole.get("patches")
         events = tuple(
             Event(float(t), owners[EVENT_KINDS[kind]][number], EVENT_KINDS[kind])
@@ -145,9 +142,9 @@ class Result(Summarized):
             q=read_only(whole["q"]),
             v=read_only(whole["v"]),
             pairs=pairs,
-            contacts=ContactLog(**{k: read_only(c) for k, c in log.items()}),
+            contacts=ContactLog(**log),
             events=events,
-            energy=EnergyAudit(**energy),
+            energy=EnergyAudit(*energies),
             stats=stats,
             scene=scene,
             sensors=sensors.logs(whole),
@@ -248,10 +245,9 @@ class Result(Summarized):
         Raises ResultError without a scene, for a time before 1970 and where the file cannot be
         written, MissingExtra without mcap.
         """
-        written: Path = offered("sphshell_pin.export.mcap:write_mcap")(
-            path, self, scene, start=start
-        )
-        return written
+        from sphshell_pin.export.mcap import write_mcap
+
+        return write_mcap(path, self, scene, start=start)
 
     def plot(self, kind: str = "overview", scene: Scene | None = None) -> Figure:
         """Return a figure, which a notebook shows.
@@ -265,13 +261,15 @@ class Result(Summarized):
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
         there is no scene for the map or it cannot be built again.
         """
-        figure: Figure = offered("sphshell_pin.plot:plot_result")(self, kind, scene)
-        return figure
+        from sphshell_pin.plot import plot_result
+
+        return plot_result(self, kind, scene)
 
     def save_figures(self, folder: str | PathLike[str], scene: Scene | None = None) -> list[Path]:
         """Write the figures as .png files into `folder`; see `sphshell_pin.plot.save_figures`."""
-        paths: list[Path] = offered("sphshell_pin.plot:save_figures")(self, folder, scene=scene)
-        return paths
+        from sphshell_pin.plot import save_figures
+
+        return save_figures(self, folder, scene=scene)
 
     def view(
         self,
@@ -291,10 +289,9 @@ class Result(Summarized):
 
         Raises ResultError without a scene, MissingExtra without meshcat.
         """
-        recording: RecordingView = offered("sphshell_pin.view.recording:view_result")(
-            self, scene, visual_model, speed=speed, height=height, title=title
-        )
-        return recording
+        from sphshell_pin.view.recording import view_result
+
+        return view_result(self, scene, visual_model, speed=speed, height=height, title=title)
 
     def render(
         self,
@@ -312,10 +309,9 @@ class Result(Summarized):
         Raises what `render_film` does: MissingExtra without playwright, ResultError without
         Chromium.
         """
-        film: Path = offered("sphshell_pin.view.film:render_film")(
-            path, self, scene, visual_model, **options
-        )
-        return film
+        from sphshell_pin.view.film import render_film
+
+        return render_film(path, self, scene, visual_model, **options)
 
 
 def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:

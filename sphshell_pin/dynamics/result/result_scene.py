@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.offered import offered
 from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
@@ -23,7 +22,9 @@ def find_scene(result: Result, scene: Scene | None = None) -> Scene | None:
     """
     scene = result.scene if scene is None else scene
     if scene is None and result.origin is not None:
-        scene = offered("sphshell_pin.scenario.running.replay:Replay")(result).scene
+        from sphshell_pin.scenario.running.replay import Replay
+
+        scene = Replay(result).scene
     if scene is not None and not isinstance(getattr(scene, "pairs", None), tuple):
         raise InvalidParameter("scene", scene, "must be a Scene")
     return scene

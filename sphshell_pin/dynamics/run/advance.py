@@ -29,13 +29,7 @@ from sphshell_pin.dynamics.result.run_state import RunState
 from sphshell_pin.dynamics.result.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.scene import explain
-from sphshell_pin.dynamics.scene.explain import (
-    DEFAULT_SPEED,
-    coarseness,
-    explain_pairs,
-    has_state,
-    weakness,
-)
+from sphshell_pin.dynamics.scene.explain import DEFAULT_SPEED, coarseness, weakness
 from sphshell_pin.dynamics.scene.joint_components import moving_joints
 from sphshell_pin.dynamics.scene.models import find_joint
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -220,7 +214,7 @@ def core_pairs(
 
     `warn` as of `start_run`; `limited_dt` [s] is that of the run's integrator.
     """
-    figures = explain_pairs(scene, q0, v0) if scene.pairs and (warn or has_state(scene)) else ()
+    cores, figures = explain.core_pairs(scene, q0, v0, explained=warn)
     for pair, figure in zip(scene.pairs, figures, strict=False) if warn else ():
         weak = weakness(pair, figure)
         # A sphere at rest in touch has no speed to judge by.
@@ -229,7 +223,7 @@ def core_pairs(
     coarse = coarseness(scene, figures, limited_dt) if warn else None
     if coarse is not None:
         warnings.warn(coarse, SetupWarning, stacklevel=4)
-    return explain.core_pairs(scene, figures)
+    return cores
 
 
 def deep_start(scene: Scene, pair: int, depth: float) -> DeepStart:

@@ -1,7 +1,5 @@
 """Which method moves the state, and what decides how far it moves at a time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from sphshell_pin.base.parameters import Component, parameter, same_parameter

@@ -1,7 +1,5 @@
 """What many runs of one scene at once are made of: starts, controllers, and busy threads."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 

@@ -254,10 +254,11 @@ def _alike(before: Scene, after: Scene) -> bool:
 
 def _same_place(a: ContactPair, b: ContactPair) -> bool:
     return (
-        (a.joint_i, a.joint_j, a.method, a.name) == (b.joint_i, b.joint_j, b.method, b.name)
-        and a.shell is b.shell
-        and a.find is b.find
-        and a.kind == b.kind
+        (a.joint_i, a.joint_j, a.name) == (b.joint_i, b.joint_j, b.name)
+        and [(id(one.shell), one.method) for one in a.shells]
+        == [(id(one.shell), one.method) for one in b.shells]
+        and getattr(a.side_i, "find", None) is getattr(b.side_i, "find", None)
+        and (type(a.side_i), type(a.side_j)) == (type(b.side_i), type(b.side_j))
         and type(a.friction) is type(b.friction)
         and (a.friction and a.friction.state_size) == (b.friction and b.friction.state_size)
         and bool(a.placement_i == b.placement_i)

@@ -1,7 +1,5 @@
 """Runs a scene, once or many times."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace

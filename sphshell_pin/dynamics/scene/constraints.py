@@ -1,7 +1,5 @@
 """Contacts as constraints of Pinocchio's own solvers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +9,7 @@ from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
+from sphshell_pin.dynamics.scene.sides import PlaneSide
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,7 +47,7 @@ def constraints_of(
         # The point is on the shell, or on the plane, which has the part of the sphere.
         on_shell = pin.SE3(_frame(normal), point)
         on_sphere = pin.SE3(on_shell.rotation, point - depth * normal)
-        if pair.plane is not None:
+        if isinstance(pair.side_i, PlaneSide):
             on_shell, on_sphere = pin.SE3(on_shell.rotation, point + depth * normal), on_shell
         ends = (pair.joint_j, on_shell), (pair.joint_i, on_sphere)
         placed = [one for joint, at in ends for one in (joint, data.oMi[joint].actInv(at))]

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 # Values of Parameter in C++.
 _FIELD, _RADIUS, _BALL, _OFFSET, _PLACEMENT = range(5)
 _PLACES = {
-    ("placement",): _PLACEMENT,
-    ("sphere", "offset"): _OFFSET,
+    ("side_j", "placement"): _PLACEMENT,
+    ("side_i", "sphere", "offset"): _OFFSET,
     # The ball's center is the origin of what stands for the shell's frame.
-    ("other_sphere", "offset"): _PLACEMENT,
+    ("side_j", "sphere", "offset"): _PLACEMENT,
 }
 # Steps of central differences, and of one-sided ones at a bound, relative to the number; a law is a
 # smooth function of its numbers, at a contact that is held.
@@ -124,18 +124,22 @@ def core_parameters(
     how fast an impact is; None where they do not.
     """
     numbers = every_column(names_of_pairs(scene.pairs))
-    return [_core_parameter(scene, *numbers[column], start) for column in columns]
+    return [_core_parameter(scene, column, *numbers[column], start) for column in columns]
 
 
 def _core_parameter(
-    scene: Scene, number: NamedNumber, place: int, start: tuple[Array, Array] | None
+    scene: Scene,
+    column: str,
+    number: NamedNumber,
+    place: int,
+    start: tuple[Array, Array] | None,
 ) -> _core.Parameter:
     if number.path in _PLACES:
         return _core.Parameter(number.at, _PLACES[number.path], place)
     pair = scene.pairs[number.at]
     value = functools.reduce(getattr, number.path, pair)
     assert isinstance(value, float)
-    kind = {"sphere": _RADIUS, "other_sphere": _BALL}.get(number.path[0], _FIELD)
+    kind = {"side_i": _RADIUS, "side_j": _BALL}.get(number.path[0], _FIELD)
 
     def changed(value: float) -> _core.Pair | None:
         try:
@@ -156,7 +160,7 @@ def _core_parameter(
             less, more = changed(value - 2 * step), here
     if less is None or more is None:
         must = "cannot be differentiated: neither a larger nor a smaller value is allowed"
-        raise InvalidParameter(".".join((pair.name, *number.path)), value, must)
+        raise InvalidParameter(column, value, must)
     return _core.Parameter(number.at, kind, 0, less, more, step, abs(value) or 1.0)
 
 

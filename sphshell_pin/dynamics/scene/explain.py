@@ -19,7 +19,6 @@ from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
 from sphshell_pin.dynamics.scene.sphere_arguments import corner_warning, seam_warning
-from sphshell_pin.dynamics.scene.touches import Touch, touches_at
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair
@@ -212,24 +211,29 @@ def _names(names: list[str]) -> str:
     return shown if len(names) <= 4 else f"{shown}, ... ({len(names)} joints)"
 
 
-def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:
-    """Work out the explanation of each pair of `scene` at q (nq,), v (nv,)."""
+def explain_pairs(
+    scene: Scene, q: Array, v: Array, cores: list[_core.Pair] | None = None
+) -> tuple[PairExplanation, ...]:
+    """Work out the explanation of each pair at q (nq,), v (nv,); `cores`: its C++ pairs."""
     pairs = scene.pairs
     if not pairs:
         return ()
     model = scene.model
-    gravity = float(np.linalg.norm(model.gravity.linear))
-    touches = touches_at(model, pairs, q, v)
+    gravity = math.hypot(*model.gravity.linear)
+    touches = _core.touches_at(model, cores or [pair._bind() for pair in pairs], q, v)
     return tuple(
-        _explain_pair(pair, touch, gravity) for pair, touch in zip(pairs, touches, strict=True)
+        _explain_pair(pair, gravity, *touch) for pair, touch in zip(pairs, touches, strict=True)
     )
 
 
 def _with_curvature(pair: ContactPair, figures: PairExplanation) -> PairExplanation:
     """Say how far the curved elements of a pair, if it has any, stand off the flat ones."""
-    if pair.shell is None or pair.method != "smooth":
-        return figures
-    said = [f"{label}: {text}" for label, text in pair.shell.curvature_report().rows()]
+    said = [
+        f"{label}: {text}"
+        for one in pair.shells
+        if one.is_smooth
+        for label, text in one.shell.curvature_report().rows()
+    ]
     return replace(figures, modelled=(*figures.modelled, *said))
 
 
@@ -246,17 +250,30 @@ def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
     return min(0.02 * shortest, LONGEST_RELAXATION)
 
 
-def core_pairs(scene: Scene, figures: tuple[PairExplanation, ...]) -> list[_core.Pair]:
-    """Build the C++ pairs of `scene`, with the time in which their bristles relax."""
+def core_pairs(
+    scene: Scene, q: Array, v: Array, *, explained: bool = False
+) -> tuple[list[_core.Pair], tuple[PairExplanation, ...]]:
+    """Build the C++ pairs of `scene` for a motion from q (nq,), v (nv,), with the explanation.
+
+    That is left out, (), where neither bristles need it, which relax by it, nor it is asked for.
+    """
     cores = [pair._bind() for pair in scene.pairs]
-    for pair, core, figure in zip(scene.pairs, cores, figures, strict=False):
-        core.relaxation = relaxation_time(pair, figure)
-    return cores
+    if not explained and not has_state(scene):
+        return cores, ()
+    figures = explain_pairs(scene, q, v, cores)
+    for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
+        if _has_bristles(pair):
+            core.relaxation = relaxation_time(pair, figure)
+    return cores, figures
 
 
 def has_state(scene: Scene) -> bool:
     """Whether a pair has bristles: only they need to know how fast an impact is."""
-    return any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
+    return any(map(_has_bristles, scene.pairs))
+
+
+def _has_bristles(pair: ContactPair) -> bool:
+    return pair.friction is not None and pair.friction.has_state
 
 
 def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
@@ -269,12 +286,13 @@ def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
     )
 
 
-def _explain_pair(pair: ContactPair, touch: Touch | None, gravity: float) -> PairExplanation:
-    gap = mass = slip_mass = speed = math.nan
-    if touch is not None:
-        gap, mass, slip_mass, closing = touch
-        fall = math.sqrt(2 * gravity * max(gap, 0.0))
-        speed = max(closing, fall) or DEFAULT_SPEED
+def _explain_pair(
+    pair: ContactPair, gravity: float, gap: float, mass: float, slip_mass: float, closing: float
+) -> PairExplanation:
+    # Of what the core finds where a pair touches, or would: nan where there is nothing.
+    speed = closing
+    if math.isfinite(gap):
+        speed = max(closing, math.sqrt(2 * gravity * max(gap, 0.0))) or DEFAULT_SPEED
     law = pair.plane_law
     weight = mass * gravity
     load = depth = contact_time = resting_depth = limit = math.nan
@@ -313,8 +331,8 @@ def _disc(pair: ContactPair, depth: float) -> float:
 def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:
     out: list[str] = []
     where = f"contact '{pair.name}'"
-    radius, shell = pair.least_radius, pair.shell
-    if shell is not None:
+    radius = pair.least_radius
+    for shell in (one.shell for one in pair.shells):
         sentence = unit_warning(scene.model, radius, shell.size) if pair.spheres else None
         out += [f"{where}: {sentence}"] if sentence else []
         out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
@@ -336,17 +354,18 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
         out.append(f"{where}: starts at depth {-figures.gap * 1e3:.4g} mm, deep inside")
     if not math.isfinite(figures.effective_mass):
         out.append(f"{where}: neither body can move along the normal at this q")
-    if shell is not None and shell.side != "both" and not shell.is_closed:
-        out.append(
-            f"{where}: shell '{shell.name}' is open and one-sided: a sphere that goes round its "
-            "rim is thrown out on the other side and gains energy"
-        )
+    out += [
+        f"{where}: shell '{one.shell.name}' is open and one-sided: a sphere that goes round its "
+        "rim is thrown out on the other side and gains energy"
+        for one in pair.shells
+        if one.shell.side != "both" and not one.shell.is_closed
+    ]
     if pair.friction is not None and (creep := pair.friction.creep_speed) > radius:
         out.append(
             f"{where}: under half of what friction can hold, the sphere creeps at {creep:.2g} m/s, "
             "more than its radius per second: a smaller v_static, or BristleFriction, which sticks"
         )
-    if pair.method == "elements":
+    if any(one.method == "elements" for one in pair.shells):
         out.append(f"{where}: method 'elements' counts a place of touch once per touched element")
     return out
 

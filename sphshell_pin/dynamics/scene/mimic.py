@@ -4,8 +4,6 @@ A Pinocchio model with JointModelMimic has nq, nv, limits and torques of the rem
 its joints and frames are those of the model in which every joint moves freely, in the same order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Questions to a Pinocchio model: frames by name, joints held, joints that no run can move."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Methods of objects with one state: for one user at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from typing import Concatenate, ParamSpec, Protocol, TypeVar

@@ -1,11 +1,8 @@
 """Two bodies that may touch, as constant descriptions."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -19,67 +16,49 @@ from sphshell_pin.contact import (
     Method,
     MindlinFriction,
     NormalLaw,
-    Plane,
-    Sphere,
 )
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
-from sphshell_pin.dynamics.scene.sources import Find, checked_source
+from sphshell_pin.dynamics.scene.sides import (
+    PlaneSide,
+    ShellSide,
+    Side,
+    SourceSide,
+    SphereSide,
+)
+from sphshell_pin.dynamics.scene.sources import checked_source
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.shell import Shell
-
-
-class PlacedSphere(NamedTuple):
-    """A sphere of `radius` [m] whose center is the origin of `placement` in a joint."""
-
-    joint: int
-    placement: pin.SE3
-    radius: float
 
 
 @dataclass(frozen=True, repr=False)
 class ContactPair(Summarized):
-    """One pair of bodies that may touch; body i carries the sphere, body j the shell.
+    """Two bodies that may touch: `side_i` and `side_j`, with their law and friction.
 
-    `frame_i`, `frame_j` name their frames, `joint_i`, `joint_j` the joints, `pose_i`, `pose_j` the
-    frames' placements in the joints. The shell is at `placement` in frame_j; a pair of two spheres
-    has `other_sphere`, on body j, instead of it, a pair of a plane and a shell has `plane`, on body
-    i, instead of `sphere`, and a pair of a contact source has `find` instead of `sphere` and
-    `shell`. `group` names the entry of which there are several pairs.
+    Side i is a SphereSide beside a ShellSide or another SphereSide, a PlaneSide beside a ShellSide,
+    or the SourceSide of a contact source. `group` names the entry of which there are several pairs.
     """
 
     name: str
-    frame_i: str
-    frame_j: str
-    joint_i: int
-    joint_j: int
-    pose_i: pin.SE3
-    pose_j: pin.SE3
-    placement: pin.SE3
+    side_i: Side
+    side_j: Side
     law: NormalLaw
     friction: Friction | None
-    method: str = "facets"
-    sphere: Sphere | None = None
-    shell: Shell | None = None
-    find: Find | None = None
-    other_sphere: Sphere | None = None
     group: str = ""
-    plane: Plane | None = None
 
     def __post_init__(self) -> None:
-        """Check law, friction and method, and what needs a sphere or a shell where there is none.
+        """Check law and friction, and what needs a sphere where there is none.
 
-        Raises InvalidParameter, NameNotFound for a method.
+        Raises InvalidParameter.
         """
-        check_law(self.law, "" if self.find is None else "at the points of a contact source")
+        is_source = isinstance(self.side_i, SourceSide)
+        check_law(self.law, "at the points of a contact source" if is_source else "")
         check_friction(self.friction)
-        Method.from_name(self.method)
-        if self.plane is not None:
+        if isinstance(self.side_i, PlaneSide):
             self._check_plane()
         if isinstance(self.friction, FunctionFriction) and isinstance(self.law, FoundationLaw):
             must = "is for contacts at a point: beside a FoundationLaw take a CoulombFriction"
             raise InvalidParameter("friction", self.friction.kind, must)
-        if self.find is not None and isinstance(self.friction, MindlinFriction):
+        if is_source and isinstance(self.friction, MindlinFriction):
             must = "needs a sphere, and a contact source has none: take a BristleFriction"
             raise InvalidParameter("friction", self.friction.kind, must)
 
@@ -94,6 +73,62 @@ class ContactPair(Summarized):
             for label, text in zip(labels, self.shown[1:], strict=True)
         ]
 
+    @property
+    def frame_i(self) -> str:
+        """The frame of body i."""
+        return self.side_i.frame
+
+    @property
+    def frame_j(self) -> str:
+        """The frame of body j."""
+        return self.side_j.frame
+
+    @property
+    def joint_i(self) -> int:
+        """The joint that carries body i."""
+        return self.side_i.joint
+
+    @property
+    def joint_j(self) -> int:
+        """The joint that carries body j."""
+        return self.side_j.joint
+
+    @property
+    def placement_i(self) -> pin.SE3:
+        """The sphere's center, or the plane, in joint_i; of a source, frame_i."""
+        return self.side_i.in_joint
+
+    @property
+    def placement_j(self) -> pin.SE3:
+        """The shell, or the other sphere's center, in joint_j; of a source, frame_j."""
+        return self.side_j.in_joint
+
+    @cached_property
+    def spheres(self) -> tuple[SphereSide, ...]:
+        """The spheres of this pair: one, two, or none."""
+        return tuple(one for one in (self.side_i, self.side_j) if isinstance(one, SphereSide))
+
+    @cached_property
+    def shells(self) -> tuple[ShellSide, ...]:
+        """The shells of this pair: one or none."""
+        return (self.side_j,) if isinstance(self.side_j, ShellSide) else ()
+
+    @property
+    def sphere_on_shell(self) -> tuple[tuple[SphereSide, ShellSide], ...]:
+        """Both sides of a pair of a sphere and a shell; nothing of another."""
+        return tuple(zip(self.spheres, self.shells, strict=False))
+
+    @property
+    def parts(self) -> dict[str, tuple[str, ...]]:
+        """The fields that lead to what can be changed, by the names of files and derivatives."""
+        found: dict[str, tuple[str, ...]] = {"law": ("law",), "friction": ("friction",)}
+        for name, end in (("sphere", "side_i"), ("other_sphere", "side_j")):
+            if isinstance(getattr(self, end), SphereSide):
+                found[name] = end, "sphere"
+        if self.shells:
+            found["placement"] = "side_j", "placement"
+        return found
+
     @cached_property
     def plane_law(self) -> NormalLaw:
         """The law, and of one that follows the curvature of the shell that of a plane shell.
@@ -102,48 +137,16 @@ class ContactPair(Summarized):
         """
         if not self.law.needs_shape:
             return self.law
-        if self.plane and self.shell and isinstance(self.law, FoundationLaw):
-            sides = np.sort(np.ptp(self.shell.vertices, axis=0))
+        if isinstance(self.side_i, PlaneSide) and isinstance(self.law, FoundationLaw):
+            (on_shell,) = self.shells
+            sides = np.sort(np.ptp(on_shell.shell.vertices, axis=0))
             return self.law.on_face(float(sides[1] * sides[2]))
         return self.law.on_plane(1 / sum(1 / one.radius for one in self.spheres))
-
-    @property
-    def kind(self) -> str:
-        """Return "sphere-shell", "sphere-sphere", "plane-shell" or "source"."""
-        if self.find is not None:
-            return "source"
-        if self.plane is not None:
-            return "plane-shell"
-        return "sphere-shell" if self.other_sphere is None else "sphere-sphere"
-
-    @cached_property
-    def spheres(self) -> tuple[PlacedSphere, ...]:
-        """The spheres of this pair: one, two, or none of a source."""
-        out = []
-        if self.sphere is not None:
-            out.append(PlacedSphere(self.joint_i, self.placement_i, self.sphere.radius))
-        if self.other_sphere is not None:
-            out.append(PlacedSphere(self.joint_j, self.placement_j, self.other_sphere.radius))
-        return tuple(out)
 
     @cached_property
     def least_radius(self) -> float:
         """The radius of the smallest of `spheres` [m], nan without any."""
         return min((one.radius for one in self.spheres), default=math.nan)
-
-    @cached_property
-    def placement_i(self) -> pin.SE3:
-        """The sphere's center, or the plane, in joint_i; of a source, frame_i."""
-        if self.plane is not None:
-            return self.pose_i * self.plane.placement
-        return self.pose_i if self.sphere is None else _center(self.pose_i, self.sphere)
-
-    @cached_property
-    def placement_j(self) -> pin.SE3:
-        """The shell, or the other sphere's center, in joint_j; of a source, frame_j."""
-        if self.other_sphere is not None:
-            return _center(self.pose_j, self.other_sphere)
-        return self.pose_j * self.placement
 
     def _check_plane(self) -> None:
         """Refuse what follows from the radius of a sphere, and flat elements."""
@@ -156,103 +159,71 @@ class ContactPair(Summarized):
             isinstance(friction, MindlinFriction) or friction._binding.torsional
         ):
             raise InvalidParameter("friction", friction, f"must have no disc of contact {why}")
-        if self.method != "smooth":
-            must = "must be 'smooth' beside a Plane; flat elements: a Shell with crease_angle 0"
-            raise InvalidParameter("method", self.method, must)
+        for one in self.shells:
+            if not one.is_smooth:
+                must = "must be 'smooth' beside a Plane; flat elements: a Shell with crease_angle 0"
+                raise InvalidParameter("method", one.method, must)
 
     @property
-    def core_sides(self) -> tuple[str, str]:
-        """Which of "frame_i", "frame_j" names the frame of the core's body i, and j.
+    def core_sides(self) -> tuple[Side, Side]:
+        """The core's body i, and j.
 
         Against a plane the core's body i is the one with the shell: in the frame of the plane, its
         body j, the normal is constant.
         """
-        return ("frame_i", "frame_j") if self.plane is None else ("frame_j", "frame_i")
+        if isinstance(self.side_i, PlaneSide):
+            return self.side_j, self.side_i
+        return self.side_i, self.side_j
 
     @property
     def shown(self) -> tuple[str, str, str, str, str]:
         """Name, sphere, what it touches, law and friction, each in a few words."""
-        spheres = [
-            f"radius {one.radius * 1e3:g} mm at '{one.frame}'"
-            for one in (self.sphere, self.other_sphere)
-            if one is not None
-        ]
-        if self.plane is not None:
-            first = f"plane at '{self.frame_i}'"
-        else:
-            first = spheres[0] if self.sphere is not None else f"contact source at '{self.frame_i}'"
-        if self.shell is not None:
-            other = f"'{self.shell.name}' at '{self.frame_j}', {self.method}"
-        else:
-            other = spheres[1] if len(spheres) > 1 else f"'{self.frame_j}'"
-        return (
-            self.name,
-            first,
-            other,
-            self.law.text,
-            ("none" if self.friction is None else self.friction.text),
-        )
+        friction = "none" if self.friction is None else self.friction.text
+        return self.name, self.side_i.text, self.side_j.text, self.law.text, friction
 
     @cached_property
     def modelled(self) -> tuple[str, ...]:
         """What is modeled of this pair, in sentences."""
-        shell, frame_i, frame_j = self.shell, self.frame_i, self.frame_j
-        bodies = [
-            f"sphere of radius {one.radius * 1e3:.4g} mm on frame '{one.frame}'"
-            for one in (self.sphere, self.other_sphere)
-            if one is not None
+        first, second = self.side_i.sentence, self.side_j.sentence
+        bodies = f"{first} against {second}"
+        if isinstance(self.side_i, SourceSide):
+            bodies = (
+                "contact points of the user's own routine between frames "
+                f"'{self.frame_i}' and '{self.frame_j}'"
+            )
+        moving = "moves with its frame" if self.joint_j else "does not move: no wrench on its side"
+        lines = [
+            f"{len(one.shell.elements)} elements, box diagonal {one.shell.size * 1e3:.4g} mm, "
+            f"side '{one.shell.side}', method '{one.method}'; the shell {moving}"
+            for one in self.shells
         ]
-        lines = []
-        if shell is not None:
-            bodies = bodies or [f"plane on frame '{frame_i}'"]
-            bodies.append(f"shell '{shell.name}' on frame '{frame_j}'")
-            moving = (
-                "moves with its frame" if self.joint_j else "does not move: no wrench on its side"
-            )
-            lines.append(
-                f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
-                f"side '{shell.side}', method '{self.method}'; the shell {moving}"
-            )
-        own = f"contact points of the user's own routine between frames '{frame_i}' and '{frame_j}'"
         friction = "no friction: no tangential force is computed"
         if self.friction is not None:
             friction = f"friction: {self.friction.text}"
-        first = " against ".join(bodies) or own
-        return first, *lines, f"normal force: {self.law.text}", friction
+        return bodies, *lines, f"normal force: {self.law.text}", friction
 
     def _bind(self) -> _core.Pair:
         """Build the C++ binding of this pair."""
         source = None
-        if self.find is not None:
+        if isinstance(self.side_i, SourceSide):
             has_state = self.friction is not None and self.friction.has_state
-            source = checked_source(self.find, self.name, has_state)
-        ends = [(self.joint_i, self.placement_i), (self.joint_j, self.placement_j)]
-        if self.plane is not None:
-            ends.reverse()  # see core_sides
+            source = checked_source(self.side_i.find, self.name, has_state)
+        method = self.shells[0].method if self.shells else "facets"
+        side_i, side_j = self.core_sides
         core = _core.Pair(
             name=self.name,
-            joint_i=ends[0][0],
-            placement_i=ends[0][1].homogeneous,
-            joint_j=ends[1][0],
-            placement_j=ends[1][1].homogeneous,
-            radius=0.0 if self.sphere is None else self.sphere.radius,
-            ball=0.0 if self.other_sphere is None else self.other_sphere.radius,
-            shell=None if self.shell is None else self.shell.core_for(self.method),
+            joint_i=side_i.joint,
+            placement_i=side_i.in_joint.homogeneous,
+            joint_j=side_j.joint,
+            placement_j=side_j.in_joint.homogeneous,
+            radius=self.spheres[0].radius if self.spheres else 0.0,
+            ball=self.spheres[1].radius if len(self.spheres) > 1 else 0.0,
+            shell=self.shells[0].shell.core_for(method) if self.shells else None,
             source=source,
-            method=int(Method.from_name(self.method)),
+            method=int(Method.from_name(method)),
             law=self.law._binding,
             friction=None if self.friction is None else self.friction._binding,
-            plane=self.plane is not None,
+            plane=isinstance(self.side_i, PlaneSide),
         )
         core.group = self.group
         return core
-
-
-def shell_key(pair: ContactPair) -> tuple[int, int, bytes]:
-    """Return a key: pairs with equal keys have the same shell at the same place."""
-    place = pair.placement_j.homogeneous + 0.0  # no -0.0
-    return id(pair.shell), pair.joint_j, place.tobytes()
-
-
-def _center(frame: pin.SE3, sphere: Sphere) -> pin.SE3:
-    return frame * pin.SE3(np.eye(3), np.array(sphere.offset))

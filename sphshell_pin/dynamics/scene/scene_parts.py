@@ -8,7 +8,7 @@ from contextlib import suppress
 from copy import copy
 from dataclasses import replace
 from functools import partial
-from typing import Self, TypedDict, TypeVar, Unpack
+from typing import Any, Self, TypedDict, TypeVar, Unpack
 
 import numpy as np
 import pinocchio as pin
@@ -32,12 +32,12 @@ from sphshell_pin.dynamics.scene.models import (
     reduced_model,
 )
 from sphshell_pin.dynamics.scene.pairs import ContactPair
+from sphshell_pin.dynamics.scene.sides import ShellSide, Side, SourceSide
 from sphshell_pin.dynamics.scene.sources import Find
 from sphshell_pin.dynamics.scene.sphere_arguments import (
-    Parts,
     default_group,
     named,
-    parts_of,
+    sides_of,
     warn_of_size,
 )
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SetupWarning, SphshellError
@@ -168,10 +168,8 @@ class SceneParts(Summarized):
         the sphere or the robot, and with FutureWarning where no `law` is stated: it is then ADAMS's
         default, ImpactLaw.from_adams().
         """
-        frame_j, parts = parts_of(sphere, shell, frame, placement, method)
-        default = f"{sphere.frame}-{parts['shell'].name if 'shell' in parts else frame_j}"
-        ends = (sphere.frame, "frame"), (frame_j, "frame")
-        pair = self._add(name, default, *ends, law=law, friction=friction, **parts)
+        sides = sides_of(self.frame_in_joint, sphere, shell, frame, placement, method)
+        pair = self._add(name, f"{sphere.frame}-{default_group(shell)}", *sides, law, friction)
         warn_of_size(self._model, pair)
         return pair
 
@@ -199,10 +197,8 @@ class SceneParts(Summarized):
         group = default_group(shell) if name is None else name
         try:
             for sphere, called in named(spheres, group):
-                frame_j, parts = parts_of(sphere, shell, frame, placement, method)
-                ends = (sphere.frame, "frame"), (frame_j, "frame")
-                parts["group"] = group
-                self._add(called, called, *ends, law=law, friction=friction, **parts)
+                sides = sides_of(self.frame_in_joint, sphere, shell, frame, placement, method)
+                self._add(called, called, *sides, law, friction, group)
         except SphshellError:
             self._pairs = known
             raise
@@ -228,16 +224,9 @@ class SceneParts(Summarized):
         """
         if not callable(find):
             raise InvalidParameter("find", find, "must be callable: find(pose_i, pose_j)")
-        return self._add(
-            name,
-            f"{frame_i}-{frame_j}",
-            (frame_i, "frame_i"),
-            (frame_j, "frame_j"),
-            placement=pin.SE3.Identity(),
-            law=law,
-            friction=friction,
-            find=find,
-        )
+        side_i = SourceSide(frame_i, *self.frame_in_joint(frame_i, "frame_i"), find)
+        side_j = Side(frame_j, *self.frame_in_joint(frame_j, "frame_j"))
+        return self._add(name, f"{frame_i}-{frame_j}", side_i, side_j, law, friction)
 
     def check_state(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Array, Array]:
         """Return copies of q (nq,) and v (nv,).
@@ -263,7 +252,13 @@ class SceneParts(Summarized):
         if unknown:
             raise NameNotFound("setting", unknown.pop(), "a pair", known)
         old = self.pair(name)
-        self._pairs = tuple(replace(p, **changes) if p is old else p for p in self._pairs)
+        new: dict[str, Any] = dict(changes)
+        if method := new.pop("method", None):
+            if not isinstance(old.side_j, ShellSide):
+                must = f"must not be given: contact '{name}' has no shell"
+                raise InvalidParameter("method", method, must)
+            new["side_j"] = replace(old.side_j, method=method)
+        self._pairs = tuple(replace(p, **new) if p is old else p for p in self._pairs)
         self._core = None
 
     @property
@@ -308,14 +303,13 @@ class SceneParts(Summarized):
         self,
         name: str | None,
         default: str,
-        i: tuple[str, str],
-        j: tuple[str, str],
-        *,
+        side_i: Side,
+        side_j: Side,
         law: NormalLaw | None,
         friction: Friction | None,
-        **parts: Unpack[Parts],
+        group: str = "",
     ) -> ContactPair:
-        """Add a pair of the frames `i` and `j`, each with the name of its argument."""
+        """Add a pair, called `default` unless `name` is given."""
         if law is None:
             law = ImpactLaw.from_adams()
             warnings.warn(
@@ -325,19 +319,7 @@ class SceneParts(Summarized):
                 stacklevel=3,
             )
         _warn_of_friction_at_rest(friction)
-        (joint_i, pose_i), (joint_j, pose_j) = (self.frame_in_joint(*frame) for frame in (i, j))
-        pair = ContactPair(
-            name=self._pair_name(name, default),
-            frame_i=i[0],
-            frame_j=j[0],
-            joint_i=joint_i,
-            joint_j=joint_j,
-            pose_i=pose_i,
-            pose_j=pose_j,
-            law=law,
-            friction=friction,
-            **parts,
-        )
+        pair = ContactPair(self._pair_name(name, default), side_i, side_j, law, friction, group)
         self._pairs = (*self._pairs, pair)
         self._core = None
         return pair

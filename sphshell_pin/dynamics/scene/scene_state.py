@@ -11,7 +11,7 @@ from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_floats, check_not_negative, read_only
 from sphshell_pin.base.summary import Fact, Summarized
-from sphshell_pin.dynamics.scene.explain import core_pairs, explain_pairs, has_state
+from sphshell_pin.dynamics.scene.explain import core_pairs
 from sphshell_pin.errors import InvalidParameter, NotPicklable
 
 if TYPE_CHECKING:
@@ -46,8 +46,8 @@ class SceneState(Summarized):
         self._pairs = scene.pairs
         self.start = scene.check_state(scene.neutral if q is None else q, v)
         """Where it began: q (nq,), v (nv,)."""
-        figures = explain_pairs(scene, *self.start) if has_state(scene) else ()
-        self._core = scene._compile(_core.SceneState, core_pairs(scene, figures))
+        pairs, _ = core_pairs(scene, *self.start)
+        self._core = scene._compile(_core.SceneState, pairs)
         if q is not None:
             self._core.advance(*self.start, 0.0)
 

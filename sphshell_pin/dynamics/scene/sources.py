@@ -1,7 +1,5 @@
 """Contact points from the user's own routine, checked on their way to the core."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,11 +1,8 @@
 """Arguments of Scene.add_contact and add_contacts: spheres or a plane, and what they touch."""
 
-from __future__ import annotations
-
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from typing import TypedDict
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 import pinocchio as pin
@@ -14,38 +11,30 @@ from sphshell_pin.base.checks import check_name, check_placement, check_type
 from sphshell_pin.contact import FoundationLaw, Plane, Sphere
 from sphshell_pin.dynamics.scene.models import unit_warning
 from sphshell_pin.dynamics.scene.pairs import ContactPair
-from sphshell_pin.dynamics.scene.sources import Find
+from sphshell_pin.dynamics.scene.sides import PlaneSide, ShellSide, Side, SphereSide
 from sphshell_pin.errors import InvalidParameter, SetupWarning, UnitWarning
 from sphshell_pin.shell import Shell
 
-
-class Parts(TypedDict, total=False):
-    """Fields of a ContactPair in which kinds of pairs differ."""
-
-    placement: pin.SE3
-    method: str
-    sphere: Sphere
-    shell: Shell
-    find: Find
-    other_sphere: Sphere
-    group: str
-    plane: Plane
+# Returns the joint of a frame and its placement there, by the name of the frame.
+Locate = Callable[[str], tuple[int, pin.SE3]]
 
 
-def parts_of(
+def sides_of(
+    locate: Locate,
     sphere: Sphere | Plane,
     shell: Shell | Sphere,
     frame: str,
     placement: pin.SE3 | None,
     method: str | None,
-) -> tuple[str, Parts]:
-    """Check the arguments of Scene.add_contact; return frame_j and the fields of the pair."""
+) -> tuple[Side, Side]:
+    """Check the arguments of Scene.add_contact; return the sides of the pair."""
     if isinstance(sphere, Plane):
         check_type("shell", shell, Shell, "must be a Shell beside a Plane (of a ball: a sphere)")
+        side_i: Side = PlaneSide(sphere.frame, *locate(sphere.frame), sphere)
     else:
         check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame) or a Plane(frame)")
+        side_i = SphereSide(sphere.frame, *locate(sphere.frame), sphere)
     if isinstance(shell, Sphere):
-        assert isinstance(sphere, Sphere)  # a plane has been refused
         why = "must not be given where shell is a Sphere"
         if frame != "universe":
             raise InvalidParameter("frame", frame, f"{why}: that names its own frame")
@@ -53,18 +42,10 @@ def parts_of(
             raise InvalidParameter("placement", placement, f"{why}: that has its own offset")
         if method is not None:
             raise InvalidParameter("method", method, f"{why}: their contact has a closed form")
-        return shell.frame, {
-            "placement": pin.SE3.Identity(),
-            "sphere": sphere,
-            "other_sphere": shell,
-        }
+        return side_i, SphereSide(shell.frame, *locate(shell.frame), shell)
     check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file) or a Sphere")
-    method = "smooth" if method is None else method
-    placement = check_placement("placement", placement)
-    parts: Parts = {"placement": placement, "method": method, "shell": shell}
-    if isinstance(sphere, Plane):
-        return frame, {**parts, "plane": sphere}
-    return frame, {**parts, "sphere": sphere}
+    placement, method = check_placement("placement", placement), method or "smooth"
+    return side_i, ShellSide(frame, *locate(frame), shell, placement, method)
 
 
 def default_group(shell: Shell | Sphere) -> str:
@@ -93,9 +74,9 @@ def named(spheres: Iterable[Sphere], name: str) -> Iterator[tuple[Sphere, str]]:
 
 def corner_warning(pair: ContactPair) -> str | None:
     """Say so where a flat face may lie on a plane, with a law that acts at its lowest corner."""
-    shell = pair.shell
-    if pair.plane is None or shell is None or isinstance(pair.law, FoundationLaw):
+    if not isinstance(pair.side_i, PlaneSide) or isinstance(pair.law, FoundationLaw):
         return None
+    shell = pair.shells[0].shell
     corners, normals = shell.vertices[shell.triangles], shell.triangle_normals
     patch = shell.element_patch[shell.triangle_element]
     sides = corners[:, 1:] - corners[:, :1]
@@ -116,8 +97,10 @@ def corner_warning(pair: ContactPair) -> str | None:
 
 def seam_warning(pair: ContactPair, other: ContactPair) -> str | None:
     """Say so where a sphere touches two shells that go on smoothly into each other."""
-    a, b = pair.shell, other.shell
-    if a is None or b is None or a.is_closed or b.is_closed or pair.sphere != other.sphere:
+    if not (pair.shells and other.shells) or pair.spheres != other.spheres:
+        return None
+    a, b = pair.shells[0].shell, other.shells[0].shell
+    if a.is_closed or b.is_closed:
         return None
     if pair.joint_j != other.joint_j or isinstance(pair.law, FoundationLaw):
         return None
@@ -147,12 +130,8 @@ def warn_of_size(model: pin.Model, pair: ContactPair) -> None:
     corners = corner_warning(pair)
     if corners:
         warnings.warn(corners, SetupWarning, stacklevel=3)
-    if pair.sphere is None or pair.shell is None:
-        return
-    suspicion = unit_warning(model, pair.sphere.radius, pair.shell.size)
-    if suspicion:
-        warnings.warn(
-            f"contact '{pair.name}', shell '{pair.shell.name}': {suspicion}",
-            UnitWarning,
-            stacklevel=3,
-        )
+    for on_sphere, on_shell in pair.sphere_on_shell:
+        shell = on_shell.shell
+        if suspicion := unit_warning(model, on_sphere.radius, shell.size):
+            text = f"contact '{pair.name}', shell '{shell.name}': {suspicion}"
+            warnings.warn(text, UnitWarning, stacklevel=3)

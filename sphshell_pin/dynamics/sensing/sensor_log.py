@@ -79,6 +79,8 @@ def split_logs(
     values: Array,
 ) -> dict[str, SensorLog]:
     """Return the log of each sensor; the arguments are `joined_logs`'."""
+    if not columns:
+        return {}
     widths = np.array([len(one) for one in columns.values()], dtype=int)
     begin = np.cumsum(widths[which]) - widths[which]
     logs = {}

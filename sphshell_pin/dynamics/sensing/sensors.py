@@ -1,7 +1,5 @@
 """Sensors: what a robot's computer knows of its forces, sampled, filtered, noisy and late."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Iterable
@@ -140,7 +138,7 @@ class ForceTorqueSensor(_Analog, kind="force-torque"):
             [
                 k
                 for k, pair in enumerate(scene.pairs)
-                if find_frame(scene.model, getattr(pair, pair.core_sides[side])) in part.frames
+                if find_frame(scene.model, pair.core_sides[side].frame) in part.frames
             ]
             for side in (0, 1)
         )

@@ -1,7 +1,5 @@
 """What of a model hangs beyond one of its frames: for a sensor between that and the rest."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import pinocchio as pin

@@ -1,7 +1,5 @@
 """Where the sphere touches as a user asked: a point of the part, or a face by kind and size."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

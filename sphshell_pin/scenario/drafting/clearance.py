@@ -1,7 +1,5 @@
 """Whether links of a robot are in a part: their collision geometry against its surface, by Coal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A planned scenario as text: TOML with comments beside the values that say where they are from."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Where a robot carries its sphere: known fingertips and feet, or the end of its only limb."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection

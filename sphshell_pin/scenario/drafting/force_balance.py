@@ -1,7 +1,5 @@
 """Forces of fingertips that hold a part: in their friction cones, in balance with its weight."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array

@@ -1,7 +1,5 @@
 """How a hand holds a part: a place and joint angles at which every fingertip touches it."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

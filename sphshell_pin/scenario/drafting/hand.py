@@ -1,7 +1,5 @@
 """A new scenario in which a hand holds a free part between all its fingertips."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

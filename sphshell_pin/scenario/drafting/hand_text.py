@@ -1,7 +1,5 @@
 """The text of a scenario in which a hand holds a part, and the values in it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

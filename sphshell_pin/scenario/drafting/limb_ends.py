@@ -1,7 +1,5 @@
 """Where a limb ends, by the geometry of its last link: the sphere to put there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The path of a tip on the surface: the one asked for, or the longest that joints allow."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from bisect import bisect_left

@@ -1,7 +1,5 @@
 """The search for a draft that works: directions to press in, places of the part, and repairs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple

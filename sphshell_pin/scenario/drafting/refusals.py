@@ -1,7 +1,5 @@
 """What a search for a draft came across, and the sentence that refuses."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field
 

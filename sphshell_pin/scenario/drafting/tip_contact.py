@@ -1,7 +1,5 @@
 """What a tip and a surface are made of, and the law and friction that follow."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

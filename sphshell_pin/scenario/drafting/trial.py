@@ -1,7 +1,5 @@
 """A draft of a scenario, tried: it touches, holds its force, and keeps links off the part."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -82,7 +80,7 @@ def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
         return None
     (tip,), (pair,) = plan.tips, built.scene.pairs
     reach = Reach(built.scene.model, tip.frame, tip.offset)
-    away = pair.placement.actInv(reach.center(result.q[-1])) - control.path[-1]
+    away = pair.shells[0].placement.actInv(reach.center(result.q[-1])) - control.path[-1]
     behind = math.sqrt(max(float(away @ away) - tip.radius**2, 0.0))
     if behind < _BEHIND * tip.radius:
         return None

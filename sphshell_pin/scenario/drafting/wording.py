@@ -1,7 +1,5 @@
 """Numbers as texts of a new scenario state them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

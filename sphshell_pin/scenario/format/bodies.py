@@ -1,7 +1,5 @@
 """The robots of a scenario, put together into one pinocchio model with its start state."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

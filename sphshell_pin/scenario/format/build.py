@@ -1,7 +1,5 @@
 """From a scenario file to what runs: the scene, its start state, its controller, its simulation."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -52,6 +50,7 @@ from sphshell_pin.scenario.format.bodies import (
 )
 from sphshell_pin.scenario.format.functions import Loader, Modules, load_function
 from sphshell_pin.scenario.format.joint_tables import joint_components
+from sphshell_pin.scenario.format.numbers import with_numbers
 from sphshell_pin.scenario.format.reading import (
     change_scenario,
     find_scenario,
@@ -129,17 +128,22 @@ def build(
     )
 
 
-def rebuild(built: Built, changes: Mapping[str, str]) -> Built:
+def rebuild(built: Built, changes: Mapping[str, str], *, anew: bool = False) -> Built:
     """Build the scenario of `built` with more values changed; its file is not read again.
 
     What the changes leave alone is the same object as before: `shells`, `assembly`,
-    `visual_model`, `functions`. `built` stays as it is.
+    `visual_model`, `functions`. `built` stays as it is. With `anew` the user's own functions are
+    loaded again: what they remember must not reach another run.
 
     Raises
     ------
     ScenarioError
         A key or a value is wrong; the text names it and what would be valid.
     """
+    if anew and built.functions:
+        built = replace(built, functions={})
+    elif (same := with_numbers(built, changes)) is not None:
+        return same
     scenario = change_scenario(built.scenario, changes, built.path)
     check_knobs(scenario, built.path, ranges=False)
     return build_scenario(scenario, built.path, built)

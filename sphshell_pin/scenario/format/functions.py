@@ -3,8 +3,6 @@
 They are the only code that a scenario can name, and this is the only place that executes it.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import inspect
 import os

@@ -1,7 +1,5 @@
 """Inverse kinematics of a point on a frame, by damped least squares within the joints' limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

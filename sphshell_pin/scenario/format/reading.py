@@ -1,7 +1,5 @@
 """From a scenario file to a Scenario: find it, read it, change values, report what is wrong."""
 
-from __future__ import annotations
-
 import functools
 import importlib
 import os
@@ -119,7 +117,7 @@ def change_scenario(
         A key or a value that no scenario may have.
     """
     data = scenario.model_dump(exclude_unset=True)
-    change_data(data, {key: _parse_value(text) for key, text in changes.items()}, scenario, path)
+    change_data(data, {key: parse_value(text) for key, text in changes.items()}, scenario, path)
     return _validated(data, path)
 
 
@@ -260,7 +258,8 @@ def _read_text(path: str | PathLike[str]) -> str:
         raise ScenarioError(path, "", "is not a text file in UTF-8") from None
 
 
-def _parse_value(text: str) -> Toml:
+def parse_value(text: str) -> Toml:
+    """Return the value that --set states: in TOML, else the text itself."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):

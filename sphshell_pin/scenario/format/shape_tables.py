@@ -1,7 +1,5 @@
 """Primitive shapes that a scenario states by their sizes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import TypedDict, Unpack
 

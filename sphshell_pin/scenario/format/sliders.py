@@ -71,10 +71,10 @@ def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
             _check_choice(section, found, path, where)
             continue
         value = _number(found, section.key, path)
+        if not ranges and None in (section.min, section.max):
+            continue  # its author saw a range, which this value may have left
         low, high, log = _range(section, value, meaning(scenario, found))
         if low is None or high is None:
-            if not ranges:
-                continue  # its author saw a range, which this value has left
             raise ScenarioError(
                 path, where, f"needs min and max, as '{section.key}' is not positive", value
             )

@@ -1,7 +1,5 @@
 """The spheres, or the plane, of a contact, as a scenario states them."""
 
-from __future__ import annotations
-
 from sphshell_pin.contact import Plane, Sphere
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError

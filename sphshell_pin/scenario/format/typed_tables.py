@@ -1,7 +1,5 @@
 """Tables of a scenario file whose key `type` says which class of a family they state."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import operator

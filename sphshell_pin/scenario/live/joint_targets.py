@@ -1,7 +1,5 @@
 """The joint targets of a controller, as a page moves them while the run goes on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A scenario that keeps running while its parameters are changed and its bodies pushed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from dataclasses import replace
@@ -258,11 +256,16 @@ class LiveRun:
         self.built = after
         self._targets = None
         # Their ranges stay those of the start: they do not wander with the values.
-        self._parameters = tuple(
-            replace(one, value=str(now) if one.choices else float(now))
-            for one in self._parameters
-            for now in [look_up(after.scenario, one.key, after.path).value]
-        )
+        if isinstance(value, float) and key in (one.key for one in self._parameters):
+            self._parameters = tuple(
+                replace(one, value=value) if one.key == key else one for one in self._parameters
+            )
+        else:  # a word, or another spelling of a key
+            self._parameters = tuple(
+                replace(one, value=str(now) if one.choices else float(now))
+                for one in self._parameters
+                for now in [look_up(after.scenario, one.key, after.path).value]
+            )
 
     def _go_on(self, run: OpenRun) -> None:
         """Go on with `run`, which is in the state of this one: with its push and its audit."""

@@ -132,9 +132,10 @@ def _cad_pairs(built: Built) -> Iterator[tuple[int, ShellSection]]:
     """Walk the pairs whose shell is of a CAD file."""
     sections = {section.name: section for section in built.scenario.shell}
     for index, pair in enumerate(built.scene.pairs):
-        if pair.shell is None or pair.sphere is None or pair.shell.name not in sections:
+        names = [on_shell.shell.name for _, on_shell in pair.sphere_on_shell]
+        if not names or names[0] not in sections:
             continue
-        section = sections[pair.shell.name]
+        section = sections[names[0]]
         if section.file is not None and Path(section.file).suffix.lower() in CAD_SUFFIXES:
             yield index, section
 
@@ -168,14 +169,13 @@ def _audit_shell(
     shown = -1
     for place, i in enumerate(own.tolist()):
         pair = built.scene.pairs[log.pair[i]]
-        assert pair.sphere is not None  # _cad_pairs() leaves planes out
         if log.row[i] != shown:
             shown = int(log.row[i])
             pin.forwardKinematics(model, data, np.asarray(result.q[shown], dtype=float))
         shell = data.oMi[pair.joint_j] * pair.placement_j
         normals[place] = shell.rotation.T @ log.normal_world[i]
         points[place] = shell.actInv(log.point_world[i])
-        radii[place] = pair.sphere.radius
+        radii[place] = pair.least_radius
         centers[place] = points[place] + (radii[place] - log.depth[i]) * normals[place]
     errors = np.full((len(own), 2), np.nan)
     for place, found in enumerate(zip(*_feet(section, built.path, centers, points), strict=True)):

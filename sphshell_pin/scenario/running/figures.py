@@ -1,7 +1,5 @@
 """What a run is measured by, and whether it came out as the scenario expects."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ So a finished run can be shown on any machine, and no file is read but that of t
 kept may have been changed since: indices are checked, nothing is executed.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import tempfile

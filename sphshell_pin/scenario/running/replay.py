@@ -1,7 +1,5 @@
 """A finished run, played again in the scene that it came from."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from os import PathLike
@@ -222,14 +220,14 @@ class Replay:
         check_scene(self.result, self.scene, self._name)
         log = self.result.contacts
         for index, pair in enumerate(self.scene.pairs):
-            most = 0 if pair.shell is None else len(pair.shell.elements)
             touched = int(np.max(log.element[log.pair == index], initial=-1))
-            if pair.shell is not None and touched >= most:
-                raise ResultError(
-                    self._name,
-                    f"contact '{pair.name}' touched element {touched}, but its shell has {most} "
-                    "elements: the surface has changed since",
-                )
+            for most in (len(one.shell.elements) for one in pair.shells):
+                if touched >= most:
+                    raise ResultError(
+                        self._name,
+                        f"contact '{pair.name}' touched element {touched}, but its shell has "
+                        f"{most} elements: the surface has changed since",
+                    )
 
 
 def _shown(scenario: Scenario) -> Scenario:

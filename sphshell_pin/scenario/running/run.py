@@ -1,7 +1,5 @@
 """Run a scenario without a screen and write its results folder."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

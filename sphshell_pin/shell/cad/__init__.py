@@ -7,8 +7,6 @@ which takes a second, and run it in the process that calls them: for files that 
 good.
 """
 
-from __future__ import annotations
-
 from sphshell_pin.shell.cad.options import CAD_SUFFIXES, CadOptions, require_kernel
 
 __all__ = ["CAD_SUFFIXES", "CadOptions", "require_kernel"]

@@ -1,7 +1,5 @@
 """The process in which OpenCASCADE runs: it reads jobs from one pipe and answers on another."""
 
-from __future__ import annotations
-
 import ctypes
 import fcntl
 import importlib.util

@@ -4,8 +4,6 @@ A tessellation finds the face and the place near a point; Newton's method goes o
 exact surface or curve. BRepExtrema of OpenCASCADE misses closest points on real files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """The surface below a CAD face, at many places at once."""
 
-from __future__ import annotations
-
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_C0

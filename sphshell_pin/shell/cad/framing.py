@@ -1,7 +1,5 @@
 """Whether a CAD file begins and ends as its format has it."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

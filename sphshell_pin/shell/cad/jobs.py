@@ -4,8 +4,6 @@
 caller.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Faces with a kink inside: divided along it, so that each piece is smooth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

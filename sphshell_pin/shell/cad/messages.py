@@ -1,7 +1,5 @@
 """Messages of a CAD child to the process that started it, with a checksum."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import pickle

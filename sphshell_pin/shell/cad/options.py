@@ -1,7 +1,5 @@
 """What may be asked of a CAD file, and whether the library that reads one is installed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias

@@ -6,8 +6,6 @@ standard library's pools of processes run the caller's main module again, which 
 guard does not survive, and leave a worker behind that hangs.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import pickle

@@ -1,7 +1,5 @@
 """STEP, IGES and BREP files: their faces and bodies, with names and the unit of the header."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A CAD file as polygons with exact normals, ready for the cleaning."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

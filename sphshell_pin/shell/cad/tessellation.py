@@ -1,7 +1,5 @@
 """Tessellation of trimmed faces within a stated chord error, which is measured."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property

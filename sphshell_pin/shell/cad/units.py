@@ -1,7 +1,5 @@
 """The unit of length a CAD file states, and the one that is taken."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import dataclass, replace

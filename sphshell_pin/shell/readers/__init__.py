@@ -1,7 +1,5 @@
 """Surface files: which reader takes which suffix."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Callable

@@ -5,8 +5,6 @@ the normals of their corners, and it loses the quads of off files altogether; he
 stay what they are.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ A reader of our own: trimesh refuses binary files whose elements have different 
 and accepts truncated text files.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any

@@ -6,8 +6,6 @@ follow the polygons, one per point (points repeat where normals differ). SCALE i
 unit in the files seen. Winding cannot be trusted, and counts may be written as reals.
 """
 
-from __future__ import annotations
-
 import re
 from contextlib import suppress
 from dataclasses import dataclass

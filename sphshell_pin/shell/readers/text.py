@@ -1,7 +1,5 @@
 """What the text formats have in common."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Fits parameters of a scenario to measured data."""
 
-from __future__ import annotations
-
 from sphshell_pin.study.fit.data import Experiment
 from sphshell_pin.study.fit.fitting import fit
 from sphshell_pin.study.fit.report import Fit, Fitted, Series

@@ -1,7 +1,5 @@
 """Measured data: read from csv files or columns, checked, and brought into SI units."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,7 +1,5 @@
 """Fits parameters of a scenario to measured data."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What is fitted: numbers of a scenario, each on a scale that suits it and within its bounds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Sentences on a fit: what the data do not determine, and what speaks against the scenario."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

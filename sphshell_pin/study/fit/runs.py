@@ -1,7 +1,5 @@
 """The runs of a fit: what the scenario says at values of the parameters, and its derivatives."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -20,8 +18,7 @@ from sphshell_pin.errors import (
     UnitWarning,
     WeakLawWarning,
 )
-from sphshell_pin.scenario.format.build import Built, build_scenario
-from sphshell_pin.scenario.format.reading import change_scenario
+from sphshell_pin.scenario.format.build import Built, rebuild
 from sphshell_pin.study.fit.data import Measured
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.quantities import row_step
@@ -100,14 +97,11 @@ class Runs:
             for one, value in zip(self.free, x.tolist(), strict=True)
             for key in one.keys
         }
-        # The user's own functions are loaded anew: what they remember must not reach another run.
-        before = replace(trial.built, functions={}) if trial.built.functions else trial.built
         with warnings.catch_warnings():
             for kind in (WeakLawWarning, SetupWarning, UnitWarning):  # said of the fitted values
                 warnings.simplefilter("ignore", kind)
-            scenario = change_scenario(trial.built.scenario, texts, trial.built.path)
-            built = build_scenario(scenario, trial.built.path, before)
-            run = scenario.run
+            built = rebuild(trial.built, texts, anew=True)
+            run = built.scenario.run
             simulation = sp.Simulation(
                 built.scene,
                 built.simulation.integrator,

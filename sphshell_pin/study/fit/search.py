@@ -1,7 +1,5 @@
 """The search for the values of parameters at which runs come nearest to the data."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

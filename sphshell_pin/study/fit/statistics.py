@@ -1,7 +1,5 @@
 """What the data determine: covariance, intervals, and tests of the residuals."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

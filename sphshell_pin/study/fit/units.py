@@ -1,7 +1,5 @@
 """Units of measured columns, as they stand in a header: `[mm]`, `[kN]`, `[deg/s]`."""
 
-from __future__ import annotations
-
 import math
 
 from sphshell_pin.errors import InvalidParameter

@@ -1,7 +1,5 @@
 """A scenario's file with other values in place; comments and order stay."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Collection, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Cases of work and precision with a closed form: a ball on springs, bounces, a stiff plate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

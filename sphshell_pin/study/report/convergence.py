@@ -10,8 +10,6 @@ bowl the sphere is pushed by both sides of every edge, and refinement does not h
 elements grows without limit.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace

@@ -9,8 +9,6 @@ that swings in a bowl of curved elements, a Panda that slides a steel ball on st
 sticks and slips on a belt.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import astuple, dataclass, replace

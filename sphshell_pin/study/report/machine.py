@@ -1,7 +1,5 @@
 """What the measurements ran on: processor, system, versions, command, date."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import platform

@@ -1,7 +1,5 @@
 """Measure the sections one after another, and write the page and its tables."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import json

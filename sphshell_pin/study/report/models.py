@@ -1,7 +1,5 @@
 """Small models: bodies on joints at the world, each with a frame of its name."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -1,7 +1,5 @@
 """Cases of work and precision that finer runs judge: what moves, and with which settings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

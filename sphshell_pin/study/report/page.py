@@ -1,7 +1,5 @@
 """The page: one HTML file that makes no external requests, in light and dark, and for paper."""
 
-from __future__ import annotations
-
 import base64
 from dataclasses import dataclass
 from html import escape

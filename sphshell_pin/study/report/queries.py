@@ -6,8 +6,6 @@ contact for every triangle that is touched. The sheet grows at equal size of its
 the sphere always touches the same number of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import coal

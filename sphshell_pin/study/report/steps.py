@@ -6,8 +6,6 @@ alone, in a compiled loop. What a component adds is a difference to the scene wi
 step is ABA, continuous collision detection, the energy audit and summaries.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 
@@ -147,7 +145,7 @@ def measure(rounds: int, progress: Progress = silent) -> Times:
     def plain() -> sp.Scene:
         return touching(UNDAMPED, None)
 
-    def zero(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:
+    def zero(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
         return np.zeros_like(v)
 
     second = "... and a {} second sphere"

@@ -1,7 +1,5 @@
 """The surfaces and the sphere positions of the measurements."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

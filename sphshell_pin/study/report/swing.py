@@ -1,7 +1,5 @@
 """Period and energy of a ball that swings in a bowl without friction, against the exact bowl."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence

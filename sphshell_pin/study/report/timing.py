@@ -1,7 +1,5 @@
 """Ratios on a noisy machine: contestants take turns, each round gives one ratio."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import subprocess

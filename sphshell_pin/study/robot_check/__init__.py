@@ -3,8 +3,6 @@
 `check_robot` takes a name that sphshell_pin.robots knows or a file, and returns a RobotReport.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike

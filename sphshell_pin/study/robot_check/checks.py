@@ -1,7 +1,5 @@
 """The checks of one robot, each by the functions that `sphshell_pin.testing` asserts with."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable
@@ -146,10 +144,11 @@ def run_checks(
 def _variants(scene: Scene) -> list[Scene]:
     """Return a scene that touches, the same with method "facets", and out of touch."""
     (pair,) = scene.pairs
-    flat = replace(pair, method="facets")
+    (on_shell,) = pair.shells
+    flat = replace(pair, side_j=replace(on_shell, method="facets"))
     # The patch goes behind itself.
     away = pin.SE3(np.eye(3), np.array([0.0, 0.0, -10.0 * pair.least_radius]))
-    far = replace(pair, placement=pair.placement * away)
+    far = replace(pair, side_j=replace(on_shell, placement=on_shell.placement * away))
     return [scene, scene.with_pairs((flat,)), scene.with_pairs((far,))]
 
 
@@ -163,7 +162,7 @@ def _energies(setting: Setting, rng: np.random.Generator) -> list[Finding]:
     pair = touch.scene.pairs[0]
     lossless = Scene(touch.scene.model)
     law = stopping_law(touch.mass, touch.speed, 0.2 * setting.radius)
-    lossless.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.placement, law)
+    lossless.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.shells[0].placement, law)
     results = [
         _run(replace(touch, scene=scene), Adaptive(_RTOL), _DURATION)
         for scene in (touch.scene, lossless)
@@ -200,7 +199,7 @@ def _impact(setting: Setting, rng: np.random.Generator) -> list[Result]:
     # Whatever the joints do, the law can take up all the energy they have.
     heavy = 2.0 * kinetic_energy(scene.model, touch.q, touch.v) / speed**2
     law = stopping_law(heavy, speed, 0.3 * radius)
-    scene.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.placement, law)
+    scene.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.shells[0].placement, law)
     start = replace(touch, scene=scene)
     return [_run(start, how, step) for how in (Adaptive(), SemiImplicitEuler(step))]
 

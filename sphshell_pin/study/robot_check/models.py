@@ -1,7 +1,5 @@
 """Robots without their meshes: the physics of contact needs none, and most time goes into them."""
 
-from __future__ import annotations
-
 import copy
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Legal random postures, and joints that no forward dynamics can move."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -1,7 +1,5 @@
 """Where the sphere of a check sits: a fingertip that is known, or the end of the longest limb."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sweeps: one scenario run many times with other values, over processes or a Dask cluster."""
 
-from __future__ import annotations
-
 from sphshell_pin.study.sweep.distributions import Distribution, LogNormal, Normal, Uniform
 from sphshell_pin.study.sweep.driver import SweepReport, run_plan, sweep
 from sphshell_pin.study.sweep.grid import Axis, axes_of

@@ -1,7 +1,5 @@
 """The workers of a Dask cluster: a sweep is a client of its scheduler."""
 
-from __future__ import annotations
-
 import queue
 import re
 import socket

@@ -1,7 +1,5 @@
 """Curves of the runs of a sweep over one grid of times, from which bands are computed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How an uncertain number is distributed, as texts such as "normal(1e5,1e4)" and as classes."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Mapping

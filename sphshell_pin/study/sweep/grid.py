@@ -1,7 +1,5 @@
 """What a sweep varies: keys of the scenario, the values each takes, and the runs they make."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -5,8 +5,6 @@ with a CRC-32 of what is before that, because no parser notices a digit that a d
 are appended to one file that stays open: a run that exchanges the folder links it into the new one.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import os

@@ -1,7 +1,5 @@
 """The workers of this machine: processes, each of which does one run at a time."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import queue

@@ -1,7 +1,5 @@
 """Which runs a sweep with uncertain inputs makes: points of a sample, and those around them."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

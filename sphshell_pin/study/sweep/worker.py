@@ -1,7 +1,5 @@
 """What happens in a worker: the scenario is built once, then changed and run again and again."""
 
-from __future__ import annotations
-
 import os
 import socket
 import threading
@@ -14,6 +12,7 @@ from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError, SweepError
 from sphshell_pin.scenario import Built, judge
 from sphshell_pin.scenario.format.build import build_scenario
+from sphshell_pin.scenario.format.numbers import with_numbers
 from sphshell_pin.scenario.format.reading import change_scenario
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import check_knobs
@@ -121,9 +120,12 @@ def _try_run(job: Job, run: Run) -> Outcome:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            # The user's routines are loaded anew: what they remember must not reach another run.
-            before = replace(_built[job.token], functions={})
-            built = build_scenario(changed(job.scenario, run, path), path, before)
+            before = _built[job.token]
+            built = None if before.functions else with_numbers(before, run.changes)
+            if built is None:
+                # The user's routines are loaded anew: no run gets what they remember of another.
+                before = replace(before, functions={})
+                built = build_scenario(changed(job.scenario, run, path), path, before)
             _built[job.token] = built
             result, stopped = simulate(built)
     except (Exception, SystemExit) as fault:  # a routine of the user's may call exit()

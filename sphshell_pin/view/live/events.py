@@ -1,7 +1,5 @@
 """The messages of a browser: one JSON object each, checked before it is used."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import math

@@ -1,7 +1,5 @@
 """A picture in another meshcat window: fewer commands, as the sender waits for each answer."""
 
-from __future__ import annotations
-
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.nodes import Sent, Window, is_below
 

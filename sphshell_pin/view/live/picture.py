@@ -278,11 +278,9 @@ class _Trails:
         for index in [index for index in self._points if index not in strongest]:
             self._finish(index)
         for index, k in strongest.items():
-            pair = pairs[index]
-            if pair.shell is None:
-                continue
-            where = self._display.data.oMi[pair.joint_j] * pair.placement_j
-            self._extend(index, where.actInv(contacts.point_world[k]))
+            for one in pairs[index].shells:
+                where = self._display.data.oMi[one.joint] * one.in_joint
+                self._extend(index, where.actInv(contacts.point_world[k]))
 
     def _extend(self, index: int, point: Array) -> None:
         points = self._points.setdefault(index, [])
@@ -319,11 +317,11 @@ class _Trails:
 
 def _empty_parts(scene: Scene) -> frozenset[str]:
     """Return the parts that show nothing of `scene`."""
-    shells = [(pair.shell, pair.method) for pair in scene.pairs if pair.shell is not None]
+    shells = [(one.shell, one.is_smooth) for pair in scene.pairs for one in pair.shells]
     has = {
         "patches": any(np.ptp(shell.element_patch) for shell, _ in shells),
-        "distance": any(method == "smooth" for _, method in shells),
-        "curved": any(is_curved(shell, method == "smooth") for shell, method in shells),
+        "distance": any(smooth for _, smooth in shells),
+        "curved": any(is_curved(shell, smooth) for shell, smooth in shells),
         "faces": any(shell.element_face is None for shell, _ in shells),
         "pressure": bool(scene.pairs),
     }

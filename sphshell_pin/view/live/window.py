@@ -5,8 +5,6 @@ which it last changed, and each browser is given what changed since the frame it
 one skips frames, a late one starts at frame zero and gets the whole scene.
 """
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np

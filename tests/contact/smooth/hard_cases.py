@@ -3,8 +3,6 @@
 Each docstring is a row "case; what happens". The sphere has radius one unless said otherwise.
 """
 
-from __future__ import annotations
-
 import inspect
 from importlib import import_module
 

@@ -5,8 +5,6 @@ at p alone, with that depth and that normal: no radius of curvature is below thr
 parts of a surface are near each other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

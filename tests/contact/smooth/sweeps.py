@@ -1,7 +1,5 @@
 """Sweeps of a sphere of radius one over every kind of joint, and what must not jump along them."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The force on curved surfaces: order of convergence, size of the error, one contact per place."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Curved elements are never worse than flat ones: creases stay, and what is round stays round."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Normals estimated from the elements alone, as the method "smooth" bends elements to them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A scene follows a slow sphere from call to call; what it finds is what a fresh query finds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

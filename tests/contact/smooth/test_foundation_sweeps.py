@@ -1,7 +1,5 @@
 """A ball on an elastic foundation is swept over joints, creases, borders: its force cannot jump."""
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The derivative of the force with respect to the sphere's position, against differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

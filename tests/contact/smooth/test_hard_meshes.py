@@ -1,7 +1,5 @@
 """Hard cases: meshes of ill-shaped elements, odd sizes, noise, wrong normals, T-junctions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Hard cases: hollows about as round as the sphere, rings and holes."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

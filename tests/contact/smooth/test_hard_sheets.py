@@ -1,7 +1,5 @@
 """Hard cases: sheets, folds, tips and vertices."""
 
-from __future__ import annotations
-
 import coal
 import numpy as np
 import pytest

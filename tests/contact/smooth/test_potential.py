@@ -1,7 +1,5 @@
 """The normal force has a potential, and there is one contact however near a border is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

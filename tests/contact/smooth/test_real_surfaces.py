@@ -5,8 +5,6 @@ SPHSHELL_SPHERES=10000 takes more. Skipped where the corpus is absent. SPHSHELL_
 files of another folder, in millimeters.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

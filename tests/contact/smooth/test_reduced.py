@@ -4,8 +4,6 @@ Each file holds vertices V and corner normals N of triangles T, in units of the 
 two centres a, b between which the potential jumped by the share `jump` of itself.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A touch to the last bit: whatever round-off decides, the side is right and the depth tiny."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A sphere is swept over curved creases, borders and vertices: its force does not jump."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sphere is swept over folds of flat sides: its force does not jump."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

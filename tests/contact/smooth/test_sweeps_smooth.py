@@ -1,7 +1,5 @@
 """A sphere is swept over smooth joints: its force does not jump."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import pairwise, product
 

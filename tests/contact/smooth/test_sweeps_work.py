@@ -1,7 +1,5 @@
 """Along sweeps over joints the work of the force is what the potential loses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A ball swings in a bowl without friction: its period is the exact bowl's, its energy stays."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flat surfaces and true edges are exact: closed forms of plates, grooves, ridges, cubes, cones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,6 @@
 #include "dynamics/scene/geometry.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "shell/curved/curved.hpp"
@@ -17,6 +18,18 @@ bool is_closed(const Shell& shell) {
 void ShellSurface::find_near(const Vec3& center, double radius, double margin, Query& query) const {
   query.find(*shell, center, radius + margin, method);
   for (Contact& contact : query.contacts) contact.depth -= margin;
+}
+
+Contact ShellSurface::nearest(const Vec3& center, double radius, Query& query) const {
+  SurfacePoint at = shell->closest_point(center);
+  if (method == Method::Smooth) at = on_curved(*shell, center, at, query);
+  const double outside = shell->side() == Side::Both      ? std::abs(at.distance)
+                         : shell->side() == Side::Outside ? at.distance
+                                                          : -at.distance;
+  const Vec3 away = center - at.point;
+  const double length = away.norm();
+  return {at.point, length > 0 ? Vec3(away / length) : at.normal, radius - outside, at.element,
+          Feature::Face};
 }
 
 // A curved element is off its flat one by the bulge at most.
@@ -50,6 +63,42 @@ void PlaneBelow::find(const SE3& plane_from_shell, Query& query) const {
 void Ball::find_near(const Vec3& center, double other, double, Query& query) const {
   const double depth = other + radius - center.norm();
   query.contacts.assign(1, Contact{Vec3::Zero(), Vec3::Zero(), depth, 0, Feature::Face});
+}
+
+Contact Ball::nearest(const Vec3& center, double other) const {
+  const double length = center.norm();
+  const Vec3 normal = length > 0 ? Vec3(center / length) : Vec3(Vec3::UnitZ());
+  return {radius * normal, normal, other + radius - length, 0, Feature::Face};
+}
+
+Contact PlaneBelow::nearest(const SE3& plane_from_shell) const {
+  const Vec3 up = plane_from_shell.rotation().row(2);
+  const std::vector<Vec3>& vertices = shell->vertices();
+  const auto lowest =
+      std::min_element(vertices.begin(), vertices.end(),
+                       [&](const Vec3& a, const Vec3& b) { return up.dot(a) < up.dot(b); });
+  const Vec3 point = plane_from_shell.act(*lowest);
+  return {point, Vec3::UnitZ(), -point.z(), 0, Feature::Face};
+}
+
+void SourcePoints::find(const SE3& pose_i, const SE3& pose_j,
+                        std::vector<Contact>& contacts) const {
+  contacts.clear();
+  source(pose_i, pose_j, contacts);
+  for (Contact& contact : contacts) {
+    contact.point = pose_j.actInv(contact.point);
+    contact.normal = pose_j.rotation().transpose() * contact.normal;
+  }
+}
+
+Contact SourcePoints::nearest(const SE3& pose_i, const SE3& pose_j,
+                              std::vector<Contact>& contacts) const {
+  find(pose_i, pose_j, contacts);
+  const auto deepest =
+      std::max_element(contacts.begin(), contacts.end(),
+                       [](const Contact& a, const Contact& b) { return a.depth < b.depth; });
+  return deepest == contacts.end() ? Contact{Vec3::Zero(), Vec3::Zero(), 0, -1, Feature::Face}
+                                   : *deepest;
 }
 
 }  // namespace sphshell

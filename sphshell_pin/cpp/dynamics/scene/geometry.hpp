@@ -33,6 +33,8 @@ using ContactSource =
 // - least_radius, disc_radius: see Pair;
 // - curvature: of what it is made of, where that is the same everywhere [1/m];
 // - smooth_shell: the shell whose curvature is to be looked up at each contact, or null;
+// - nearest: where it is closest to a center, at any distance: the point, the normal there and the
+//   depth, which is negative by the gap; an element of -1: there is nothing;
 // - distance: a lower bound of the distance from a center to the body [m];
 // - depth_behind: how deep a sphere is that touches nothing, but whose center is behind the
 //   surface of a solid [m]; 0 elsewhere;
@@ -61,6 +63,11 @@ struct ShellSurface : AnyGeometry {
     query.find(*shell, center, radius, method);
   }
   void find_near(const Vec3& center, double radius, double margin, Query& query) const;
+  template <class Pose>
+  Contact nearest(const Pose&, const SE3&, const Vec3& center, double radius, Query& query) const {
+    return nearest(center, radius, query);
+  }
+  Contact nearest(const Vec3& center, double radius, Query& query) const;
   void overlap(Foundation& foundation, const Vec3& center, double radius, bool slopes,
                bool points) const {
     foundation.find(*shell, method, center, radius, slopes, points);
@@ -79,6 +86,11 @@ struct Ball : AnyGeometry {
     find_on_ball(radius, center, other, query.contacts);
   }
   void find_near(const Vec3& center, double other, double margin, Query& query) const;
+  template <class Pose>
+  Contact nearest(const Pose&, const SE3&, const Vec3& center, double other, Query&) const {
+    return nearest(center, other);
+  }
+  Contact nearest(const Vec3& center, double other) const;
   void overlap(Foundation& foundation, const Vec3& center, double other, bool, bool points) const {
     foundation.find_on_ball(radius, center, other, points);
   }
@@ -102,6 +114,11 @@ struct PlaneBelow : AnyGeometry {
     find(pose_j.actInv(pose_i()), query);
   }
   void find(const SE3& plane_from_shell, Query& query) const;
+  template <class Pose>
+  Contact nearest(const Pose& pose_i, const SE3& pose_j, const Vec3&, double, Query&) const {
+    return nearest(pose_j.actInv(pose_i()));
+  }
+  Contact nearest(const SE3& plane_from_shell) const;
   void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }
   void overlap(Foundation&, const Vec3&, double, bool, bool) const {}
   double distance(const Vec3&) const { return 0; }
@@ -115,13 +132,19 @@ struct SourcePoints : AnyGeometry {
   bool has_dn_dc() const { return false; }
   template <class Pose>
   void find(const Pose& pose_i, const SE3& pose_j, const Vec3&, double, Query& query) const {
-    query.contacts.clear();
-    source(pose_i(), pose_j, query.contacts);
-    for (Contact& contact : query.contacts) {
-      contact.point = pose_j.actInv(contact.point);
-      contact.normal = pose_j.rotation().transpose() * contact.normal;
-    }
+    std::vector<Contact>& found = query.contacts;
+    find(pose_i(), pose_j, found);
+    found.erase(std::remove_if(found.begin(), found.end(),
+                               [](const Contact& one) { return !(one.depth > 0); }),
+                found.end());
   }
+  // Those of no depth, too.
+  void find(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts) const;
+  template <class Pose>
+  Contact nearest(const Pose& pose_i, const SE3& pose_j, const Vec3&, double, Query& query) const {
+    return nearest(pose_i(), pose_j, query.contacts);
+  }
+  Contact nearest(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts) const;
   void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }
   void overlap(Foundation&, const Vec3&, double, bool, bool) const {}
   double distance(const Vec3&) const { return 0; }

@@ -303,6 +303,25 @@ void Multibody::task(const VectorX& q, int joint, const pinocchio::SE3& frame, M
   mass_.solveInPlace(mobility);
 }
 
+void Multibody::place(const VectorX& q) {
+  compute_mass(q);
+  mass_.compute(data_.M);
+}
+
+void Multibody::add_jacobian(int joint, const Eigen::Vector3d& point, double factor,
+                             MatrixX& out) const {
+  for (; joint > 0; joint = static_cast<int>(model_.parents[joint]))
+    for (int c = 0; c < model_.nvExtendeds[joint]; ++c) {
+      const pinocchio::Motion axis(data_.J.col(model_.idx_vExtendeds[joint] + c));
+      out.col(model_.idx_vs[joint] + c) += factor * (axis.linear() + axis.angular().cross(point));
+    }
+}
+
+MatrixX Multibody::mobility(const MatrixX& jacobian) const {
+  const MatrixX half = mass_.matrixL().solve(jacobian.transpose());
+  return half.transpose() * half;
+}
+
 void Multibody::transmit(const VectorX& q, const VectorX& v, const VectorX& acceleration,
                          const Forces& external) {
   pinocchio::rnea(model_, data_, q, v, acceleration, external);

@@ -72,6 +72,12 @@ class Multibody {
   // Jacobian (6, nv) of a frame of `joint`, in that frame, and M^-1 of its transpose (nv, 6).
   void task(const VectorX& q, int joint, const pinocchio::SE3& frame, Matrix6X& jacobian,
             MatrixX& mobility);
+  // All joints at q: what the two below answer for.
+  void place(const VectorX& q);
+  // Adds factor x the velocity of a point of `joint`, in the world, by the velocities (3, nv).
+  void add_jacobian(int joint, const Eigen::Vector3d& point, double factor, MatrixX& out) const;
+  // J M^-1 J^T.
+  MatrixX mobility(const MatrixX& jacobian) const;
   // Inverse dynamics, and what it leaves, all in the joints' frames.
   void transmit(const VectorX& q, const VectorX& v, const VectorX& acceleration,
                 const Forces& external);

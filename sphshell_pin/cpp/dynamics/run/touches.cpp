@@ -1,0 +1,48 @@
+#include "dynamics/run/touches.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <limits>
+
+namespace sphshell {
+namespace {
+
+constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+
+double mass_of(double mobility) { return mobility > 1e-12 ? 1 / mobility : kNothing; }
+
+}  // namespace
+
+std::vector<Touch> touches_at(Multibody& body, const std::vector<Pair>& pairs, const VectorX& q,
+                              const VectorX& v) {
+  std::vector<Touch> out;
+  Query query;
+  body.place(q);
+  for (const Pair& pair : pairs) {
+    const auto pose_i = [&] { return body.world_from(pair.joint_i, pair.placement_i); };
+    const SE3 pose_j = body.world_from(pair.joint_j, pair.placement_j);
+    const Vec3 center =
+        pose_j.actInv(body.world_from(pair.joint_i, pair.placement_i.translation()));
+    const Contact at = pair.ask([&](const auto& geometry) {
+      return geometry.nearest(pose_i, pose_j, center, pair.radius, query);
+    });
+    if (at.element < 0) {
+      out.push_back({kNothing, kNothing, kNothing, kNothing});
+      continue;
+    }
+    const Vec3 point = pose_j.act(at.point), normal = pose_j.rotation() * at.normal;
+    MatrixX jacobian = MatrixX::Zero(3, v.size());
+    body.add_jacobian(pair.joint_i, point, 1, jacobian);
+    body.add_jacobian(pair.joint_j, point, -1, jacobian);
+    const Mat3 mobility = body.mobility(jacobian);
+    const Mat3 across = Mat3::Identity() - normal * normal.transpose();
+    const double slip =
+        Eigen::SelfAdjointEigenSolver<Mat3>(across * mobility * across, Eigen::EigenvaluesOnly)
+            .eigenvalues()
+            .maxCoeff();
+    out.push_back({-at.depth, mass_of(normal.dot(mobility * normal)), mass_of(slip),
+                   std::abs(normal.dot(jacobian * v))});
+  }
+  return out;
+}
+
+}  // namespace sphshell
