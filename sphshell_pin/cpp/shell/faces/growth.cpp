@@ -273,8 +273,8 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
   all.resize(kept);
 }
 
-// What was left out of a face, was taken for a strip before the face was known or is another part of
-// it goes to it where it lies on it and stands off no more than the rest.
+// What was left out of a face, was taken for a strip before the face was known or is another part
+// of it goes to it where it lies on it and stands off no more than the rest.
 void Recognizer::absorb(int face) {
   Growth& growth = faces_[face];
   const auto fits = [&](int t) {
