@@ -39,7 +39,14 @@ def new_figure(width: float, height: float, title: str = "") -> Figure:
 def png(figure: Figure, dpi: int = RESOLUTION) -> bytes:
     """Return `figure` as a .png file."""
     stream = io.BytesIO()
+    # Its places are found once: `savefig` would draw it twice to find them, and find them twice.
+    layout = figure.get_layout_engine()
+    figure.set_dpi(dpi)
+    if layout is not None:
+        layout.execute(figure)
+    figure.set_layout_engine("none")
     figure.savefig(stream, format="png", dpi=dpi, pil_kwargs={"compress_level": 1})
+    figure.set_layout_engine(layout)
     return stream.getvalue()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack, get_args
@@ -127,11 +127,9 @@ class Result(Summarized):
         sensors: SensorSet,
     ) -> Result:
         """Build from the rows that the core has recorded."""
-        row = whole["contact_row"].astype(np.int64)
-        log = {**columns(whole["contacts"]), "t": whole["t"][row], "row": row}
-        energy = {
-            f.name: read_only(whole["energy"][:, i]) for i, f in enumerate(fields(EnergyAudit))
-        }
+        row = read_only(whole["contact_row"].astype(np.int64))
+        log = {**columns(whole["contacts"]), "t": read_only(whole["t"][row]), "row": row}
+        energies = read_only(whole["energy"]).T
         owners, patches = _owners(pairs, scene), whole.get("patches")
         events = tuple(
             Event(float(t), owners[EVENT_KINDS[kind]][number], EVENT_KINDS[kind])
@@ -144,9 +142,9 @@ class Result(Summarized):
             q=read_only(whole["q"]),
             v=read_only(whole["v"]),
             pairs=pairs,
-            contacts=ContactLog(**{k: read_only(c) for k, c in log.items()}),
+            contacts=ContactLog(**log),
             events=events,
-            energy=EnergyAudit(**energy),
+            energy=EnergyAudit(*energies),
             stats=stats,
             scene=scene,
             sensors=sensors.logs(whole),

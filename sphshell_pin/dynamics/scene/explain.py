@@ -262,13 +262,18 @@ def core_pairs(
         return cores, ()
     figures = explain_pairs(scene, q, v, cores)
     for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
-        core.relaxation = relaxation_time(pair, figure)
+        if _has_bristles(pair):
+            core.relaxation = relaxation_time(pair, figure)
     return cores, figures
 
 
 def has_state(scene: Scene) -> bool:
     """Whether a pair has bristles: only they need to know how fast an impact is."""
-    return any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
+    return any(map(_has_bristles, scene.pairs))
+
+
+def _has_bristles(pair: ContactPair) -> bool:
+    return pair.friction is not None and pair.friction.has_state
 
 
 def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:

@@ -99,5 +99,5 @@ class SceneContacts(Summarized):
 
 def columns(rows: Rows) -> Columns:
     """Return the fields of the core's rows, read-only, by name."""
-    table = np.frombuffer(rows, ROW)
-    return {name: read_only(table[name]) for name in ROW.names or ()}
+    table = read_only(np.frombuffer(rows, ROW))  # and so are its fields
+    return {name: table[name] for name in ROW.names or ()}

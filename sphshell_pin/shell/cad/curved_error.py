@@ -108,35 +108,49 @@ class _Places:
             nodes = mesh.triangles[polygon[own] - cad.found.starts[face]]
             self._find_curves(mesh, own, nodes, SAME_PLACE * cad.size)
         self._curves.seal()
+        self._flat_points = np.einsum("kc,tcx->tkx", WEIGHTS, self.corners)
+        # Measured last: where, nan where nowhere yet; and how far off.
+        self._curved = np.full_like(self._flat_points, np.nan), self._none()
+        self._flat = self._curved
+
+    def _none(self) -> Errors:
+        count = len(self.corners)
+        return Errors(np.zeros((count, 3)), np.zeros(count), np.zeros((count, 3)))
 
     def errors(self, shell: ShellBase) -> Errors:
         """Measure the curved elements of `shell`, whose triangles are those of the surface."""
-        rows = np.arange(len(self.corners))
-        points = points_at(shell, rows, WEIGHTS) / self._factor
-        return self._measure(points, self._sides.first, rows >= 0)
+        points = points_at(shell, np.arange(len(self.corners)), WEIGHTS) / self._factor
+        self._curved = points, self._measure(points, *self._curved)
+        return self._curved[1]
 
     def flat_errors(self, rows: Longs) -> Errors:
-        """Measure the flat triangles `rows` alone: the others have errors of 0."""
-        some = np.zeros(len(self.corners), np.bool_)
-        some[rows] = True
-        points = np.einsum("kc,tcx->tkx", WEIGHTS, self.corners)
-        return self._measure(points, np.repeat(some[:, None], 3, axis=1), some)
+        """Measure the flat triangles `rows`: others have the errors of an earlier call, or 0."""
+        points = self._flat[0].copy()
+        of_sides = np.isin(self._sides.number, self._sides.number[rows]).any(axis=1)
+        points[of_sides] = self._flat_points[of_sides]
+        self._flat = points, self._measure(points, *self._flat)
+        return self._flat[1]
 
-    def _measure(self, points: Array, on_sides: Mask, in_middles: Mask) -> Errors:
-        """Errors of points (t, k, 3) at WEIGHTS of all triangles; only where wanted (t, 3), (t,).
+    def _measure(self, points: Array, before: Array, known: Errors) -> Errors:
+        """Errors of points (t, k, 3) at WEIGHTS of all triangles; `known` are those of `before`.
 
-        A side that triangles of a face share needs to be measured in one of them.
+        Only what has moved is measured; a side that triangles of a face share, in one of them.
         """
         count = len(self.corners)
-        sides, middles, borders = np.zeros((count, 3)), np.zeros(count), np.zeros((count, 3))
+        changed = ((points != before) & np.isfinite(points)).any(axis=(1, 2))
+        on_sides = self._sides.first & changed[:, None]
+        sides, middles, borders = known.sides.copy(), known.middles.copy(), known.borders.copy()
         for mesh, own, corners_uv in self._of_face:
             wanted = np.repeat(on_sides[own], len(ALONG), axis=1)
-            wanted = np.column_stack([wanted, in_middles[own]])
+            wanted = np.column_stack([wanted, changed[own]])
+            if not wanted.any():
+                continue
             uv = np.einsum("kc,tcx->tkx", WEIGHTS, corners_uv)
             found = np.zeros(wanted.shape)
             found[wanted] = mesh.surface.distances(points[own][wanted], uv[wanted], self._tolerance)
-            sides[own] = found[:, :-1].reshape(-1, 3, len(ALONG)).max(axis=2)
-            middles[own] = found[:, -1]
+            largest = found[:, :-1].reshape(-1, 3, len(ALONG)).max(axis=2)
+            sides[own] = np.where(on_sides[own], largest, sides[own])
+            middles[own] = np.where(changed[own], found[:, -1], middles[own])
         of_sides = points[:, : 3 * len(ALONG)].reshape(count, 3, len(ALONG), 3)
         for shape, places in self._curves.shapes:
             wanted = on_sides[tuple(places.T)]
@@ -185,9 +199,9 @@ class _Sides:
 
     def spread(self, values: Array) -> Array:
         """Give all triangles (t, 3) what the first one of each side has."""
-        largest = np.zeros(int(self.number.max(initial=-1)) + 1)
-        np.maximum.at(largest, self.number.ravel(), values.ravel())
-        return np.asarray(largest[self.number])
+        of_number = np.zeros(int(self.number.max(initial=-1)) + 1)
+        of_number[self.number[self.first]] = values[self.first]
+        return np.asarray(of_number[self.number])
 
 
 def _own_sides(triangles: Ints, face: Longs) -> _Sides:
