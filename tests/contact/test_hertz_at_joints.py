@@ -63,6 +63,8 @@ def test_the_force_is_continuous_and_small_beside_the_normal() -> None:
     size = np.linalg.norm(forces, axis=1)
     per_micrometer = np.abs(np.diff(forces, axis=0)).max() / (places[1] - places[0]) * 1e-6
     assert per_micrometer < 0.01 * size.max()
+    # The share of the other face goes from 1/2 to 0 as smoothly as it can.
+    assert per_micrometer * 1e6 * LENGTH < 0.35 * size.max()
     assert np.all(np.diff(size) > -1e-9 * size.max())
     # On the flat nothing but the law pushes aside, by at most the root of depth over radius.
     flat = places < 0
@@ -106,7 +108,7 @@ def test_the_force_is_continuous_beside_a_joint_that_bulges_beyond_its_chords() 
     assert size[-1] < 0.9 * size[0]  # the rim is softer than the disc
 
 
-@pytest.mark.parametrize("beyond", [-0.9, -0.5, -0.1, 0.1, 0.5, 0.9])
+@pytest.mark.parametrize("beyond", [-0.9, -0.4, -0.1, 0.1, 0.4, 0.9])
 def test_derivatives_are_those_of_differences(beyond: float) -> None:
     one, at, step = scene(), center(beyond * LENGTH), 1e-8
     names = ["c.sphere.radius", "c.law.young"]
