@@ -102,7 +102,8 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
         if tag == "sdf":
             raise RobotError(f"{file}: {_reason('.sdf')}")
         if tag not in ("robot", "mujoco"):
-            raise ValueError(f"its root element is <{tag}>; {_NEXT}")
+            included = "if another file includes this one, name that"
+            raise ValueError(f"its root element is <{tag}>; {_NEXT}; {included}")
         root = parsed(text)
         if tag == "mujoco":
             from sphshell_pin.robots.mjcf import plain

@@ -12,6 +12,8 @@ def check_tree(root: ET.Element) -> None:
     """Raise ValueError if two joints move one link (a closed kinematic chain), or one none."""
     movers = defaultdict(list)
     links = {link.get("name") for link in root.findall("link")}
+    if not links:
+        raise ValueError("it has no <link>: name the file of the robot that includes this one")
     for joint in root.findall("joint"):
         for end in ("parent", "child"):
             elements = joint.findall(end)

@@ -3,7 +3,6 @@
 import copy
 import gc
 import pickle
-import subprocess
 import sys
 import weakref
 
@@ -17,6 +16,7 @@ mujoco = pytest.importorskip("mujoco")
 
 from sphshell_pin.adapters.mujoco import attach  # noqa: E402
 from tests.adapters.mujoco_models import SOFT, model_of, on_slab, plate, slab  # noqa: E402
+from tests.programs import python  # noqa: E402
 
 
 def test_contacts_end_with_their_model_and_touch_no_stranger():
@@ -224,9 +224,7 @@ print("done")
 
 @pytest.mark.parametrize("program", [REFUSED, AT_ONCE, MARKS], ids=["refused", "at once", "marks"])
 def test_programs_that_crashed_hung_or_pushed_strangers(program):
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False
-    )
+    done = python(program)
     assert done.stdout == "done\n", done.stderr
 
 

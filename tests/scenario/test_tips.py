@@ -1,5 +1,6 @@
 """Which frame carries the sphere of a new scenario: tools before jaws; fingers without spheres."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -88,3 +89,74 @@ def test_every_finger_gets_a_ball_at_the_end_of_its_mesh(tmp_path: Path) -> None
         ends = LinkGeometry(robot, tip.frame).corners
         assert tip.offset[2] + tip.radius > ends[:, 2].max() - 1e-9
         assert np.hypot(*tip.offset[:2]) < 0.01
+
+
+def body(*arms: str) -> str:
+    """Return a robot on casters with spheres: a lift, a head of two joints, and arms of four."""
+    shape = '<collision><geometry><sphere radius=".05"/></geometry></collision></link>'
+    out = link("base", ".5 .4 .2", "0 0 .2") + link("torso", ".2 .2 .4")
+    out += joint("lift", "base", "torso", "prismatic", "0 0 .5", "0 0 1")
+    for name, at in (("left_caster", "0 .2 .05"), ("right_caster", "0 -.2 .05")):
+        out += link(name).replace("</link>", shape)
+        out += joint(f"{name}_roll", "base", name, "continuous", at, "0 1 0")
+    for limb, count, at in (("head", 2, "0 0 .3"), *((one, 4, "0 .3 .3") for one in arms)):
+        for k in range(count):
+            out += link(f"{limb}_{k}", ".05 .05 .2", "0 0 .1")
+            parent, place = (f"{limb}_{k - 1}", "0 0 .25") if k else ("torso", at)
+            out += joint(f"{limb}_{k}_j", parent, f"{limb}_{k}", "revolute", place, "0 1 0")
+    out += link("camera_tip") + joint("mount", "head_1", "camera_tip", "fixed", "0 0 .1", "0 0 1")
+    return f'<robot name="body">{out}</robot>'
+
+
+@pytest.mark.parametrize("arms", [("one",), ("left", "right"), ("gripper", "effector")])
+def test_the_tip_of_a_robot_with_a_head_is_on_an_arm(tmp_path: Path, arms: tuple[str, ...]) -> None:
+    file = tmp_path / "body.urdf"
+    file.write_text(body(*arms))
+    robot = robots.load_file(file)
+    (tip,) = find_tips(robot, shipped=None, frame=None, radius=None)
+    model = robot.model
+    carried = model.names[model.frames[model.getFrameId(tip.frame)].parentJoint]
+    assert carried in {f"{arm}_3_j" for arm in arms}
+    # On the end of its link, not at its joint.
+    assert tip.offset[2] > 0.2
+
+
+@pytest.mark.parametrize("feet", [0, 4])
+def test_a_drone_touches_with_its_body_or_its_feet(tmp_path: Path, feet: int) -> None:
+    shape = '<geometry><sphere radius=".01"/></geometry>'
+    spheres = [
+        f'<collision><origin xyz="{x} {y} -.05"/>{shape}</collision>'
+        for x, y in itertools.product((0.1, -0.1), repeat=2)
+    ]
+    out = link("frame", ".2 .2 .05").replace("</link>", "".join(spheres[:feet]) + "</link>")
+    for name in ("left", "right"):
+        out += link(name) + joint(f"{name}_j", "frame", name, "fixed", ".1 .1 0", "0 0 1")
+    file = tmp_path / "drone.urdf"
+    file.write_text(f'<robot name="drone">{out}</robot>')
+    robot = robots.load_file(file, free_flyer=True)
+    tips = find_tips(robot, shipped=None, frame=None, radius=None)
+    assert len(tips) == (feet or 1)
+    carriers = [robot.model.frames[robot.model.getFrameId(one.frame)] for one in tips]
+    assert {int(one.parentJoint) for one in carriers} == {1}
+
+
+def test_a_file_with_two_roots_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    file = tmp_path / "two.urdf"
+    file.write_text(arm(jaws=None, tool=None).replace("</robot>", link("alone") + "</robot>"))
+    with pytest.raises(robots.RobotError, match=r"'alone', 'base'.*fix the others to it"):
+        robots.load_file(file)
+
+
+def test_a_ball_of_free_size_fits_the_part_and_stays_on_its_link(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(arm(jaws=None, tool=None))
+    robot = robots.load_file(file)
+    (tip,) = find_tips(robot, shipped=None, frame=None, radius=None)
+    small = tip.at_most(0.2 * tip.radius)
+    assert small.radius == 0.2 * tip.radius
+    carrier = LinkGeometry(robot, tip.frame)
+    for one in (tip, small):
+        assert carrier.depth(one.offset) == pytest.approx(-one.radius)
+    assert tip.at_most(2 * tip.radius) is tip
+    (asked,) = find_tips(robot, shipped=None, frame=None, radius=0.05)
+    assert asked.at_most(0.01) is asked

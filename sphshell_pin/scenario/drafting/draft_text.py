@@ -35,13 +35,7 @@ _PARTS = re.split(
 _TEMPLATES = dict(zip(_PARTS[1::2], _PARTS[2::2], strict=True))
 
 
-def draft_text(
-    name: str,
-    title: str,
-    robot: RobotSection,
-    shell: ShellSection,
-    plan: Plan,
-) -> str:
+def draft_text(name: str, title: str, robot: RobotSection, shell: ShellSection, plan: Plan) -> str:
     """Return the text of the scenario called `name`."""
     pairs = pair_names(plan.tips, shell.name)
     digits = decimals(plan.gap)

@@ -32,6 +32,17 @@ class Tip:
     radius: float
     offset: Array
     source: str
+    ahead: Array | None = None
+    """Direction (3,) in which a smaller one is drawn back; None of a sphere that has one size."""
+
+    def at_most(self, radius: float) -> "Tip":
+        """Return it with a `radius` [m] that is no larger, where its size is free."""
+        if self.ahead is None or self.radius <= radius:
+            return self
+        offset = self.offset - (self.radius - radius) * self.ahead
+        return replace(
+            self, radius=radius, offset=offset, source=f"{self.source}, sized to the part"
+        )
 
 
 def find_tips(
@@ -57,19 +68,17 @@ def find_tips(
     if not robot.model.nv:
         raise SphshellError("the robot has no joint: let its root float with --base floating")
     held = gripper_joints(robot.model)
+    limbs = _limbs(robot.model, held)
     known = [one for one in _known(robot, shipped) if _joint_of(robot.model, one.frame) not in held]
     if frame is not None:
         find_frame(robot.model, frame)
         known = [one for one in known if one.frame == frame]
     elif not floats(robot.model):
-        # Not a head or a caster beside an arm.
-        deep = {one.frame: _joint_of(robot.model, one.frame) for one in known}
-        most = max(map(len, robot.model.supports))
-        known = [one for one in known if 2 * len(robot.model.supports[deep[one.frame]]) > most][:1]
+        known = [one for one in known if _joint_of(robot.model, one.frame) in limbs][:1]
     if known and offset is not None:
         known = [replace(known[0], offset=offset, source=_ASKED)]
     if not known:
-        names = _ends(robot.model, held) if frame is None else [(frame, _ASKED)]
+        names = _ends(robot.model, held, limbs) if frame is None else [(frame, _ASKED)]
         known = [_at_end(robot, *one, radius, offset, asked=frame is not None) for one in names]
     found = [_sized(one, radius) for one in known]
     # The sphere of a shipped robot is where it belongs, whatever size is asked for.
@@ -118,10 +127,11 @@ def _at_end(
     end = link.end(radius)
     if offset is not None:
         return Tip(frame, end.radius, offset, _ASKED)
-    before = -math.inf < link.depth(np.zeros(3)) < -0.5 * end.radius
+    placed = not robot.model.frames[find_frame(robot.model, frame)].placement.isIdentity()
+    before = placed and -math.inf < link.depth(np.zeros(3)) < -0.5 * end.radius
     if before or (asked and radius):
-        return Tip(frame, end.radius, np.zeros(3), source)
-    return Tip(frame, end.radius, end.offset, f"{source}; {end.source}")
+        return Tip(frame, end.radius, np.zeros(3), source, None if radius else np.zeros(3))
+    return Tip(frame, end.radius, end.offset, f"{source}; {end.source}", end.ahead)
 
 
 def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
@@ -169,8 +179,23 @@ def _leaves(model: pin.Model, held: Collection[int] = ()) -> set[int]:
     return left - {int(model.parents[one]) for one in left}
 
 
-def _ends(model: pin.Model, held: Collection[int]) -> list[tuple[str, str]]:
-    """Return the frames at the ends of the limbs that may be meant, and why.
+def _limbs(model: pin.Model, held: Collection[int]) -> set[int]:
+    """Return the joints without `held` whose links may be a tip: not a head or a caster by an arm.
+
+    From where it parts from the longest chain of joints, its own is more than half as long as what
+    is left of that one; all joints of a robot that floats.
+    """
+    chains = {j: set(map(int, model.supports[j])) for j in range(1, model.njoints) if j not in held}
+    longest = max(chains.values(), key=len, default=set())
+
+    def is_limb(chain: set[int]) -> bool:
+        return chain <= longest or 2 * len(chain - longest) > len(longest - chain)
+
+    return {j for j, chain in chains.items() if floats(model) or is_limb(chain)}
+
+
+def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> list[tuple[str, str]]:
+    """Return the frames at the ends of the `limbs` that may be meant, and why.
 
     The joints `held` are those of grippers, whose jaws are no ends.
     """
@@ -179,7 +204,7 @@ def _ends(model: pin.Model, held: Collection[int]) -> list[tuple[str, str]]:
     childless = [
         one
         for i, one in enumerate(model.frames)
-        if int(one.parentJoint) not in {0, *held} and i not in carriers
+        if int(one.parentJoint) in limbs and i not in carriers
     ]
     if not floats(model):
         for word in _TOOL_WORDS:

@@ -199,8 +199,11 @@ def _places(
 
     The part's box is turned in all 24 ways: one side across, between thumb and fingers.
     """
+    from scipy.spatial.transform import Rotation
+
     extent, middle = shell.box[1] - shell.box[0], shell.box.mean(axis=0)
     root = _root(hand, q0)
+    turns = np.round(Rotation.create_group("O").as_matrix())
     found: list[tuple[int, float, int, Array, pin.SE3]] = []
     for _, q, thumb in itertools.islice(_postures(hand, q0, free_of_itself), _BEST):
         centers = hand.centers(q)
@@ -215,7 +218,7 @@ def _places(
         center = 0.5 * (others.mean(axis=0) + centers[thumb])
         free = width - 2 * float(hand.radii.mean())
         own: list[tuple[float, pin.SE3]] = []
-        for turn in _turns():
+        for turn in turns:
             sizes = np.abs(turn) @ extent  # along across, ahead and the third
             misfit = abs(free - sizes[0]) / width
             if misfit > _WIDER:
@@ -275,15 +278,3 @@ def _root(hand: Hand, q0: Array) -> Array:
     pin.forwardKinematics(hand.model, data, q0)
     root: Array = np.mean([data.oMi[j].translation for j in hand.joints], axis=0)
     return root
-
-
-def _turns() -> list[Array]:
-    """Return the 24 rotations of a box into itself as a cube."""
-    out = []
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            turn = np.zeros((3, 3))
-            turn[range(3), order] = signs
-            if np.linalg.det(turn) > 0:
-                out.append(turn)
-    return out

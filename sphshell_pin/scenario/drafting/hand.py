@@ -34,6 +34,10 @@ _SAFETY = 3.0
 _MOST_RUNS, _SETTLED, _MOVED = 6, 0.4, 0.2
 
 
+class CannotHold(SphshellError):
+    """No grasp of all fingertips that were asked for holds the part."""
+
+
 def every_tip(robot: LoadedRobot, asked: Asked) -> list[Tip]:
     """Return all fingertips of `robot`.
 
@@ -57,13 +61,35 @@ def hold_in_hand(
     """Return a scenario `name` in which the `tips` of a robot hold the surface of `built`.
 
     The largest normal force of a tip is what is asked for; `make(text, reuse)` builds a text. Each
-    draft is run; the first that holds the part is taken.
+    draft is run; the first that holds the part is taken. Where all tips cannot, those do without
+    the fingers of the fewest joints, three at least.
 
     Raises
     ------
     SphshellError
         None does; the text says why, and what to change.
     """
+    ranks = Hand(built.assembly.model, tips).ranks()
+    order = sorted(range(len(tips)), key=lambda k: -len(ranks[k]))
+    refused, last = "", CannotHold()
+    for count in range(len(tips), min(len(tips), 3) - 1, -1):
+        some = [tips[k] for k in sorted(order[:count])]
+        try:
+            found = _held(asked, built, some, name, make)
+        except CannotHold as error:
+            refused, last = refused or str(error), error
+            continue
+        if refused:
+            note = f"{count} of {len(tips)} fingertips hold it: {refused.partition(';')[0]}"
+            found = found._replace(why=(note, *found.why))
+        return found
+    raise last
+
+
+def _held(
+    asked: Asked, built: Built, tips: Sequence[Tip], name: str, make: Callable[[str, Built], Built]
+) -> Working:
+    """Return a scenario in which all of the `tips` hold the surface; CannotHold if none works."""
     materials = find_material(asked.material or "rubber"), find_material(asked.against)
     press = asked.press
     model = built.assembly.model
@@ -116,21 +142,21 @@ def hold_in_hand(
             fault = _try(made, draft, links)
             if not fault:
                 return Working(text, made, draft.why(kinds, joints), part.urdf())
-    raise SphshellError(
+    raise CannotHold(
         f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {fault}; a lighter "
         "--against, another --press, or a smaller part"
     )
 
 
-def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> SphshellError:
+def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> CannotHold:
     sizes = " x ".join(f"{1e3 * one:.3g}" for one in shell.box[1] - shell.box[0])
     if blocked:
         link = max(set(blocked), key=blocked.count)
-        return SphshellError(
+        return CannotHold(
             f"link '{link}' would be in the part, or another one, wherever all {count} fingertips "
             f"touch it and could hold it: take a part of another size than {sizes} mm"
         )
-    return SphshellError(
+    return CannotHold(
         f"the {count} fingertips cannot hold a part of {sizes} mm: nowhere that was tried do all "
         "touch it with forces inside their friction cones; take a part of another size, or its "
         "--unit"

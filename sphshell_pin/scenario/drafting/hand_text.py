@@ -15,12 +15,7 @@ from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.scenario.drafting.draft_text import toml
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.part import Part, part_file
-from sphshell_pin.scenario.drafting.tip_contact import (
-    Contact,
-    bearable,
-    hertz_stiffness,
-    sticking,
-)
+from sphshell_pin.scenario.drafting.tip_contact import Contact, bearable, hertz_stiffness, sticking
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
@@ -29,7 +24,7 @@ from sphshell_pin.scenario.format.schema import ShellSection
 GAP = 1e-4
 """Gap of each fingertip at the start [m]."""
 
-DURATION, HELD = 1.5, 0.05
+DURATION, HELD = 1.5, 0.15
 """Duration of the run [s], and how well the largest force is held in it."""
 
 _TEMPLATE = Path(__file__).with_name("hand.template").read_text("utf-8")

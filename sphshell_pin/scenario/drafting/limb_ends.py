@@ -30,12 +30,15 @@ class End:
     offset: Array
     radius: float
     source: str
+    ahead: Array | None = None
+    """Unit (3,) out of a flat end, on which a ball of any size may stand; None of a round one."""
 
 
 def gripper_joints(model: pin.Model) -> set[int]:
     """Return the joints of grippers: behind a joint, two limbs or more that slide or are coupled.
 
-    They have two coordinates at most. A run holds them, where the tip is on what carries them.
+    They have two coordinates at most, or are called grippers. A run holds them, where the tip is on
+    what carries them.
     """
     rules, found = mimics(model), set[int]()
     coupled = {*rules, *(rule.of for rule in rules.values())}
@@ -46,7 +49,9 @@ def gripper_joints(model: pin.Model) -> set[int]:
             model.names[one] in coupled or model.joints[one].shortname().startswith("JointModelP")
             for one in behind
         )
-        if len(ends) > 1 and jaws and len({model.joints[one].idx_v for one in behind}) <= 2:
+        few = len({model.joints[one].idx_v for one in behind}) <= 2
+        named = all("gripper" in model.names[one].lower() for one in behind)
+        if len(ends) > 1 and (named or (jaws and few)):
             found |= set(behind)
     return found
 
@@ -104,8 +109,8 @@ class LinkGeometry:
         if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
             return End(center, rounded(covers), f"it covers the end of link '{self.link}'")
         ball = rounded(_BALL * covers) if radius is None else radius
-        front = center + (before + ball) * ahead
-        return End(front, ball, f"a ball on the end of link '{self.link}'")
+        front, source = center + (before + ball) * ahead, f"a ball on the end of link '{self.link}'"
+        return End(front, ball, source, ahead if radius is None else None)
 
     def _carries(self, link: str) -> bool:
         """Whether `link` moves with the frame, and has geometry."""

@@ -26,6 +26,7 @@ from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.pose_search import find_working, sphere_centers
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.refusals import CannotStand
+from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import check_masses
 from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.format.reading import parse_scenario
@@ -39,8 +40,9 @@ if TYPE_CHECKING:
 WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
 
-# Half the size of a surface that needs no file, in radii of the sphere.
-_SIZE = 15.0
+# Half the size of a surface that needs no file, in radii of the sphere; radius of a ball whose size
+# is free, as a part of the part's middle width.
+_SIZE, _BALL = 15.0, 0.1
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
 
 
@@ -163,7 +165,7 @@ def _written(asked: Asked) -> NewScenario:
         section = section.model_copy(update={"base": shaped})
         bare = _build_bare(section, file)
     loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
-    if radius is not None and (too_large := radius_fault(bare.assembly.model, radius)):
+    if radius and (too_large := radius_fault(bare.assembly.model, radius)):
         raise InvalidParameter("radius", radius, too_large)
     if in_hand:
         tips = every_tip(loaded, asked)
@@ -175,6 +177,7 @@ def _written(asked: Asked) -> NewScenario:
     check_masses(bare.assembly, set.intersection(*aside))
     shell = _shell_section(asked, file, bare, tips)
     built = _build_bare(section, file, shell, reuse=bare)
+    tips = _sized_to(built, tips, asked)
     built = _sided(built, tips, inside=asked.inside)
     (shell,) = built.scenario.shell
 
@@ -211,6 +214,15 @@ def _written(asked: Asked) -> NewScenario:
     if shaped is not None and not in_hand:
         why = (f"the base is {shaped}, by the robot's shape: or --base", *why)
     return NewScenario(file, made.text, made.built, explain_built(made.built), why)
+
+
+def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
+    """Return the `tips`, balls of free size that press on a file's surface as it needs them."""
+    if asked.word is not None or asked.tips == "all" or floats(built.assembly.model):
+        return list(tips)
+    (made,) = built.shells.values()
+    middle = float(np.sort(np.ptp(made.box, axis=0))[1])
+    return [tip.at_most(rounded(_BALL * middle)) for tip in tips]
 
 
 def _sided(built: Built, tips: Sequence[Tip], *, inside: bool) -> Built:
@@ -292,10 +304,7 @@ def _relative(file: Path, path: Path) -> str:
 
 
 def _build_bare(
-    section: RobotSection,
-    path: Path,
-    shell: ShellSection | None = None,
-    reuse: Built | None = None,
+    section: RobotSection, path: Path, shell: ShellSection | None = None, reuse: Built | None = None
 ) -> Built:
     """Build robot and surface without contacts.
 

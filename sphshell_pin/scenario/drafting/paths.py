@@ -87,7 +87,7 @@ def find_way(
         return best
     needed = SHORTEST_PATH * radius if asked.path is None else ENOUGH * (asked.length or 0.0)
     if most_on_surface <= needed:
-        within = mm(most_on_surface)
+        within = mm(most_on_surface + 0.5 * radius)
         reason = f"the surface has no room: an edge or another side is within {within}"
     return Way(stays, why=reason)
 

@@ -21,9 +21,9 @@ _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
 # Cosine between the normal that is touched and the side of the part, which is turned to the tip:
 # below it the part is turned to the normal itself, or another place is looked for.
 _STEEP = 0.8
-# Places and turns at which links are held against the part, and places of one posture that are
-# offered.
-_MOST_TRIED, _MOST_OF_STANCE = 160, 2
+# Places and turns at which links are held against the part: of one side and height, of these once
+# so many were tried in all, and places of one posture that are offered.
+_MOST_TRIED, _FEWER, _MANY, _MOST_OF_STANCE = 160, 32, 1600, 2
 # How far joints may be under the floor [m]: not at all, but for rounding.
 _AT_FLOOR = 1e-6
 
@@ -96,6 +96,7 @@ class Bench:
         self._depth, self._searched = depth, searched
         self._touching = SelfContact(self._model, self._geometry, q)
         self._floor = _floor(self._geometry)
+        self._found: dict[tuple[float | None, ...], list[Stance]] = {}
 
     def places(
         self,
@@ -114,23 +115,14 @@ class Bench:
         facing = turned_to(side, -approach)
         lowest = float((self._shell.vertices @ facing.T)[:, 2].min())
         uneven: list[Place] = []
-        tried = 0
+        most = self._searched.places + (_FEWER if self._searched.places > _MANY else _MOST_TRIED)
 
         def height(spot: TouchPoint) -> float | None:
             if lift is None:
                 return None
             return self._floor + lift - lowest + float(facing[2] @ spot.center)
 
-        limit = self._floor if lift is not None else None
-        postures = stances(
-            self._model,
-            self._q,
-            self._tip,
-            approach,
-            height(spots[0]),
-            lambda q: self._usable(q, limit),
-        )
-        for posture in postures:
+        for posture in self._stances(approach, height(spots[0])):
             self._searched.postures += 1
             offered = 0
             for spot in spots:
@@ -145,7 +137,6 @@ class Bench:
                 for angle in _YAWS:
                     turned = pin.AngleAxis(angle, approach).toRotationMatrix() @ facing
                     placement = pin.SE3(turned, stance.center - turned @ spot.center)
-                    tried += 1
                     self._searched.places += 1
                     # With a little room, as the tip yields when it is pressed on and slides.
                     part = nearer(placement, room * stance.approach)
@@ -162,11 +153,21 @@ class Bench:
                     else:
                         uneven.append(place)
                     break
-                if offered >= _MOST_OF_STANCE or tried >= _MOST_TRIED:
+                if offered >= _MOST_OF_STANCE or self._searched.places >= most:
                     break
-            if tried >= _MOST_TRIED:
+            if self._searched.places >= most:
                 break
         yield from uneven
+
+    def _stances(self, approach: Array, height: float | None) -> list[Stance]:
+        """Return postures for an approach, at a `height` [m] above the floor if it is given."""
+        key = (*approach, height)
+        if key not in self._found:
+            limit = None if height is None else self._floor
+            self._found[key] = stances(
+                self._model, self._q, self._tip, approach, height, lambda q: self._usable(q, limit)
+            )
+        return self._found[key]
 
     def _usable(self, q: Array, floor: float | None) -> bool:
         """Whether links are free of each other and above the `floor` [m] at q (nq,)."""

@@ -24,13 +24,7 @@ from sphshell_pin.scenario.drafting.tip_contact import (
     sticking,
 )
 from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
-from sphshell_pin.scenario.drafting.wording import (
-    axis_name,
-    counted,
-    listed,
-    mm,
-    rounded,
-)
+from sphshell_pin.scenario.drafting.wording import axis_name, listed, mm, rounded
 from sphshell_pin.shell import Shell
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -173,12 +167,7 @@ def press_gap(radius: float, force: float, materials: tuple[Material, Material])
 
 
 def press_plan(
-    tip: Tip,
-    place: Place,
-    way: Way,
-    materials: tuple[Material, Material],
-    force: float,
-    gap: float,
+    tip: Tip, place: Place, way: Way, materials: tuple[Material, Material], force: float, gap: float
 ) -> Plan:
     """Plan a scenario in which a tip of a robot with a fixed base presses with `force` [N].
 
@@ -224,7 +213,7 @@ def press_plan(
     why.append("the joints are bent to a posture in which the tip moves well and can press")
     why.append(place.told)
     if stance.lock:
-        why.append(f"{counted(len(stance.lock), 'joint')} that do not move the tip are locked")
+        why.append(f"joints that do not move the tip are locked: {len(stance.lock)}")
     why.append(
         f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
     )

@@ -29,7 +29,7 @@ from sphshell_pin.scenario.drafting.plan import (
     press_gap,
     press_plan,
 )
-from sphshell_pin.scenario.drafting.poses import NO_LIMIT, home_approach, joints_aside
+from sphshell_pin.scenario.drafting.poses import NO_LIMIT, approaches, joints_aside
 from sphshell_pin.scenario.drafting.refusals import Tried, cannot_stand, refusal
 from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
@@ -69,54 +69,26 @@ class Working(NamedTuple):
     """The URDF of a free part that it names."""
 
 
-class Failed(NamedTuple):
-    """A draft that did not work, as repairs see it."""
+def repaired(one: Plan, fault: Fault, joints: Sequence[str]) -> Plan | str | None:
+    """Return what to try in place of a draft that failed; None: nothing.
 
-    fault: Fault
-    press: Press | None
-    """Its control, if it presses."""
-    repair: str
-    """What was changed of it before."""
-    joints: Sequence[str]
-    """What acts in the joints, and may have caused the fault."""
-
-    @property
-    def slides(self) -> bool:
-        """Whether its tip moves."""
-        return self.press is not None and self.press.slides
-
-    @property
-    def is_pulled(self) -> bool:
-        """Whether the posture pulls at its tip."""
-        return self.press is not None and any(self.press.posture_stiffness)
-
-
-class Repair(NamedTuple):
-    """What to do about a draft that `fits`, as Plan.repair calls it."""
-
-    name: str
-    fits: Callable[[Failed], bool]
-    change: Callable[[Press], Press] | None = None
-    """None: what acts in the joints under that name is left out."""
-
-
-REPAIRS = (
+    Another plan, or the kind of what acts in the `joints` that is to be left out.
+    """
+    press = one.control if isinstance(one.control, Press) else None
+    if fault.kind in ("links", "run") or (fault.excess and not (press and press.slides)):
+        joints = ()  # They are not the cause.
     # Friction in the joints keeps the tip off the part, and against its motion.
-    Repair("friction", lambda one: "friction" in one.joints),
-    Repair(
-        "loose",
-        lambda one: one.repair == "" and one.fault.kind == "force" and one.is_pulled,
-        lambda press: replace(press, posture_stiffness=()),
-    ),
+    if "friction" in joints:
+        return "friction"
+    shaken = fault.kind == "force"
+    if press and shaken and one.repair == "" and any(press.posture_stiffness):
+        return replace(one, control=replace(press, posture_stiffness=()), repair="loose")
     # The tip creeps to the surface, or drags behind.
-    Repair("damping", lambda one: "damping" in one.joints),
-    Repair(
-        "calmed",
-        lambda one: one.repair != "calmed" and one.fault.kind == "force" and one.slides,
-        Press.calmed,
-    ),
-)
-"""The first that fits is made."""
+    if "damping" in joints:
+        return "damping"
+    if press and shaken and one.repair != "calmed" and press.slides:
+        return replace(one, control=press.calmed(), repair="calmed")
+    return None
 
 
 def find_working(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Working:
@@ -240,12 +212,8 @@ class _Search:
         q_work = np.array(known) if len(known) == model.nq else self.built.assembly.q0
         gap = TIP_GAP * tip.radius
         bench = Bench(self.built, tip, self.links, q_work, 2 * gap, self.tried)
-        directions = [
-            PLACES["below"],
-            tuple(home_approach(model, q_work, tip) + 0.0),
-            *PLACES.values(),
-        ]
-        approaches = [PLACES[asked.place]] if asked.place else list(dict.fromkeys(directions))
+        directions = [PLACES[asked.place]] if asked.place else list(PLACES.values())
+        pressed = approaches(model, q_work, tip, directions)
         lifts = [part * model_reach(model) for part in _LIFTS]
         if asked.fixed:
             spots = asked_touches(asked, shell, tip.radius, gap)
@@ -256,7 +224,7 @@ class _Search:
                 (one, list(touch_points(shell, tip.radius, gap, toward=one, inside=asked.inside)))
                 for one in (sides(shell) if side is None else [side])
             ]
-        for approach in map(np.array, approaches):
+        for approach in pressed[:1] if asked.place else pressed:
             # Upright ones first, as they stand in their file.
             ordered = sorted(choices, key=lambda one: abs(one[0][2] + approach[2]) > 1e-3)
             for room in (self.room, 0.0):
@@ -265,7 +233,7 @@ class _Search:
                         yield from bench.places(side, some, approach, lift=lift, room=room)
 
     def _repaired(self, section: RobotSection, plan: Plan) -> Working | None:
-        """Run a draft, and what REPAIRS make of it; return the first that works."""
+        """Run a draft, and those that repair it; return the first that works."""
         tried, changed = self.tried, plan
         while tried.runs < _MOST_RUNS:
             one = changed
@@ -282,18 +250,12 @@ class _Search:
                 self.asked.tell(f"tried, run {tried.runs}: {fault.text}")
             if one.repair == "" and len(tried.stays) < _MOST_STILL and not self.asked.slides:
                 tried.stays += [(section, other) for other in _still(one, fault)]
-            press = one.control if isinstance(one.control, Press) else None
-            failed = Failed(fault, press, one.repair, joints)
-            if fault.kind in ("links", "run") or (fault.excess and not failed.slides):
-                failed = failed._replace(joints=())
-            repair = next((repair for repair in REPAIRS if repair.fits(failed)), None)
-            if repair is None:
+            other = repaired(one, fault, joints)
+            if other is None:
                 break
-            if repair.change is None or press is None:
-                tried.leave_out(repair.name, f"with it {fault.text}")
-                changed = plan
-            else:
-                changed = replace(one, control=repair.change(press), repair=repair.name)
+            if isinstance(other, str):
+                tried.leave_out(other, f"with it {fault.text}")
+            changed = plan if isinstance(other, str) else other
         return None
 
 

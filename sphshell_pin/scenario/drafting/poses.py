@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,14 +113,27 @@ class Stance:
         return lambda: np.asarray(pin.log3(start @ reach.data.oMf[reach.frame].rotation.T))
 
 
-def home_approach(model: pin.Model, q: Array, tip: Tip) -> Array:
-    """Return the axis of the world (3,) along which the limb that carries the tip points at q."""
-    reach = Reach(model, tip.frame, tip.offset)
-    reach.center(q)
+def approaches(
+    model: pin.Model, q: Array, tip: Tip, directions: Sequence[Sequence[float]]
+) -> list[Array]:
+    """Return where the tip may press, unit vectors (3,): the `directions` (k, 3) in turn.
+
+    After the first one, the axis of the world along which the limb that carries the tip points at
+    q. A tip of a single coordinate presses in the plane of its motion alone.
+    """
+    reach = Reach(model, tip.frame, tip.offset, joints_aside(model, tip))
+    axis = reach.jacobian(q)[3:]
     limb = _limb(reach, tip.radius)
     k = int(np.argmax(np.abs(limb)))
-    axis: Array = np.sign(limb[k]) * np.eye(3)[k]
-    return axis
+    home = tuple(np.sign(limb[k]) * np.eye(3)[k] + 0.0)
+    found = [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
+    if axis.shape[1] > 1:
+        return found
+    if not axis.any():
+        return [limb, -limb]
+    normal = axis[:, 0] / np.linalg.norm(axis)
+    flat = [one - normal * (normal @ one) for one in found]
+    return [one / np.linalg.norm(one) for one in flat if np.linalg.norm(one) > 0.5]
 
 
 def stances(
@@ -130,8 +143,8 @@ def stances(
     approach: Array,
     height: float | None,
     usable: Callable[[Array], bool],
-) -> Iterator[Stance]:
-    """Yield postures from which the tip can press along `approach` (3,), the best one first.
+) -> list[Stance]:
+    """Return postures from which the tip can press along `approach` (3,), the best one first.
 
     They are found from q (nq,) and from seeds within the joints' limits, always the same, with the
     limb along the approach and, where it is given, the sphere's center at `height` [m]. `usable(q)`
@@ -145,7 +158,10 @@ def stances(
     place = np.array([0.0, 0.0, height or 0.0])
 
     def along() -> Array:
-        return turn_between(_limb(reach, tip.radius), approach)
+        limb = _limb(reach, tip.radius)
+        if len(reach.columns) == 1 and limb @ approach < 0:
+            limb = -limb
+        return turn_between(limb, approach)
 
     found: list[tuple[float, Stance]] = []
     start = reach.into_limits(q)
@@ -163,7 +179,7 @@ def stances(
         rank += k == 0 and one.mobility > _EASY < one.dexterity
         found.append((rank * (one.force > 0), one))
     found.sort(key=lambda one: -one[0])
-    yield from (one for _, one in found[:_MOST])
+    return [one for _, one in found[:_MOST]]
 
 
 def _ease(reach: Reach, q: Array) -> float:
@@ -234,17 +250,21 @@ def _stance(
         reach=reach_length,
         mobility=usable / top,
         dexterity=float(values[-1] / values[0]) if values[0] > 0 else 0.0,
-        ahead=float(limb @ approach),
+        ahead=float(limb @ approach) if len(columns) > 1 else abs(float(limb @ approach)),
     )
 
 
 def _limb(reach: Reach, radius: float) -> Array:
-    """Return the unit vector (3,) along the limb to the tip, from what is in `reach.data`.
+    """Return the unit vector (3,) along the limb to the tip, from what is in `reach`.
 
     To a sphere before its frame as the frame points, else the frame would be dragged beside it; to
-    any other along the line from the last joint that is not inside it.
+    any other along the line from the last joint that is not inside it. Of a tip with a single
+    coordinate it is the direction of its motion: pressed along another one it jams by friction.
     """
-    pose = reach.data.oMf[reach.frame]
+    pose, motion = reach.data.oMf[reach.frame], reach.moves
+    if motion.shape[1] == 1 and motion.any():
+        only: Array = motion[:, 0]
+        return only / np.linalg.norm(only)
     if reach.offset.any():
         ahead: Array = pose.rotation @ reach.offset
         return ahead / np.linalg.norm(ahead)

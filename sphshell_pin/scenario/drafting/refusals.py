@@ -54,7 +54,7 @@ class Tried(Searched):
         """Leave one more kind of what the file states of the joints out: `why` is a clause."""
         self.without = (*self.without, kind)
         kinds = " and ".join(self.without).replace("effort", "effort limits")
-        be = "are" if kinds.endswith("s") else "is"
+        be = "are" if kinds.endswith("s") or " and " in kinds else "is"
         self.note = (
             f"the {kinds} that the robot's file states for its joints {be} not modeled, because "
             f"{why}"

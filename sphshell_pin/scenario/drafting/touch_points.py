@@ -23,6 +23,8 @@ _ALIGNED = 0.98
 _SHEET = 0.3
 # How far from the middle other places are looked for, as parts of half the box.
 _PARTS = (0.15, 0.35, 0.6)
+# Planes on which a place is looked for, and points on each.
+_MOST_PLANES, _SAMPLES = 4, 200
 # Points at the end of a path that are left out, so that it ends before a rim and not on it.
 _SPARE = 2
 # Directions in which a path is tried when the asked one is too short.
@@ -84,13 +86,42 @@ def sides(shell: Shell) -> list[Array]:
 def touch_points(
     shell: Shell, radius: float, gap: float, *, toward: Array, inside: bool = False
 ) -> Iterator[TouchPoint]:
-    """Yield touch points: that of `find_touch_point`, then others farther and farther from it."""
-    yield find_touch_point(shell, radius, gap, toward=toward, inside=inside)
-    half = 0.5 * (shell.box[1] - shell.box[0])
-    for part, signs in itertools.product(_PARTS, itertools.product((0, 1, -1), repeat=3)):
-        aside = part * half * np.array(signs)
-        if any(signs) and abs(toward @ aside) <= 1e-9 * shell.size:
-            yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=aside)
+    """Yield touch points: that of `find_touch_point`, wide planes, then others around the first."""
+    middle, half = shell.box.mean(axis=0), 0.5 * (shell.box[1] - shell.box[0])
+    around = [
+        part * half * np.array(signs)
+        for part, signs in itertools.product(_PARTS, itertools.product((0, 1, -1), repeat=3))
+        if any(signs)
+    ]
+    level = [aside for aside in around if abs(toward @ aside) <= 1e-9 * shell.size]
+    planes = [] if inside else [point - middle for point in _wide_planes(shell, toward)]
+    for beside in (np.zeros(3), *planes, *level):
+        yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=beside)
+
+
+def _wide_planes(shell: Shell, toward: Array) -> list[Array]:
+    """Return points (3,) far from the borders of planes that face `toward`, the farthest first."""
+    corners, found = shell.vertices[shell.triangles], list[tuple[float, Array]]()
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    rng = np.random.default_rng(0)
+    for face in shell.faces:
+        own = np.flatnonzero(np.isin(shell.triangle_element, face.elements))
+        areas = np.linalg.norm(normals[own], axis=1)
+        if face.kind != "plane" or normals[own].sum(axis=0) @ toward < _ALIGNED * areas.sum():
+            continue
+        edges = np.sort(shell.triangles[own][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges, count = np.unique(edges, axis=0, return_counts=True)
+        start, end = (shell.vertices[edges[count == 1, k]] for k in (0, 1))
+        weights = rng.dirichlet(np.ones(3), _SAMPLES)
+        some = rng.choice(own, _SAMPLES, p=areas / areas.sum())
+        points = np.einsum("ij,ijk->ik", weights, corners[some])
+        along, away = end - start, points[:, None] - start
+        part = (away * along).sum(axis=2) / (along * along).sum(axis=1)
+        off = away - np.clip(part, 0.0, 1.0)[..., None] * along
+        room = (off * off).sum(axis=2).min(axis=1)
+        best = int(np.argmax(room))
+        found.append((float(room[best]), points[best]))
+    return [point for _, point in sorted(found, key=lambda one: -one[0])[:_MOST_PLANES]]
 
 
 def touches_once(

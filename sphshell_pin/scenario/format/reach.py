@@ -1,5 +1,6 @@
 """Inverse kinematics of a point on a frame, by damped least squares within the joints' limits."""
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -18,13 +19,13 @@ _MARGIN = 0.02
 
 def turn_between(axis: Array, along: Array) -> Array:
     """Return the shortest rotation vector (3,) that turns the unit vector `axis` to `along`."""
-    turn: Array = np.cross(axis, along)
-    sine = float(np.linalg.norm(turn))
+    turn: Array = pin.skew(axis) @ along
+    sine = math.sqrt(turn @ turn)
     if sine < 1e-9 and axis @ along < 0:
         turn, sine = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]), 0.0
         turn = turn / np.linalg.norm(turn)
         return np.pi * turn
-    return turn * (np.arctan2(sine, axis @ along) / max(sine, 1e-12))
+    return turn * (math.atan2(sine, axis @ along) / max(sine, 1e-12))
 
 
 class Reach:
@@ -47,10 +48,13 @@ class Reach:
         bounded = np.isfinite(low) & np.isfinite(high) & (low < high)
         self.hinges, self.bounded = hinges, hinges[bounded]
         self.low, self.high = low[bounded], high[bounded]
+        # The point's velocity by the joints that move (3, k), where jacobian() was asked for last.
+        self.moves = np.zeros((3, len(self.columns)))
 
     def center(self, q: Array) -> Array:
-        """Return where the point is (3,) [m]; places of frames and joints are in `data` then."""
-        pin.framesForwardKinematics(self.model, self.data, q)
+        """Return where the point is (3,) [m]; the places of frame and joints are in `data` then."""
+        pin.forwardKinematics(self.model, self.data, q)
+        pin.updateFramePlacement(self.model, self.data, self.frame)
         return np.asarray(self.data.oMf[self.frame].act(self.offset))
 
     def jacobian(self, q: Array) -> Array:
@@ -62,6 +66,7 @@ class Reach:
         found: Array = np.reshape(local, (6, self.model.nv))[:, self.columns].copy()
         arm = self.center(q) - self.data.oMf[self.frame].translation
         found[:3] -= pin.skew(arm) @ found[3:]
+        self.moves = found[:3]
         return found
 
     def into_limits(self, q: Array) -> Array:
