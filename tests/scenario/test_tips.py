@@ -9,6 +9,8 @@ import pytest
 from sphshell_pin import robots
 from sphshell_pin.scenario.drafting.fingertips import every_finger, find_tips
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, gripper_joints
+from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.format.reach import Reach
 
 
 def link(name: str, size: str = "", at: str = "0 0 0") -> str:
@@ -138,6 +140,23 @@ def test_a_drone_touches_with_its_body_or_its_feet(tmp_path: Path, feet: int) ->
     assert len(tips) == (feet or 1)
     carriers = [robot.model.frames[robot.model.getFrameId(one.frame)] for one in tips]
     assert {int(one.parentJoint) for one in carriers} == {1}
+
+
+def test_a_finger_of_one_joint_presses_along_its_motion(tmp_path: Path) -> None:
+    """Pressed along another direction it jams: friction bears part of the force."""
+    shape = '<geometry><sphere radius=".01"/></geometry>'
+    ball = f'<collision><origin xyz="0 0 .1"/>{shape}</collision></link>'
+    out = link("palm", ".05 .1 .05") + link("finger").replace("</link>", ball)
+    out += joint("bend", "palm", "finger", "revolute", "0 0 .1", ".4 .9 .2")
+    file = tmp_path / "hand.urdf"
+    file.write_text(f'<robot name="hand">{out}</robot>')
+    made = new_scenario(file, "box", out=tmp_path / "new.toml")
+    (pair,), q = made.built.scene.pairs, made.built.q0
+    reach = Reach(made.built.scene.model, "finger", [0.0, 0.0, 0.1])
+    motion = reach.jacobian(q)[:3, 0]
+    center = pair.placement.actInv(reach.center(q))
+    normal = pair.placement.rotation @ pair.shell.closest_points(center[None]).normals[0]
+    assert abs(motion @ normal) > 0.999 * np.linalg.norm(motion)
 
 
 def test_a_file_with_two_roots_is_refused_with_what_to_do(tmp_path: Path) -> None:
