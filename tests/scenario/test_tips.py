@@ -152,10 +152,11 @@ def test_a_finger_of_one_joint_presses_along_its_motion(tmp_path: Path) -> None:
     file.write_text(f'<robot name="hand">{out}</robot>')
     made = new_scenario(file, "box", out=tmp_path / "new.toml")
     (pair,), (shell,), q = made.built.scene.pairs, made.built.shells.values(), made.built.q0
+    place = pair.shells[0].placement
     reach = Reach(made.built.scene.model, "finger", [0.0, 0.0, 0.1])
     motion = reach.jacobian(q)[:3, 0]
-    center = pair.placement.actInv(reach.center(q))
-    normal = pair.placement.rotation @ shell.closest_points(center[None]).normals[0]
+    center = place.actInv(reach.center(q))
+    normal = place.rotation @ shell.closest_points(center[None]).normals[0]
     assert abs(motion @ normal) > 0.999 * np.linalg.norm(motion)
 
 
