@@ -180,3 +180,17 @@ def test_a_ball_of_free_size_fits_the_part_and_stays_on_its_link(tmp_path: Path)
     assert tip.at_most(2 * tip.radius) is tip
     (asked,) = find_tips(robot, shipped=None, frame=None, radius=0.05)
     assert asked.at_most(0.01) is asked
+
+
+def test_of_several_named_tips_the_one_that_stands_free_is_taken(tmp_path: Path) -> None:
+    out = link("palm", ".1 .1 .02")
+    for name, y in (("first", "0"), ("middle", ".02"), ("thumb", ".09"), ("ring", "-.02")):
+        for k, parent in enumerate(("palm", f"{name}_0")):
+            out += link(f"{name}_{k}")
+            out += joint(f"{name}_{k}_j", parent, f"{name}_{k}", "revolute", f"0 {y} .04", "1 0 0")
+        out += link(f"{name}_tip")
+        out += joint(f"{name}_end", f"{name}_1", f"{name}_tip", "fixed", "0 0 .03", "0 0 1")
+    file = tmp_path / "hand.urdf"
+    file.write_text(f'<robot name="hand">{out}</robot>')
+    (tip,) = find_tips(robots.load_file(file), shipped=None, frame=None, radius=None)
+    assert tip.frame == "thumb_tip"

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -194,6 +194,16 @@ def _limbs(model: pin.Model, held: Collection[int]) -> set[int]:
     return {j for j, chain in chains.items() if floats(model) or is_limb(chain)}
 
 
+def _freest(model: pin.Model, names: Sequence[str]) -> str:
+    """Return the frame that is farthest from the others: of fingertips, the thumb's."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    places = np.array([data.oMf[find_frame(model, name)].translation for name in names])
+    away = np.linalg.norm(places[:, None] - places, axis=2).round(6)
+    away[away == 0.0] = np.inf  # two frames at one place
+    return names[int(np.argmax(away.min(axis=1)))]
+
+
 def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> list[tuple[str, str]]:
     """Return the frames at the ends of the `limbs` that may be meant, and why.
 
@@ -231,6 +241,8 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
         found = [name for name in names if word in name.lower()]
         if len(found) == 1 or (found and floats(model)):
             return [(name, f"an end of the robot called '{word}'") for name in found]
+        if found:
+            return [(_freest(model, found), f"the freest of {len(found)} ends called '{word}'")]
     last = max(sorted(leaves), key=lambda j: len(model.supports[j]))
     if floats(model) or len(model.supports[last]) <= 2:
         raise SphshellError(
