@@ -15,7 +15,8 @@ from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.scenario.drafting.clearance import Links, _fixed_to
-from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
+from sphshell_pin.scenario.drafting.fingertips import find_tips
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
 from tests.scenario.files import center_of, run_well

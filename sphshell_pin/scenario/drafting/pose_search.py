@@ -16,7 +16,7 @@ from sphshell_pin.robots import WORKING, floats
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
 from sphshell_pin.scenario.drafting.asked_places import asked_touches
 from sphshell_pin.scenario.drafting.clearance import Links
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.paths import Way, find_way
 from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
 from sphshell_pin.scenario.drafting.plan import (
