@@ -10,7 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick slow-tests studies lint format bench report robots validation hard-cases rollouts \
-  joints real-surfaces new-study parts fuzz kills sanitize wheel notebooks docs docs-serve clean
+  joints real-surfaces new-study parts fuzz sanitize wheel notebooks docs docs-serve clean
 
 help:
 	@sed -nE 's/^([a-z-]+):.* ## (.*)/make \1\t\2/p' Makefile | expand -t 22
@@ -118,9 +118,6 @@ parts: $(VENV)/.test ## what STL files of 300 generated parts cost against their
 fuzz: $(VENV)/.test ## damaged files, folders of robots and results for every reader, until one breaks it (SECONDS=600 SEED=1)
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 	$(BIN)/python -m tests.fuzz.cad --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
-
-kills: $(VENV)/.test ## kill run, fit, render, sweep, new and report at random times
-	$(BIN)/python -m tests.scenario.kills
 
 sanitize: $(VENV)/.test ## run tests with checks of memory, undefined behavior and data races
 	.ci/sanitize address

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import sphshell_pin
 from sphshell_pin.cli import app
 from tests.command import call, refused
+from tests.programs import python
 from tests.scenario.files import DROP, write
 
 # Tests that run in the background pass on that Ctrl-C is to be ignored.
@@ -45,8 +46,7 @@ def test_help_is_quick_and_imports_nothing_heavy():
         "print([m for m in ('trimesh', 'pydantic', 'matplotlib', 'meshcat', 'pandas')\n"
         "       if m in sys.modules])\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip().endswith("[]")
+    assert python(code, check=True).stdout.strip().endswith("[]")
 
 
 def test_run_prints_a_summary_and_where_the_files_are(tmp_path):
@@ -259,14 +259,10 @@ def test_output_that_nobody_takes_fails_no_command(redirected, told):
 def test_characters_that_an_encoding_lacks_are_escaped(tmp_path):
     path = write(tmp_path, name="é")
     code = f"import sys; sys.argv[1:] = ['explain', {str(path)!r}]; "
-    run = subprocess.run(
-        [sys.executable, "-c", code + "from sphshell_pin.cli import main; main()"],
-        env={**os.environ, "PYTHONIOENCODING": "ascii"},
-        capture_output=True,
-        check=False,
-    )
+    code += "from sphshell_pin.cli import main; main()"
+    run = python(code, env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert run.returncode == 0
-    assert b"\\xe9" in run.stdout
+    assert "\\xe9" in run.stdout
 
 
 @pytest.mark.parametrize(

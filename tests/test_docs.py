@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from sphshell_pin.cli import app
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, read_scenario
+from tests.slow import LIST as SLOW
 from tests.studies import mostly_studies
 
 ROOT = Path(__file__).parent.parent
@@ -176,6 +177,16 @@ def test_the_links_of_a_page_lead_somewhere(page):
         assert target.exists(), f"{link}: no such file"
         if anchor:
             assert anchor in anchors(target), f"{link}: no such heading"
+
+
+def test_tests_that_are_named_exist():
+    for page in PAGES:
+        for path in re.findall(r"`(tests/[\w/]+\.py)`", page.read_text(encoding="utf-8")):
+            assert (ROOT / path).exists(), f"{page.name}: {path}"
+    for test in SLOW.read_text("utf-8").split():
+        file, _, name = test.partition("::")
+        text = (ROOT / file).read_text("utf-8")
+        assert re.search(rf"^ *def {name.rpartition('::')[2]}\(", text, re.M), test
 
 
 def test_no_page_is_an_orphan():

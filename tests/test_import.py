@@ -5,13 +5,13 @@ import importlib
 import json
 import re
 import shutil
-import subprocess
-import sys
 from graphlib import CycleError, TopologicalSorter
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+
+from tests.programs import python
 
 PACKAGE = Path(__file__).parent.parent / "sphshell_pin"
 
@@ -41,8 +41,7 @@ EXTRAS = [name for name in HEAVY if name not in ("trimesh", "pydantic", "typer",
 @pytest.fixture(scope="module")
 def loaded() -> set[str]:
     program = "import json, sys, sphshell_pin; print(json.dumps(list(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
-    return set(json.loads(done.stdout))
+    return set(json.loads(python(program, check=True).stdout))
 
 
 @pytest.mark.parametrize("module", HEAVY)
@@ -65,7 +64,7 @@ def test_commands_load_without_extras(module: str) -> None:
         for name in {EXTRAS}:
             sys.modules[name] = None
         import sphshell_pin.{module}"""
-    subprocess.run([sys.executable, "-c", program], check=True)
+    python(program, check=True)
 
 
 def test_what_is_needed_is_loaded(loaded: set[str]) -> None:
@@ -117,9 +116,8 @@ def failing_import(folder: Path, core: str | None, built: dict[str, str] | None 
         (package / "_core.py").write_text(core, encoding="utf-8")
         built = built or {"pinocchio": version("pin"), "coal": version("coal")}
         (package / "_built_against.py").write_text(f"VERSIONS = {built}", encoding="utf-8")
-    program = NO_REDIRECT + "import sphshell_pin"  # without the finder of an editable install
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    # Without the finder of an editable install.
+    done = python(NO_REDIRECT + "import sphshell_pin", cwd=folder)
     assert done.returncode == 1
     assert "direct cause" not in done.stderr
     assert "During handling" not in done.stderr

@@ -3,8 +3,6 @@
 import os
 import re
 import socket
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -12,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from sphshell_pin.base.regular_file import open_regular, read_bytes, read_text
+from tests.programs import python
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -116,14 +115,7 @@ def test_commands_say_what_a_special_file_is(kind, tmp_path):
         if not place.exists() and words[1][0] == "a":
             os.mkfifo(place) if kind == "pipe" else place.symlink_to("/dev/zero")
     start = time.monotonic()
-    done = subprocess.run(
-        [sys.executable, "-c", program, json.dumps([*COMMANDS.values()][:-1])],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = python(program, json.dumps([*COMMANDS.values()][:-1]), cwd=tmp_path)
     assert time.monotonic() - start < 100.0
     assert "Traceback" not in done.stderr
     ends = [line.split() for line in done.stdout.splitlines() if line[:2] == "a."]

@@ -16,6 +16,7 @@ import pytest
 
 import sphshell_pin
 from sphshell_pin import errors
+from tests.programs import python
 
 for package in ("mkdocs", "material", "mkdocstrings"):
     pytest.importorskip(package, reason="needs the extra docs: mkdocs-material, mkdocstrings")
@@ -167,22 +168,14 @@ def test_meanings_of_parameters_do_not_pass_for_types(built, pages):
 
 
 def test_docstrings_are_spelled_out(tmp_path):
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "from sections import spell_out\n"
-            "text = 'Do it.\\n\\nParameters\\n----------\\na : first [m],\\n    or none\\n'\n"
-            "text += 'b : (n,); c : (m,) last\\nd (n, 3), e (n,) : both\\n'\n"
-            "text += '\\nRaises\\n------\\nError : kept\\n'\n"
-            "print(spell_out(text), end='')",
-        ],
-        cwd=ROOT / "docs" / "api",
-        capture_output=True,
-        text=True,
-        check=True,
+    program = (
+        "from sections import spell_out\n"
+        "text = 'Do it.\\n\\nParameters\\n----------\\na : first [m],\\n    or none\\n'\n"
+        "text += 'b : (n,); c : (m,) last\\nd (n, 3), e (n,) : both\\n'\n"
+        "text += '\\nRaises\\n------\\nError : kept\\n'\n"
+        "print(spell_out(text), end='')"
     )
-    assert done.stdout == (
+    assert python(program, cwd=ROOT / "docs" / "api", check=True).stdout == (
         "Do it.\n\nParameters\n----------\na\n    first [m],\n    or none\n"
         "b\n    (n,)\nc\n    (m,) last\nd, e\n    (n, 3), (n,) both\n\n"
         "Raises\n------\nError : kept\n"

@@ -157,7 +157,10 @@ class MujocoContacts:
         return SceneContacts.from_rows(self._core.contacts(model._address, data._address))
 
     def log(self, data: mujoco.MjData) -> ContactLog:
-        """Return the contacts of all steps of `data` since its time began, for attach(log=True)."""
+        """Return the contacts of all steps of `data`, for attach(log=True).
+
+        They begin anew where its time goes back, or other data are copied onto it.
+        """
         self._model_of(data)
         self.check()
         t, rows = self._core.log(data._address)
@@ -165,7 +168,7 @@ class MujocoContacts:
         return ContactLog(**columns(rows), t=t, row=row)
 
     def reset(self, data: mujoco.MjData) -> None:
-        """Forget the log of `data`; it also ends where time goes back."""
+        """Forget the log of `data`."""
         self._model_of(data)
         self._core.forget(data._address)
 

@@ -89,6 +89,8 @@ def layout() -> list[int]:
     data = mujoco.MjData(model)
     data.time = model.opt.timestep = 1.2345678901234567e-77
     model.opt.integrator, model.opt.enableflags = 0x5EED5EED, 0x6EED6EED
+    unused = data.warning[mujoco.mjtWarning.mjWARN_BADQPOS]
+    unused.lastinfo = 0x7EED7EED
     in_data = (
         "qvel",
         "plugin_state",
@@ -103,6 +105,7 @@ def layout() -> list[int]:
     return [
         _find(data._address, data.time, ctypes.c_double),
         *(_find(data._address, _pointer(data, name), ctypes.c_uint64) for name in in_data),
+        _find(data._address, unused.lastinfo, ctypes.c_int),
         _find(model._address, model.opt.timestep, ctypes.c_double),
         *(_find(model._address, getattr(model.opt, n), ctypes.c_int) for n in numbers),
         *(_find(model._address, _pointer(model, name), ctypes.c_uint64) for name in in_model),

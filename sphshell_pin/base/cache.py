@@ -15,7 +15,7 @@ of XDG for caches."""
 def cache_folder(kind: str) -> Path | None:
     """Return the folder for files of one `kind`, made if need be; None where there can be none.
 
-    It belongs to the user, and nobody else may write to it.
+    It belongs to the user; nobody else but root may write to it, or put another in its place.
     """
     given, xdg = os.environ.get(CACHE), os.environ.get("XDG_CACHE_HOME", "")
     if given == "":
@@ -26,9 +26,20 @@ def cache_folder(kind: str) -> Path | None:
         folder = root / kind
         for one in (root, folder):
             one.mkdir(mode=0o700, parents=True, exist_ok=True)
+        above = all(map(_keeps_names, root.resolve().parents))
     except (OSError, RuntimeError):  # no permission; no home
         return None
-    return folder if is_own(root, stat.S_ISDIR) and is_own(folder, stat.S_ISDIR) else None
+    own = is_own(root, stat.S_ISDIR) and is_own(folder, stat.S_ISDIR)
+    return folder if above and own else None
+
+
+def _keeps_names(folder: Path) -> bool:
+    """Whether nobody but this user and root can rename what this user has in `folder`."""
+    about = os.stat(folder)
+    # The group of a user alone may write to the user's folders (umask 002).
+    others = 0o002 if about.st_gid == os.getgid() else 0o022
+    closed = not about.st_mode & others or about.st_mode & stat.S_ISVTX
+    return bool(closed) and about.st_uid in (0, os.getuid())
 
 
 def is_own(path: Path, kind: Callable[[int], bool] = stat.S_ISREG) -> bool:

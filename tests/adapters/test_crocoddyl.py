@@ -1,8 +1,5 @@
 """Scenes in Crocoddyl: derivatives against differences, steps against Simulation, refusals."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -18,6 +15,7 @@ from sphshell_pin.adapters.crocoddyl import (  # noqa: E402
     ContactStep,
     FrameResidual,
 )
+from tests.programs import python  # noqa: E402
 
 LAW = sp.ImpactLaw(2e6, 1.5, damping=10.0, full_damping_depth=1e-4)
 SLIDING = sp.CoulombFriction(0.4, 0.3, 0.01, 0.1)
@@ -413,8 +411,6 @@ def test_wrong_arguments_get_a_sentence():
 @pytest.mark.parametrize("package", ["crocoddyl", "casadi"])
 def test_a_missing_package_names_its_extra(package):
     program = f"import sys; sys.modules['{package}'] = None\nimport sphshell_pin.adapters.{package}"
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False
-    )
+    done = python(program)
     assert done.returncode == 1
     assert f"pip install 'sphshell-pin[{package}]'" in done.stderr.splitlines()[-1]

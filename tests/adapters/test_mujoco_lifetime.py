@@ -3,7 +3,6 @@
 import copy
 import gc
 import pickle
-import subprocess
 import sys
 import weakref
 
@@ -16,7 +15,8 @@ from sphshell_pin.errors import InvalidParameter, NotPicklable, SphshellError
 mujoco = pytest.importorskip("mujoco")
 
 from sphshell_pin.adapters.mujoco import attach  # noqa: E402
-from tests.adapters.mujoco_models import model_of, on_slab, plate, slab  # noqa: E402
+from tests.adapters.mujoco_models import SOFT, model_of, on_slab, plate, slab  # noqa: E402
+from tests.programs import python  # noqa: E402
 
 
 def test_contacts_end_with_their_model_and_touch_no_stranger():
@@ -192,10 +192,60 @@ while any(one.is_alive() for one in workers):
 print("done")
 """
 
+# A mark may be given once: a copy outlives the contacts of its model.
+MARKS = """
+import copy, mujoco, sys
+import numpy as np
+from tests.adapters.mujoco_models import on_slab, slab
+told = []
+sys.unraisablehook = lambda fault: told.append(str(fault.exc_value))
+def force(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return bool(np.any(data.qfrc_passive))
+old, new = (mujoco.MjModel.from_xml_string(slab(1)) for _ in range(2))
+contacts = on_slab(old, "ball0")
+flags = old.opt.enableflags
+copied = copy.deepcopy(old)
+assert force(copied) and not told
+contacts.detach()
+for k in range(33000):
+    contacts._core.attach(new._address)
+    assert new.opt.enableflags != flags
+    assert force(new) and not force(copied) if k % 1000 == 0 or k > 32760 else True
+    contacts._core.detach()
+assert len(told) == 1
+contacts._core.attach(new._address)
+assert force(new) and not force(copy.deepcopy(new))
+assert "more than 32766 models" in told[1]
+print("done")
+"""
 
-@pytest.mark.parametrize("program", [REFUSED, AT_ONCE], ids=["refused", "at once"])
-def test_a_first_attach_that_is_refused_and_laws_of_python_in_new_threads(program):
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False
-    )
+
+@pytest.mark.parametrize("program", [REFUSED, AT_ONCE, MARKS], ids=["refused", "at once", "marks"])
+def test_programs_that_crashed_hung_or_pushed_strangers(program):
+    done = python(program)
     assert done.stdout == "done\n", done.stderr
+
+
+def test_a_log_is_of_its_data_alone_and_goes_on_with_them():
+    """Other data may have the address of deleted ones, or their contents."""
+    model, data = model_of(slab(1))
+    contacts = on_slab(model, "ball0", log=True)
+    other = attach(model, plate(0.1), ["ball0"], law=SOFT, log=True)
+    for _ in range(3):
+        mujoco.mj_step(model, data)
+    saved = copy.copy(data)
+    assert [len(one.log(data).t) for one in (contacts, other)] == [3, 3]
+    assert len(contacts.log(saved).t) == 0
+    addresses = set()
+    for k in range(50):
+        new = copy.copy(saved) if k % 2 else mujoco.MjData(model)
+        new.time = 1.0 + k
+        addresses.add(new._address)
+        assert len(contacts.log(new).t) == 0
+        for _ in range(2):
+            mujoco.mj_step(model, new)
+        assert contacts.log(new).t == pytest.approx([1.0 + k, 1.0 + k + 5e-5])
+        del new
+    assert len(addresses) < 50

@@ -72,11 +72,16 @@ def test_contacts_that_nobody_has_read_are_copied_and_pickled(shell, gradient, a
         (np.zeros(3, dtype=complex), RADIUS),
         (np.ma.masked_array(np.zeros(3), [True, False, False]), RADIUS),
         (np.zeros(3), 0.0),
+        (np.zeros(3), -1.0),
         (np.zeros(3), np.nan),
         (np.zeros(3), np.inf),
         (np.zeros(3), True),
     ],
 )
 def test_what_is_no_sphere_is_refused(shell, center, radius) -> None:
-    with pytest.raises(sp.InvalidParameter):
-        shell.contacts(center, radius)
+    named = "center" if radius is RADIUS else "radius"
+    for method in ("smooth", "facets"):
+        with pytest.raises(sp.InvalidParameter, match=named):
+            shell.contacts(center, radius, method)
+    with pytest.raises(sp.InvalidParameter, match=named.replace("center", "offset")):
+        sp.Sphere(radius, "tip", center)

@@ -63,17 +63,6 @@ def test_same_set(name: str, method: str, count: int) -> None:
     assert touched > count
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_random_soups(seed: int) -> None:
-    vertices, elements = meshes.soup(30, seed=100 + seed, spread=0.15 + 0.05 * seed)
-    shell = shell_of((vertices, elements))
-    corners, owner = corners_of(vertices, elements)
-    for center in positions(vertices, elements, 0.4, 25, seed=seed):
-        found = shell.contacts(center, 0.4, method="facets")
-        why = oracle.mismatch(found, oracle.facets(center, 0.4, corners, owner), 1e-12)
-        assert not why, f"seed {seed}, center {center.tolist()}: {why}"
-
-
 @pytest.mark.parametrize("name", ["cube", "icosphere", "crumpled", "soup", "fan", "needles"])
 def test_closest_points(name: str) -> None:
     """The distance of `closest_points` is the smallest over all triangles."""

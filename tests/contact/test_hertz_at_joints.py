@@ -63,6 +63,8 @@ def test_the_force_is_continuous_and_small_beside_the_normal() -> None:
     size = np.linalg.norm(forces, axis=1)
     per_micrometer = np.abs(np.diff(forces, axis=0)).max() / (places[1] - places[0]) * 1e-6
     assert per_micrometer < 0.01 * size.max()
+    # The share of the other face goes from 1/2 to 0 as smoothly as it can.
+    assert per_micrometer * 1e6 * LENGTH < 0.35 * size.max()
     assert np.all(np.diff(size) > -1e-9 * size.max())
     # On the flat nothing but the law pushes aside, by at most the root of depth over radius.
     flat = places < 0
@@ -71,7 +73,42 @@ def test_the_force_is_continuous_and_small_beside_the_normal() -> None:
     assert np.abs(across).max() < 1e-6 * size.max()
 
 
-@pytest.mark.parametrize("beyond", [-0.9, -0.5, -0.1, 0.1, 0.5, 0.9])
+def button(sides: int = 32, across: int = 16) -> sp.Shell:
+    """A disc that goes on into a round rim; the middle of one side of their joint is along x."""
+    angle, turn = np.linspace(0, np.pi / 2, across + 1), 2 * np.pi * np.arange(sides) / sides
+    turn = turn[:, None] + np.pi / sides
+    out = np.concatenate([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    up, middle = np.array([0.0, 0.0, 1.0]), [np.zeros(3)]
+    normals = [np.sin(a) * out + np.cos(a) * up for a in angle]
+    rings = [HALF * out + BEND * (n - up) for n in normals]
+    inner = np.arange(sides) + sides * np.arange(across)[:, None]
+    corners = inner, inner + sides, np.roll(inner, -1, axis=1) + sides, np.roll(inner, -1, axis=1)
+    fan = [[-1, k, (k + 1) % sides, -1] for k in range(sides)]
+    fan = np.array(fan) + [sides * (across + 1) + 1, 0, 0, 0]
+    quads = np.stack(corners, axis=-1).reshape(-1, 4)
+    return sp.Shell(
+        np.concatenate([*rings, middle]),
+        np.concatenate([fan, quads]),
+        normals=np.concatenate([*normals, [up]]),
+    )
+
+
+def test_the_force_is_continuous_beside_a_joint_that_bulges_beyond_its_chords() -> None:
+    one, places = scene(shell=button()), np.linspace(-1.2, 1.2, 401) * LENGTH
+    reach = BEND + RADIUS - DEPTH
+    centers = [
+        np.array([HALF + reach * np.sin(a), 0.0, reach * np.cos(a) - BEND])
+        if a > 0
+        else np.array([HALF + a * BEND, 0.0, RADIUS - DEPTH])
+        for a in places / BEND
+    ]
+    forces = np.array([force(one, at) for at in centers])
+    size = np.linalg.norm(forces, axis=1)
+    assert np.abs(np.diff(forces, axis=0)).max() < 3e-3 * size.max()
+    assert size[-1] < 0.9 * size[0]  # the rim is softer than the disc
+
+
+@pytest.mark.parametrize("beyond", [-0.9, -0.4, -0.1, 0.1, 0.4, 0.9])
 def test_derivatives_are_those_of_differences(beyond: float) -> None:
     one, at, step = scene(), center(beyond * LENGTH), 1e-8
     names = ["c.sphere.radius", "c.law.young"]

@@ -1,7 +1,5 @@
 """Error-controlled runs: rows, held torques, kinks, and what the arguments may be."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +10,7 @@ import sphshell_pin as sp
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.format.build import build
 from tests import meshes, models
+from tests.programs import python
 from tests.scenario import files
 
 R = 0.05
@@ -125,11 +124,7 @@ for integrator in (sp.Adaptive(), sp.Implicit()):
 
 def test_round_off_of_time_does_not_hang_the_run() -> None:
     """0.09 + (0.42 - 0.09) < 0.42, and 1e6 + k 1e-3 is off by more than 1e-9 of the period."""
-    program = [sys.executable, "-c", FAR.format(root=str(ROOT))]
-    try:
-        said = subprocess.run(program, capture_output=True, text=True, timeout=60, check=False)
-    except subprocess.TimeoutExpired as late:
-        pytest.fail(f"the run makes steps of no length for ever: {late.stdout!r}")
+    said = python(FAR.format(root=str(ROOT)))
     assert said.stdout.split() == ["held", "kink"] * 2, said.stderr
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.programs import python
+
 ROOT = Path(__file__).parents[2]
 
 COUNTER = r"""
@@ -90,13 +92,8 @@ SOME = [both for both in CASES if both[0] == "impedance" or both[1] == "Implicit
 def test_steps_do_not_touch_the_heap(counter: Path, cases: list[tuple[str, str]]) -> None:
     """A second more may cost a handful of calls (events grow), never one a step."""
     rows = ", ".join(f"({name!r}, {CONTROLLERS[name]}, sp.{one})" for name, one in cases)
-    done = subprocess.run(
-        [sys.executable, "-c", PROBE.format(root=str(ROOT), cases=rows)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "LD_PRELOAD": str(counter)},
-    )
+    probe = PROBE.format(root=str(ROOT), cases=rows)
+    done = python(probe, env={**os.environ, "LD_PRELOAD": str(counter)})
     assert done.returncode == 0, done.stderr
     for case, line in zip(cases, done.stdout.splitlines(), strict=True):
         first, short, long, steps, contact_time = line.split()

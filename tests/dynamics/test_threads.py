@@ -3,11 +3,11 @@
 The programs run in processes of their own: what used to go wrong here killed the process.
 """
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.programs import python
 
 ROOT = Path(__file__).parents[2]
 
@@ -40,18 +40,8 @@ def hammer(routines, seconds=0.5):
 """
 
 
-def run(program: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", SETUP + program],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
-
-
 def passes(program: str) -> None:
-    done = run(program)
+    done = python(SETUP + program)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -168,7 +158,7 @@ lambda: [scene2.contacts(Q) for _ in range(10**7)],
 
 @pytest.mark.parametrize("calls", DAEMONS)
 def test_the_interpreter_ends_while_daemon_threads_compute(calls: str) -> None:
-    done = run(f"""
+    done = python(f"""{SETUP}
 sim, still = sp.Simulation(scene, sp.SemiImplicitEuler(1e-6)), lambda *state: np.zeros(6)
 scene2 = sp.Scene(ball())
 find = lambda i, j: ([[0, 0, 0]], [[0, 0, 1.0]], [1e-4])

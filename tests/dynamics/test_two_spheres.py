@@ -96,30 +96,6 @@ def test_torsion_is_symmetric_and_that_of_the_disc_of_both_radii() -> None:
     assert np.allclose(moments, -limit, rtol=1e-12)
 
 
-# Two identical glass spheres at 10 m/s each (Chung and Ooi, Granular Matter 13 (2011) 643, test 1:
-# E = 48 GPa, nu = 0.2, radius 10 mm); by density: peak force [N] and overlap [m] of Hertz's theory.
-GLASS = {2800.0: (10696.9, 274.113e-6), 2580.0: (10184.4, 265.286e-6)}
-
-
-@pytest.mark.parametrize("density", GLASS)
-def test_two_glass_spheres(density: float) -> None:
-    radius, young, poisson, speed = 0.01, 4.8e10, 0.2, 10.0
-    mass = density * 4 / 3 * math.pi * radius**3
-    law = sp.ImpactLaw.hertz(radius, young, poisson, young, poisson, radius_2=radius)
-    scene = sp.Scene(balls_on_a_line(2, radius, mass))
-    scene.add_contact(sp.Sphere(radius, "ball0"), sp.Sphere(radius, "ball1"), law=law)
-    q = np.array([0.0, 2 * radius + 1e-6])
-    result = sp.Simulation(scene, sp.RungeKutta4(2e-8)).run(q, [speed, -speed], 6e-5)
-    (figures,) = result.stats.pairs.values()
-    depth = (5 / 4 * mass / 2 * (2 * speed) ** 2 / law.stiffness) ** 0.4
-    assert np.isclose(figures.max_depth, depth, rtol=1e-6)
-    assert np.isclose(figures.peak_force, law.stiffness * depth**1.5, rtol=1e-6)
-    assert np.allclose((figures.peak_force, figures.max_depth), GLASS[density], rtol=1e-5)
-    assert np.allclose(result.v[-1], [-speed, speed], rtol=1e-7)
-    # 2.94 d / v (Johnson, Contact Mechanics, 11.24).
-    assert np.isclose(figures.contact_time, 2.9432751 * depth / (2 * speed), rtol=2e-3)
-
-
 def balls_on_a_line(count: int, radius: float, mass: float) -> pin.Model:
     """Balls "ball0", ... that slide along x."""
     model = models.empty(0.0)

@@ -115,9 +115,6 @@ def v_groove() -> Verdicts:
         yield compare("rolling acceleration", tried, law, expected, seen, 1e-6)
 
 
-ECCENTRIC, TOP_SPIN, TOP_TILT = 0.002, 150.0, 0.3
-
-
 MU_SLOPE, OF_CONE = 0.5, 0.9
 
 

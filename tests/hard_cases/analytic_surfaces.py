@@ -32,7 +32,7 @@ from tests.hard_cases.balls import (
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
 STILL = np.zeros(3)
-BOWL = DOME = 0.040
+DOME = 0.040
 
 
 def period_along_x(result: Result, velocity: Array, periods: int) -> float:

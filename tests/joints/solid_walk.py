@@ -156,7 +156,8 @@ def _elements_at(shell: sp.Shell, point: Array, radius: float) -> Ints:
 
 
 def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str, str]:
-    tolerance += truth.off
+    # Faces that are nearly tangent cross farther away than by what they miss each other.
+    tolerance += 4 * truth.off
     sure = truth.sure & (truth.depths > tolerance)
     if not len(found.depths):
         return ("lost", f"depth {truth.depths.max()}") if sure.any() else ("", "")

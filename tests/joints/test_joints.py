@@ -45,7 +45,17 @@ def test_no_sphere_is_lost_or_counted_twice(part, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "part", [cones(30.0, 0.3), shaft(5.2, 2.4, 1e-4)], ids=lambda part: part.name
+    "part",
+    [
+        cones(30.0, 0.3),
+        cones(24.0, 0.400742, 0.64),
+        shaft(5.2, 2.4, 1e-4),
+        shaft(6.4, 2.1, -1.3e-4),
+        disc(80.0, 0.14, 2.2e-5),
+        pocket(63.0, 3.3, 0.2),
+        pocket(100.0, 3.7, 1.3),
+    ],
+    ids=lambda part: part.name,
 )
 def test_none_is_on_meshes_of_single_precision(part, tmp_path):
     assert_right(part, tmp_path, stl=True)

@@ -115,7 +115,8 @@ class Minima:
     """Local minima of the distance from one center, with depths above zero.
 
     `sure` says which are so beyond rounding: not within rounding of a border or of another one.
-    `off` is how far the file's curve of an edge is off its faces, at most.
+    `off` is how far the file's curve of an edge, or a vertex, is off its faces, at most: that of a
+    minimum, or of a line or circle that the sphere reaches.
     """
 
     points: Array
@@ -183,7 +184,7 @@ class TrimmedSolid:
     def minima(self, centers: Array, radii: Array) -> list[Minima]:
         """Local minima of the distance of centers (n, 3) that are nearer than radii (n,)."""
         found: list[list[tuple[Array, float, bool, bool, float]]] = [[] for _ in centers]
-        passes: list[list[float]] = [[] for _ in centers]
+        passes: list[list[tuple[float, float]]] = [[] for _ in centers]
         for number, surface in enumerate(self.surfaces):
             if surface.kind:
                 self._on_face(number, centers, radii, found)
@@ -198,9 +199,9 @@ class TrimmedSolid:
             sure, plane = (np.array([row[k] for row in rows], bool) for k in (2, 3))
             if saddles and len(rows):
                 # As deep as a place on an edge: it ends there, or merges with another minimum.
-                apart = np.abs(depths[:, None] - np.array(saddles)).min(axis=1)
+                apart = np.abs(depths[:, None] - np.array(saddles)[:, 0]).min(axis=1)
                 sure &= (apart > PERSISTENCE * r) | (depths == depths.max())
-            off = max((row[4] for row in rows), default=0.0)
+            off = max([row[4] for row in rows] + [miss for _, miss in saddles], default=0.0)
             out.append(Minima(points, depths, sure, plane, off))
         return out
 
@@ -245,9 +246,7 @@ class TrimmedSolid:
                     if inside[k]:
                         states[rows[k]] = 0 if abs(within[k]) < 1e-9 else np.sign(within[k])
 
-    def _on_edge(
-        self, edge: Edge, centers: Array, radii: Array, found: Any, passes: list[list[float]]
-    ) -> None:
+    def _on_edge(self, edge: Edge, centers: Array, radii: Array, found: Any, passes: Any) -> None:
         reach = np.linalg.norm(centers[:, None] - edge.grid[1], axis=2).min(axis=1)
         step = np.linalg.norm(np.diff(edge.grid[1], axis=0), axis=1).max()
         rows = np.flatnonzero(reach < radii + step)
@@ -268,14 +267,15 @@ class TrimmedSolid:
             if self.surfaces[edge.faces[k]].kind
         ]
         least = np.min(rise, axis=0) if rise else np.full(len(rows), -1.0)
+        simple = edge.curve.GetType() in (GeomAbs_Line, GeomAbs_Circle)
         for k, row in enumerate(rows.tolist()):
             if distance[k] < radii[row]:
-                passes[row].append(radii[row] - distance[k])
-            if distance[k] < radii[row] and least[k] > -1e-6:
                 off = max((float(abs(d[k])) for d in offs), default=0.0)
-                found[row].append(
-                    (points[k], radii[row] - distance[k], bool(least[k] > 1e-6), False, off)
-                )
+                passes[row].append((radii[row] - distance[k], off if simple else 0.0))
+                if least[k] > -1e-6:
+                    found[row].append(
+                        (points[k], radii[row] - distance[k], bool(least[k] > 1e-6), False, off)
+                    )
 
     def _nearest(self, edge: Edge, centers: Array) -> tuple[Ints, Array, Array, Array]:
         """Rows of centers, the closest points of an edge, tangents, and whether inside it."""
@@ -287,10 +287,14 @@ class TrimmedSolid:
 
     def _on_vertices(self, centers: Array, radii: Array, found: Any) -> None:
         leave: list[list[Array]] = [[] for _ in self.vertices]
+        off = np.zeros(len(self.vertices))
         for edge in self.edges:
             for t, end, sign in zip(edge.span, edge.ends, (1.0, -1.0), strict=True):
                 leave[end].append(sign * edge.at(np.array([t]))[1][0])
-        for vertex, ways in zip(self.vertices, leave, strict=True):
+                for surface in (self.surfaces[k] for k in edge.faces if self.surfaces[k].kind):
+                    apart = surface.closest(self.vertices[[end]])[0]
+                    off[end] = max(off[end], abs(float(apart[0])))
+        for k, (vertex, ways) in enumerate(zip(self.vertices, leave, strict=True)):
             away = vertex - centers
             distance = np.linalg.norm(away, axis=1)
             for row in np.flatnonzero(distance < radii).tolist():
@@ -298,7 +302,7 @@ class TrimmedSolid:
                 if rise.min(initial=0.0) > -1e-6:
                     depth = radii[row] - distance[row]
                     # Between two edges the distance may fall where they turn by more than half.
-                    found[row].append((vertex, depth, False, False, 0.0))
+                    found[row].append((vertex, depth, False, False, off[k]))
 
 
 def _number(places: list[Any], vertex: Any) -> int:

@@ -4,6 +4,7 @@ import re
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import coal
 import numpy as np
@@ -18,12 +19,15 @@ from sphshell_pin.scenario.drafting.clearance import Links, _fixed_to
 from sphshell_pin.scenario.drafting.fingertips import find_tips
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.drafting.plan import Press
+from sphshell_pin.scenario.drafting.pose_search import REPAIRS, Failed
+from sphshell_pin.scenario.drafting.trial import Fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
+from tests import models
 from tests.scenario.files import center_of, run_well
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
-BLADE_STEP = BLADE.with_name("blade.step")
 FINGER = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
 PLACES = ("below", "above", "+x", "-x", "+y", "-y")
 
@@ -178,7 +182,7 @@ def test_an_arm_whose_collection_lets_it_float_is_fixed(tmp_path):
     assert made.why[0] == "the base is fixed, by the robot's shape: or --base"
     assert 'name = "so101"\nbase = "fixed"' in made.text
     built = build(made.path)
-    assert built.scene.model.nq == 6
+    assert built.scene.model.nq == built.scene.model.nv  # no quaternion
     run_well(built)
 
 
@@ -306,3 +310,51 @@ def test_links_beyond_locked_joints_are_fixed_to_one_another(joint, held, fixed)
     for k in range(4):
         model.addJoint(k, pin.JointModelRX(), pin.SE3.Identity(), f"joint{k}")
     assert _fixed_to(model, joint, held) == fixed
+
+
+def pressing(points, posture=0.0):
+    """A tip that is pressed along a path of these points."""
+    values = dict.fromkeys(list(Press.__dataclass_fields__)[:11], 1.0)
+    values |= {"path": np.array(points), "even": True, "joint_damping": ()}
+    return Press(**values, posture_stiffness=(posture,))
+
+
+PATH = [[0.0, 0.0, 0.0], [0.3, 0.1, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("joints", "kind", "before", "press", "repair"),
+    [
+        (["damping", "friction"], "touch", "", None, "friction"),
+        (["damping"], "force", "", pressing(PATH, 1.0), "loose"),
+        (["damping"], "path", "", pressing(PATH, 1.0), "damping"),
+        (["damping"], "force", "loose", pressing(PATH, 1.0), "damping"),
+        ([], "force", "", pressing(PATH), "calmed"),
+        ([], "force", "", pressing(PATH[:1], 1.0), "loose"),
+        ([], "force", "loose", pressing(PATH[:1], 1.0), None),  # it does not slide
+        ([], "force", "calmed", pressing(PATH), None),
+        ([], "path", "", pressing(PATH, 1.0), None),
+        ([], "force", "", None, None),  # nothing is pressed
+    ],
+)
+def test_what_failed_decides_what_is_tried_next(joints, kind, before, press, repair):
+    failed = Failed(Fault(kind, ""), press, before, joints)
+    assert next((one.name for one in REPAIRS if one.fits(failed)), None) == repair
+
+
+@pytest.mark.parametrize(("aside", "told"), [(0.55, False), (0.66, True)])
+def test_a_tip_may_stay_behind_the_end_of_its_path_by_a_part_of_its_radius(aside, told):
+    """0.6 radii along the surface, which is where the run ends, not where it begins."""
+    radius, place = 0.05, pin.SE3(pin.utils.rotate("x", 0.3), np.array([0.1, 0.2, 0.3]))
+    scene = sp.Scene(models.ball(joint=pin.JointModelTranslation()))
+    tip = Tip("ball", radius, np.array([0.01, 0.0, 0.02]), "")
+    scene.add_contact(
+        sp.Sphere(radius, "ball", tip.offset), models.plate(), placement=place, law=models.LAW
+    )
+    start, end = (place.act(np.add(one, [0, 0, radius])) - tip.offset for one in PATH)
+    behind = end - place.rotation @ [aside * radius, 0.0, 0.0]
+    plan = SimpleNamespace(control=pressing(PATH), tips=(tip,))
+    result = SimpleNamespace(q=np.array([end if told else start, behind]))
+    fault = _path_fault(SimpleNamespace(scene=scene), plan, result)
+    assert (fault is not None) == told
+    assert not told or "33 mm behind the end of its path" in fault.text

@@ -19,6 +19,7 @@ from sphshell_pin.scenario.running import run
 from sphshell_pin.study.sweep.job import Outcome
 from sphshell_pin.study.sweep.journal import Journal
 from tests.command import call
+from tests.scenario import races
 from tests.scenario.files import write
 
 LAST = "summary.json"
@@ -294,3 +295,8 @@ def test_of_processes_that_meet_in_a_new_folder_one_wins_and_loses_nothing(name,
         assert os.listdir(out) == [LAST]
         assert os.listdir(out.parent) == ["out"]
         shutil.rmtree(tmp_path / name.split("/")[0])
+
+
+def test_of_processes_that_run_into_one_new_folder_one_wins_and_keeps_its_results():
+    """`python -m tests.scenario.races` has more rounds."""
+    assert races.main(["--rounds", "2"]) == 0

@@ -9,6 +9,7 @@ import shutil
 import tempfile
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.base.atomic import AtomicFolder, write_whole
 from sphshell_pin.base.atomic.files import held_folder
+from sphshell_pin.cli import fit
 from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
@@ -25,8 +27,9 @@ from sphshell_pin.shell.converting import convert
 from sphshell_pin.study.report import making
 from sphshell_pin.study.report.contents import Column, Section, Table
 from sphshell_pin.study.sweep.table import write_table
+from sphshell_pin.view.film import render_film
 from tests import meshes
-from tests.scenario.files import write
+from tests.scenario.files import DROP, write
 from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
 from tests.studies import mostly_studies
 
@@ -226,6 +229,25 @@ def of_sweep(seed):
     return lambda place: write_table(place / "table.parquet", columns, {"scenario": "drop"})
 
 
+def of_fit(value):
+    found = SimpleNamespace(to_json=lambda: value, scenario_text=lambda *_: DROP + f"# {value}")
+    return lambda place: fit._write(found, Path("s.toml"), place / "fit", {}, picture=False)
+
+
+def of_film(count):
+    """Writes a folder of as many pictures, which no browser draws."""
+    pictures = [b"picture" * (k + count) for k in range(count)]
+    drawn = Mock(opened=lambda _: contextlib.nullcontext(), all=lambda _: iter(pictures))
+    stands_in = {"_Stage": lambda *_: drawn, "Shown": Mock(of=lambda *_: Mock(speed=1.0))}
+    run = SimpleNamespace(t=[0.0, 1.0], q=np.zeros((2, 1)))
+
+    def write_film(place):
+        with patch.multiple("sphshell_pin.view.film", **stands_in):
+            render_film(place / "film", run)
+
+    return write_film
+
+
 def of_shell(side):
     shell = sp.Shell(*meshes.cube(side))
     return lambda place: shell.to_file(place / "box.obj")
@@ -234,6 +256,8 @@ def of_shell(side):
 WRITERS = {
     "report": (of_report("old"), of_report("new")),
     "sweep": (of_sweep(1), of_sweep(2)),
+    "fit": (of_fit("old"), of_fit("new")),
+    "render": (of_film(3), of_film(2)),
     "shell": (of_shell(1.0), of_shell(2.0)),
     "convert": tuple(
         lambda place, unit=unit: convert(MESH, place / "mesh.shl", unit) for unit in ("m", "mm")
@@ -257,7 +281,9 @@ def test_other_files_are_old_or_new(writer, act, place, tmp_path):
     before = contents(place)
     write_new(place)
     after = contents(place)
-    assert before != after
+    (tmp_path / "empty").mkdir()
+    write_new(tmp_path / "empty")
+    assert before != after == contents(tmp_path / "empty")
     seen = []
     for n in ends(place, keep, lambda: write_new(place), act, once=False):
         left = contents(place) if act else visible(place)

@@ -3,7 +3,6 @@
 import csv
 import json
 import os
-import subprocess
 import sys
 
 import numpy as np
@@ -19,6 +18,7 @@ from sphshell_pin.errors import (
 )
 from sphshell_pin.scenario import build, explain_built, run_built, run_scenario
 from sphshell_pin.scenario.running.figures import figure_names, measuring
+from tests.programs import python
 from tests.scenario.files import DROP, write
 
 
@@ -34,7 +34,7 @@ def test_a_run_without_figures_writes_all_else_and_imports_no_matplotlib(tmp_pat
         "assert 'matplotlib' not in sys.modules"
     )
     path, out = write(tmp_path), tmp_path / "out"
-    subprocess.run([sys.executable, "-c", program, path, out], check=True)
+    python(program, path, out, check=True)
     assert {"run.npz", "contacts.csv", "summary.json"} == set(os.listdir(out))
 
 
@@ -87,7 +87,6 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_run(built, tmp_path,
 
 
 def test_without_the_view_packages_the_rest_is_written(tmp_path, monkeypatch):
-    import sys
 
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)

@@ -7,7 +7,7 @@ import numpy as np
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_NurbsConvert
 from OCP.BRepTools import BRepTools
 from OCP.collections import Array1_double, Array1_int, Array2_gp_Pnt
-from OCP.Geom import Geom_BSplineSurface
+from OCP.Geom import Geom_BezierSurface, Geom_BSplineSurface
 from OCP.gp import gp_Pnt
 from OCP.IGESControl import IGESControl_Writer
 from OCP.Interface import Interface_Static
@@ -124,6 +124,15 @@ def roof(height: float = 3.0) -> Any:
         1,
     )
     return BRepBuilderAPI_MakeFace(surface, 1e-7).Face()
+
+
+def patch(corners: Any) -> Any:
+    """The bilinear face between corners (2, 2, 3) [mm]."""
+    poles = Array2_gp_Pnt(1, 2, 1, 2)
+    for i in range(2):
+        for j in range(2):
+            poles.SetValue(i + 1, j + 1, gp_Pnt(*corners[i][j]))
+    return BRepBuilderAPI_MakeFace(Geom_BezierSurface(poles), 1e-7).Face()
 
 
 def _array(kind: Any, values: tuple[float, ...]) -> Any:

@@ -2,14 +2,13 @@
 
 import hashlib
 import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 from sphshell_pin import Shell
 from tests import meshes
+from tests.programs import python
 
 
 def sheet(cells: int = 120):
@@ -38,9 +37,7 @@ def digest() -> str:
 def test_the_same_bits_on_one_core_and_on_all() -> None:
     one = f"import os; os.sched_setaffinity(0, {{{min(os.sched_getaffinity(0))}}})"
     script = f"{one}; from tests.shell.test_building import digest; print(digest())"
-    alone = subprocess.run(
-        [sys.executable, "-c", script], check=True, capture_output=True, text=True
-    )
+    alone = python(script, check=True)
     assert alone.stdout.strip() == digest()
 
 

@@ -1,6 +1,5 @@
 """CAD files: what is read, what it is called, in which unit, and what is refused."""
 
-import subprocess
 import sys
 
 import numpy as np
@@ -21,6 +20,7 @@ from sphshell_pin.errors import (
     UnusableExtra,
 )
 from tests.parts.occ import area_and_volume
+from tests.programs import python
 from tests.shell import cad_shapes as shapes
 
 
@@ -241,7 +241,7 @@ import sys, sphshell_pin
 print(len(sphshell_pin.Shell.from_file({str(path)!r}, "mm").face_names))
 print(any(m.split(".")[0] == "OCP" for m in sys.modules))
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python(code, check=True)
     assert done.stdout.split() == ["6", "False"]
     assert done.stderr == ""
 

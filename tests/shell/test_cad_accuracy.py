@@ -72,6 +72,19 @@ def test_curved_elements_of_real_files_are_as_near_as_stated(name):
             assert exact.distances(points).max() <= stated, where
 
 
+def test_distances_from_a_surface_of_skew_parameters_are_found_in_few_steps(tmp_path):
+    """A flat patch whose lines meet at 10 degrees: Newton's step to its plane is exact."""
+    from sphshell_pin.shell.cad.face_surface import FaceSurface
+
+    lean = np.radians(10.0)
+    along, across = np.array([20.0, 0, 0]), 20.0 * np.array([np.cos(lean), np.sin(lean), 0.0])
+    surface = FaceSurface(shapes.patch([[0 * along, along], [across, along + across]]))
+    at = np.random.default_rng(0).uniform(0.2, 0.8, (50, 2))
+    points = at @ [across, along] + [0.0, 0.0, 0.3]
+    beside = at + np.random.default_rng(1).uniform(-0.2, 0.2, at.shape)
+    assert surface.distances(points, beside, 1e-9) == pytest.approx(0.3, abs=1e-9)
+
+
 @pytest.mark.parametrize("turns", [(0.9, 0.9, 0.9, 0.9), (0.9, -0.9, 0.9), (0.9,), (0.5, 0.7)])
 @pytest.mark.parametrize("scale", [1.0, 2.5])
 def test_long_elements_beside_nearly_tangent_joints(turns, scale, tmp_path):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sphshell_pin.base.cache import CACHE, keep_newest
+from sphshell_pin.base.cache import CACHE, cache_folder, keep_newest
 from sphshell_pin.errors import UnitWarning
 from sphshell_pin.shell import loading
 from sphshell_pin.shell.cad import CadOptions
@@ -112,10 +112,14 @@ def test_without_a_folder_nothing_is_kept(
     open_to_all = tmp_path / "open"
     open_to_all.mkdir()
     open_to_all.chmod(0o777)
-    for folder in ("", "/proc/none", str(open_to_all)):
+    own_in_open = open_to_all / "own"
+    own_in_open.mkdir(mode=0o700)
+    for folder in ("", "/proc/none", str(open_to_all), str(own_in_open)):
         monkeypatch.setenv(CACHE, folder)
         load(PART)
-    assert len(reads) == 3
+    assert len(reads) == 4
+    open_to_all.chmod(0o1777)  # as /tmp: there nobody renames what others have
+    assert cache_folder("x") == own_in_open / "x"
 
 
 def test_the_oldest_go(tmp_path: Path) -> None:

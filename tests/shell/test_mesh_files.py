@@ -196,6 +196,7 @@ def test_off_with_comments_colours_and_loose_lines(write):
         "comments": f"OFF # cube\n# by hand\n\n8 6 12 # counts\n{body}\n{plain}# end",
         "no edges": f"OFF\n8 6\n{body}{plain}",
         "colors": f"OFF\n8 6 0\n{body}" + plain.replace("\n", " 3 255 0 0\n"),
+        "faces without lines": f"OFF\n8 6 0\n{body}{plain}".replace("\n4", " 4"),
         "vertex colors": "COFF\n8 6 0\n" + body.replace("\n", " 1 0 0 1\n") + plain,
     }
     for name, text in texts.items():
@@ -205,6 +206,15 @@ def test_off_with_comments_colours_and_loose_lines(write):
     normals = f"NOFF\n8 6 0\n{body}".replace("\n", " 0 0 1\n").replace("NOFF 0 0 1", "NOFF")
     normals = normals.replace("8 6 0 0 0 1", "8 6 0") + plain
     assert Shell.from_file(write("cube.off", normals), unit="m").normals is not None
+
+
+@pytest.mark.parametrize("face", ["0", "-1 0 1", "4 0 1 2", "3 0 1 x"])
+def test_off_faces_are_whole(write, face):
+    """Of all in one line, and of one in a line of its own."""
+    body = "".join(f"{x} {y} {z}\n" for x, y, z in CUBE)
+    for before in ("3 0 1 2 ", "3 0 1 2 255 0 0\n"):
+        with pytest.raises(ShellFileError, match="damaged face"):
+            Shell.from_file(write("bad.off", f"OFF\n8 2 0\n{body}{before}{face}\n"), unit="m")
 
 
 @pytest.mark.parametrize("index", [-1, 8, 10**12])

@@ -1,8 +1,6 @@
 """The command that fits: what it prints and writes, and its exit codes."""
 
 import json
-import os
-import signal
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +10,7 @@ pytest.importorskip("scipy")
 pytest.importorskip("matplotlib")
 
 import sphshell_pin as sp
-from sphshell_pin.base.atomic import folder
 from sphshell_pin.base.tables import csv_text
-from sphshell_pin.cli import fit
 from sphshell_pin.scenario import read_scenario
 from sphshell_pin.study.fit.parameters import parse_wanted
 from tests.command import call
@@ -85,45 +81,3 @@ def test_a_file_that_cannot_be_made_leaves_none(bounce, tmp_path, monkeypatch, m
     done = call("fit", "fall.csv", bounce, "--param", "gravity.2")
     assert done.exit_code == 2
     assert not Path("results").exists()
-
-
-@pytest.mark.parametrize("call", [1, 2])
-def test_values_and_report_are_of_one_fit_when_it_is_killed(tmp_path, monkeypatch, call):
-    """At each call that renames: the old files, all of them, or the new ones."""
-    source = tmp_path / "s.toml"
-    source.write_text("")
-
-    class Found:
-        value = "old"
-
-        def to_json(self):
-            return self.value
-
-        def scenario_text(self, *_):
-            return self.value
-
-    found, out = Found(), tmp_path / "out"
-    monkeypatch.setattr("sphshell_pin.scenario.format.sliders.check_knobs", lambda *_, **__: None)
-    monkeypatch.setattr("sphshell_pin.scenario.format.reading.read_scenario", lambda *_: None)
-    fit._write(found, source, out, {}, picture=False)
-    found.value = "new"
-    child = os.fork()
-    if child == 0:
-        calls = []
-
-        def killed(rename):
-            def done(*names, **options):
-                rename(*names, **options)
-                calls.append(names)
-                if len(calls) == call:
-                    os.kill(os.getpid(), signal.SIGKILL)
-
-            return done
-
-        os.replace = killed(os.replace)
-        folder.exchange = killed(folder.exchange)
-        fit._write(found, source, out, {}, picture=False)
-        os._exit(0)
-    os.waitpid(child, 0)
-    assert {path.read_text() for path in out.iterdir()} in ({"old"}, {"new"})
-    assert {path.name for path in out.iterdir()} == {"fit.json", "s.fitted.toml"}

@@ -19,6 +19,7 @@ from sphshell_pin.study.sweep import local
 from sphshell_pin.study.sweep.job import DONE, Outcome, Run
 from sphshell_pin.study.sweep.journal import Journal
 from tests.command import call, refused
+from tests.programs import python
 from tests.study.resting import check_once, entries
 
 pytest.importorskip("pandas")
@@ -75,14 +76,7 @@ def reference(scenario):
 def stopped(runs, scenario, options, out, workers, number):
     """Begin a sweep that gets the signal when `runs` are done; return its exit code and errors."""
     code = ENTRY.format(runs=runs, number=int(number))
-    command = ["sweep", scenario, *options, "--workers", workers, "--out", out]
-    done = subprocess.run(
-        [sys.executable, "-c", code, *map(str, command)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    done = python(code, "sweep", scenario, *options, "--workers", workers, "--out", out)
     return done.returncode, done.stderr
 
 

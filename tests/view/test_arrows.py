@@ -67,13 +67,6 @@ def test_a_full_pool_shows_the_largest_forces():
     assert shown == [(3.0, 4.0, 5.0), (9.0, 10.0, 11.0)]
 
 
-def test_no_arrow_is_longer_than_the_longest():
-    scale = ArrowScale(0.1, 1.0, longest=0.25)
-    where = last_transforms(1, forces(1000.0), scale)
-    tip = (where["normal_0/head"] @ [0, 0.5, 0, 1])[:3]
-    assert np.linalg.norm(tip - [0, 1, 2]) == pytest.approx(0.25)
-
-
 def test_a_contact_keeps_its_arrow_when_another_lets_go():
     film = Film()
     pool = ArrowPool(film.canvas, 3, 0.001)
@@ -87,7 +80,7 @@ def test_a_contact_keeps_its_arrow_when_another_lets_go():
     np.testing.assert_array_equal(np.array(sizes) > 1e-4, [[1, 1, 0], [0, 1, 0], [1, 1, 0]])
 
 
-@pytest.mark.parametrize("size", [1e200, np.inf, np.nan])
+@pytest.mark.parametrize("size", [1000.0, 1e200, np.inf, np.nan])
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
 def test_forces_beyond_all_bounds_are_drawn_as_far_as_can_be(size):
     where = last_transforms(1, forces(size), ArrowScale(0.1, 1.0, longest=0.25))

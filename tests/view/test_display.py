@@ -1,6 +1,3 @@
-import subprocess
-import sys
-
 import meshcat
 import numpy as np
 import pinocchio as pin
@@ -10,6 +7,7 @@ from sphshell_pin import ImpactLaw, Plane, Scene, Shell, Sphere
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import ArrowScale, Display
 from sphshell_pin.view.camera import choose_view
+from tests.programs import python
 from tests.view.drawn import Film
 from tests.view.stand_ins import (
     a_scene,
@@ -164,8 +162,7 @@ def test_importing_the_folders_loads_no_picture_library():
         "import sys, sphshell_pin.view, sphshell_pin.view.live, sphshell_pin.plot;"
         "print({'meshcat', 'matplotlib', 'zmq', 'tornado', 'pydantic'} & set(sys.modules))"
     )
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "set()"
+    assert python(script, check=True).stdout.strip() == "set()"
 
 
 def test_a_plane_is_drawn_where_its_shell_is_and_the_eye_above_it():

@@ -11,6 +11,7 @@ import pytest
 from sphshell_pin.scenario import run_scenario
 from sphshell_pin.view.live import Live, opening
 from tests.command import call
+from tests.programs import python
 from tests.scenario.files import without_pictures, write
 from tests.view.live_client import get
 from tests.view.live_player import BallPlayer
@@ -81,12 +82,7 @@ def test_faults_are_one_sentence(tmp_path, finished):
 
 def test_without_meshcat_it_says_what_to_install(tmp_path):
     code = f"import sys; sys.modules['meshcat'] = None; {ENTRY}"
-    done = subprocess.run(
-        [sys.executable, "-c", code, "view", str(write(tmp_path)), "--no-open"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python(code, "view", write(tmp_path), "--no-open")
     assert done.returncode == 2
     assert "sphshell-pin[view]" in done.stderr
     assert done.stderr.count("\n") == 1

@@ -1,7 +1,5 @@
 """The loop, frame by frame: what time does, what events do, what is not done."""
 
-import subprocess
-import sys
 import time
 import warnings
 from unittest.mock import Mock
@@ -17,6 +15,7 @@ from sphshell_pin.view import live as live_module
 from sphshell_pin.view.live import Live, loop, preview
 from sphshell_pin.view.live.loop import BUDGET, FPS
 from sphshell_pin.view.live.opening import player_of
+from tests.programs import python
 from tests.scenario.files import DROP, write
 from tests.view.live_driver import TAB, ForeignWindow, frames, say
 from tests.view.live_player import BallPlayer, FilmPlayer
@@ -205,9 +204,7 @@ def test_a_script_may_end_without_stopping_it():
         "live = Live(LiveRun(build('sphere_on_shell')), speed=10.0).start()\n"
         "time.sleep(0.3)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
-    )
+    done = python(code)
     assert (done.returncode, done.stderr) == (0, "")
 
 

@@ -104,15 +104,6 @@ def test_without_spheres_the_legend_names_the_body_the_force_acts_on(tmp_path):
     )
 
 
-def test_equal_runs_give_equal_pages(tmp_path):
-    scene, result = ball_on_plate()
-    one, two = (
-        write_recording(tmp_path / name, result, scene, title="same").read_bytes()
-        for name in ("one.html", "two.html")
-    )
-    assert one == two
-
-
 @pytest.mark.parametrize(("name", "value"), [("fps", 0.0), ("fps", np.nan), ("speed", -1.0)])
 def test_a_pace_that_is_not_positive_is_refused(tmp_path, name, value):
     scene, result = ball_on_plate()

@@ -95,19 +95,6 @@ def test_the_ball_its_shell_and_its_arrow_are_seen(ball_page, opened):
     assert abs(end - start) > 0.15 * SIZE["width"]
 
 
-def test_it_plays_pauses_and_starts_again(ball_page, opened):
-    page = opened(ball_page)
-    page.wait_for_function("recording.time > 0.2", timeout=20_000)
-    page.get_by_role("button", name="Pause").click()
-    stopped = page.evaluate("recording.time")
-    page.wait_for_timeout(300)
-    assert page.evaluate("recording.time") == stopped
-    shown = page.locator("#clock").inner_text()
-    assert float(shown.split()[0]) == pytest.approx(stopped, abs=0.006)
-    page.get_by_role("button", name="Play", exact=True).click()
-    page.wait_for_function(f"recording.time > {stopped} + 0.2", timeout=20_000)
-
-
 def test_the_trail_grows_with_time(ball_page, opened):
     page = opened(ball_page)
     visible = """() => {

@@ -134,7 +134,7 @@ def test_keys(page, ball):
     page.keyboard.press("Home")
     assert time_of(page) == 0.0
     page.evaluate("recording.rate = 0.01")  # not at its end before the next key
-    page.keyboard.press("Space")
+    page.get_by_role("button", name="Play", exact=True).click()
     assert page.evaluate("recording.playing")
     page.wait_for_function("recording.time > 0")
     page.keyboard.press("Space")

@@ -92,9 +92,10 @@ std::vector<ContactRow> MujocoContacts::contacts(const void* model, const void* 
 }
 
 // Where time goes back the log ends; of several evaluations at one time the last one counts.
-void MujocoContacts::add_to_log(const void* data, Scratch& own) {
+void MujocoContacts::add_to_log(void* data, Scratch& own) {
   const std::unique_lock lock(mutex_);
   Log& log = logs_of_[data];
+  if (const auto mark = mark_of_data(data, layout_.mark); log.mark != mark) log = {mark, {}, {}};
   const auto keep = std::lower_bound(log.times.begin(), log.times.end(), own.time);
   log.times.erase(keep, log.times.end());
   log.rows.resize(log.times.size());
@@ -102,10 +103,10 @@ void MujocoContacts::add_to_log(const void* data, Scratch& own) {
   log.times.resize(log.rows.size(), own.time);
 }
 
-std::pair<std::vector<double>, std::vector<ContactRow>> MujocoContacts::log(const void* data) {
+std::pair<std::vector<double>, std::vector<ContactRow>> MujocoContacts::log(void* data) {
   const std::shared_lock lock(mutex_);
   const auto at = logs_of_.find(data);
-  if (at == logs_of_.end()) return {};
+  if (at == logs_of_.end() || at->second.mark != mark_of_data(data, layout_.mark)) return {};
   return {at->second.times, at->second.rows};
 }
 

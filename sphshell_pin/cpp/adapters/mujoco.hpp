@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <cstring>
 #include <memory>
 #include <shared_mutex>
@@ -21,9 +22,10 @@
 namespace sphshell {
 
 // Where an mjData, and in the second row an mjModel, keep what is read and written [bytes from the
-// beginning]. It differs between versions of MuJoCo: Python finds it in the structs at hand.
+// beginning]. It differs between versions of MuJoCo: Python finds it in the structs at hand. `mark`
+// is of use to MuJoCo where a warning has been given alone: `lastinfo` of one, zero after a reset.
 struct MujocoLayout {
-  std::size_t time, qvel, plugin_state, xpos, xquat, cvel, subtree_com, cdof, qfrc_passive;
+  std::size_t time, qvel, plugin_state, xpos, xquat, cvel, subtree_com, cdof, qfrc_passive, mark;
   std::size_t timestep, integrator, enableflags, contype, conaffinity;
 };
 
@@ -76,7 +78,7 @@ class MujocoContacts {
   // The contacts at the state of `data`.
   std::vector<ContactRow> contacts(const void* model, const void* data);
   // Those of all accepted steps, and their times [s].
-  std::pair<std::vector<double>, std::vector<ContactRow>> log(const void* data);
+  std::pair<std::vector<double>, std::vector<ContactRow>> log(void* data);
   // Forgets the log of `data`.
   void forget(const void* data);
   // What went wrong in apply(), which cannot raise, since this was last called.
@@ -103,6 +105,7 @@ class MujocoContacts {
     std::array<VectorX, 4> rates;  // of the bristles, at the stages
   };
   struct Log {
+    std::uint32_t mark = 0;  // of its data
     std::vector<double> times;
     std::vector<ContactRow> rows;
   };
@@ -116,7 +119,7 @@ class MujocoContacts {
   void evaluate(const void* model, const char* data, Scratch& scratch) const;
   void begin(const void* model, const char* data, Scratch& scratch) const;
   void add_forces(char* data, const SceneData& scene) const;
-  void add_to_log(const void* data, Scratch& scratch);
+  void add_to_log(void* data, Scratch& scratch);
 
   static std::vector<double> memory_of_none(SceneData scene) {
     return scene.save(VectorX::Zero(scene.bristle_size()));
@@ -160,5 +163,8 @@ bool is_taken(const void* model, int instance);
 bool acts_on(const void* model, const MujocoContacts* contacts);
 // The model, which is deleted by now, has no contacts any more.
 void end_model(const void* model);
+// A number that no other mjData has had, kept in `data` at `offset`: another one may have its
+// address later.
+std::uint32_t mark_of_data(void* data, std::size_t offset);
 
 }  // namespace sphshell

@@ -16,7 +16,8 @@ namespace {
 
 using Set = std::vector<std::shared_ptr<MujocoContacts>>;
 
-// The mark of a model is in bits of its enableflags that MuJoCo does not use.
+// The mark of a model is in bits of its enableflags that MuJoCo does not use. No mark is given
+// twice, as a copy may outlive the contacts; when all are, models get the last, which finds none.
 constexpr std::uint32_t kMarks = 0x7fff;
 constexpr int kMarkShift = 16;
 // The first bytes of an mjModel are its sizes: they tell a model from one that has the mark by
@@ -32,9 +33,12 @@ struct Marked {
 struct Registry {
   std::shared_mutex mutex;
   std::optional<MujocoLayout> layout;
-  std::unordered_map<std::uint32_t, Marked> marked;
-  std::unordered_map<const void*, std::uint32_t> owners;
-  std::uint32_t last = std::random_device()();
+  std::unordered_map<std::uint64_t, Marked> marked;
+  std::unordered_map<const void*, std::uint64_t> owners;
+  const std::uint32_t first = std::random_device()() % kMarks;
+  std::uint64_t given = 0;
+  std::unordered_map<const void*, std::uint32_t> marks_of_data;
+  std::uint32_t last_of_data = 0;
   std::unordered_set<std::uint32_t> ended;  // marks of copies that were found without contacts
   void (*report)(const std::string&) = nullptr;
 
@@ -46,6 +50,11 @@ struct Registry {
     const auto others = value_at<std::uint32_t>(at, 0) & ~(kMarks << kMarkShift);
     const std::uint32_t flags = others | mark << kMarkShift;
     std::memcpy(at, &flags, sizeof(flags));
+  }
+  // A number of its own for a set of contacts; up to kMarks it is also the mark.
+  std::uint64_t next() {
+    const std::uint64_t k = given++;
+    return k < kMarks - 1 ? (first + k) % (kMarks - 1) + 1 : k + 2;
   }
   const Marked* find(const void* model) const {
     if (marked.empty()) return nullptr;
@@ -76,7 +85,7 @@ std::shared_ptr<const Set> contacts_of(const void* model) {
   }
   all.report(
       "a copy of a MuJoCo model moves without contacts: those of the model have ended, with it or "
-      "by detach(); attach them to the copy");
+      "by detach(), or more than 32766 models had contacts: attach them to the copy");
   return nullptr;
 }
 
@@ -166,15 +175,8 @@ std::string register_passive(void* model, std::shared_ptr<MujocoContacts> contac
   set.push_back(std::move(contacts));
   // A copy of a model with contacts has a mark, and contacts, of its own from here on.
   const auto owned = all.owners.find(model);
-  std::uint32_t number = owned == all.owners.end() ? 0 : owned->second;
-  if (number == 0) {
-    if (all.marked.size() + 1 >= kMarks)
-      throw std::length_error("too many MuJoCo models have contacts");
-    do number = ++all.last & kMarks;
-    while (number == 0 || all.marked.count(number));
-  }
-  all.ended.erase(number);
-  all.set_mark(model, number);
+  const std::uint64_t number = owned == all.owners.end() ? all.next() : owned->second;
+  all.set_mark(model, std::uint32_t(std::min<std::uint64_t>(number, kMarks)));
   all.owners[model] = number;
   all.marked[number] = {model, std::string(static_cast<const char*>(model), kSizes),
                         std::make_shared<const Set>(std::move(set))};
@@ -223,6 +225,17 @@ void end_model(const void* model) {
   before = all.marked.at(owned->second).contacts;
   all.marked.erase(owned->second);
   all.owners.erase(owned);
+}
+
+std::uint32_t mark_of_data(void* data, std::size_t offset) {
+  Registry& all = registry();
+  const std::unique_lock lock(all.mutex);
+  std::uint32_t& own = all.marks_of_data[data];
+  if (own == 0 || value_at<std::uint32_t>(data, offset) != own) {
+    own = ++all.last_of_data;
+    std::memcpy(static_cast<char*>(data) + offset, &own, sizeof(own));
+  }
+  return own;
 }
 
 }  // namespace sphshell

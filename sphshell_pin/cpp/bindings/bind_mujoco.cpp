@@ -49,7 +49,7 @@ void bind_mujoco(nb::module_& m) {
              const std::vector<int>& memory, const std::vector<int>& ids,
              const std::vector<int>& roots, const std::vector<std::vector<int>>& dofs,
              const std::vector<int>& roles, std::vector<std::string> touches, bool logs) {
-            check_count("layout", layout.size(), 14);
+            check_count("layout", layout.size(), 15);
             check_count("memory", memory.size(), 3);
             const std::size_t* at = layout.data();
             std::vector<MujocoBody> bodies;
@@ -60,7 +60,7 @@ void bind_mujoco(nb::module_& m) {
             new (self) OwnMujoco{std::make_shared<MujocoContacts>(
                 SceneData(state.state.scene()),
                 MujocoLayout{at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8], at[9],
-                             at[10], at[11], at[12], at[13]},
+                             at[10], at[11], at[12], at[13], at[14]},
                 MujocoMemory{memory[0], std::size_t(memory[1]), std::size_t(memory[2])},
                 std::move(bodies), std::move(parts), std::move(touches), logs, &report)};
           },

@@ -47,8 +47,8 @@ def compile_robot(model: pin.Model) -> Path:
     folder = cache_folder("robots")
     if folder is None:
         raise SphshellError(
-            "the cache folder cannot be used, as it cannot be made or others can write to it: set "
-            "SPHSHELL_PIN_CACHE to a folder of your own"
+            "the cache folder cannot be used, as it cannot be made or others can write to it or "
+            "replace it: set SPHSHELL_PIN_CACHE to a folder of your own"
         )
     path = folder / f"{_key(model)}.so"
     if is_own(path):

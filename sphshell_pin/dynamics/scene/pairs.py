@@ -1,7 +1,7 @@
 """Two bodies that may touch, as constant descriptions."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ import pinocchio as pin
 from sphshell_pin import _core
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.contact import (
+    BristleFriction,
     FoundationLaw,
     Friction,
     FunctionFriction,
@@ -149,13 +150,19 @@ class ContactPair(Summarized):
         return min((one.radius for one in self.spheres), default=math.nan)
 
     def _check_plane(self) -> None:
-        """Refuse what follows from the radius of a sphere, and flat elements."""
+        """Refuse what follows from the radius of a sphere, and flat elements.
+
+        A bristle on the area of a foundation resists spin: else a part would spin on its face
+        without end.
+        """
         why = "beside a Plane: it follows from the radius of a Sphere"
         if self.law.needs_shape and not isinstance(self.law, FoundationLaw):
             must = "take law.on_plane(radius), or a FoundationLaw, which needs no radius"
             raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}; {must}")
         friction = self.friction
-        if friction is not None and (
+        if isinstance(friction, BristleFriction) and isinstance(self.law, FoundationLaw):
+            object.__setattr__(self, "friction", replace(friction, torsional=True))
+        elif friction is not None and (
             isinstance(friction, MindlinFriction) or friction._binding.torsional
         ):
             raise InvalidParameter("friction", friction, f"must have no disc of contact {why}")

@@ -12,16 +12,6 @@ from tests.contact.smooth.surfaces import SURFACES
 from tests.oracle.pieces import potential_and_force
 
 
-def test_duplicate_elements() -> None:
-    """Elements given twice, or turned over; dropped, the force is the same."""
-    vertices, elements, normals = SURFACES["wavy above"].mesh(0.6)
-    once = Shell(vertices, elements, normals=normals)
-    twice = Shell(vertices, np.concatenate([elements, elements[::2, ::-1]]), normals=normals)
-    assert twice.health.duplicate_elements == len(elements[::2])
-    for center in SURFACES["wavy above"].probes(50, DEPTH)[0]:
-        assert push(once, center) == pytest.approx(push(twice, center), abs=1e-12)
-
-
 def test_needle() -> None:
     """Needle of aspect 1e6 in a plate; as without it, to round-off."""
     corners = [[-1, -1], [1, -1], [1, 1], [-1, 1], [-0.5, 1e-6], [0.5, 1e-6], [0.5, 0]]
@@ -124,16 +114,6 @@ def test_far_from_the_origin(exact: bool) -> None:
     here, there = Shell(vertices, elements, **options), Shell(vertices + shift, elements, **options)
     for center in SURFACES["torus inside"].probes(60, DEPTH)[0]:
         assert push(there, center + shift) == pytest.approx(push(here, center), abs=1e-7)
-
-
-@pytest.mark.parametrize("scale", [1e-6, 1e6])
-def test_any_unit(scale: float) -> None:
-    """Everything 1e-6 or 1e6 times as large; the same force to round-off."""
-    vertices, elements, normals = SURFACES["wavy above"].mesh(0.6)
-    here = Shell(vertices, elements, normals=normals)
-    there = Shell(scale * vertices, elements, normals=normals)
-    for center in SURFACES["wavy above"].probes(60, DEPTH)[0]:
-        assert push(there, scale * center, scale) == pytest.approx(push(here, center), abs=1e-11)
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.01, 0.1])

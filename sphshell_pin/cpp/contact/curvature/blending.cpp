@@ -5,10 +5,13 @@
 // faces about a point x of the surface, d_j the distance from x to r_j (zero to its own face), and
 // K_j the curvature at the point of r_j next to x, the curvature is the mean
 //
-//   K(x) = sum_j w_j K_j / sum_j w_j,  w_j = (1 - d_j^2 / a^2)^2 where d_j < a, else 0
+//   K(x) = sum_j w_j K_j / sum_j w_j,  w_j = h / (1 - h)
+//   h = 1/2 - d_j^2 / a^2 up to d_j = a / 2, then (1 - d_j / a)^2, and none from a on
 //
 // It is a function of x alone, whichever facet holds x: on a border both faces have d = 0. As w is
-// flat at d = 0, the first derivatives agree there too, wherever K_j goes on smoothly.
+// flat at d = 0, the first derivatives agree there too, wherever K_j goes on smoothly. Next to one
+// joint h is the share of the other face: of all that go from 1/2 to 0 and are flat at both ends it
+// has the smallest second derivative, by which the force changes.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -23,6 +26,12 @@ namespace sphshell {
 namespace {
 
 double square(double x) { return x * x; }
+
+// w by the square of d / a.
+double weight_of(double t2) {
+  const double h = t2 < 0.25 ? 0.5 - t2 : square(1 - std::sqrt(std::min(t2, 1.0)));
+  return h / (1 - h);
+}
 
 double chord_distance2(const Facet& facet, int side, const Vec3& x) {
   const Vec3 &p = facet.corner[side], d = facet.corner[next_corner(side)] - p;
@@ -137,7 +146,7 @@ CurvatureField::Local CurvatureField::at(const Place& place, double length2) {
   }
   double weights = 1;
   for (const Neighbor& one : neighbors_) {
-    const double weight = square(1 - one.least2 / length2);
+    const double weight = weight_of(one.least2 / length2);
     sum += weight / one.weights * one.sum;
     weights += weight;
   }

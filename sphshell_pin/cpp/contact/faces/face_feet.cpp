@@ -15,6 +15,9 @@ namespace {
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
 constexpr int kMostRepeats = 20;
+// Faces that cross at less than this (sine) overlap as if it were this.
+constexpr double kLeastSlope = 1e-4;
+
 }  // namespace
 
 // The facets near the point are looked through; where it may be anywhere around an axis, those near
@@ -139,7 +142,10 @@ bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tol
     Vec3 towards;
     const double away =
         joint.divide(surface.faces().shapes, cell.face, crossing ? at.point : at.center, towards);
-    return !(cell.turn[k] * away < -tolerance);
+    // The overlap is along the face: where both are nearly tangent the other one hardly falls
+    // there.
+    const double slope = crossing ? std::max(towards.cross(at.outward).norm(), kLeastSlope) : 1.0;
+    return !(cell.turn[k] * away < -tolerance * slope);
   }
   const CubicCurve side = surface.facets()[f].side(facet, k);
   const double t = nearest_on_side(side, at.point);
@@ -206,10 +212,12 @@ bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideF
     out.tangent = du * along[0] + dv * along[1];
     return probe.pull(out.point).dot(out.tangent);
   };
-  const double last = pull(1), first = pull(0);
-  if (!(first > 0)) return true;
-  if (!(last < 0)) return pull(1), true;
-  find_rest(pull, 0, 1, first, last);
+  const double last = pull(1), at_last = probe.depth(out.point);
+  const double first = pull(0), at_first = probe.depth(out.point);
+  if (first > 0 && last < 0)
+    find_rest(pull, 0, 1, first, last);
+  else if (first > 0 || (!(last < 0) && at_last > at_first))  // over a ridge both ends are near
+    pull(1);
   return true;
 }
 
@@ -217,7 +225,6 @@ bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideF
 // the rulings of one; from the cubic's closest point on. False where they do not follow.
 template <class Probe>
 bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, SideFoot& out) {
-  constexpr double kEnd = 1e-6;  // as near to an end that is tangent there is a direction
   const CurvedShell& surface = *shell.curved();
   const Faces& faces = surface.faces();
   const FaceJoint& joint = faces.joints[surface.face_cells()[f].joint[k]];
@@ -230,10 +237,15 @@ bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, S
     out.tangent = turn * joint.tangent_on_ruling(faces.shapes, out.point);
     return probe.pull(out.point).dot(out.tangent);
   };
+  // From an end, but where both faces are tangent: so near to that there is a direction.
+  const auto from_end = [&](const Vec3& x) {
+    return joint.ends_tangent && !(joint.at(faces.shapes, x).sine > kLeastAngle) ? 1e-6 : 0;
+  };
+  const double least = from_end(p), most = 1 - from_end(q);
   // Regions of features overlap by this: no center is between two of them.
-  const double gap = surface.gap(), t = std::clamp(out.t, kEnd, 1 - kEnd), middle = pull(t);
+  const double gap = surface.gap(), t = std::clamp(out.t, least, most), middle = pull(t);
   const bool ahead = middle > 0;
-  const double end = ahead ? 1 - kEnd : kEnd;
+  const double end = ahead ? most : least;
   // The first rest that way: in steps that double, as there may be several.
   double from = t, to = t, last = middle, next = middle;
   for (double step = 1.0 / 64; next != 0 && (next > 0) == ahead && to != end; step *= 2) {
@@ -242,6 +254,8 @@ bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, S
     next = pull(to);
   }
   if (next != 0 && (next > 0) == ahead) {
+    // Within it the point is still the side's own.
+    out.t = std::clamp(out.t, 1e-6, 1 - 1e-6);
     if (std::abs(next) >= gap) out.t = ahead ? 1 : 0, out.point = ahead ? q : p;
   } else if (ahead && next < 0) {
     find_rest(pull, from, to, last, next);

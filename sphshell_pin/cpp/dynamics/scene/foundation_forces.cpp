@@ -79,6 +79,21 @@ struct BristleSlopes {
   }
 };
 
+// Mean square of the distance of the pressure beside a plane from its center [m^2].
+double spread_of(const Foundation& foundation) {
+  const FoundationRow& row = foundation.rows()[0];
+  double sum = 0;
+  for (const FoundationPoint& one : foundation.points())
+    sum += one.force.z() * (one.point - row.center).squaredNorm();
+  return std::max(0.0, sum) / row.sum.pressure;
+}
+
+// For the laws, whose disc of contact is Hertz's: a^2 = radius depth. Over a sphere's patch it is
+// as wide as that, else it has the same second moment under Hertz's pressure.
+double disc_radius(const Pair& pair, const Foundation& foundation, double depth) {
+  return pair.on_plane() ? 2.5 * spread_of(foundation) / depth : 2 * pair.disc_radius();
+}
+
 // The derivative of the pressure at a point this far from the sphere's center by that center.
 Vec3 pressure_by_center(const Vec3& from, double radius) {
   // p = (R^2 - rho^2) / (2 rho): dp/drho = -(R^2 / rho^2 + 1) / 2, and rho falls along `from`.
@@ -284,8 +299,9 @@ void FoundationForces::slopes_below(const Pair& pair, double relaxation, const C
   // First moment of the push, and its derivative.
   Vec3 first = Vec3::Zero();
   Matrix36 first_by = Matrix36::Zero();
-  Row6 sum_by = Row6::Zero();
+  Row6 sum_by = Row6::Zero(), spread_by = Row6::Zero();
   double sum = 0;
+  Vec3 off_center = Vec3::Zero();
   out.wrench.setZero(), out.by_twist.setZero();
   const std::vector<FoundationPoint>& points = foundation_.points();
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -306,6 +322,9 @@ void FoundationForces::slopes_below(const Pair& pair, double relaxation, const C
     level_by.row(2).setZero();
     first_by.rightCols<3>() += level_by;
     sum += push, sum_by += push_by;
+    const Vec3 from = x - center_;
+    off_center += push * from;
+    spread_by += from.squaredNorm() * push_by + 2 * push * from.transpose() * x_by;
     // Of friction and damping; the rest follows from the sums.
     const Vec3 v = site.twist.head<3>() + site.twist.tail<3>().cross(x);
     const Pressed pressed(law, friction, n, v);
@@ -322,20 +341,29 @@ void FoundationForces::slopes_below(const Pair& pair, double relaxation, const C
   out.wrench[2] += sum, out.wrench.tail<3>() += first.cross(n);
   by.row(2) += sum_by, by.bottomRows<3>() -= cross_matrix(n) * first_by;
   if (pair.friction.has_state()) {
+    const double spread = spread_of(foundation_);
     const Matrix36 point_by = (first_by - first / sum * sum_by) / sum;
     const Row6 normal_by = by.row(2), normal_by_twist = out.by_twist.row(2);
     static const Mat3 kCarried = Mat3::Identity();
     ContactSite at = site;
-    at.place = at.contact.point, at.point_by = &kCarried;
+    at.place = at.contact.point, at.point_by = &kCarried,
+    at.disc_radius = 2.5 * spread / at.contact.depth;
     const BristleSlopes bristle(pair.friction, relaxation, at, normal_force);
+    // The disc's radius goes with the root of the depth where the pressure is held, and really with
+    // that of its spread.
+    spread_by -= 2 * off_center.transpose() * point_by + spread * sum_by;
+    const Row6 depth_by =
+        spread > 0 ? Row6(at.contact.depth / (spread * sum) * spread_by) : Row6::Zero();
     out.wrench += bristle.all.wrench - bristle.without.wrench;
-    by +=
-        (bristle.all.by_place - bristle.without.by_place) * point_by + bristle.by_force * normal_by;
+    by += (bristle.all.by_place - bristle.without.by_place) * point_by +
+          (bristle.all.by_depth - bristle.without.by_depth) * depth_by +
+          bristle.by_force * normal_by;
     out.by_twist +=
         bristle.all.by_twist - bristle.without.by_twist + bristle.by_force * normal_by_twist;
     for (int k = 0; k < pair.friction.rings(); ++k) {
       ContactSlopes::Ring& ring = out.rings[k] = bristle.all.rings[k];
-      const Matrix36 rate_by = ring.rate_by_place * point_by + bristle.rate_by_force(k) * normal_by;
+      const Matrix36 rate_by = ring.rate_by_place * point_by + ring.rate_by_depth * depth_by +
+                               bristle.rate_by_force(k) * normal_by;
       ring.rate_by_place = rate_by.leftCols<3>(), ring.rate_by_turn = rate_by.rightCols<3>();
       ring.rate_by_twist += bristle.rate_by_force(k) * normal_by_twist;
     }
@@ -370,12 +398,12 @@ void FoundationForces::complete(const SceneData& scene, ActiveContact& active) c
   active.elastic = law.modulus / law.thickness * foundation_.rows()[i].sum.energy;
   active.pieces = i == 0 ? 1 : 0;
   if (!pair.friction.has_state()) return;
-  // One bristle at the center of pressure, on a disc as large as that of a plane.
+  // One bristle at the center of pressure.
+  const double disc = disc_radius(pair, foundation_, m.depth);
   ContactForce<double> bristle;
   bristle.normal = f.normal, bristle.slip = f.slip;
-  std::visit(
-      [&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), scene.relaxation(pair)); },
-      pair.friction.law);
+  std::visit([&](const auto& one) { one.add(bristle, m, disc, scene.relaxation(pair)); },
+             pair.friction.law);
   active.sliding = friction_power(bristle, m);
   bristle.elastic = f.elastic;
   bristle.friction += f.friction;

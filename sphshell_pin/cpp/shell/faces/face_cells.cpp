@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <stdexcept>
+#include <string>
 
 #include "shell/curved/curved.hpp"
 
@@ -10,9 +12,6 @@ namespace sphshell {
 namespace {
 
 constexpr double kTurn = 6.283185307179586;
-// A cubic may bound a face that it is off by this share of the size: the potential may jump by as
-// much there. Of vertices and joints it is kMostGap.
-constexpr double kMostCut = 4 * kMostGap;
 // Facets of one face overlap by this share of their parameters: one of them has each point.
 constexpr double kOverlap = 1e-9;
 // Facets whose corners are off their plane by more than this share of the size are not flat on it.
@@ -98,11 +97,7 @@ namespace {
 class CellMaker {
  public:
   CellMaker(const Shell& shell, Faces& faces, const LargeArray<CurvedFacet>& facets)
-      : shell_(shell),
-        faces_(faces),
-        facets_(facets),
-        gap_(kMostGap * shell.size()),
-        cut_(kMostCut * shell.size()) {}
+      : shell_(shell), faces_(faces), facets_(facets), gap_(kMostGap * shell.size()) {}
 
   FaceCells make() {
     if (faces_.of.empty()) return {};
@@ -114,6 +109,7 @@ class CellMaker {
     for (std::size_t f = 0; f < facets_.size(); ++f)
       for (int k = 0; k < 3; ++k) decide(static_cast<int>(f), k);
     settle();
+    check_sides();
     find_intruders();
     return std::move(out_);
   }
@@ -139,8 +135,7 @@ class CellMaker {
     const int face = faces_.of_triangle(shell_.triangle_of_facet(f));
     if (!told_[face]) out_.inexact.push_back({face, other, off});
     told_[face] = 1;
-    if (!open_[f]) opened_.push_back(f);
-    open_[f] = 1;
+    if (!std::exchange(open_[f], 1)) opened_.push_back(f);
   }
 
   // How far the cubic of a side is off the facet's face [m].
@@ -155,8 +150,7 @@ class CellMaker {
 
   void place(int f) {
     FaceCell& cell = out_.of[f] = FaceCell();
-    cell.face = face_of_facet(f);
-    if (cell.face < 0) return;
+    if ((cell.face = face_of_facet(f)) < 0) return;
     const Facet& facet = shell_.facets()[f];
     const Primitive& shape = faces_.shapes[cell.face];
     double first[2] = {0, 0};
@@ -205,8 +199,7 @@ class CellMaker {
   // Flat facets of planes far from anything round stay as they are.
   bool is_bent(int f) const {
     const int face = out_.of[f].face;
-    if (face < 0) return false;
-    if (is_off(f)) return true;
+    if (face < 0 || is_off(f)) return face >= 0;
     for (int k = 0; k < 3; ++k) {
       const int h = beyond(f, k);
       if (h >= 0 && is_round(out_.of[triangle_of(h)].face)) return true;
@@ -223,7 +216,7 @@ class CellMaker {
     cell.bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
     const int joint = other >= 0 && h > 3 * f + k ? joint_of(f, k, cell.face, other) : -1;
     if (joint >= 0 && agree(joint, 3 * f + k, h)) return;
-    if (const double off = off_face(f, k); off > cut_) give_up(f, other, off);
+    if (const double off = off_face(f, k); off > gap_) give_up(f, other, off);
   }
 
   double bulge_of(int f, int k) const {
@@ -250,8 +243,7 @@ class CellMaker {
       }
       points.push_back(q);
       found.emplace();
-      found->face[0] = a, found->face[1] = b;
-      found->across[0] = two, found->across[1] = one;
+      found->face[0] = a, found->face[1] = b, found->across[0] = two, found->across[1] = one;
       find_branches(faces_.shapes, points, *found);
     }
     std::vector<int>& known = joints_[{a, b}];
@@ -337,7 +329,7 @@ class CellMaker {
         if (h < 0 || out_.of[f].face < 0 || open_[f]) continue;
         out_.of[f].side[k] = FaceCell::Side::Cubic;
         out_.of[f].bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
-        if (const double off = off_face(f, k); off > cut_) give_up(f, out_.of[g].face, off);
+        if (const double off = off_face(f, k); off > gap_) give_up(f, out_.of[g].face, off);
       }
     }
     std::vector<char> asked(faces_.shapes.size(), 0);
@@ -363,6 +355,18 @@ class CellMaker {
                     std::all_of(cell.side, cell.side + 3,
                                 [](FaceCell::Side side) { return side == FaceCell::Side::Inner; });
       for (int k = 0; k < 3 && !cell.closed; ++k) cell.side[k] = FaceCell::Side::Cubic;
+    }
+  }
+
+  // No center is lost at a side, or counted twice, if both facets read one joint there.
+  void check_sides() const {
+    for (int h = 0; h < static_cast<int>(3 * out_.of.size()); ++h) {
+      const FaceCell& cell = out_.of[triangle_of(h)];
+      const int k = side_of(h), g = beyond(triangle_of(h), k);
+      if (g < h || !cell.closed || !out_.of[triangle_of(g)].closed) continue;
+      const FaceCell& other = out_.of[triangle_of(g)];
+      if (cell.side[k] != other.side[side_of(g)] || cell.joint[k] != other.joint[side_of(g)])
+        throw std::logic_error("the facets of side " + std::to_string(h) + " read two joints");
     }
   }
 
@@ -427,7 +431,7 @@ class CellMaker {
   const Shell& shell_;
   Faces& faces_;
   const LargeArray<CurvedFacet>& facets_;
-  const double gap_, cut_;
+  const double gap_;
   FaceCells out_;
   std::vector<char> open_;   // facets that are left to their cubics
   std::vector<int> opened_;  // those whose neighbors do not know of it yet

@@ -101,7 +101,7 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
     if (!(std::abs(shape.distance(point(v))) <= tolerance)) return out;
   const std::array<Vec3, 3> at = {point(c[0]), point(c[1]), point(c[2])};
   const std::array<Vec3, 3> normals = normals_at(shape, at);
-  double flat[3], curved[3], sum = 0;
+  double flat[3], curved[3], beyond[3] = {0, 0, 0}, sum = 0;
   for (int k = 0; k < 3; ++k) {
     const int l = next_corner(k);
     const Vec3 d = at[l] - at[k], middle = (at[k] + at[l]) / 2;
@@ -111,6 +111,11 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
     flat[k] = std::abs(shape.distance(middle)), curved[k] = std::abs(shape.distance(middle + rise));
     out.deviation = std::max(out.deviation, flat[k]);
     sum += normals[k].dot(facet_normal(t));
+    // A chord around a torus may cross its crest, and its cubic side lies beyond: where the tube
+    // has turned off by the chord's sagitta.
+    if (shape.kind != FaceKind::Torus || shape.radius < shape.second) continue;
+    const double sagitta = d.squaredNorm() / (8 * shape.radius);
+    beyond[k] = std::min(sagitta * sagitta / (2 * shape.second), kMostOfFlat * shape.second);
   }
   out.sign = sum < 0 ? -1 : 1;
   const double least = std::cos(kMostLeanOnFace);
@@ -120,7 +125,7 @@ Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double 
   bool closer = true, no_farther = true;
   for (int k = 0; k < 3; ++k) {
     closer = closer && curved[k] <= most + 1.5 * tolerance;
-    no_farther = no_farther && curved[k] <= std::max(most, flat[k]) + 1.5 * tolerance;
+    no_farther = no_farther && curved[k] <= std::max({most, flat[k], beyond[k]}) + 1.5 * tolerance;
   }
   // A chord along the crest of a torus is as near to it as its cubic side. But so are the ears of a
   // plane that is tangent there, whose corners are on one line of the parameters.
@@ -268,8 +273,8 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
   all.resize(kept);
 }
 
-// What was left out of a face, or was taken for a strip before the face was known, goes to it where
-// it lies on it and stands off no more than the rest.
+// What was left out of a face, was taken for a strip before the face was known or is another part
+// of it goes to it where it lies on it and stands off no more than the rest.
 void Recognizer::absorb(int face) {
   Growth& growth = faces_[face];
   const auto fits = [&](int t) {
@@ -298,7 +303,9 @@ void Recognizer::absorb(int face) {
         asked[other] = 1;
         for (const int one : faces_[other].triangles)
           if (of_[one] == other) gained.push_back(one);
-        if (3 * gained.size() > own || !std::all_of(gained.begin(), gained.end(), fits))
+        const bool strip = 3 * gained.size() <= own;
+        if (!(strip || faces_[other].shape.kind == growth.shape.kind) ||
+            !std::all_of(gained.begin(), gained.end(), fits))
           gained.clear();
       }
       for (const int one : gained) {

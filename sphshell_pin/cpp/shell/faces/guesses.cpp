@@ -12,6 +12,8 @@ namespace {
 constexpr std::size_t kFewVertices = 8, kManyVertices = 12;
 // Simpler kinds win ties (cylinder, cone, sphere, torus).
 constexpr double kSimpler[] = {0, 1, 0.98, 0.97, 0.95};
+// A torus whose circle is this small over its tube is none.
+constexpr double kLeastRadius = 1e-3;
 
 }  // namespace
 
@@ -52,6 +54,8 @@ std::vector<int> Recognizer::patch(int seed, std::size_t vertices, bool along, i
 bool Recognizer::try_shape(int seed, const Primitive& guess, Growth& best, double& score) {
   Growth growth = grow_and_refit(seed, guess);
   const Primitive shape = growth.shape;
+  // A sphere is tried as one.
+  if (shape.kind == FaceKind::Torus && shape.radius < kLeastRadius * shape.second) return false;
   leave_own_faces_out(growth);
   if (!is_over_determined(growth)) {
     // Fine meshes stand off so little that only the closest vertices count.

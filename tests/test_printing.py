@@ -1,0 +1,117 @@
+"""Every command does the same where nobody takes what it prints."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+from sphshell_pin.cli import app, main
+from sphshell_pin.cli.app import echo
+from sphshell_pin.scenario import run_scenario
+from sphshell_pin.study import report
+from sphshell_pin.study.report.contents import Finding, Section
+from sphshell_pin.study.report.making import Part
+from tests.scenario.files import DROP, without_pictures, write
+
+MESH = Path(__file__).parent / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
+# In a folder of its own with drop.toml, drop.csv and results; é is in no ASCII.
+WORDS = {
+    "run": "drop.toml --no-recording --no-figures --out é",
+    "view": "results --no-open",
+    "render": "results --out é.png",
+    "export": "results --to csv --out é",
+    "explain": "drop.toml",
+    "check": f"{MESH} --unit m",
+    "convert": f"{MESH} é.stl --unit-in m --unit-out mm",
+    "check-robot": "three_link_finger",
+    "new": "--robot three_link_finger --out é.toml",
+    "sweep": "drop.toml --vary contact.ball-plate.law.stiffness=1e5:1e6:2 --workers 0 "
+    "--no-pictures --out é.parquet",
+    "fit": "drop.csv drop.toml --param gravity.2 --out é",
+    "taxels": "results --contact ball-plate --out é",
+    "compare": "results results --no-picture --out é",
+    "report": "--out é",
+    "list": "",
+}
+
+
+def heard() -> None:
+    """Leave the streams as they are."""
+
+
+def closed() -> None:
+    for descriptor in range(3):
+        os.close(descriptor)
+
+
+def full_in_ascii() -> None:
+    for descriptor, name in ((1, "stdout"), (2, "stderr")):
+        os.dup2(os.open("/dev/full", os.O_WRONLY), descriptor)
+        setattr(sys, name, os.fdopen(descriptor, "w", encoding="ascii", closefd=False))
+
+
+def end_of(name: str, redirect, place: Path) -> tuple[int, set[str]]:
+    """Return the exit code of a command in a process of its own, and the files it has written."""
+    child = os.fork()
+    if child == 0:
+        code = 99
+        try:
+            os.chdir(place)
+            signal.signal(signal.SIGALRM, signal.default_int_handler)
+            redirect()
+            sys.argv = ["sphshell-pin", name, *WORDS[name].split()]
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(child, 0)
+    return os.waitstatus_to_exitcode(status), {str(one) for one in place.rglob("*")}
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory) -> Path:
+    home = tmp_path_factory.mktemp("home")
+    text = DROP.replace("duration = 0.05", 'duration = 0.05\nrecord = ["patch"]')
+    with without_pictures():
+        result = run_scenario(write(home, text), out=home / "results", recording=False).result
+    rows = [f"{t},{q}" for t, q in zip(result.t[::5], result.q[::5, 2], strict=True)]
+    (home / "drop.csv").write_text("\n".join(["t [s],q.root_joint.2 [m]", *rows]))
+    return home
+
+
+@pytest.mark.browser  # `render` opens one, where there is one
+@pytest.mark.parametrize("name", WORDS)
+def test_no_command_needs_somebody_who_takes_what_it_prints(name, home, monkeypatch):
+    found = Section("x", "é", findings=[Finding("a", "a", 1.0)])
+    small = functools.partial(
+        report.make_report, parts=[Part("x", "é", lambda **_: found, (1.0, 1.0))]
+    )
+    monkeypatch.setattr(report, "make_report", small)
+
+    def ended_by_ctrl_c(url: str) -> None:
+        echo(url)
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+
+    monkeypatch.setattr(importlib.import_module("sphshell_pin.cli.view"), "echo", ended_by_ctrl_c)
+    ends = {}
+    for redirect in (heard, closed, full_in_ascii):
+        place = home.with_name("é")
+        shutil.copytree(home, place)
+        ends[redirect.__name__] = end_of(name, redirect, place)
+        shutil.rmtree(place)
+    usual = ends["heard"]
+    assert ends == dict.fromkeys(ends, usual)
+    assert usual[0] == 0 or name in ("render", "view")
+
+
+def test_these_are_all_commands():
+    assert {*typer.main.get_command(app).commands} == {*WORDS}
