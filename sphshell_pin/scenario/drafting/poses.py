@@ -102,8 +102,8 @@ class Stance:
                 return k, "its joints cannot keep the tip from turning there"
             if off > _ASTRAY * step or turn > _FASTEST * step / self.reach + 1e-9:
                 return k, "its joints do not reach farther there"
-            if k % 4 == 0 and not free(to):
-                return k - 3, "a link would come into the part"
+            if (k % 4 == 0 or k == len(centers) - 1) and not free(to):
+                return max(k - 3, 1), "a link would come into the part"
             q = to
         return len(centers), ""
 
