@@ -42,7 +42,7 @@ from sphshell_pin.scenario.format.schema import RobotSection
 # Drafts that are run, in all, before a path is given up, and of a robot that floats.
 _MOST_RUNS, _MOST_SLIDES, _MOST_DROPS = 10, 6, 3
 # Places at which the tip cannot slide, before one of them is taken.
-_MOST_STILL = 12
+_MOST_STILL = 40
 # Places at which efforts do not carry the robot, before they are taken for wrong.
 _MOST_WEAK = 4
 # Heights of the part above the floor, in turn, as parts of the robot's reach.
