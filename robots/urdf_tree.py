@@ -25,7 +25,8 @@ def check_tree(root: ET.Element) -> None:
             link = elements[0].get("link") if elements else None
             if link is not None and link not in links:
                 raise ValueError(
-                    f"joint '{joint.get('name')}' has the {end} '{link}', but there is no such link"
+                    f"joint '{joint.get('name')}' has the {end} '{link}', but there is no such "
+                    "link: correct it, or name the file of the robot that includes this one"
                 )
             if end == "child" and link is not None:
                 movers[link].append(str(joint.get("name")))

@@ -244,7 +244,9 @@ def main() -> int:
         if found is None or (part is not None and found.new is None and not found.load):
             found = kept[row.repository, row.file] = _asked(file, part, row)
             print(found, flush=True)
-        if "there is no such link" not in (found.load or ""):  # that is a tool for another robot
+        if "but there is no such link" not in (
+            found.load or ""
+        ):  # that is a tool for another robot
             rows.append(found)
         if asked.kept:
             asked.kept.write_text(json.dumps([vars(one) for one in kept.values()], indent=1))

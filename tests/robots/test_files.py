@@ -153,6 +153,22 @@ def test_other_formats_name_the_next_step(tmp_path, name, words):
         robots.load_file(path)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<robot name='r'/>",
+        "<robot name='r'><link name='a'/><joint name='j' type='fixed'><parent link='b'/>"
+        "<child link='a'/></joint></robot>",
+        "<mujocoinclude/>",
+    ],
+)
+def test_part_of_a_robot_asks_for_the_file_that_includes_it(tmp_path, text):
+    path = tmp_path / "part.urdf"
+    path.write_text(text)
+    with pytest.raises(robots.RobotError, match=r"name (that|the file of the robot)"):
+        robots.load_file(path)
+
+
 def test_sdf_is_known_by_its_content_too(tmp_path):
     path = tmp_path / "model.xml"
     path.write_text("<sdf version='1.6'><model name='m'/></sdf>")

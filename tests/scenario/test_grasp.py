@@ -10,10 +10,10 @@ from sphshell_pin import robots
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.hand_text import GAP
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.part import Part, word_primitive
 from sphshell_pin.scenario.format.shape_tables import Box, Cylinder

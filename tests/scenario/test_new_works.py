@@ -16,10 +16,11 @@ from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.scenario.drafting.clearance import Links, _fixed_to
-from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
+from sphshell_pin.scenario.drafting.fingertips import find_tips
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
-from sphshell_pin.scenario.drafting.plan import Press
-from sphshell_pin.scenario.drafting.pose_search import REPAIRS, Failed
+from sphshell_pin.scenario.drafting.plan import Plan, Press
+from sphshell_pin.scenario.drafting.pose_search import repaired
 from sphshell_pin.scenario.drafting.trial import Fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
 from tests import models
@@ -337,8 +338,9 @@ PATH = [[0.0, 0.0, 0.0], [0.3, 0.1, 0.0]]
     ],
 )
 def test_what_failed_decides_what_is_tried_next(joints, kind, before, press, repair):
-    failed = Failed(Fault(kind, ""), press, before, joints)
-    assert next((one.name for one in REPAIRS if one.fits(failed)), None) == repair
+    plan = Plan((), None, press, 1.0, 0.0, pin.SE3.Identity(), None, repair=before)
+    found = repaired(plan, Fault(kind, ""), joints)
+    assert (found.repair if isinstance(found, Plan) else found) == repair
 
 
 @pytest.mark.parametrize(("aside", "told"), [(0.55, False), (0.66, True)])

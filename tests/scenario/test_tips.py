@@ -9,6 +9,8 @@ import pytest
 from sphshell_pin import robots
 from sphshell_pin.scenario.drafting.fingertips import every_finger, find_tips
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, gripper_joints
+from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.format.reach import Reach
 
 
 def link(name: str, size: str = "", at: str = "0 0 0") -> str:
@@ -140,6 +142,24 @@ def test_a_drone_touches_with_its_body_or_its_feet(tmp_path: Path, feet: int) ->
     assert {int(one.parentJoint) for one in carriers} == {1}
 
 
+def test_a_finger_of_one_joint_presses_along_its_motion(tmp_path: Path) -> None:
+    """Pressed along another direction it jams: friction bears part of the force."""
+    shape = '<geometry><sphere radius=".01"/></geometry>'
+    ball = f'<collision><origin xyz="0 0 .1"/>{shape}</collision></link>'
+    out = link("palm", ".05 .1 .05") + link("finger").replace("</link>", ball)
+    out += joint("bend", "palm", "finger", "revolute", "0 0 .1", ".4 .9 .2")
+    file = tmp_path / "hand.urdf"
+    file.write_text(f'<robot name="hand">{out}</robot>')
+    made = new_scenario(file, "box", out=tmp_path / "new.toml")
+    (pair,), (shell,), q = made.built.scene.pairs, made.built.shells.values(), made.built.q0
+    place = pair.shells[0].placement
+    reach = Reach(made.built.scene.model, "finger", [0.0, 0.0, 0.1])
+    motion = reach.jacobian(q)[:3, 0]
+    center = place.actInv(reach.center(q))
+    normal = place.rotation @ shell.closest_points(center[None]).normals[0]
+    assert abs(motion @ normal) > 0.999 * np.linalg.norm(motion)
+
+
 def test_a_file_with_two_roots_is_refused_with_what_to_do(tmp_path: Path) -> None:
     file = tmp_path / "two.urdf"
     file.write_text(arm(jaws=None, tool=None).replace("</robot>", link("alone") + "</robot>"))
@@ -160,3 +180,17 @@ def test_a_ball_of_free_size_fits_the_part_and_stays_on_its_link(tmp_path: Path)
     assert tip.at_most(2 * tip.radius) is tip
     (asked,) = find_tips(robot, shipped=None, frame=None, radius=0.05)
     assert asked.at_most(0.01) is asked
+
+
+def test_of_several_named_tips_the_one_that_stands_free_is_taken(tmp_path: Path) -> None:
+    out = link("palm", ".1 .1 .02")
+    for name, y in (("first", "0"), ("middle", ".02"), ("thumb", ".09"), ("ring", "-.02")):
+        for k, parent in enumerate(("palm", f"{name}_0")):
+            out += link(f"{name}_{k}")
+            out += joint(f"{name}_{k}_j", parent, f"{name}_{k}", "revolute", f"0 {y} .04", "1 0 0")
+        out += link(f"{name}_tip")
+        out += joint(f"{name}_end", f"{name}_1", f"{name}_tip", "fixed", "0 0 .03", "0 0 1")
+    file = tmp_path / "hand.urdf"
+    file.write_text(f'<robot name="hand">{out}</robot>')
+    (tip,) = find_tips(robots.load_file(file), shipped=None, frame=None, radius=None)
+    assert tip.frame == "thumb_tip"

@@ -6,7 +6,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.contact.materials import find_material
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.plan import _under, plan_stand
 from sphshell_pin.scenario.drafting.touch_points import (
     find_touch_point,

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.schema import RobotSection, ShellSection

@@ -2,8 +2,8 @@
 
 import math
 import re
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +12,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
-from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, gripper_joints
+from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip, gripper_joints
 
 # Points of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's
 # place, as meshes of fingertips stand out of the spheres that stand for them.
@@ -22,27 +22,6 @@ _ASKED = "as it was asked for"
 # the end of a limb.
 _TOOL_WORDS = ("tcp", "tool", "ee", "eef", "effector", "grasp", "grip", "flange")
 _END_WORDS = ("tcp", "tip", "tool", "ee_link", "eef", "end_effector", "foot", "feet")
-
-
-@dataclass(frozen=True)
-class Tip:
-    """A sphere on a robot: `radius` [m], center `offset` (3,) [m] in `frame`; how it is known."""
-
-    frame: str
-    radius: float
-    offset: Array
-    source: str
-    ahead: Array | None = None
-    """Direction (3,) in which a smaller one is drawn back; None of a sphere that has one size."""
-
-    def at_most(self, radius: float) -> "Tip":
-        """Return it with a `radius` [m] that is no larger, where its size is free."""
-        if self.ahead is None or self.radius <= radius:
-            return self
-        offset = self.offset - (self.radius - radius) * self.ahead
-        return replace(
-            self, radius=radius, offset=offset, source=f"{self.source}, sized to the part"
-        )
 
 
 def find_tips(
@@ -101,8 +80,7 @@ def every_finger(robot: LoadedRobot) -> list[Tip]:
         frame = frame_on_joint(model, joint)
         link = None if frame is None else LinkGeometry(robot, frame)
         if link is not None and frame is not None and len(link.corners):
-            end = link.end()
-            tips.append(Tip(frame, end.radius, end.offset, end.source))
+            tips.append(link.end())
     return tips
 
 
@@ -126,12 +104,13 @@ def _at_end(
     link = LinkGeometry(robot, frame)
     end = link.end(radius)
     if offset is not None:
-        return Tip(frame, end.radius, offset, _ASKED)
+        return replace(end, offset=offset, source=_ASKED, ahead=None)
     placed = not robot.model.frames[find_frame(robot.model, frame)].placement.isIdentity()
     before = placed and -math.inf < link.depth(np.zeros(3)) < -0.5 * end.radius
     if before or (asked and radius):
-        return Tip(frame, end.radius, np.zeros(3), source, None if radius else np.zeros(3))
-    return Tip(frame, end.radius, end.offset, f"{source}; {end.source}", end.ahead)
+        still = None if radius else np.zeros(3)
+        return replace(end, offset=np.zeros(3), source=source, ahead=still)
+    return replace(end, source=f"{source}; {end.source}")
 
 
 def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
@@ -194,6 +173,16 @@ def _limbs(model: pin.Model, held: Collection[int]) -> set[int]:
     return {j for j, chain in chains.items() if floats(model) or is_limb(chain)}
 
 
+def _freest(model: pin.Model, names: Sequence[str]) -> str:
+    """Return the frame that is farthest from the others: of fingertips, the thumb's."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    places = np.array([data.oMf[find_frame(model, name)].translation for name in names])
+    away = np.linalg.norm(places[:, None] - places, axis=2).round(6)
+    away[away == 0.0] = np.inf  # two frames at one place
+    return names[int(np.argmax(away.min(axis=1)))]
+
+
 def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> list[tuple[str, str]]:
     """Return the frames at the ends of the `limbs` that may be meant, and why.
 
@@ -231,6 +220,8 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
         found = [name for name in names if word in name.lower()]
         if len(found) == 1 or (found and floats(model)):
             return [(name, f"an end of the robot called '{word}'") for name in found]
+        if found:
+            return [(_freest(model, found), f"the freest of {len(found)} ends called '{word}'")]
     last = max(sorted(leaves), key=lambda j: len(model.supports[j]))
     if floats(model) or len(model.supports[last]) <= 2:
         raise SphshellError(

@@ -10,8 +10,8 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import leader_of, mimics
 from sphshell_pin.dynamics.scene.models import find_frame
-from sphshell_pin.scenario.drafting.fingertips import Tip
 from sphshell_pin.scenario.drafting.force_balance import least_friction
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.shell.shell import Shell
 
 # Hands that are tried: random postures, and how many of them, the best, get a part.

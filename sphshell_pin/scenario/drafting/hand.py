@@ -13,10 +13,11 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, floats
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
-from sphshell_pin.scenario.drafting.fingertips import Tip, every_finger
+from sphshell_pin.scenario.drafting.fingertips import every_finger
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.drafting.hand_text import DURATION, GAP, HandDraft
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import Part, part_file
 from sphshell_pin.scenario.drafting.pose_search import Working, stated_kinds
 from sphshell_pin.scenario.drafting.tip_contact import GRAVITY

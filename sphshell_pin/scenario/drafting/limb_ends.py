@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -24,14 +24,24 @@ _AT_AXIS = 0.2
 
 
 @dataclass(frozen=True)
-class End:
-    """A sphere at the end of a link: center (3,) [m] in the frame asked for, radius [m]."""
+class Tip:
+    """A sphere on a robot: `radius` [m], center `offset` (3,) [m] in `frame`; how it is known."""
 
-    offset: Array
+    frame: str
     radius: float
+    offset: Array
     source: str
     ahead: Array | None = None
-    """Unit (3,) out of a flat end, on which a ball of any size may stand; None of a round one."""
+    """Out of a flat end (3,), against which a smaller one is drawn back; None: it has one size."""
+
+    def at_most(self, radius: float) -> "Tip":
+        """Return it with a `radius` [m] that is no larger, where its size is free."""
+        if self.ahead is None or self.radius <= radius:
+            return self
+        offset = self.offset - (self.radius - radius) * self.ahead
+        return replace(
+            self, radius=radius, offset=offset, source=f"{self.source}, sized to the part"
+        )
 
 
 def gripper_joints(model: pin.Model) -> set[int]:
@@ -87,15 +97,16 @@ class LinkGeometry:
             return -math.inf
         return float(-(hull.equations[:, :3] @ center + hull.equations[:, 3]).max())
 
-    def end(self, radius: float | None = None) -> End:
+    def end(self, radius: float | None = None) -> Tip:
         """Return a ball at the end, of `radius` [m] if that is given.
 
         It is the smallest one that covers the end as deep as it is large, if the end is round: a
         fingertip's own sphere. On a flat end it is a smaller ball in the middle of it.
         """
+        name = str(self._frame.name)
         if not len(self.corners):
             ball = radius or rounded(_OF_REACH * model_reach(self._model))
-            return End(np.zeros(3), ball, "a ball on its origin, as its link has no geometry")
+            return Tip(name, ball, np.zeros(3), "a ball on its origin, as its link has no geometry")
         ahead = self._ahead()
         along = self.corners @ ahead
         depth = along.max() - along
@@ -107,10 +118,10 @@ class LinkGeometry:
         before = float(along.max() - center @ ahead)
         # Open jaws may lie in a ball, but are no round end.
         if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
-            return End(center, rounded(covers), f"it covers the end of link '{self.link}'")
+            return Tip(name, rounded(covers), center, f"it covers the end of link '{self.link}'")
         ball = rounded(_BALL * covers) if radius is None else radius
         front, source = center + (before + ball) * ahead, f"a ball on the end of link '{self.link}'"
-        return End(front, ball, source, ahead if radius is None else None)
+        return Tip(name, ball, front, source, ahead if radius is None else None)
 
     def _carries(self, link: str) -> bool:
         """Whether `link` moves with the frame, and has geometry."""

@@ -19,8 +19,9 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, S
 from sphshell_pin.robots import floats, is_path
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
-from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
+from sphshell_pin.scenario.drafting.fingertips import find_tips
 from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.pose_search import find_working, sphere_centers

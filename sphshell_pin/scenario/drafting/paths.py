@@ -25,6 +25,8 @@ from sphshell_pin.shell.shell import Shell
 # number of radii on, and no longer one is looked for from this part of it on.
 PATH_RADII, PATH_REACH = 10.0, 0.15
 SHORTEST_PATH, ENOUGH = 1.0, 0.8
+# Cosine of the normal with that of the beginning, at which a path ends that was not asked for.
+_TILTED = 0.85
 # Strokes of a raster, and points of a circle.
 _STROKES, _AROUND = 5, 24
 
@@ -69,6 +71,9 @@ def find_way(
     for points, smooth in _tried(asked, shell, touch, direction, radius, length):
         fine = points if smooth else _fine(points, 0.5 * radius)
         count = _even_part(shell, place, fine, radius, gap)
+        if asked.path is None:  # not down the side of the part
+            tilted = np.abs(shell.closest_points(fine[:count]).normals @ touch.normal) < _TILTED
+            count = int(np.argmax(tilted)) if tilted.any() else count
         most_on_surface = max(most_on_surface, Way(fine[:count]).length)
         normals = shell.closest_points(fine[:count]).normals
         signs = np.sign(normals @ touch.normal)

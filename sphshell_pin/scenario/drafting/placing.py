@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.poses import Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
 from sphshell_pin.scenario.drafting.wording import axis_name

@@ -11,7 +11,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.placing import Place
 from sphshell_pin.scenario.drafting.poses import Stance

@@ -16,7 +16,7 @@ from sphshell_pin.robots import WORKING, floats
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
 from sphshell_pin.scenario.drafting.asked_places import asked_touches
 from sphshell_pin.scenario.drafting.clearance import Links
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.paths import Way, find_way
 from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
 from sphshell_pin.scenario.drafting.plan import (
@@ -42,7 +42,7 @@ from sphshell_pin.scenario.format.schema import RobotSection
 # Drafts that are run, in all, before a path is given up, and of a robot that floats.
 _MOST_RUNS, _MOST_SLIDES, _MOST_DROPS = 10, 6, 3
 # Places at which the tip cannot slide, before one of them is taken.
-_MOST_STILL = 12
+_MOST_STILL = 40
 # Places at which efforts do not carry the robot, before they are taken for wrong.
 _MOST_WEAK = 4
 # Heights of the part above the floor, in turn, as parts of the robot's reach.

@@ -11,13 +11,14 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.format.reach import Reach, turn_between
 
 # Mobility along the approach and across it, as a part of the best one: below the first a posture is
 # singular; the posture that a robot is known to work in is taken from the second on.
-# A heavy arm with a light wrist has 0.01 in its best posture.
-_MOBILE, _EASY = 2e-3, 0.1
+# A heavy arm with a light wrist has 0.01 in its best posture. The last is that of a tip with one
+# coordinate, whose friction bears part of the force otherwise.
+_MOBILE, _EASY, _STRAIGHT = 2e-3, 0.1, 0.998
 # Postures: seeds tried, how far from each other [rad or m] they have to be, and how many are taken.
 _SEEDS, _APART, _MOST = 32, 0.3, 4
 # Cosine between limb and approach below which the limb is beside the tip or before it.
@@ -101,8 +102,8 @@ class Stance:
                 return k, "its joints cannot keep the tip from turning there"
             if off > _ASTRAY * step or turn > _FASTEST * step / self.reach + 1e-9:
                 return k, "its joints do not reach farther there"
-            if k % 4 == 0 and not free(to):
-                return k - 3, "a link would come into the part"
+            if (k % 4 == 0 or k == len(centers) - 1) and not free(to):
+                return max(k - 3, 1), "a link would come into the part"
             q = to
         return len(centers), ""
 
@@ -163,13 +164,14 @@ def stances(
             limb = -limb
         return turn_between(limb, approach)
 
+    least = _MOBILE if len(reach.columns) > 1 else _STRAIGHT
     found: list[tuple[float, Stance]] = []
     start = reach.into_limits(q)
     for k in range(_SEEDS):
         seed = reach.seed(start, rng) if k else start
         at, off = reach.solve(seed, place, rows=rows, turn=along)
         one = _stance(reach, at, lock, approach, tip.radius)
-        if off > _HEIGHT * one.reach or one.mobility < _MOBILE or one.ahead <= _BESIDE:
+        if off > _HEIGHT * one.reach or one.mobility < least or one.ahead <= _BESIDE:
             continue
         if any(np.abs(pin.difference(model, other.q, at)).max() < _APART for _, other in found):
             continue

@@ -11,7 +11,7 @@ from sphshell_pin.contact.materials import (
     restitution_between,
 )
 from sphshell_pin.scenario.drafting.asked import Asked
-from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.wording import rounded
 
 GRAVITY = 9.81

@@ -9,7 +9,8 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact import Sphere
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
+from sphshell_pin.scenario.drafting.fingertips import find_tips
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.study.robot_check.models import Subject
 from sphshell_pin.study.robot_check.postures import random_posture
 from sphshell_pin.testing.forces import point_jacobian
