@@ -1,14 +1,12 @@
 """Robots by name (own small URDFs, example-robot-data's) and by file, and their fingertips."""
 
-from __future__ import annotations
-
 import os
 import warnings
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +14,7 @@ import pinocchio as pin
 
 from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.contact.sphere import Sphere
-from sphshell_pin.dynamics.scene.mimic import shortened, with_mimics
+from sphshell_pin.dynamics.scene.mimic import Mimic, shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
 from sphshell_pin.robots.description import Description, check_poses, check_size, parsed
 from sphshell_pin.robots.files import (
@@ -64,10 +62,6 @@ __all__ = [
     "with_density",
 ]
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    from sphshell_pin.dynamics.scene.mimic import Mimic
 
 _AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # of a root that floats
 

@@ -13,19 +13,28 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.named_numbers import AXES, TWIST
 from sphshell_pin.testing.differences import _AHEAD as AHEAD
 from sphshell_pin.testing.differences import _PLACES as PLACES
 from sphshell_pin.testing.differences import differentiated as derivative
 from sphshell_pin.testing.forces import accelerations
-from sphshell_pin.testing.numbers import changed, columns_of, is_place, names_of, scale_of
+from sphshell_pin.testing.numbers import changed, is_place, names_of, scale_of
 
 __all__ = ["AHEAD", "PLACES", "changed", "columns_of", "is_place", "names_of", "scale_of"]
+
+COORDINATES = {"offset": AXES, "placement": TWIST}
 
 Function = Callable[[float], Array]
 State = tuple[sp.Scene, Array, Array, Array]
 
 SHARES = (1e-3, 1e-4, 1e-5)
 ROUNDING = 8.0 * float(np.finfo(float).eps)
+
+
+def columns_of(name: str) -> list[str]:
+    """Return the coordinates of what is called `name`: three of an offset, six of a placement."""
+    ends = COORDINATES.get(name.rpartition(".")[2])
+    return [name] if ends is None else [f"{name}.{end}" for end in ends]
 
 
 def off(

@@ -1,20 +1,15 @@
 """Pressure of an elastic foundation: where the patch is no ellipse, but the overlap."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.scene.pairs import ContactPair
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.patches.placed import patches_on, poses_along
 from sphshell_pin.patches.sampling import divide
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.result import Result
-    from sphshell_pin.dynamics.scene.pairs import ContactPair
-    from sphshell_pin.dynamics.scene.scene import Scene
 
 
 def has_foundation(pair: ContactPair) -> bool:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array, Longs, Mask
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.result import Result
-    from sphshell_pin.dynamics.scene.scene import Scene
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.scene.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.errors import InvalidParameter
-
-if TYPE_CHECKING:
-    from sphshell_pin.shell.shell import Shell
-
+from sphshell_pin.shell.shell import Shell
 
 _MOST_SAMPLES = 3_000_000
 

@@ -1,11 +1,9 @@
 """Tactile sensors: what each cell of a grid on a sphere, or of a shell, feels of the patches."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -14,16 +12,14 @@ from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_name, check_positive, check_vector, read_only
 from sphshell_pin.base.summary import Summarized
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import scene_of
+from sphshell_pin.dynamics.scene.pairs import ContactPair
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
 from sphshell_pin.patches.placed import PlacedPatches, patches_on
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.result import Result
-    from sphshell_pin.dynamics.scene.pairs import ContactPair
-    from sphshell_pin.dynamics.scene.scene import Scene
 
 # Parallels are no straight lines in a patch: they are cut so that a chord leaves them by this
 # share of the larger half axis of the smallest of the larger patches.

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Longs, Mask
+from sphshell_pin.dynamics.result.contact_patches import Patches
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_parts import ContactLog
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.patches.placed import poses_along
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.contact_patches import Patches
-    from sphshell_pin.dynamics.result.result import Result
-    from sphshell_pin.dynamics.result.result_parts import ContactLog
-    from sphshell_pin.dynamics.scene.scene import Scene
 
 LARGEST = 1e15  # beyond this, [m] or [N], nothing can be drawn
 

@@ -1,21 +1,16 @@
 """The curves and figures of a run that a recording shows under its scene."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.dynamics.result.pair_series import PairSeries
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.view.contact_path import LARGEST
 from sphshell_pin.view.meshes import pack_numbers
 from sphshell_pin.view.nodes import Json
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.result import Result
 
 MOST_PAIRS = 8
 BINS = 300  # of time: of each the extremes are kept

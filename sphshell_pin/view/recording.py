@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import html
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TypedDict, Unpack
 
 import numpy as np
 import pinocchio as pin
@@ -13,7 +14,9 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.checks import check_positive
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import (
     FRICTION_COLOR,
@@ -37,12 +40,6 @@ from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
 from sphshell_pin.view.robot import has_links
 from sphshell_pin.view.run_panel import run_panel
-
-if TYPE_CHECKING:
-    from os import PathLike
-
-    from sphshell_pin.dynamics.result.result import Result
-    from sphshell_pin.dynamics.scene.scene import Scene
 
 BARE = (
     "The robot is drawn by its joints, as the scene's model has no geometry: "

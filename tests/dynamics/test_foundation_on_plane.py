@@ -205,19 +205,23 @@ def test_a_cylinder_that_rolls_is_slowed_by_the_dissipation() -> None:
     assert rate == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.parametrize(("power", "exponent"), [(-2.0, 1 / 3), (-0.5, 2 / 3)])
+@pytest.mark.parametrize(("power", "exponent"), [(-2.0, 1 / 3), (-0.5, 2 / 3), (0.6, 5 / 2)])
 def test_a_disc_spins_down_with_the_published_exponents(power: float, exponent: float) -> None:
     """The tilt of Euler's disk is a (1 - t / end)^exponent: its energy is 3/2 m g radius tilt.
 
     A loss as tilt^-2, of the air below it: Moffatt, Nature 404 (2000) 833; as its speed of rolling,
     tilt^-1/2: Easwar, Rouyer and Menon, Phys. Rev. E 66 (2002) 045102. It acts as a moment against
-    the rotation; what is measured is that the contact adds no loss of its own.
+    the rotation; what is measured is that the contact adds no loss of its own. Last that of the law
+    alone, b N mean(gap rate^2): the disc is depth / tilt wide and sqrt(depth / tilt) long where it
+    touches, so that the volume gives tilt^(3/5).
     """
+    own = power > 0
     radius, thickness, mass, tilt, end = 0.04, 0.001, 0.2, 0.1, 0.6
     shell = sp.Shell.from_geometry(coal.Cylinder(radius, thickness), segments=48)
     inertia = pin.Inertia.FromCylinder(mass, radius, thickness)
     friction = sp.CoulombFriction(0.02, 0.02, 0.01, 0.1)
-    scene = thrown(shell, inertia, sp.FoundationLaw(1e8, 1e-3), friction)
+    law = sp.FoundationLaw(1e7, 1e-3, 10.0) if own else sp.FoundationLaw(1e8, 1e-3)
+    scene = thrown(shell, inertia, law, friction)
     turn = pin.Quaternion(pin.utils.rotate("y", tilt)).coeffs()
     touch = radius * np.sin(tilt) + thickness / 2 * np.cos(tilt)
 
@@ -236,17 +240,20 @@ def test_a_disc_spins_down_with_the_published_exponents(power: float, exponent: 
 
     duration = end * (1 - 0.35 ** (1 / exponent))
     result = sp.Simulation(scene, sp.Adaptive(1e-5, 1e-8)).run(
-        q, [0, 0, 0, -spin, 0, 0], duration, controller=moment, control_dt=5e-4
+        q,
+        [0, 0, 0, -spin, 0, 0],
+        1.1 if own else duration,
+        **({} if own else {"controller": moment, "control_dt": 5e-4}),
     )
     tilts = [tilt_of(one) for one in result.q]
     fitted = curve_fit(
         lambda t, a, b, c: a * np.maximum(1 - t / b, 1e-9) ** c,
         result.t,
         tilts,
-        (tilt, end, exponent),
+        (tilt, 2.0 if own else end, exponent),
     )[0]
-    assert fitted[2] == pytest.approx(exponent, rel=0.03)
-    assert fitted[1] == pytest.approx(end, rel=0.02)
+    assert fitted[2] == pytest.approx(exponent, rel=0.05 if own else 0.03)
+    assert own or fitted[1] == pytest.approx(end, rel=0.02)
 
 
 @pytest.mark.parametrize("slope", [0.3, 0.45])

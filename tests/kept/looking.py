@@ -6,6 +6,7 @@ that is executed.
 """
 
 import contextlib
+import importlib
 import importlib.util
 import io
 import json
@@ -101,9 +102,10 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
         return run
 
     def live() -> None:
-        """End the page after a second, as Ctrl-C does."""
+        """End the page a second after it is there, as Ctrl-C does."""
         signal.signal(signal.SIGALRM, signal.default_int_handler)
-        signal.setitimer(signal.ITIMER_REAL, 2.0)
+        page = importlib.import_module("sphshell_pin.cli.view")
+        page.echo = lambda _: signal.setitimer(signal.ITIMER_REAL, 1.0)
         command("view", "run", "--no-open")()
 
     def load() -> Result:

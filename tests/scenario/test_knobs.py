@@ -124,10 +124,22 @@ def test_a_rebuild_makes_anew_what_changed(tmp_path):
     assert started.q0[2] == 0.5
 
 
-def test_a_rebuild_moves_as_a_fresh_build_does(tmp_path):
-    path, changes = write(tmp_path), {STIFFNESS: "3e5", "contact.0.law.damping": "5"}
-    fresh, turned = build(path, changes), rebuild(build(path), changes)
-    runs = [one.simulation.run(one.q0, one.v0, 0.05) for one in (fresh, turned)]
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("drop", {STIFFNESS: "3e5", "contact.0.law.damping": "5"}),
+        ("drop", {"contact.sphere.radius": "0.013"}),
+        ("fingertip_on_blade", {"controller.normal_force": "4", "controller.stiffness": "500"}),
+        ("fingertip_on_blade", {"controller.speed": "0.07", "contact.law.stiffness": "4e7"}),
+        ("gear_contact", {"source.gears.law.stiffness": "1e9"}),
+    ],
+)
+def test_a_rebuild_moves_as_a_fresh_build_does(tmp_path, name, changes):
+    path = write(tmp_path) if name == "drop" else name
+    before = build(path)
+    fresh, turned = build(path, changes), rebuild(before, changes)
+    assert turned.scenario == fresh.scenario != before.scenario
+    runs = [one.simulation.run(one.q0, one.v0, 0.01, one.controller) for one in (fresh, turned)]
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
 
 

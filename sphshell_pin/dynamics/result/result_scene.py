@@ -1,17 +1,11 @@
 """What a result is shown with: the scene in which it moved, and its rows of finite numbers."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.result import Result
-    from sphshell_pin.dynamics.scene.scene import Scene
 
 
 def find_scene(result: Result, scene: Scene | None = None) -> Scene | None:

@@ -50,7 +50,7 @@ from sphshell_pin.scenario.format.bodies import (
 )
 from sphshell_pin.scenario.format.functions import Loader, Modules, load_function
 from sphshell_pin.scenario.format.joint_tables import joint_components
-from sphshell_pin.scenario.format.numbers import with_numbers
+from sphshell_pin.scenario.format.numbers import has_number, number_in, with_numbers
 from sphshell_pin.scenario.format.reading import (
     change_scenario,
     find_scenario,
@@ -133,20 +133,44 @@ def rebuild(built: Built, changes: Mapping[str, str], *, anew: bool = False) -> 
 
     What the changes leave alone is the same object as before: `shells`, `assembly`,
     `visual_model`, `functions`. `built` stays as it is. With `anew` the user's own functions are
-    loaded again: what they remember must not reach another run.
+    loaded again, unless they are figures alone: what they remember must not reach another run.
 
     Raises
     ------
     ScenarioError
         A key or a value is wrong; the text names it and what would be valid.
     """
-    if anew and built.functions:
+    if anew and built.functions.keys() - built.scenario.figures.values():
         built = replace(built, functions={})
-    elif (same := with_numbers(built, changes)) is not None:
+    elif (same := with_numbers(built, changes) or _with_controller(built, changes)) is not None:
         return same
     scenario = change_scenario(built.scenario, changes, built.path)
     check_knobs(scenario, built.path, ranges=False)
     return build_scenario(scenario, built.path, built)
+
+
+def _with_controller(built: Built, changes: Mapping[str, str]) -> Built | None:
+    """Return `built` with other numbers of its controller; None as `with_numbers`."""
+    stated, values = built.scenario.controller, dict[str, float]()
+    for key, text in changes.items():
+        name, value = key.removeprefix("controller."), number_in(text)
+        if name == key or value is None or not has_number(stated, name):
+            return None
+        values[name] = value
+    try:
+        new = stated.changed(**values)
+    except InvalidParameter:
+        return None
+    scenario = built.scenario.model_copy(update={"controller": new})
+    shells = {
+        one.name: (built.shells[one.name], one.frame, to_se3(one.placement))
+        for one in scenario.shell
+    }
+    load = built.functions.__getitem__
+    controller = _build_controller(
+        new, built.scene, built.q0, shells, built.path, lambda where, _: load(where)
+    )
+    return replace(built, scenario=scenario, controller=controller)
 
 
 def build_scenario(

@@ -1,10 +1,9 @@
 """What a scenario models in the joints: of its robots' files, and by its own tables."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pinocchio as pin
 
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.scene.joint_components import (
@@ -17,9 +16,6 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.format.bodies import Assembly, blamed_on
 from sphshell_pin.scenario.format.reading import item_key
 from sphshell_pin.scenario.format.schema import JointSection, Scenario
-
-if TYPE_CHECKING:
-    import pinocchio as pin
 
 
 def joint_components(scenario: Scenario, assembly: Assembly, path: Path) -> JointComponents | None:

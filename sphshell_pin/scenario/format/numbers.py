@@ -29,12 +29,11 @@ def with_numbers(built: Built, changes: Mapping[str, str]) -> Built | None:
     """
     found: dict[tuple[str, int], dict[str, dict[str, float]]] = {}
     for key, text in changes.items():
-        places = list(_places(built, key))
-        value = parse_value(text)
-        if len(places) != 1 or isinstance(value, bool) or not isinstance(value, int | float):
+        places, value = list(_places(built, key)), number_in(text)
+        if len(places) != 1 or value is None:
             return None
         ((table, index, part, name),) = places
-        found.setdefault((table, index), {}).setdefault(part, {})[name] = float(value)
+        found.setdefault((table, index), {}).setdefault(part, {})[name] = value
     scenario, pairs = built.scenario, list(built.scene.pairs)
     try:
         for (table, index), parts in found.items():
@@ -57,17 +56,24 @@ def _places(built: Built, key: str) -> Iterator[tuple[str, int, str, str]]:
         entries: list[Entry] = getattr(built.scenario, table)
         for index, entry in enumerate(entries):
             # The name of a table alone may be left out of the key.
-            heads = [f"{table}.{entry.name}."] + [f"{table}."] * (len(entries) == 1)
+            heads = [f"{table}.{entry.name}.", f"{table}.{index}."]
+            heads += [f"{table}."] * (len(entries) == 1)
             for part in ("law", "friction", "sphere"):
                 if (stated := getattr(entry, part, None)) is None:
                     continue
                 for head in (f"{head}{part}." for head in heads):
                     name = key.removeprefix(head)
-                    if key.startswith(head) and _is_number(stated, name):
+                    if key.startswith(head) and has_number(stated, name):
                         yield table, index, part, name
 
 
-def _is_number(stated: object, name: str) -> bool:
+def number_in(text: str) -> float | None:
+    """Return the number that --set states; None where it is none."""
+    value = parse_value(text)
+    return float(value) if type(value) in (int, float) else None
+
+
+def has_number(stated: object, name: str) -> bool:
     """Whether what is stated, with no file beside it, has a number of that name."""
     if not isinstance(stated, Component):
         return name == "radius"

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.dynamics.scene.models import apparent_mass, find_frame
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.run.open_run import OpenRun
-    from sphshell_pin.dynamics.scene.scene import Scene
 
 
 def movable_bodies(scene: Scene) -> tuple[str, ...]:

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Longs
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.scene.scene import SceneContacts
-
+from sphshell_pin.dynamics.scene.scene import SceneContacts
 
 FORCES = ("normal_force", "friction_force", "depth")
 

@@ -4,24 +4,17 @@ A curve is described once, by a Series: its names, its unit, and how its values 
 player records. Nothing is computed for a curve that nobody looks at.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.dynamics.result.result_columns import coordinates
+from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
 from sphshell_pin.scenario.running.player import Rows
-
-if TYPE_CHECKING:
-    import pinocchio as pin
-
-    from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
-
 
 # Units of charts, as people read them: the factor from SI units, and the name.
 _SHOWN = {

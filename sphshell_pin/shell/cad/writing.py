@@ -1,11 +1,8 @@
 """Writing CAD files: exact surfaces as they were read, or a shell as planar faces."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from OCP.BRep import BRep_Builder
@@ -35,10 +32,8 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.model import CadModel, Part, compound
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES, Occ
 from sphshell_pin.shell.cad.units import MILLIMETER
+from sphshell_pin.shell.shell import Shell
 from sphshell_pin.units import meters_per_unit
-
-if TYPE_CHECKING:
-    from sphshell_pin.shell.shell import Shell
 
 MOST_FACETS = 20_000
 """A face takes about 1 kB in a STEP file, and CAD programs fail on more of them."""

@@ -147,11 +147,14 @@ void Recognizer::recognize_rims(int face) {
       for (const int v : vertices_of(patch(seed, kManyVertices, false, face)))
         points.push_back(point(v));
       if (points.size() < kFewVertices) continue;
+      if (is_fruitless()) return;
       Primitive guess = with_axis(FaceKind::Torus, about.point, about.axis, points);
       Growth best;
       double score = 0;
-      if (fit_primitive(points, tolerance_, guess) && try_shape(seed, guess, best, score))
-        take(std::move(best));
+      const std::size_t before = visits_;
+      if (!(fit_primitive(points, tolerance_, guess) && try_shape(seed, guess, best, score) &&
+            take(std::move(best))))
+        fruitless_ += visits_ - before;
     }
 }
 

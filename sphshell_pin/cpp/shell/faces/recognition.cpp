@@ -330,6 +330,8 @@ void Recognizer::add_planes(Faces& faces) const {
   }
 }
 
+bool Recognizer::is_fruitless() const { return fruitless_ > kFewVisits + kMostVisits * of_.size(); }
+
 Faces Recognizer::run() {
   std::vector<int> seeds;
   for (std::size_t t = 0; t < of_.size(); ++t)
@@ -341,16 +343,17 @@ Faces Recognizer::run() {
     state = state * 6364136223846793005u + 1442695040888963407u;
     std::swap(seeds[i - 1], seeds[(state >> 33) % i]);
   }
-  std::size_t failures = 0, fruitless = 0;
+  std::size_t failures = 0;
   for (const int seed : seeds) {
     if (failures >= kPatience + seeds.size() / kTrianglesPerSeed) break;
-    if (fruitless > kFewVisits + kMostVisits * of_.size()) break;
+    if (is_fruitless()) break;
     if (of_[seed] >= 0 || tries_[seed] >= 2) continue;
     const std::size_t before = visits_;
     const bool found = recognize_from(seed);
     failures = found ? 0 : failures + 1;
-    fruitless += found ? 0 : visits_ - before;
+    fruitless_ += found ? 0 : visits_ - before;
   }
+  fruitless_ = 0;
   for (std::size_t f = 0; is_precise() && f < faces_.size(); ++f) recognize_rims(int(f));
   drop_zones_of_free_shapes();
   for (std::size_t f = 0; f < faces_.size(); ++f) absorb(int(f));

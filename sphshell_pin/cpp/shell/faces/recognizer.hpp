@@ -117,6 +117,7 @@ class Recognizer {
   bool is_precise() const { return tolerance_ < 3e-7 * shell_.size(); }
 
   // recognition.cpp
+  bool is_fruitless() const;  // too many
   void list_neighbors();
   // Fills curved_: the triangles that a face other than a plane may have.
   void find_candidates();
@@ -146,7 +147,8 @@ class Recognizer {
   std::vector<Growth> faces_;  // triangles as they were found; others may have taken some since
   std::vector<int> mark_;
   int round_ = 0;
-  std::size_t visits_ = 0;  // of triangles, by all growths
+  std::size_t visits_ = 0;     // of triangles, by all growths
+  std::size_t fruitless_ = 0;  // of those, by growths that led to nothing
 };
 
 }  // namespace sphshell
