@@ -22,7 +22,10 @@ HEARS_CTRL_C = (
     "from sphshell_pin.cli import main; main()"
 )
 XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="{}"/></robot>'
-URDF = "<robot name='a'><joint name='{}'><parent link='b'/><child link='b'/></joint></robot>"
+URDF = (
+    "<robot name='a'><link name='b'/>"
+    "<joint name='{}'><parent link='b'/><child link='b'/></joint></robot>"
+)
 COMMANDS = [one.name or one.callback.__name__ for one in app.registered_commands]
 
 

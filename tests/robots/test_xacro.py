@@ -185,7 +185,7 @@ def test_xacro_expressions_compute(tmp_path):
     start = "<xacro:property name='_tmp_' value='3'/>"
     start += "<xacro:property name='f' value='{} {name:5.2f}'/>"
     texts = "".join(f'<a b="${{{escape(text)}}}"/>' for text in values)
-    expanded = robots.read(xacro(tmp_path, start + texts)).root
+    expanded = robots.read(xacro(tmp_path, start + texts + '<link name="l"/>')).root
     assert [one.get("b") for one in expanded.iter("a")] == [*map(str, values.values())]
     links = "".join(f'<link name="{name}"/>' for name in names)
     joint = (
