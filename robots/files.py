@@ -201,7 +201,7 @@ def _geometry(
         text = ET.tostring(root, encoding="unicode")
         return pin.buildGeomFromUrdfString(model, text, kind)
     except (ValueError, RuntimeError) as error:
-        raise _mesh_fault(description, _line(error).rstrip(".")) from None
+        raise _mesh_fault(description, _line(error)) from None
 
 
 def _without_broken(root: ET.Element, model: pin.Model) -> list[str]:
@@ -389,4 +389,4 @@ def _line(error: Exception) -> str:
     text = str(error)
     if "message:" in text:
         text = text.partition("message:")[2]
-    return " ".join(text.split())
+    return " ".join(text.split()).rstrip(".")

@@ -24,7 +24,7 @@ HEARS_CTRL_C = (
 XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="{}"/></robot>'
 URDF = (
     "<robot name='a'><link name='b'/>"
-    "<joint name='{}'><parent link='b'/><child link='b'/></joint></robot>"
+    "<joint name='{}'><parent link='b'/><child link='c'/></joint></robot>"
 )
 COMMANDS = [one.name or one.callback.__name__ for one in app.registered_commands]
 
