@@ -31,7 +31,6 @@ class BallPlayer:
     visual_model = None
     start = 0.0
     duration = None
-    planned = None
 
     def __init__(self, height=0.049, stiffness=5e3, friction=None, wall_per_second=0.0):
         self.model, self.plate = sliding_ball_model(), plate()
@@ -117,7 +116,6 @@ class FilmPlayer(BallPlayer):
     """A finished run: the ball moves along x with 0.1 m/s for two seconds, whatever happens."""
 
     duration = 2.0
-    planned = None
     bodies = ()
     parameters = ()
 
