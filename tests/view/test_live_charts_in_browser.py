@@ -108,14 +108,16 @@ def test_torques_and_sensors_come_once_they_are_chosen(tab):
 
 
 def test_the_mouse_reads_values(tab):
+    tab.step()
     tab.choose("Joint position [deg]")
     box = tab.page.locator("#chart").bounding_box()
     tab.page.mouse.move(box["x"] + 60, box["y"] + 50)
     tab.wait("chart.read")
     time, *values = tab.page.evaluate("chart.read")
     shown = float(time.removesuffix(" s"))
-    for value, name in zip(values, ("knuckle", "distal_joint"), strict=False):
-        t, angle = tab.points(f"q.{name}")
+    for value, key in zip(values, tab.page.evaluate("chart.run.keys"), strict=True):
+        name = key.removeprefix("q.")
+        t, angle = tab.points(key)
         number, unit, curve = value.split()
         assert (unit, curve) == ("deg", name)
         assert float(number) == pytest.approx(angle[np.abs(t - shown).argmin()], rel=1e-3)
@@ -124,6 +126,7 @@ def test_the_mouse_reads_values(tab):
 
 def test_the_last_run_stays_as_a_ghost_and_a_kept_one_too(tab):
     tab.choose("Joint velocity [deg/s]")
+    tab.step()
     t, first = tab.points("v.knuckle")
     tab.reset()
     ghost_t, ghost = tab.points("v.knuckle", "ghost")
