@@ -242,7 +242,7 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("redirected", "told"),
+    ("redirected", "message"),
     [
         ("> /dev/full", "not all of the output could be printed: No space left on device"),
         (">&-", ""),
@@ -250,12 +250,12 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
         ("| true", ""),
     ],
 )
-def test_output_that_nobody_takes_fails_no_command(redirected, told):
+def test_output_that_nobody_takes_fails_no_command(redirected, message):
     program = f"'{sys.executable}' -c 'from sphshell_pin.cli import main; main()' list"
     script = f"set -o pipefail; {program} {redirected}"
     run = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False)
     assert run.returncode == 0
-    assert told in run.stderr
+    assert message in run.stderr
     assert "Error" not in run.stderr
 
 

@@ -40,13 +40,16 @@ def png(figure: Figure, dpi: int = RESOLUTION) -> bytes:
     """Return `figure` as a .png file."""
     stream = io.BytesIO()
     # Its places are found once: `savefig` would draw it twice to find them, and find them twice.
-    layout = figure.get_layout_engine()
-    figure.set_dpi(dpi)
-    if layout is not None:
-        layout.execute(figure)
-    figure.set_layout_engine("none")
-    figure.savefig(stream, format="png", dpi=dpi, pil_kwargs={"compress_level": 1})
-    figure.set_layout_engine(layout)
+    layout, own_dpi = figure.get_layout_engine(), figure.get_dpi()
+    try:
+        figure.set_dpi(dpi)
+        if layout is not None:
+            layout.execute(figure)
+        figure.set_layout_engine("none")
+        figure.savefig(stream, format="png", dpi=dpi, pil_kwargs={"compress_level": 1})
+    finally:
+        figure.set_layout_engine(layout)
+        figure.set_dpi(own_dpi)
     return stream.getvalue()
 
 
