@@ -18,10 +18,9 @@ std::vector<Touch> touches_at(Multibody& body, const std::vector<Pair>& pairs, c
   Query query;
   body.place(q);
   for (const Pair& pair : pairs) {
-    const auto pose_i = [&] { return body.world_from(pair.joint_i, pair.placement_i); };
+    const SE3 pose_i = body.world_from(pair.joint_i, pair.placement_i);
     const SE3 pose_j = body.world_from(pair.joint_j, pair.placement_j);
-    const Vec3 center =
-        pose_j.actInv(body.world_from(pair.joint_i, pair.placement_i.translation()));
+    const Vec3 center = pose_j.actInv(pose_i.translation());
     const Contact at = pair.ask([&](const auto& geometry) {
       return geometry.nearest(pose_i, pose_j, center, pair.radius, query);
     });

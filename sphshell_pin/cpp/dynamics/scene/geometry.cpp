@@ -20,7 +20,8 @@ void ShellSurface::find_near(const Vec3& center, double radius, double margin, Q
   for (Contact& contact : query.contacts) contact.depth -= margin;
 }
 
-Contact ShellSurface::nearest(const Vec3& center, double radius, Query& query) const {
+Contact ShellSurface::nearest(const SE3&, const SE3&, const Vec3& center, double radius,
+                              Query& query) const {
   SurfacePoint at = shell->closest_point(center);
   if (method == Method::Smooth) at = on_curved(*shell, center, at, query);
   const double outside = shell->side() == Side::Both      ? std::abs(at.distance)
@@ -65,13 +66,15 @@ void Ball::find_near(const Vec3& center, double other, double, Query& query) con
   query.contacts.assign(1, Contact{Vec3::Zero(), Vec3::Zero(), depth, 0, Feature::Face});
 }
 
-Contact Ball::nearest(const Vec3& center, double other) const {
+Contact Ball::nearest(const SE3&, const SE3&, const Vec3& center, double other, Query&) const {
   const double length = center.norm();
   const Vec3 normal = length > 0 ? Vec3(center / length) : Vec3(Vec3::UnitZ());
   return {radius * normal, normal, other + radius - length, 0, Feature::Face};
 }
 
-Contact PlaneBelow::nearest(const SE3& plane_from_shell) const {
+Contact PlaneBelow::nearest(const SE3& pose_i, const SE3& pose_j, const Vec3&, double,
+                            Query&) const {
+  const SE3 plane_from_shell = pose_j.actInv(pose_i);
   const Vec3 up = plane_from_shell.rotation().row(2);
   const std::vector<Vec3>& vertices = shell->vertices();
   const auto lowest =
@@ -91,8 +94,9 @@ void SourcePoints::find(const SE3& pose_i, const SE3& pose_j,
   }
 }
 
-Contact SourcePoints::nearest(const SE3& pose_i, const SE3& pose_j,
-                              std::vector<Contact>& contacts) const {
+Contact SourcePoints::nearest(const SE3& pose_i, const SE3& pose_j, const Vec3&, double,
+                              Query& query) const {
+  std::vector<Contact>& contacts = query.contacts;
   find(pose_i, pose_j, contacts);
   const auto deepest =
       std::max_element(contacts.begin(), contacts.end(),

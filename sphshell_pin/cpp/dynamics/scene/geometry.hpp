@@ -63,11 +63,8 @@ struct ShellSurface : AnyGeometry {
     query.find(*shell, center, radius, method);
   }
   void find_near(const Vec3& center, double radius, double margin, Query& query) const;
-  template <class Pose>
-  Contact nearest(const Pose&, const SE3&, const Vec3& center, double radius, Query& query) const {
-    return nearest(center, radius, query);
-  }
-  Contact nearest(const Vec3& center, double radius, Query& query) const;
+  Contact nearest(const SE3& pose_i, const SE3& pose_j, const Vec3& center, double radius,
+                  Query& query) const;
   void overlap(Foundation& foundation, const Vec3& center, double radius, bool slopes,
                bool points) const {
     foundation.find(*shell, method, center, radius, slopes, points);
@@ -86,11 +83,8 @@ struct Ball : AnyGeometry {
     find_on_ball(radius, center, other, query.contacts);
   }
   void find_near(const Vec3& center, double other, double margin, Query& query) const;
-  template <class Pose>
-  Contact nearest(const Pose&, const SE3&, const Vec3& center, double other, Query&) const {
-    return nearest(center, other);
-  }
-  Contact nearest(const Vec3& center, double other) const;
+  Contact nearest(const SE3& pose_i, const SE3& pose_j, const Vec3& center, double other,
+                  Query& query) const;
   void overlap(Foundation& foundation, const Vec3& center, double other, bool, bool points) const {
     foundation.find_on_ball(radius, center, other, points);
   }
@@ -114,11 +108,8 @@ struct PlaneBelow : AnyGeometry {
     find(pose_j.actInv(pose_i()), query);
   }
   void find(const SE3& plane_from_shell, Query& query) const;
-  template <class Pose>
-  Contact nearest(const Pose& pose_i, const SE3& pose_j, const Vec3&, double, Query&) const {
-    return nearest(pose_j.actInv(pose_i()));
-  }
-  Contact nearest(const SE3& plane_from_shell) const;
+  Contact nearest(const SE3& pose_i, const SE3& pose_j, const Vec3& center, double radius,
+                  Query& query) const;
   void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }
   void overlap(Foundation&, const Vec3&, double, bool, bool) const {}
   double distance(const Vec3&) const { return 0; }
@@ -140,11 +131,8 @@ struct SourcePoints : AnyGeometry {
   }
   // Those of no depth, too.
   void find(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts) const;
-  template <class Pose>
-  Contact nearest(const Pose& pose_i, const SE3& pose_j, const Vec3&, double, Query& query) const {
-    return nearest(pose_i(), pose_j, query.contacts);
-  }
-  Contact nearest(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts) const;
+  Contact nearest(const SE3& pose_i, const SE3& pose_j, const Vec3& center, double radius,
+                  Query& query) const;
   void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }
   void overlap(Foundation&, const Vec3&, double, bool, bool) const {}
   double distance(const Vec3&) const { return 0; }

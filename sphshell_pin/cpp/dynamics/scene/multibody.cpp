@@ -294,8 +294,7 @@ pinocchio::Motion Multibody::drift(int joint) const {
 // M^-1 J^T by the factorized mass matrix; J is brought from the joint's frame to the task's.
 void Multibody::task(const VectorX& q, int joint, const pinocchio::SE3& frame, Matrix6X& jacobian,
                      MatrixX& mobility) {
-  compute_mass(q);
-  mass_.compute(data_.M);
+  place(q);
   jacobian.setZero(6, model_.nv);
   pinocchio::computeJointJacobian(model_, data_, q, joint, jacobian);
   jacobian = frame.toActionMatrixInverse() * jacobian;
