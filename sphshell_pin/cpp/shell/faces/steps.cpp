@@ -80,7 +80,8 @@ double width_between(const Primitive& s, const std::vector<Vec3>& points) {
 
 // A round face is sampled in equal steps: the last one can be shorter, never longer. Steps are
 // those that another of the same width follows. The result is infinite where few do.
-// An oblique cut is sampled in unequal ones: n of them leave open whether n - 1 would have done.
+// An oblique cut is sampled in unequal ones: n of them leave open whether n - 1 would have done,
+// and the widest may differ as much again from the wide ones as those from the others.
 Recognizer::Steps Recognizer::widest_steps(const Growth& growth) {
   struct Chord {
     int ends[2];
@@ -134,9 +135,8 @@ Recognizer::Steps Recognizer::widest_steps(const Growth& growth) {
     steps.clear();
     for (end = i; end < oblique.size() && oblique[end].first == oblique[i].first; ++end)
       steps.push_back(oblique[end].second);
-    const double n = double(steps.size());
-    if (n > 1)
-      out.before[oblique[i].first] = quantile(std::move(steps), kMostRegular) * n / (n - 1);
+    const double n = double(steps.size()), wide = quantile(steps, kMostRegular);
+    if (n > 1) out.before[oblique[i].first] = wide * n / (n - 1) + wide - median(steps);
   }
   return out;
 }
