@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes
+from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes, why_no_file
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import ShellFileError, SphshellError
@@ -127,11 +127,9 @@ def is_path(robot: str | PathLike[str]) -> bool:
 
 def check_readable(file: Path) -> None:
     """Raise RobotError for what is no file, or a file that holds no robot, with what to do."""
-    if not os.path.isfile(file):
-        what = "is a folder, not a file" if os.path.isdir(file) else "no such file"
-        raise RobotError(f"{file}: {what}; {_NEXT}")
-    reason = _reason(file.suffix.lower())
-    if reason:
+    if reason := why_no_file(file):
+        raise RobotError(f"{file}: {reason}; {_NEXT}")
+    if reason := _reason(file.suffix.lower()):
         raise RobotError(f"{file}: {reason}")
 
 

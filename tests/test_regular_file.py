@@ -120,3 +120,4 @@ def test_commands_say_what_a_special_file_is(kind, tmp_path):
     assert "Traceback" not in done.stderr
     ends = [line.split() for line in done.stdout.splitlines() if line[:2] == "a."]
     assert [end for _, end in ends] == ["2"] * (len(COMMANDS) - 1), done.stderr
+    assert done.stderr.count("is a pipe, a socket or a device") == len(COMMANDS) - 1, done.stderr
