@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from sphshell_pin.base.atomic.file import write_whole
 from sphshell_pin.base.regular_file import open_regular, read_bytes, read_text
+from sphshell_pin.errors import ResultError
 from tests.programs import python
 
 PACKAGE = Path(__file__).parents[1]
@@ -60,6 +62,16 @@ def test_larger_files_than_stated_are_refused(tmp_path):
     with pytest.raises(OSError, match=r"it holds 1\.1e\+03 GB, more than 4 GB"):
         read_bytes(file)
     assert read_bytes("/proc/self/stat" if Path("/proc/self/stat").exists() else os.devnull)
+
+
+def test_a_pipe_that_nobody_reads_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ResultError, match="a pipe that nobody reads"):
+        write_whole(tmp_path / "pipe", b"1")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_whole(tmp_path / "pipe", b"1")
+    assert os.read(reader, 2) == b"1"
+    os.close(reader)
 
 
 READS = re.compile(
