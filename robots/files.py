@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes
+from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
-from sphshell_pin.errors import ShellFileError, SphshellError
+from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
+from sphshell_pin.robots.mesh_faults import mesh_fault
 from sphshell_pin.robots.packages import Folders
-from sphshell_pin.robots.plain_mesh import collada_unit, refused_reference
+from sphshell_pin.robots.plain_mesh import collada_unit
 from sphshell_pin.robots.urdf_tree import add_limits, check_tree, mimics_of
-from sphshell_pin.shell.readers import READERS
 
 
 class RobotError(SphshellError, ValueError):
@@ -50,9 +50,6 @@ _REFUSED = {
     "this one as srdf",
     (".mjb",): "is a compiled MuJoCo model: give its MJCF (.xml)",
 }
-
-MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
-"""Formats of the meshes that a robot may name."""
 
 # A license before the declaration of XML, which no reader of robots minds.
 _BEFORE_XML = re.compile(rb"\A(?:\s|<!--(?:(?!-->).)*-->)+(?=<\?xml\s)", re.DOTALL)
@@ -127,11 +124,9 @@ def is_path(robot: str | PathLike[str]) -> bool:
 
 def check_readable(file: Path) -> None:
     """Raise RobotError for what is no file, or a file that holds no robot, with what to do."""
-    if not os.path.isfile(file):
-        what = "is a folder, not a file" if os.path.isdir(file) else "no such file"
-        raise RobotError(f"{file}: {what}; {_NEXT}")
-    reason = _reason(file.suffix.lower())
-    if reason:
+    if reason := why_no_file(file):
+        raise RobotError(f"{file}: {reason}; {_NEXT}")
+    if reason := _reason(file.suffix.lower()):
         raise RobotError(f"{file}: {reason}")
 
 
@@ -201,7 +196,7 @@ def _geometry(
         text = ET.tostring(root, encoding="unicode")
         return pin.buildGeomFromUrdfString(model, text, kind)
     except (ValueError, RuntimeError) as error:
-        raise _mesh_fault(description, _line(error)) from None
+        raise _cannot_load(description, _line(error)) from None
 
 
 def _without_broken(root: ET.Element, model: pin.Model) -> list[str]:
@@ -271,8 +266,8 @@ def _with_meshes(
                 if mesh is None:
                     continue
                 if os.path.isfile(mesh.get("file", "")):
-                    if reason := _mesh_reason(Path(mesh.get("file", ""))):
-                        raise _mesh_fault(description, reason)
+                    if reason := mesh_fault(Path(mesh.get("file", ""))):
+                        raise _cannot_load(description, reason)
                 elif _is_visual(geom) or description.folders.kept is not None:
                     missing[mesh.get("file", "")] = None
                     body.remove(geom)
@@ -289,7 +284,7 @@ def _with_meshes(
                 continue
             uri = mesh.get("filename", "")
             found = description.folders.find(uri)
-            reason = "" if found is None else _mesh_reason(found)
+            reason = "" if found is None else mesh_fault(found)
             if found is not None and not reason:
                 mesh.set("filename", str(found.absolute()))
                 if meters and found.suffix.lower() == ".dae":
@@ -299,32 +294,11 @@ def _with_meshes(
                 missing[uri] = None
                 link.remove(part)
             else:
-                raise _mesh_fault(description, reason)
+                raise _cannot_load(description, reason)
     return root, list(missing)
 
 
-def _mesh_reason(path: Path) -> str:
-    """Say why a mesh is not given to the reader that Pinocchio has, which may crash at it.
-
-    It knows 40 formats; those of robots have been tried: damaged .ply files made it crash, damaged
-    .off files go on for ever.
-    """
-    suffix = path.suffix.lower()
-    try:
-        open_regular(path).close()
-    except OSError as error:
-        return f"{path}: {error.strerror}"
-    if suffix not in MESHES:
-        return f"{path}: not one of the formats {', '.join(MESHES)}"
-    if suffix in (".ply", ".off"):
-        try:
-            READERS[suffix](path)
-        except ShellFileError as error:
-            return str(error)
-    return refused_reference(path)
-
-
-def _mesh_fault(description: Description, reason: str) -> RobotError:
+def _cannot_load(description: Description, reason: str) -> RobotError:
     return RobotError(
         f"{description.file}: a mesh cannot be loaded ({reason}); searched in "
         f"{description.folders.searched()}: give the folder above the package with --package-dir, "
