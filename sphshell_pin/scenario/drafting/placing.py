@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
+from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.poses import Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
@@ -94,7 +94,6 @@ class Bench:
         self._data, self._at = self._model.createData(), pin.GeometryData(self._geometry)
         self._q, self._tip, self._links, self._shell = q, tip, links, links.shell
         self._depth, self._searched = depth, searched
-        self._touching = SelfContact(self._model, self._geometry, q)
         self._floor = _floor(self._geometry)
         self._found: dict[tuple[float | None, ...], list[Stance]] = {}
 
@@ -171,7 +170,7 @@ class Bench:
 
     def _usable(self, q: Array, floor: float | None) -> bool:
         """Whether links are free of each other and above the `floor` [m] at q (nq,)."""
-        if self._touching.found(q):
+        if self._links.crossed(q):
             return False
         pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._at, q)
         heights = [

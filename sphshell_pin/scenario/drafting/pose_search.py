@@ -69,24 +69,14 @@ class Working(NamedTuple):
     """The URDF of a free part that it names."""
 
 
-def repaired(one: Plan, fault: Fault, joints: Sequence[str]) -> Plan | str | None:
-    """Return what to try in place of a draft that failed; None: nothing.
-
-    Another plan, or the kind of what acts in the `joints` that is to be left out.
-    """
-    press = one.control if isinstance(one.control, Press) else None
-    if fault.kind in ("links", "run") or (fault.excess and not (press and press.slides)):
-        joints = ()  # They are not the cause.
-    # Friction in the joints keeps the tip off the part, and against its motion.
-    if "friction" in joints:
-        return "friction"
-    shaken = fault.kind == "force"
-    if press and shaken and one.repair == "" and any(press.posture_stiffness):
+def repaired(one: Plan, fault: Fault) -> Plan | None:
+    """Return what to try in place of a draft that failed; None: nothing."""
+    press = one.control
+    if fault.kind != "force" or not isinstance(press, Press):
+        return None
+    if one.repair == "" and any(press.posture_stiffness):
         return replace(one, control=replace(press, posture_stiffness=()), repair="loose")
-    # The tip creeps to the surface, or drags behind.
-    if "damping" in joints:
-        return "damping"
-    if press and shaken and one.repair != "calmed" and press.slides:
+    if one.repair != "calmed" and press.slides:
         return replace(one, control=press.calmed(), repair="calmed")
     return None
 
@@ -127,6 +117,8 @@ class Candidate(NamedTuple):
     materials: tuple[Material, Material]
     force: float
     gap: float
+    weak: bool
+    """Whether the efforts that its file states do not carry the robot."""
 
 
 class _Search:
@@ -143,7 +135,9 @@ class _Search:
                 "float with --free-flyer"
             )
         geometry, aside = built.assembly.loaded[0].collision_model, joints_aside(model, tip)
-        self.links = Links(model, geometry, self.shell, [tip], aside)
+        known = WORKING.get(self.section.name or "", ())
+        self.q = np.array(known) if len(known) == model.nq else built.assembly.q0
+        self.links = Links(model, geometry, self.shell, [tip], aside, self.q)
         self.room = _ROOM * tip.radius
 
     def find(self) -> Working | None:
@@ -178,11 +172,8 @@ class _Search:
         for found in self._places():
             stance = found.stance
             pair = chosen_materials(asked, [tip], stance.mass)
-            if "effort" in self.tried.without:
-                stance = replace(stance, force=NO_LIMIT)
-            elif not stance.force and len(self.tried.errors) == _MOST_WEAK:
-                self.tried.leave_out("effort", "they do not carry the robot's own weight")
-                stance = replace(stance, force=NO_LIMIT)
+            weak = not stance.force and len(self.tried.errors) >= _MOST_WEAK
+            stance = replace(stance, force=NO_LIMIT) if weak else stance
             try:
                 force = press_force(stance, tip, pair, asked.press)
             except SphshellError as error:  # of this posture: another one may do
@@ -191,14 +182,15 @@ class _Search:
             gap = press_gap(tip.radius, force, pair)
             place = found.with_gap(gap)
             way = find_way(asked, place, self.links, tip.radius, gap, self.room)
-            yield Candidate(place, way, pair, force, gap)
+            yield Candidate(place, way, pair, force, gap, weak)
 
     def _planned(self, one: Candidate) -> tuple[RobotSection, Plan]:
         stance = one.place.stance
+        kinds = stated_kinds(self.model, stance.lock)
         stands = {
             "lock": list(stance.lock),
             "start": _changed_joints(self.model, self.built.assembly.q0, stance.q),
-            "joints": stated_kinds(self.model, stance.lock),
+            "joints": [kind for kind in kinds if not (one.weak and kind == "effort")],
         }
         return self.section.model_copy(update=stands), press_plan(self.tip, *one)
 
@@ -208,12 +200,10 @@ class _Search:
         The tip presses down if nothing else is asked for, else as its limb points, else sideways.
         """
         asked, model, shell, tip = self.asked, self.model, self.shell, self.tip
-        known = WORKING.get(self.section.name or "", ())
-        q_work = np.array(known) if len(known) == model.nq else self.built.assembly.q0
         gap = TIP_GAP * tip.radius
-        bench = Bench(self.built, tip, self.links, q_work, 2 * gap, self.tried)
+        bench = Bench(self.built, tip, self.links, self.q, 2 * gap, self.tried)
         directions = [PLACES[asked.place]] if asked.place else list(PLACES.values())
-        pressed = approaches(model, q_work, tip, directions)
+        pressed = approaches(model, self.q, tip, directions)
         lifts = [part * model_reach(model) for part in _LIFTS]
         if asked.fixed:
             spots = asked_touches(asked, shell, tip.radius, gap)
@@ -234,13 +224,10 @@ class _Search:
 
     def _repaired(self, section: RobotSection, plan: Plan) -> Working | None:
         """Run a draft, and those that repair it; return the first that works."""
-        tried, changed = self.tried, plan
-        while tried.runs < _MOST_RUNS:
-            one = changed
-            if tried.without and not one.left_out:
-                one = replace(one, left_out=tried.without, why=(*one.why, tried.note))
-            joints = [kind for kind in section.joints if kind not in one.left_out]
-            text, built = self.draft(section.model_copy(update={"joints": joints}), one)
+        tried = self.tried
+        one: Plan | None = plan
+        while one is not None and tried.runs < _MOST_RUNS:
+            text, built = self.draft(section, one)
             fault = try_out(built, one, self.links)
             tried.runs += 1
             if fault is None:
@@ -250,12 +237,7 @@ class _Search:
                 self.asked.tell(f"tried, run {tried.runs}: {fault.text}")
             if one.repair == "" and len(tried.stays) < _MOST_STILL and not self.asked.slides:
                 tried.stays += [(section, other) for other in _still(one, fault)]
-            other = repaired(one, fault, joints)
-            if other is None:
-                break
-            if isinstance(other, str):
-                tried.leave_out(other, f"with it {fault.text}")
-            changed = plan if isinstance(other, str) else other
+            one = repaired(one, fault)
         return None
 
 
