@@ -323,18 +323,20 @@ PATH = [[0.0, 0.0, 0.0], [0.3, 0.1, 0.0]]
 @pytest.mark.parametrize(
     ("kind", "before", "press", "repair"),
     [
-        ("force", "", pressing(PATH, 1.0), "loose"),
-        ("force", "", pressing(PATH), "calmed"),
-        ("force", "", pressing(PATH[:1], 1.0), "loose"),
-        ("force", "loose", pressing(PATH[:1], 1.0), None),  # it does not slide
+        ("force", "", pressing(PATH, 1.0), "calmed"),
         ("force", "calmed", pressing(PATH), None),
-        ("path", "", pressing(PATH, 1.0), None),
+        ("path", "", pressing(PATH[:1], 1.0), None),
+        ("path", "", pressing([[0.1 * k, 0.0, 0.0] for k in range(5)]), "cut"),
+        ("path", "cut", pressing(PATH, 1.0), None),
         ("force", "", None, None),  # nothing is pressed
     ],
 )
 def test_what_failed_decides_what_is_tried_next(kind, before, press, repair):
-    plan = Plan((), None, press, 1.0, 0.0, pin.SE3.Identity(), None, repair=before)
-    found = repaired(plan, Fault(kind, ""))
+    tip = Tip("tip", 0.1, np.zeros(3), "")
+    plan = Plan((tip,), None, press, 2.0, 0.0, pin.SE3.Identity(), None, repair=before)
+    found = repaired(plan, Fault(kind, "", 1.35))
+    if repair == "cut":  # four fifths of the 35 cm that the target has come in 0.35 s
+        assert (len(found.control.path), found.duration) == (3, pytest.approx(1.8))
     assert (None if found is None else found.repair) == repair
 
 

@@ -103,13 +103,13 @@ class Bench:
         spots: Sequence[TouchPoint],
         approach: Array,
         *,
-        lift: float | None,
+        on_floor: bool,
         room: float,
     ) -> Iterator[Place]:
         """Yield places where the part has `side` (3,) to a tip that presses along `approach` (3,).
 
-        It stands `lift` [m] above the floor, or wherever the posture has the tip, `room` [m] before
-        the links. First those of each posture where the sphere touches one face.
+        It stands on the floor, or wherever the posture has the tip, `room` [m] before the links.
+        First those of each posture where the sphere touches one face.
         """
         facing = turned_to(side, -approach)
         lowest = float((self._shell.vertices @ facing.T)[:, 2].min())
@@ -117,9 +117,7 @@ class Bench:
         most = self._searched.places + (_FEWER if self._searched.places > _MANY else _MOST_TRIED)
 
         def height(spot: TouchPoint) -> float | None:
-            if lift is None:
-                return None
-            return self._floor + lift - lowest + float(facing[2] @ spot.center)
+            return self._floor - lowest + float(facing[2] @ spot.center) if on_floor else None
 
         for posture in self._stances(approach, height(spots[0])):
             self._searched.postures += 1

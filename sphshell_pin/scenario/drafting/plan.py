@@ -83,9 +83,10 @@ class Press:
         return self.smooth and len(self.path) > 2
 
     def calmed(self) -> Press:
-        """Return it with four times the damping: friction shakes the tip less."""
+        """Return it with four times the damping, and joints that nothing pulls to a posture."""
         return replace(
             self,
+            posture_stiffness=(),
             damping=rounded(4.0 * self.damping),
             rotational_damping=rounded(4.0 * self.rotational_damping),
             damped=4.0 * self.damped,

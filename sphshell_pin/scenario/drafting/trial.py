@@ -102,7 +102,9 @@ def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     behind = math.sqrt(max(float(away @ away) - tip.radius**2, 0.0))
     if behind < _BEHIND * tip.radius:
         return None
-    return Fault("path", f"the tip stays {1e3 * behind:.2g} mm behind the end of its path")
+    reached = float(np.linalg.norm(np.diff(control.path, axis=0), axis=1).sum()) - behind
+    said = f"the tip stays {1e3 * behind:.2g} mm behind the end of its path"
+    return Fault("path", said, control.lead_in + reached / control.speed)
 
 
 def whole_posture(built: Built, q: Array, model: pin.Model) -> Array:
@@ -131,16 +133,15 @@ def _force_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     off = np.abs(held / force - 1) > HELD
     if (held == 0).any():
         k = int(np.flatnonzero(held == 0)[0])
-        return Fault("force", f"{what}: nothing touches at t = {t[after][k]:.3g} s")
+        return Fault("force", f"{what}: nothing touches at t = {t[after][k]:.3g} s", t[after][k])
     mean = float(held.mean())
     if abs(mean / force - 1) > HELD:
         text = f"{what}: the surface bears {mean:.3g} N on average"
         return Fault("force", text)
     if off.mean() > _SHAKEN:
         k = int(np.argmax(np.abs(held / force - 1)))
-        return Fault(
-            "force", f"{what}: the surface bears {held[k]:.3g} N at t = {t[after][k]:.3g} s"
-        )
+        text = f"{what}: the surface bears {held[k]:.3g} N at t = {t[after][k]:.3g} s"
+        return Fault("force", text, t[after][k])
     return None
 
 
