@@ -20,9 +20,9 @@ from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
 from sphshell_pin.robots.mesh_faults import mesh_fault
-from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.packages import Folders, including
 from sphshell_pin.robots.plain_mesh import collada_unit
-from sphshell_pin.robots.urdf_tree import add_limits, check_tree, mimics_of
+from sphshell_pin.robots.urdf_tree import INCLUDED, add_limits, check_tree, mimics_of
 
 
 class RobotError(SphshellError, ValueError):
@@ -76,18 +76,24 @@ def read(
     for folder in folders.given:
         if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
+    assumed = dict[str, object]()
     try:
         if file.suffix.lower() == ".xacro":
             from sphshell_pin.robots.xacro_file import expand
 
-            text = expand(file, folders, xacro_args or {})
+            text, assumed = expand(file, folders, xacro_args or {})
         elif xacro_args:
             raise ValueError("arguments are for files that end in .xacro")
         else:
             text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
         raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
-    return described(text, folders, free_flyer=free_flyer)
+    found = described(text, folders, free_flyer=free_flyer)
+    if assumed:
+        values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
+        note = f"its arguments without a default are taken as {values}: or give others"
+        found = replace(found, notes=(*found.notes, note))
+    return found
 
 
 def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) -> Description:
@@ -99,8 +105,7 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
         if tag == "sdf":
             raise RobotError(f"{file}: {_reason('.sdf')}")
         if tag not in ("robot", "mujoco"):
-            included = "if another file includes this one, name that"
-            raise ValueError(f"its root element is <{tag}>; {_NEXT}; {included}")
+            raise ValueError(f"its root element is <{tag}>; {_NEXT}; or {INCLUDED}")
         root = parsed(text)
         if tag == "mujoco":
             from sphshell_pin.robots.mjcf import plain
@@ -113,7 +118,9 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
     except (ValueError, OSError, LookupError, RuntimeError) as error:  # the last: Pinocchio's
         if isinstance(error, SphshellError):
             raise
-        raise RobotError(f"{file}: not a {what} that can be read: {_line(error)}") from None
+        said = f"{file}: not a {what} that can be read: {_line(error)}"
+        whole = including(file) if INCLUDED in said and folders.kept is None else None
+        raise RobotError(said if whole is None else f"{said}: {whole}") from None
 
 
 def is_path(robot: str | PathLike[str]) -> bool:
