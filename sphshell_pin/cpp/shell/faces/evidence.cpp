@@ -10,6 +10,8 @@ namespace sphshell {
 namespace {
 
 constexpr std::size_t kMoreThanParameters = 3;
+// Of a region that is symmetric half of the vertices tell, of a torus five parameters.
+constexpr std::size_t kVerticesOfTorus = 2 * (5 + kMoreThanParameters);
 // Flat sides stand off by this many tolerances: less is rounding.
 constexpr double kLeastDeviation = 4;
 // Within so many tolerances a vertex has left slowly; a share of those beside a region.
@@ -108,6 +110,7 @@ bool Recognizer::is_over_determined(const Growth& growth) {
   const std::vector<int> vertices = vertices_of(triangles);
   if (triangles.size() < 3 ||
       vertices.size() < std::size_t(num_parameters(s.kind)) + kMoreThanParameters ||
+      (s.kind == FaceKind::Torus && vertices.size() < kVerticesOfTorus) ||
       growth.deviation < kLeastDeviation * growth.window || !(s.radius > 0) || drifts_away(growth))
     return false;
   // What a facet leans must be more than the tolerance could tilt it by: else its normal says

@@ -261,7 +261,9 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
       band = count <= 2 && (s.kind != FaceKind::Torus ||
                             regions_.count(by_region[i].first) == static_cast<int>(members.size()));
     }
-    for (std::size_t n = i; n < j && !band; ++n) keep[by_region[n].second] = 0;
+    if (band) continue;
+    for (std::size_t n = i; n < j; ++n) keep[by_region[n].second] = 0;
+    growth.wide.push_back(by_region[i].first);
   }
   std::size_t kept = 0;
   growth.deviation = 0;
