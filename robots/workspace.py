@@ -35,7 +35,7 @@ def find_robots(folder: str | PathLike[str]) -> Iterator[FoundRobot]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 description = read(file)
-                if description.root.find("link" if not description.is_mjcf else ".//body") is None:
+                if not description.is_mjcf and description.root.find("link") is None:
                     continue  # macros alone
                 model = build_model(description, mimic=True)
         except SphshellError as error:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import floats, is_path
@@ -332,7 +333,7 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
         )
     if word not in WORDS:
         if file.suffix:
-            raise SphshellError(f"no such surface file: {file}")
+            raise SphshellError(f"surface {file}: {why_no_file(file)}")
         raise NameNotFound("surface", word, "the command (beside files)", WORDS)
     if asked.unit is not None:
         raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in meters")
