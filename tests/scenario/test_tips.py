@@ -75,6 +75,13 @@ def test_without_a_tool_frame_the_wrist_carries_it(tmp_path: Path) -> None:
     assert model.names[model.frames[model.getFrameId(tip.frame)].parentJoint] == "b"
 
 
+def test_what_spins_beside_sliding_jaws_is_held_with_them(tmp_path: Path) -> None:
+    file, spin = tmp_path / "arm.urdf", link("spin", ".01 .01 .01")
+    spin += joint("spin_joint", "wrist", "spin", "continuous", "0 0 .02", "0 0 1")
+    file.write_text(arm(jaws="prismatic", tool="ee").replace("</robot>", f"{spin}</robot>"))
+    assert gripper_joints(robots.load_file(file).model) == {3, 4, 5}
+
+
 def test_two_free_fingers_are_no_gripper(tmp_path: Path) -> None:
     file = tmp_path / "arm.urdf"
     file.write_text(arm(jaws="revolute", tool=None))

@@ -45,23 +45,26 @@ class Tip:
 
 
 def gripper_joints(model: pin.Model) -> set[int]:
-    """Return the joints of grippers: behind a joint, two limbs or more that slide or are coupled.
+    """Return the joints of grippers: behind a joint, two ends or more that slide or are coupled.
 
-    They have two coordinates at most, or are called grippers. A run holds them, where the tip is on
-    what carries them.
+    They have three coordinates at most, or are called grippers. A run holds them, where the tip is
+    on what carries them.
     """
     rules, found = mimics(model), set[int]()
     coupled = {*rules, *(rule.of for rule in rules.values())}
     for carrier in range(1, model.njoints):
         behind = [int(one) for one in model.subtrees[carrier]][1:]
         ends = set(behind) - {int(model.parents[one]) for one in behind}
-        jaws = all(
-            model.names[one] in coupled or model.joints[one].shortname().startswith("JointModelP")
+        jaws = {
+            one
             for one in behind
-        )
-        few = len({model.joints[one].idx_v for one in behind}) <= 2
+            if model.names[one] in coupled
+            or model.joints[one].shortname().startswith("JointModelP")
+        }
+        few = len({model.joints[one].idx_v for one in behind}) <= 3
         named = all("gripper" in model.names[one].lower() for one in behind)
-        if len(ends) > 1 and (named or (jaws and few)):
+        sliding = few and len(ends & jaws) > 1 and set(behind) == ends | jaws
+        if len(ends) > 1 and (named or sliding):
             found |= set(behind)
     return found
 

@@ -28,6 +28,7 @@ from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.pose_search import find_working, sphere_centers
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.refusals import CannotStand
+from sphshell_pin.scenario.drafting.touch_points import widest_room
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import check_masses
 from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
@@ -43,8 +44,8 @@ WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
 
 # Half the size of a surface that needs no file, in radii of the sphere; radius of a ball whose size
-# is free, as a part of the part's middle width.
-_SIZE, _BALL = 15.0, 0.1
+# is free, as a part of the part's middle width, and of the room on its widest face.
+_SIZE, _BALL, _OF_ROOM = 15.0, 0.1, 0.5
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
 
 
@@ -220,7 +221,8 @@ def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
         return list(tips)
     (made,) = built.shells.values()
     middle = float(np.sort(np.ptp(made.box, axis=0))[1])
-    return [tip.at_most(rounded(_BALL * middle)) for tip in tips]
+    most = min(_BALL * middle, _OF_ROOM * widest_room(made))
+    return [tip.at_most(rounded(most)) if most else tip for tip in tips]
 
 
 def _sided(built: Built, tips: Sequence[Tip], *, inside: bool) -> Built:

@@ -87,15 +87,20 @@ def touch_points(
 ) -> Iterator[TouchPoint]:
     """Yield touch points: that of `find_touch_point`, then those farthest from edges."""
     middle = shell.box.mean(axis=0)
-    for point in (middle, *_roomy_places(shell, -toward if inside else toward)):
+    for point in (middle, *_roomy_places(shell, -toward if inside else toward)[0]):
         beside = point - middle - toward * (toward @ (point - middle))
         yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=beside)
 
 
-def _roomy_places(shell: Shell, toward: Array) -> list[Array]:
+def widest_room(shell: Shell) -> float:
+    """Return the largest distance [m] of a place from where the surface ends, or turns sharply."""
+    return max(_roomy_places(shell, side)[1] for side in sides(shell))
+
+
+def _roomy_places(shell: Shell, toward: Array) -> tuple[list[Array], float]:
     """Return points (3,) apart from each other on what faces `toward`, the best one first.
 
-    The best is the farthest from where the surface ends, or turns sharply.
+    The best is the farthest from where the surface ends, or turns sharply: so far [m].
     """
     corners, rng = shell.vertices[shell.triangles], np.random.default_rng(0)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -103,7 +108,7 @@ def _roomy_places(shell: Shell, toward: Array) -> list[Array]:
     normals = normals / np.maximum(areas, 1e-300)[:, None]
     facing = np.flatnonzero(normals @ toward > _FACING)
     if not len(facing):
-        return []
+        return [], 0.0
     ends = np.sort(shell.triangles[facing][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     ends, owner, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     # An edge of two facets is sharp where their normals differ, any other always.
@@ -126,7 +131,7 @@ def _roomy_places(shell: Shell, toward: Array) -> list[Array]:
     for point in points[np.argsort(-room, kind="stable")]:
         if all(np.linalg.norm(point - one) > _APART * shell.size for one in found):
             found.append(point)
-    return found[:_MOST_PLACES]
+    return found[:_MOST_PLACES], float(np.sqrt(room.max()))
 
 
 def touches_once(
