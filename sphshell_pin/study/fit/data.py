@@ -65,12 +65,11 @@ _LARGEST = 1e70  # of data and 1 / sigma: the squares of their quotients do not 
 
 @dataclass(frozen=True)
 class Measured:
-    """The data of one experiment: times `t` (n,) [s] and columns; `notes` say what is odd."""
+    """The data of one experiment: times `t` (n,) [s] and columns."""
 
     name: str
     t: Array
     columns: tuple[Column, ...]
-    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -167,7 +166,7 @@ def read_experiment(
             columns.append(_column(table, known[label], (sigma or {}).get(label)))
     if not columns:
         raise table.fault(f"has no column of data beside the time, as in '{_EXAMPLE}'")
-    return Measured(name, t, tuple(columns), _gaps(name, t))
+    return Measured(name, t, tuple(columns))
 
 
 def _times(table: _Table, duration: float) -> Array:
@@ -214,25 +213,6 @@ def _column(table: _Table, quantity: Quantity, sigma: float | None) -> Column:
             f"{quantity.unit}, to compute with them".rstrip()
         )
     return Column(quantity, rows, values[rows], given)
-
-
-def _gaps(name: str, t: Array) -> tuple[str, ...]:
-    """Say of times that seem to be missing: a step that is a multiple of an otherwise even one."""
-    steps = np.diff(t)
-    if len(steps) < 3:
-        return ()
-    usual = float(np.median(steps))
-    wide = np.flatnonzero(steps > 1.5 * usual)
-    even = np.abs(steps - usual).max(where=steps <= 1.5 * usual, initial=0.0) < 0.25 * usual
-    if not even or not len(wide):
-        return ()
-    k = int(wide[np.argmax(steps[wide])])
-    missing = int(sum(np.rint(steps[wide] / usual) - 1))
-    return (
-        f"{name}: the time stamps have {len(wide)} gap{'s' * (len(wide) > 1)}, in which about "
-        f"{missing} row{'s' * (missing > 1)} of {usual:.4g} s are missing; the longest is from "
-        f"{t[k]:.6g} s to {t[k + 1]:.6g} s",
-    )
 
 
 def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
