@@ -142,13 +142,12 @@ def columns(*names: str) -> tuple[Column, ...]:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of values, written as NAME.csv with all digits; a `folded` one is shown on demand."""
+    """Rows of values, written as NAME.csv with all digits."""
 
     name: str
     caption: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Value]]
-    folded: bool = False
 
     @property
     def cells(self) -> list[list[str]]:

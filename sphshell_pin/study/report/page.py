@@ -32,24 +32,16 @@ def tally_of(sections: list[Section]) -> str:
     """Return how many aims are met, in a sentence or two."""
     judged = [f.met for section in sections for f in section.findings if f.met is not None]
     failed = sum(section.error is not None for section in sections)
-    tally = f"{sum(judged)} of {len(judged)} aims are met."
-    if failed:
-        tally += f" {failed} section{'s' * (failed > 1)} could not be measured."
-    return tally
+    more = f" {failed} section{'s' * (failed > 1)} could not be measured." if failed else ""
+    return f"{sum(judged)} of {len(judged)} aims are met.{more}"
 
 
 def not_met(sections: list[Section]) -> dict[str, list[str]]:
     """Return the aims that were missed, and those that were not measured, each in a line."""
     findings = [f for section in sections for f in section.findings]
-    named = [whole_name(findings, k) for k in range(len(findings))]
-    missed = [
-        f"{name}: {f.text}, aim {f.aim_text}"
-        for f, name in zip(findings, named, strict=True)
-        if f.met is False
-    ]
-    unmeasured = [
-        f"{name}, aim {f.aim_text}" for f, name in zip(findings, named, strict=True) if f.unmeasured
-    ]
+    named = [(f, whole_name(findings, k)) for k, f in enumerate(findings)]
+    missed = [f"{name}: {f.text}, aim {f.aim_text}" for f, name in named if f.met is False]
+    unmeasured = [f"{name}, aim {f.aim_text}" for f, name in named if f.unmeasured]
     unmeasured += [f"all of: {one.title}" for one in sections if one.error is not None]
     unmeasured += [line for section in sections for line in section.unmeasured]
     return {"Aims that are missed": missed, "Not measured in this run": unmeasured}
@@ -130,9 +122,6 @@ def _picture(picture: Picture) -> str:
 
 def _table(table: Table) -> str:
     caption = f"{escape(table.caption)} <code>{table.name}.csv</code>"
-    if table.folded:
-        caption += f" ({len(table.rows)} rows)"
-        return f"<details><summary>{caption}</summary>{_html(table)}</details>"
     return f'<p class="caption">{caption}</p>{_html(table)}'
 
 
