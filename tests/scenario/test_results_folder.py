@@ -198,13 +198,12 @@ def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
 def test_what_somebody_else_puts_beside_the_folder_is_left_alone(tmp_path):
     (tmp_path / "precious").write_text("precious")
     (tmp_path / ".out.lock").symlink_to("precious")
-    (tmp_path / "theirs" / "files").mkdir(parents=True)
-    (tmp_path / "theirs" / "ready.json").write_text('{"new": [], "old": []}')
-    (tmp_path / "theirs" / "files" / "bad.html").touch()
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs" / "bad.html").touch()
     (tmp_path / ".out.writing").symlink_to("theirs")
     assert put(tmp_path / "out", "new") == {"a": "new", LAST: "new"}
     assert (tmp_path / "precious").read_text() == "precious"
-    assert (tmp_path / "theirs" / "files" / "bad.html").exists()
+    assert (tmp_path / "theirs" / "bad.html").exists()
 
 
 def test_a_folder_called_like_a_result_is_told(no_pictures, tmp_path):
