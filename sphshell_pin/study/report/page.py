@@ -1,7 +1,6 @@
 """The page: one HTML file that makes no external requests, in light and dark, and for paper."""
 
 import base64
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from string import Template
@@ -11,15 +10,7 @@ from sphshell_pin.study.report.contents import Finding, Picture, Section, Table,
 TEMPLATE = Path(__file__).with_name("page.html")
 
 
-@dataclass(frozen=True)
-class Heading:
-    """The title of a page and the text below it."""
-
-    title: str
-    text: str
-
-
-SPEED = Heading(
+TITLE, TEXT = (
     "sphshell_pin: speed against error",
     "Contact of spheres with CAD surfaces, measured on this machine in one run. Figures are "
     "medians; ratios are taken round by round, of contestants that take turns on one core, and are "
@@ -55,9 +46,7 @@ def whole_name(findings: list[Finding], k: int) -> str:
     return what if first == k else f"{findings[first].what}; {what}"
 
 
-def render(
-    sections: list[Section], machine: dict[str, str], heading: Heading = SPEED, caution: str = ""
-) -> str:
+def render(sections: list[Section], machine: dict[str, str], caution: str = "") -> str:
     """Return the page; `caution` is what a reader should know of the machine."""
     findings = [f for section in sections for f in section.findings]
     lists = "".join(
@@ -68,8 +57,8 @@ def render(
     )
     missing = '<span class="missed"> not measured</span>'
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
-        title=escape(heading.title),
-        introduction=escape(heading.text),
+        title=escape(TITLE),
+        introduction=escape(TEXT),
         caution=f'<p class="error" role="note">{escape(caution)}</p>' if caution else "",
         tally=tally_of(sections),
         lists=lists,
