@@ -130,7 +130,6 @@ def scene_table(rows: list[Row], scene: str, title: str) -> Table:
             + (row.cost, row.low, row.high, row.note)
             for row in found
         ],
-        folded=True,
     )
 
 
@@ -146,7 +145,6 @@ def settings_table(rows: list[Row]) -> Table:
         "Settings, and where they are recommended.",
         columns("engine", "scene", "setting", "text: value and source"),
         list(settings),
-        folded=True,
     )
 
 

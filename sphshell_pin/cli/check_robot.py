@@ -57,7 +57,6 @@ def check_robot_(
     quick: bool = False,
     seed: Annotated[int, option("Seed of the random postures.", min=0)] = 0,
     json: Path | None = None,
-    write: Path | None = None,
 ) -> None:
     """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.
 
@@ -78,7 +77,6 @@ def check_robot_(
     mend OUT.urdf : Write a URDF of the robot that needs none of these options.
     quick : Fewer postures and runs.
     json FILE : Write all figures to this file.
-    write FILE : Write the table as Markdown.
     """
     from sphshell_pin.base.atomic import write_whole
     from sphshell_pin.study import robot_check as study
@@ -92,7 +90,7 @@ def check_robot_(
     models.check_known(names)
     if mend is not None and len(names) != 1:
         raise SphshellError("--mend writes one robot: give one")
-    for path in (json, write, mend):
+    for path in (json, mend):
         if path is not None:
             _check_writable(path)
     if mend is not None:
@@ -128,9 +126,6 @@ def check_robot_(
     if json is not None:
         text = report.as_json(reports, f"{command} --json {json}", seed, sizes)
         write_whole(json, text.encode())
-    if write is not None:
-        page = report.as_markdown(reports, f"{command} --write {write}")
-        write_whole(write, page.encode())
     verdicts = [one.verdict for one in reports]
     # A robot that was asked for by name and cannot be checked is wrong input, and so is what
     # no robot there is can be checked with.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
@@ -20,44 +20,21 @@ WORLD = "universe"
 
 
 @dataclass(frozen=True)
-class Fixed:
-    """A frame called `name` at `placement` in the frame `parent`, for the whole run."""
-
-    name: str
-    parent: str
-    placement: pin.SE3
-
-
-@dataclass(frozen=True)
-class Moving:
-    """A frame called `name` at `placement` in a moving joint."""
-
-    name: str
-    joint: int
-    placement: pin.SE3
-
-
-@dataclass(frozen=True)
 class Frames:
     """The frames of a scene.
 
-    `moving`: one for each moving joint, in the world; `fixed`: all others,
-    in one of those or in the world. `spheres`, `other_spheres` name the frames of the spheres by
-    the name of their pair, `shells` those of the shells by the key of their side; `contacts` are
-    names for frames of the contacts of each pair.
+    `moving`: name and placement in the joint of one frame for each moving joint; `fixed`: name,
+    parent and placement of all others. `names` are those of the frames of spheres, by pair and
+    number, of contacts, by pair, and of shells, by the key of their side.
     """
 
-    moving: tuple[Moving, ...]
-    fixed: tuple[Fixed, ...]
-    spheres: dict[str, str]
-    other_spheres: dict[str, str]
-    contacts: dict[str, str]
-    shells: dict[tuple[int, int, bytes], str]
+    moving: dict[int, tuple[str, pin.SE3]] = field(default_factory=dict)
+    fixed: list[tuple[str, str, pin.SE3]] = field(default_factory=list)
+    names: dict[object, str] = field(default_factory=dict)
 
     def on(self, joint: int) -> tuple[str, pin.SE3]:
         """Return the frame that moves with `joint`, and where it is in the joint."""
-        one = next((one for one in self.moving if one.joint == joint), None)
-        return (WORLD, pin.SE3.Identity()) if one is None else (one.name, one.placement)
+        return self.moving.get(joint, (WORLD, pin.SE3.Identity()))
 
     @classmethod
     def of(cls, scene: Scene, also: Iterable[str] = ()) -> Frames:
@@ -67,40 +44,39 @@ class Frames:
         Spheres are called sphere/PAIR, the second of a pair sphere/PAIR/other, shells shell/NAME,
         with a number if names repeat.
         """
-        model = scene.model
+        model, made = scene.model, cls()
         named = {name for pair in scene.pairs for name in (pair.frame_i, pair.frame_j)}
         wanted = {k for k, one in enumerate(model.frames) if one.type == pin.FrameType.BODY}
         wanted |= {find_frame(model, name) for name in (*named, *also)}
-        wanted.discard(0)
-        moving: dict[int, Moving] = {}
-        fixed: list[Fixed] = []
-        for frame in (model.frames[k] for k in sorted(wanted)):
-            joint, place = int(frame.parentJoint), pin.SE3(frame.placement)
-            if joint and joint not in moving:
-                moving[joint] = Moving(frame.name, joint, place)
-            else:
-                fixed.append(_hung(frame.name, joint, place, moving))
-        taken = {WORLD, *(one.name for one in moving.values()), *(one.name for one in fixed)}
+        taken = {WORLD, *(model.frames[k].name for k in wanted)}
+        links = [model.frames[k] for k in sorted(wanted - {0})]
+        for frame in reversed(links):  # the first of a joint is the last that is put there
+            made.moving[int(frame.parentJoint)] = frame.name, pin.SE3(frame.placement)
+        made.moving.pop(0, None)
+        for frame in links:
+            joint = int(frame.parentJoint)
+            if made.on(joint)[0] != frame.name:
+                made._hang(frame.name, joint, pin.SE3(frame.placement))
         # A joint that carries nothing itself may carry other joints.
         for joint in range(1, model.njoints):
-            if joint not in moving:
-                name = free_name(model.names[joint], taken)
-                moving[joint] = Moving(name, joint, pin.SE3.Identity())
-        spheres: dict[str, str] = {}
-        others: dict[str, str] = {}
-        contacts: dict[str, str] = {}
-        shells: dict[tuple[int, int, bytes], str] = {}
+            if joint not in made.moving:
+                made.moving[joint] = free_name(model.names[joint], taken), pin.SE3.Identity()
         for pair in scene.pairs:
-            contacts[pair.name] = free_name(f"contact/{pair.name}", taken)
-            ends = (spheres, ""), (others, "/other")
-            for ball, (known, end) in zip(pair.spheres, ends, strict=False):
-                name = known[pair.name] = free_name(f"sphere/{pair.name}{end}", taken)
-                fixed.append(_hung(name, ball.joint, ball.in_joint, moving))
+            made.names[pair.name] = free_name(f"contact/{pair.name}", taken)
+            for k, ball in enumerate(pair.spheres):
+                name = free_name(f"sphere/{pair.name}{'/other' * k}", taken)
+                made.names[pair.name, k] = name
+                made._hang(name, ball.joint, ball.in_joint)
             for one in pair.shells:
-                if one.key not in shells:
-                    name = shells[one.key] = free_name(f"shell/{one.shell.name}", taken)
-                    fixed.append(_hung(name, one.joint, one.in_joint, moving))
-        return cls(tuple(moving.values()), tuple(fixed), spheres, others, contacts, shells)
+                if one.key not in made.names:
+                    made.names[one.key] = free_name(f"shell/{one.shell.name}", taken)
+                    made._hang(made.names[one.key], one.joint, one.in_joint)
+        return made
+
+    def _hang(self, name: str, joint: int, place: pin.SE3) -> None:
+        """Add a frame at `place` in `joint`, fixed to what moves with the joint."""
+        parent, at = self.on(joint)
+        self.fixed.append((name, parent, at.actInv(place)))
 
 
 def xyz(vector: Array) -> Message:
@@ -111,13 +87,6 @@ def xyz(vector: Array) -> Message:
 def quaternion(rotation: Array) -> Message:
     """Return a rotation matrix as a message."""
     return dict(zip("xyzw", pin.Quaternion(rotation).coeffs().tolist(), strict=True))
-
-
-def _hung(name: str, joint: int, place: pin.SE3, moving: dict[int, Moving]) -> Fixed:
-    """Return a frame at `place` in `joint` as hung on what moves with the joint."""
-    if joint == 0:
-        return Fixed(name, WORLD, place)
-    return Fixed(name, moving[joint].name, moving[joint].placement.actInv(place))
 
 
 def free_name(wanted: str, taken: set[str], mark: str = "-") -> str:

@@ -1,5 +1,6 @@
 """A result as an MCAP file of ROS 2 messages; the page docs/export.md lists the topics."""
 
+import contextlib
 import heapq
 import json
 import re
@@ -8,7 +9,6 @@ from dataclasses import fields
 from importlib import metadata
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -38,6 +38,7 @@ from sphshell_pin.view.arrows import ArrowScale, largest_force
 
 _ARROW = 8.0  # length of a usual force's arrow, in radii of the smallest sphere
 _INFO, _WARN = 20, 30  # of rcl_interfaces/Log
+_ONCE = ("/tf_static", "/shells", "/bodies")
 _USUAL = ("touch", "lift_off")
 _LAST = (1 << 31) * 10**9  # ROS 2 has the seconds in 31 bits
 
@@ -51,15 +52,9 @@ _LATCHED = (
 )
 
 
-class _Sent(NamedTuple):
-    """A message of the type `kind` on `topic`; times [ns]."""
-
-    logged: int
-    published: int
-    topic: str
-    kind: str
-    message: Message
-    latched: bool = False
+_Sent = tuple[int, int, str, str, Message]
+"""Times at which a message is logged and published [ns], topic, type, content."""
+_Part = tuple[str, str, Message]
 
 
 def write_mcap(
@@ -88,10 +83,11 @@ def write_mcap(
                 writer.add_attachment(run.first, run.first, "settings.json", "text/json", data)
             schemas = {}
             counts: dict[str, int] = {}
-            for logged, published, topic, kind, message, latched in run.messages():
+            for logged, published, topic, kind, message in run.messages():
                 if kind not in schemas:
                     schemas[kind] = writer.register_msgdef(full_name(kind), schema_of(kind))
-                if latched:  # a channel has metadata only if it is registered by MCAP's own writer
+                # A channel has metadata only if it is registered by MCAP's own writer.
+                if topic in _ONCE:
                     about = {"offered_qos_profiles": _LATCHED}
                     writer._channel_ids[topic] = writer._writer.register_channel(
                         topic, "cdr", schemas[kind].id, about
@@ -115,22 +111,25 @@ class _Run:
         self.result, self.scene, self.start = result, scene, start
         # A run that diverged is written up to where its numbers end.
         self.count = sound_rows("the result", result.q, result.v)
-        self.times = _nanoseconds(result.t[: self.count], start)
-        self.first = int(self.times[0])
+        self.times = _nanoseconds(result.t[: self.count], start).tolist()
+        self.first = self.times[0]
         self.stated = _stated_frames(result, scene)
         self.frames = Frames.of(scene, self.stated.values())
-        self.touched = sorted({int(k) for k in result.contacts.pair})
-        length = _ARROW * least_radius(scene)
-        self.scale = ArrowScale.from_forces(largest_force(result.contacts), length)
-        self.topics = _topics("contacts", [result.pairs[k] for k in self.touched], ["markers"])
+        touched = sorted({int(k) for k in result.contacts.pair})
+        self.series = {k: PairSeries.of(result, k) for k in touched}
+        self.least = least_radius(scene)
+        self.scale = ArrowScale.from_forces(largest_force(result.contacts), _ARROW * self.least)
+        self.topics = _topics("contacts", [result.pairs[k] for k in touched], ["markers"])
         self.sensors = _topics("sensors", result.sensors)
-        self.twists = _topics("twists", [one.name for one in self.frames.moving])
+        self.twists = _topics("twists", [name for name, _ in self.frames.moving.values()])
 
     def about(self, command: str) -> dict[str, str]:
         """Return what the file says of itself."""
         result, stats = self.result, self.result.stats
-        packages = ("sphshell-pin", "pin", "coal", "numpy", "mcap")
-        said = {f"version.{name}": _version(name) for name in packages}
+        said = {}
+        for name in ("sphshell-pin", "pin", "coal", "numpy", "mcap"):
+            with contextlib.suppress(metadata.PackageNotFoundError):
+                said[f"version.{name}"] = metadata.version(name)
         said |= {
             "scenario": "" if result.origin is None else result.origin.scenario,
             "command": command,
@@ -145,107 +144,99 @@ class _Run:
 
     def messages(self) -> Iterator[_Sent]:
         """Yield all messages in the order of their times."""
-        rows, events = self._rows(), self._events()
-        sensors = (self._readings(name, log) for name, log in self.result.sensors.items())
-        yield from self._first()
-        yield from heapq.merge(rows, events, *sensors, key=lambda one: one.logged)
-
-    def _first(self) -> Iterator[_Sent]:
-        """Yield what does not change, once."""
-        t, stamp = self.first, _split(self.first)
-        static = [
-            _transform(stamp, one.parent, one.name, one.placement) for one in self.frames.fixed
-        ]
+        t = self.first
+        static = [_transform(t, parent, name, at) for name, parent, at in self.frames.fixed]
         for topic, kind, message in (
-            ("/tf_static", "tf2_msgs/TFMessage", {"transforms": static}),
-            ("/shells", _MARKERS, shell_markers(self.scene, self.frames, stamp)),
-            ("/bodies", _MARKERS, body_markers(self.scene, self.frames, stamp)),
+            ("/tf_static", _TRANSFORMS, {"transforms": static}),
+            ("/shells", _MARKERS, shell_markers(self.scene, self.frames, t)),
+            ("/bodies", _MARKERS, body_markers(self.scene, self.frames, t)),
         ):
-            yield _Sent(t, t, topic, kind, message, latched=True)
+            yield t, t, topic, kind, message
+        sensors = (self._readings(name, log) for name, log in self.result.sensors.items())
+        yield from heapq.merge(self._rows(), self._events(), *sensors, key=lambda one: one[0])
 
     def _rows(self) -> Iterator[_Sent]:
-        result, model = self.result, self.scene.model
-        data = model.createData()
-        plain = [j for j in range(1, model.njoints) if model.joints[j].nv == 1 and _own(model, j)]
-        several = [j for j in range(1, model.njoints) if model.joints[j].nv > 1]
-        series = {k: PairSeries.of(result, k) for k in self.touched}
-        energy = {f.name: getattr(result.energy, f.name) for f in fields(result.energy)}
-        energy["residual"] = result.energy.residual
-        size = ROD * least_radius(self.scene)
+        data = self.scene.model.createData()
+        energy = {f.name: getattr(self.result.energy, f.name) for f in fields(self.result.energy)}
+        energy["residual"] = self.result.energy.residual
         drawn = False
-        for row in range(self.count):
-            t = int(self.times[row])
-            stamp, q, v = _split(t), result.q[row], result.v[row]
-            contacts = result.contacts.at_row(row)
-            pin.forwardKinematics(model, data, q, v)
+        for row, t in enumerate(self.times):
+            contacts = self.result.contacts.at_row(row)
+            pin.forwardKinematics(self.scene.model, data, self.result.q[row], self.result.v[row])
             moved = [
-                _transform(stamp, WORLD, one.name, data.oMi[one.joint] * one.placement)
-                for one in self.frames.moving
+                _transform(t, WORLD, name, data.oMi[joint] * placed)
+                for joint, (name, placed) in self.frames.moving.items()
             ]
-            parts: list[tuple[str, str, Message]] = []
-            for k, pair in series.items():
-                parts += self._pair(k, pair, row, contacts, data, moved)
+            parts: list[_Part] = []
+            for k in self.series:
+                parts += self._pair(k, row, contacts, data, moved)
             if moved:
-                parts.append(("/tf", "tf2_msgs/TFMessage", {"transforms": moved}))
-            if plain:
-                state = {
-                    "header": _header(stamp, ""),
-                    "name": [model.names[j] for j in plain],
-                    "position": [_position(model.joints[j], q) for j in plain],
-                    "velocity": [float(v[model.joints[j].idx_v]) for j in plain],
-                }
-                parts.append(("/joint_states", "sensor_msgs/JointState", state))
-            for j in several:
-                name, place = self.frames.on(j)
-                twist = place.actInv(data.v[j])
-                moving = {"linear": xyz(twist.linear), "angular": xyz(twist.angular)}
-                stamped = {"header": _header(stamp, name), "twist": moving}
-                parts.append((self.twists[name], "geometry_msgs/TwistStamped", stamped))
+                parts.append(("/tf", _TRANSFORMS, {"transforms": moved}))
+            parts += self._joints(row, data)
             if len(contacts) or drawn:
-                marked = contact_markers(contacts, result.pairs, self.scale, size, stamp)
+                size = ROD * self.least
+                marked = contact_markers(contacts, self.result.pairs, self.scale, size, t)
                 parts.append(("/contacts/markers", _MARKERS, marked))
                 drawn = bool(len(contacts))
-            for name, values in energy.items():
-                parts.append((f"/energy/{name}", _FLOAT, {"data": values[row]}))
+            parts += [(f"/energy/{name}", _FLOAT, {"data": e[row]}) for name, e in energy.items()]
             for topic, kind, message in parts:
-                yield _Sent(t, t, topic, kind, message)
+                yield t, t, topic, kind, message
+
+    def _joints(self, row: int, data: pin.Data) -> Iterator[_Part]:
+        """Yield the state of joints with one coordinate of their own, and twists of the others."""
+        model, t = self.scene.model, self.times[row]
+        q, v = self.result.q[row], self.result.v[row]
+        joints = [(name, model.joints[j]) for j, name in enumerate(model.names) if j]
+        plain = [
+            (name, joint)
+            for name, joint in joints
+            if joint.nv == 1 and joint.shortname() != "JointModelMimic"
+        ]
+        if plain:
+            state = {
+                "header": _header(t, ""),
+                "name": [name for name, _ in plain],
+                "position": [_position(joint, q) for _, joint in plain],
+                "velocity": [float(v[joint.idx_v]) for _, joint in plain],
+            }
+            yield "/joint_states", "sensor_msgs/JointState", state
+        for _, joint in joints:
+            if joint.nv > 1:
+                name, place = self.frames.on(joint.id)
+                twist = place.actInv(data.v[joint.id])
+                moving = {"linear": xyz(twist.linear), "angular": xyz(twist.angular)}
+                message = {"header": _header(t, name), "twist": moving}
+                yield self.twists[name], "geometry_msgs/TwistStamped", message
 
     def _pair(
-        self,
-        index: int,
-        pair: PairSeries,
-        row: int,
-        contacts: SceneContacts,
-        data: pin.Data,
-        moved: list[Message],
-    ) -> Iterator[tuple[str, str, Message]]:
+        self, index: int, row: int, contacts: SceneContacts, data: pin.Data, moved: list[Message]
+    ) -> Iterator[_Part]:
         """Yield what one pair exerts in a row; add the frame of its wrench to `moved`."""
-        stamp = _split(int(self.times[row]))
+        t, pair = self.times[row], self.series[index]
         own, placed = contacts.pair == index, self.scene.pairs[index]
         center = (data.oMi[placed.joint_i] * placed.placement_i).translation
         torque = np.cross(contacts.point_world[own] - center, contacts.force_world[own]).sum(axis=0)
-        frame = self.frames.contacts[pair.name]
-        moved.append(_transform(stamp, WORLD, frame, pin.SE3(np.eye(3), center)))
-        topic = self.topics[pair.name]
+        frame, topic = self.frames.names[pair.name], self.topics[pair.name]
+        moved.append(_transform(t, WORLD, frame, pin.SE3(np.eye(3), center)))
         slip = np.linalg.norm(contacts.slip_velocity_world[own], axis=1)
         wrench = _wrench(np.concatenate([pair.force_world[row], torque]))
-        message = {"header": _header(stamp, frame), "wrench": wrench}
-        yield f"{topic}/wrench", "geometry_msgs/WrenchStamped", message
+        message = {"header": _header(t, frame), "wrench": wrench}
+        yield f"{topic}/wrench", _WRENCH, message
         yield f"{topic}/normal_force", _FLOAT, {"data": pair.normal[row]}
         yield f"{topic}/depth", _FLOAT, {"data": pair.depth[row]}
         yield f"{topic}/slip", _FLOAT, {"data": slip.max(initial=0.0)}
 
     def _events(self) -> Iterator[_Sent]:
         for event in self.result.events:
-            t = int(_nanoseconds(np.array([event.t]), self.start)[0])
+            (t,) = _nanoseconds(np.array([event.t]), self.start).tolist()
             usual = event.kind in _USUAL or event.kind.endswith("_left")
             said = {
-                "stamp": stamp_of(_split(t)),
+                "stamp": stamp_of(t),
                 "level": _INFO if usual else _WARN,
                 "name": event.pair,
                 "msg": event.kind,
             }
-            yield _Sent(t, t, "/events", "rcl_interfaces/Log", said)
+            yield t, t, "/events", "rcl_interfaces/Log", said
 
     def _readings(self, name: str, log: SensorLog) -> Iterator[_Sent]:
         """Yield the readings when they arrived; they are published when they were taken."""
@@ -255,17 +246,17 @@ class _Run:
         wrench = [f"{part}_{axis}" for part in ("force", "torque") for axis in "xyz"]
         for t, sampled, values in zip(arrived, taken, log.values, strict=True):
             if columns == wrench:
-                header = _header(_split(sampled), self.stated.get(name, name))
-                read = {"header": header, "wrench": _wrench(values)}
-                yield _Sent(t, sampled, topic, "geometry_msgs/WrenchStamped", read)
+                header = _header(sampled, self.stated.get(name, name))
+                yield t, sampled, topic, _WRENCH, {"header": header, "wrench": _wrench(values)}
             elif columns == ["closed"]:
-                yield _Sent(t, sampled, topic, "std_msgs/Bool", {"data": values[0] > 0})
+                yield t, sampled, topic, "std_msgs/Bool", {"data": values[0] > 0}
             else:
                 for column, value in zip(columns, values, strict=True):
-                    yield _Sent(t, sampled, f"{topic}/{_token(column)}", _FLOAT, {"data": value})
+                    yield t, sampled, f"{topic}/{_token(column)}", _FLOAT, {"data": value}
 
 
 _FLOAT, _MARKERS = "std_msgs/Float64", "visualization_msgs/MarkerArray"
+_TRANSFORMS, _WRENCH = "tf2_msgs/TFMessage", "geometry_msgs/WrenchStamped"
 
 
 def _nanoseconds(t: Array, start: int) -> Longs:
@@ -283,26 +274,17 @@ def _nanoseconds(t: Array, start: int) -> Longs:
     return start + np.rint(t * 1e9).astype(np.int64)
 
 
-def _split(t: int) -> tuple[int, int]:
-    return divmod(t, 10**9)
-
-
-def _header(stamp: tuple[int, int], frame: str) -> Message:
-    return {"stamp": stamp_of(stamp), "frame_id": frame}
+def _header(time: int, frame: str) -> Message:
+    return {"stamp": stamp_of(time), "frame_id": frame}
 
 
 def _wrench(values: Array) -> Message:
     return {"force": xyz(values[:3]), "torque": xyz(values[3:])}
 
 
-def _transform(stamp: tuple[int, int], parent: str, name: str, place: pin.SE3) -> Message:
+def _transform(time: int, parent: str, name: str, place: pin.SE3) -> Message:
     transform = {"translation": xyz(place.translation), "rotation": quaternion(place.rotation)}
-    return {"header": _header(stamp, parent), "child_frame_id": name, "transform": transform}
-
-
-def _own(model: pin.Model, joint: int) -> bool:
-    """Whether a joint has a coordinate of its own, and follows no other one."""
-    return bool(model.joints[joint].shortname() != "JointModelMimic")
+    return {"header": _header(time, parent), "child_frame_id": name, "transform": transform}
 
 
 def _position(joint: pin.JointModel, q: Array) -> float:
@@ -332,10 +314,3 @@ def _topics(above: str, names: Iterable[str], taken: Iterable[str] = ()) -> dict
 def _token(name: str) -> str:
     token = re.sub(r"[^A-Za-z0-9_]", "_", name)
     return f"_{token}" if token[:1].isdigit() else token
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return ""

@@ -121,32 +121,13 @@ def test_wrenches_are_about_the_center_of_the_sphere_in_the_axes_of_the_world(fi
 
 def test_markers_are_at_the_contacts_and_disappear_with_them(finger):
     result, read = finger
-    log = result.contacts
-    points, arrows = [], []
-    for message in read.topics["/contacts/markers"]:
-        assert message.markers[0].action == 3  # all that was drawn before goes
-        for one in message.markers[1:]:
-            assert one.header.frame_id == "universe"
-            where = list(map(xyz, one.points))
-            if one.type == 7:
-                points += where
-            else:
-                arrows.append((one.ns, where))
-    np.testing.assert_array_equal(points, log.point_world)
-    normal = np.array([ends for name, ends in arrows if name == "normal/tip-wall"])
-    assert len(normal) == np.count_nonzero(log.normal_force)
-    way = normal[:, 1] - normal[:, 0]
-    length = np.linalg.norm(way, axis=1)
-    about = read.metadata["sphshell_pin"]
-    wanted = np.minimum(
-        log.normal_force * float(about["arrows [m/N]"]), float(about["longest arrow [m]"])
-    )
-    np.testing.assert_allclose(length, wanted, rtol=1e-12)
-    np.testing.assert_allclose(way / length[:, None], log.normal_world, atol=1e-12)
-    touching = np.unique(log.row)
-    drawn = len(read.topics["/contacts/markers"])
+    messages = read.topics["/contacts/markers"]
+    assert all(message.markers[0].action == 3 for message in messages)  # what was drawn goes
+    points = [p for m in messages for one in m.markers[1:] if one.type == 7 for p in one.points]
+    np.testing.assert_array_equal(list(map(xyz, points)), result.contacts.point_world)
+    touching = np.unique(result.contacts.row)
     ends = np.count_nonzero(np.diff(touching) > 1) + (touching[-1] < len(result.t) - 1)
-    assert drawn == len(touching) + ends
+    assert len(messages) == len(touching) + ends
 
 
 def test_times_are_whole_nanoseconds_in_order(finger):
@@ -161,7 +142,7 @@ def test_times_are_whole_nanoseconds_in_order(finger):
         assert read.times[topic] == wanted[:1]
 
 
-def test_readings_of_sensors_when_they_arrived(finger):
+def test_events_and_readings_of_sensors_when_they_arrived(finger):
     result, read = finger
     log = result.sensors["fingertip"]
     topic = "/sensors/fingertip"
@@ -171,18 +152,13 @@ def test_readings_of_sensors_when_they_arrived(finger):
     assert read.published[topic] == nanoseconds(log.sampled)
     knuckle = result.sensors["knuckle"].values[:, 0]
     np.testing.assert_array_equal(read.numbers("/sensors/knuckle/torque", "data"), knuckle)
+    said = [(one.name, one.msg) for one in read.topics["/events"]]
+    assert said == [(event.pair, event.kind) for event in result.events]
+    assert read.times["/events"] == nanoseconds([event.t for event in result.events])
     closed = read.numbers("/sensors/touch", "data")
     assert closed.dtype == bool
     np.testing.assert_array_equal(closed, result.sensors["touch"].values[:, 0] > 0)
     assert closed.any()
-
-
-def test_events_are_log_messages(finger):
-    result, read = finger
-    assert result.events
-    said = [(one.name, one.msg) for one in read.topics["/events"]]
-    assert said == [(event.pair, event.kind) for event in result.events]
-    assert read.times["/events"] == nanoseconds([event.t for event in result.events])
 
 
 def poses(read, row):

@@ -25,7 +25,7 @@ def test_arrows_of_contacts_add_up_to_the_force_and_none_pulls():
     rows["normal_world"] = [[0, 0, 1], [0.6, 0, 0.8], [0, 0, 1], [-0.6, 0, 0.8]]
     rows["point_world"][:, 0] = [5.0, 0.0, 1.0, 2.0]
     contacts = SceneContacts.from_rows(rows.tobytes())
-    drawn = contact_markers(contacts, ("a", "b"), ArrowScale(1.0, 1.0), 0.1, (0, 0))["markers"]
+    drawn = contact_markers(contacts, ("a", "b"), ArrowScale(1.0, 1.0), 0.1, 0)["markers"]
     arrows = [one for one in drawn if one.get("type") == ARROW]
     assert [one["ns"] for one in arrows] == ["normal/b", "normal/a", "normal/a"]
     ends = np.array([[list(point.values()) for point in one["points"]] for one in arrows])

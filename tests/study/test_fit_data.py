@@ -148,15 +148,6 @@ def test_no_file_gets_a_sentence(built, tmp_path):
         sp.fit(built.path, tmp_path / "missing.csv", ["gravity.2"])
 
 
-def test_gaps_are_told(read):
-    t = np.delete(np.arange(30) * 1e-3, [7, 8, 20])
-    (note,) = read({"t [s]": t, f"{HEIGHT} [m]": t}).notes
-    assert "2 gaps, in which about 3 rows of 0.001 s are missing" in note
-    assert "the longest is from 0.006 s to 0.009 s" in note
-    uneven = np.cumsum(np.random.default_rng(0).exponential(1e-3, 30))
-    assert not read({"t [s]": uneven, f"{HEIGHT} [m]": uneven}).notes
-
-
 def test_too_few_values_get_a_sentence(built):
     data = {"t [s]": [0.1], f"{HEIGHT} [m]": [0.01]}
     with pytest.raises(InvalidParameter, match="data with 1 value must be more than parameters"):

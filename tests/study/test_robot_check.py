@@ -17,7 +17,7 @@ from sphshell_pin.study.robot_check.checks import CHECKS
 from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
 from sphshell_pin.study.robot_check.probe_spheres import find_sphere
-from sphshell_pin.study.robot_check.report import FAILED, NOT_CHECKED, PASS, as_json, as_markdown
+from sphshell_pin.study.robot_check.report import FAILED, NOT_CHECKED, PASS, as_json, remarks
 from sphshell_pin.testing.finding import Finding
 from tests.command import call, refused
 from tests.studies import mostly_studies
@@ -255,21 +255,11 @@ def test_a_sphere_inside_the_last_mesh_is_used(
     assert 0.01 < tip.radius <= 0.025
 
 
-def test_the_page() -> None:
-    REPORTS[3].findings["fast"] = Finding(0.0, "never")
-    page = as_markdown(REPORTS, "a command")
-    rows = {line.split(" | ")[0]: line for line in page.splitlines() if line.startswith("| ")}
-    assert rows["| good"].endswith("| pass |")
-    assert rows["| bad"].count("no figure") == len(CHECKS)
-    assert rows["| absent"].endswith("| not checked |")
-    assert len({line.count(" | ") for name, line in rows.items() if name[2:] in "goodbadfine"}) == 1
-    assert "2 of 4 robots pass; written by `a command`" in page
-    assert "- good, fine: odd.\n" in page
-    assert "- absent: it is not there.\n" in page
-    assert "- bad: forces failed: there (no figure, allowed 1e-08).\n" in page
-
-
 def test_the_figures_as_json() -> None:
+    lines = remarks(REPORTS)
+    assert "good, fine: odd." in lines
+    assert "absent: it is not there." in lines
+    assert "bad: forces failed: there (no figure, allowed 1e-08)." in lines
     data = json.loads(as_json(REPORTS, "it", 7, QUICK))
     assert data["seed"] == 7
     assert data["sizes"] == {"postures": 1, "runs": 1, "poses": 12}
@@ -282,14 +272,15 @@ def run(*arguments: object):
 
 
 def test_the_command(tmp_path: Path) -> None:
-    figures, page = tmp_path / "figures.json", tmp_path / "page.md"
-    result = run("ball", "turntable", "--quick", "--json", figures, "--write", page)
+    figures = tmp_path / "figures.json"
+    result = run("ball", "turntable", "--quick", "--json", figures)
     assert result.exit_code == 0, result.output
     assert "2 of 2 robots pass" in result.output
+    rows = [line.split() for line in result.output.splitlines()]
+    assert any(row[:3] == ["turntable", "disc", "2/1"] and row[-1] == "pass" for row in rows)
     names = [one["name"] for one in json.loads(figures.read_text())["robots"]]
     assert names == ["ball", "turntable"]
-    assert "| turntable | `disc` | 2/1 |" in page.read_text()
-    assert sorted(tmp_path.iterdir()) == [figures, page]
+    assert sorted(tmp_path.iterdir()) == [figures]
 
 
 def test_exit_codes_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

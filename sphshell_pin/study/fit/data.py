@@ -3,11 +3,10 @@
 import csv
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,8 +23,9 @@ Source = str | PathLike[str] | Mapping[str, ArrayLike]
 TIME, SIGMA = "t", ".sigma"
 # A time may be so much beyond the end of a run, as a part of it, for having been rounded.
 _ROUNDED = 1e-6
-_UNIT = re.compile(r"\[([^\[\]]*)\]$")
+_HEADER = re.compile(r"\s*(.*?)\s*(?:\[([^\[\]]*)\])?\s*")
 _EXAMPLE = "t [s],pairs.tip.normal_force [N]"
+_LARGEST = 1e70  # of data and 1 / sigma: the squares of their quotients do not overflow
 
 
 @dataclass(frozen=True)
@@ -60,41 +60,29 @@ class Column:
         return self.quantity.name
 
 
-_LARGEST = 1e70  # of data and 1 / sigma: the squares of their quotients do not overflow
-
-
 @dataclass(frozen=True)
 class Measured:
-    """The data of one experiment: times `t` (n,) [s] and columns; `notes` say what is odd."""
+    """The data of one experiment: times `t` (n,) [s] and columns."""
 
     name: str
     t: Array
     columns: tuple[Column, ...]
-    notes: tuple[str, ...]
 
 
-@dataclass(frozen=True)
 class _Table:
-    """Header, unit and values (n,) of columns by name; `lines` (n,) of the file, if it is one."""
+    """Columns (n,) by their headers; `lines` (n,) of the file, if it is one."""
 
-    source: str
-    columns: dict[str, tuple[str, str | None, Array]]
-    lines: Sequence[int] | None
-
-    @classmethod
-    def of(
-        cls, source: str, columns: Iterable[tuple[str, Array]], lines: list[int] | None = None
-    ) -> Self:
-        """Return the table of headers and columns; DataError where two have one name."""
-        table = cls(source, {}, lines)
+    def __init__(
+        self, source: str, columns: Sequence[tuple[str, Array]], lines: Sequence[int] | None = None
+    ) -> None:
+        self.source, self.lines = source, lines
+        self.columns: dict[str, tuple[str, str | None, Array]] = {}
         for header, values in columns:
-            found = _UNIT.search(header.strip())
-            unit = None if found is None else found[1]
-            name = (header.strip() if found is None else header.strip()[: found.start()]).strip()
-            if name in table.columns:
-                raise table.fault(f"two columns are called '{name}'")
-            table.columns[name] = header, unit, values
-        return table
+            found = _HEADER.fullmatch(header)
+            assert found is not None
+            if found[1] in self.columns:
+                raise self.fault(f"two columns are called '{found[1]}'")
+            self.columns[found[1]] = header.strip(), found[2], values
 
     def values(self, name: str, unit: str) -> Array:
         """Return the values (n,) of a column in the SI `unit`.
@@ -102,25 +90,26 @@ class _Table:
         DataError for one that is infinite or too large, and for a unit of another kind.
         """
         header, given, values = self.columns[name]
-        for row in np.flatnonzero(np.isinf(values)):
-            reason = f"'{values[row]}' in column '{header}' is not a finite number"
-            if name != TIME:
-                reason += "; put nan where nothing was measured"
-            raise self.fault(reason, int(row))
-        for row in np.flatnonzero(np.abs(values) > _LARGEST):
-            reason = f"{values[row]:g} in column '{header}' is too large to compute with"
-            raise self.fault(reason, int(row))
+        hint = "" if name == TIME else "; put nan where nothing was measured"
+        for wrong, reason in (
+            (np.isinf(values), f"'{{}}' in column '{header}' is not a finite number{hint}"),
+            (
+                np.abs(values) > _LARGEST,
+                f"{{:g}} in column '{header}' is too large to compute with",
+            ),
+        ):
+            for row in np.flatnonzero(wrong):
+                raise self.fault(reason.format(values[row]), int(row))
         try:
             return values * factor_to_si(name, given, unit)
         except InvalidParameter as fault:
             raise self.fault(str(fault)) from None
 
     def fault(self, reason: str, row: int | None = None) -> DataError:
-        if row is None:
-            return DataError(self.source, reason)
-        if self.lines is None:
-            return DataError(self.source, f"row {row}: {reason}")
-        return DataError(self.source, reason, self.lines[row])
+        if row is None or self.lines is not None:
+            line = None if row is None or self.lines is None else self.lines[row]
+            return DataError(self.source, reason, line)
+        return DataError(self.source, f"row {row}: {reason}")
 
 
 def read_experiment(
@@ -144,8 +133,7 @@ def read_experiment(
     """
     given = experiment.data
     if isinstance(given, str | PathLike):
-        table = _read_csv(Path(given))
-        name = experiment.name or Path(given).stem
+        name, table = experiment.name or Path(given).stem, _read_csv(Path(given))
     else:
         name = experiment.name or f"experiment {number}"
         table = _take_columns(given, name)
@@ -167,7 +155,7 @@ def read_experiment(
             columns.append(_column(table, known[label], (sigma or {}).get(label)))
     if not columns:
         raise table.fault(f"has no column of data beside the time, as in '{_EXAMPLE}'")
-    return Measured(name, t, tuple(columns), _gaps(name, t))
+    return Measured(name, t, tuple(columns))
 
 
 def _times(table: _Table, duration: float) -> Array:
@@ -178,17 +166,17 @@ def _times(table: _Table, duration: float) -> Array:
     t = table.values(TIME, "s")
     if not len(t):
         raise table.fault("has no rows of data")
-    steps, must = np.diff(t, prepend=-np.inf), "times must increase"
+    steps, must = (
+        np.diff(t, prepend=-np.inf),
+        "that of the row above, {:.9g} s: times must increase",
+    )
+    end = f"the end of the run, {duration:.9g} s: cut the data, or set run.duration"
     for wrong, reason in (
         (np.isnan(t), "the time is missing"),
-        (steps == 0.0, "time {:.9g} s is the same as that of the row above, {:.9g} s: " + must),
-        (steps < 0.0, "time {:.9g} s is before that of the row above, {:.9g} s: " + must),
+        (steps == 0.0, f"time {{:.9g}} s is the same as {must}"),
+        (steps < 0.0, f"time {{:.9g}} s is before {must}"),
         (t < 0.0, "time {:.9g} s is before the start of the run, which is at 0"),
-        (
-            t > duration * (1 + _ROUNDED),
-            f"time {{:.9g}} s is after the end of the run, {duration:.9g} s: cut the data, or set "
-            "run.duration",
-        ),
+        (t > duration * (1 + _ROUNDED), f"time {{:.9g}} s is after {end}"),
     ):
         for row in np.flatnonzero(wrong):
             raise table.fault(reason.format(t[row], t[row - 1]), int(row))
@@ -203,11 +191,10 @@ def _column(table: _Table, quantity: Quantity, sigma: float | None) -> Column:
         raise table.fault(f"column '{name}' has no value")
     given = None if sigma is None else np.full(len(rows), sigma)
     if name + SIGMA in table.columns:
-        deviations = table.values(name + SIGMA, quantity.unit)
-        for row in rows[~(deviations[rows] > 0.0)]:
+        given = table.values(name + SIGMA, quantity.unit)[rows]
+        for row in rows[~(given > 0.0)]:
             reason = f"'{name}{SIGMA}' must be positive wherever '{name}' has a value"
             raise table.fault(reason, int(row))
-        given = deviations[rows]
     if given is not None and not (given.min() >= 1 / _LARGEST and given.max() <= _LARGEST):
         raise table.fault(
             f"'{name}': standard deviations must be from {1 / _LARGEST:g} to {_LARGEST:g} "
@@ -216,42 +203,22 @@ def _column(table: _Table, quantity: Quantity, sigma: float | None) -> Column:
     return Column(quantity, rows, values[rows], given)
 
 
-def _gaps(name: str, t: Array) -> tuple[str, ...]:
-    """Say of times that seem to be missing: a step that is a multiple of an otherwise even one."""
-    steps = np.diff(t)
-    if len(steps) < 3:
-        return ()
-    usual = float(np.median(steps))
-    wide = np.flatnonzero(steps > 1.5 * usual)
-    even = np.abs(steps - usual).max(where=steps <= 1.5 * usual, initial=0.0) < 0.25 * usual
-    if not even or not len(wide):
-        return ()
-    k = int(wide[np.argmax(steps[wide])])
-    missing = int(sum(np.rint(steps[wide] / usual) - 1))
-    return (
-        f"{name}: the time stamps have {len(wide)} gap{'s' * (len(wide) > 1)}, in which about "
-        f"{missing} row{'s' * (missing > 1)} of {usual:.4g} s are missing; the longest is from "
-        f"{t[k]:.6g} s to {t[k + 1]:.6g} s",
-    )
-
-
 def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
     try:
-        pairs = dict(given)
         # What is masked was not measured.
         columns = {
             str(key): np.ma.filled(np.ma.array(value, dtype=np.float64), math.nan)
-            for key, value in pairs.items()
+            for key, value in dict(given).items()
         }
     except (TypeError, ValueError) as fault:
         raise DataError(
             name, f"must be a csv file, or a mapping from headers to columns of numbers ({fault})"
         ) from None
-    lengths = {key: one.shape for key, one in columns.items()}
-    if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
-        shown = ", ".join(f"'{key}' {shape}" for key, shape in lengths.items())
+    shapes = {one.shape for one in columns.values()}
+    if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
+        shown = ", ".join(f"'{key}' {one.shape}" for key, one in columns.items())
         raise DataError(name, f"columns must be of one length, of shape (n,): {shown}")
-    return _Table.of(name, columns.items())
+    return _Table(name, list(columns.items()))
 
 
 def _read_csv(path: Path) -> _Table:
@@ -262,43 +229,38 @@ def _read_csv(path: Path) -> _Table:
         raise DataError(source, f"cannot be read: {fault.strerror}") from None
     except UnicodeDecodeError:
         raise DataError(source, "is not a text file in UTF-8") from None
-    lines = [
-        (number, line)
+    lines = {
+        number: line
         for number, line in enumerate(text.splitlines(), 1)
         if line.strip(", \t") and not line.lstrip().startswith("#")
-    ]
+    }
     if not lines:
         raise DataError(source, f"is empty: it needs a header, as '{_EXAMPLE}', and rows")
     try:
-        rows = [next(csv.reader([line], strict=True)) for _, line in lines]
+        rows = [next(csv.reader([line], strict=True)) for line in lines.values()]
     except csv.Error as fault:
         raise DataError(source, f"is not a csv file: {fault}") from None
-    numbers = [number for number, _ in lines]
+    first, *numbers = lines
     head = [one.strip() for one in rows[0]]
     if len(head) == 1 and re.search(r"[;\t]", head[0]):
         reason = "columns must be separated by commas, and decimals written with a point"
-        raise DataError(source, reason, numbers[0])
+        raise DataError(source, reason, first)
     if all(_number(one) is not None for one in head):
-        reason = f"the first line must be a header, as '{_EXAMPLE}'"
-        raise DataError(source, reason, numbers[0])
-    values: list[Array] = []
-    for number, row in zip(numbers[1:], rows[1:], strict=True):
+        raise DataError(source, f"the first line must be a header, as '{_EXAMPLE}'", first)
+    values = []
+    for number, row in zip(numbers, rows[1:], strict=True):
         if len(row) != len(head):
             reason = f"has {len(row)} values, the header has {len(head)} columns"
             raise DataError(source, reason, number)
-        values.append(np.full(len(head), math.nan))
-        for i, cell in enumerate(row):
-            if not cell.strip():
-                continue
-            value = _number(cell)
+        values.append([_number(cell) if cell.strip() else math.nan for cell in row])
+        for cell, title, value in zip(row, head, values[-1], strict=True):
             if value is None:
-                reason = f"'{cell.strip()}' in column '{head[i]}' is not a finite number"
-                if head[i].partition(" ")[0] != TIME:
+                reason = f"'{cell.strip()}' in column '{title}' is not a finite number"
+                if title.partition(" ")[0] != TIME:
                     reason += "; leave the cell empty where nothing was measured"
                 raise DataError(source, reason, number)
-            values[-1][i] = value
-    columns = np.reshape(values, (-1, len(head))).T
-    return _Table.of(source, zip(head, columns, strict=True), numbers[1:])
+    columns = np.array(values, dtype=float).reshape(-1, len(head)).T
+    return _Table(source, list(zip(head, columns, strict=True)), numbers)
 
 
 def _number(text: str) -> float | None:

@@ -18,8 +18,7 @@ from sphshell_pin.scenario.format.sliders import check_knobs
 from sphshell_pin.study.fit.data import Experiment, Source, read_experiment
 from sphshell_pin.study.fit.parameters import Free, Wanted, free_parameters
 from sphshell_pin.study.fit.report import Fit
-from sphshell_pin.study.fit.runs import Trial
-from sphshell_pin.study.fit.search import Progress, Search
+from sphshell_pin.study.fit.search import Progress, Search, Trial
 from sphshell_pin.study.quantities import quantities_of
 
 Data = Source | Experiment | Sequence[Source | Experiment]
@@ -119,7 +118,7 @@ def _trials(
         if name not in used:
             must = f"names no column; there are: {', '.join(sorted(used))}"
             raise InvalidParameter("sigma", name, must, given=f"of '{name}'")
-    size = sum(trial.size for trial in trials)
+    size = sum(len(column.values) for trial in trials for column in trial.data.columns)
     if size <= len(free):
         raise InvalidParameter(
             "data",

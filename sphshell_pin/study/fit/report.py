@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import stats
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.atomic import write_whole
@@ -21,6 +22,12 @@ from sphshell_pin.study.fit.writing import scenario_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+# Share of cases in which a test says of noise that it is none.
+FALSE_ALARM = 0.01
+# A pair of which one explains so much of the variance of the other is told.
+SHARED = 0.9
 
 
 @dataclass(frozen=True)
@@ -41,8 +48,8 @@ class Fitted:
     at_bound: bool = False
 
 
-@dataclass(frozen=True, repr=False)
-class Series(Summarized):
+@dataclass(frozen=True)
+class Series:
     """One measured column of one experiment, and what the fitted scenario says: all (m,).
 
     `sigma` are the standard deviations that weighted it; `given` whether the data came with them.
@@ -56,14 +63,6 @@ class Series(Summarized):
     fitted: Array
     sigma: Array
     given: bool
-
-    def _facts(self) -> list[Fact]:
-        return [
-            Fact("experiment", self.experiment),
-            Fact("column", self.name),
-            Fact("values", len(self.t)),
-            Fact("residuals, root of the mean square", self.rms, self.unit),
-        ]
 
     @property
     def residuals(self) -> Array:
@@ -196,6 +195,75 @@ class Fit(Summarized):
             for one in self.parameters
         ]
         return "\n".join([*lines, *self.remarks])
+
+
+def is_noise(one: Series, tests: int = 1) -> bool:
+    """Whether the residuals of a column are independent; `tests` columns are tested.
+
+    Of independent normal residuals the ratio of von Neumann, sum (r_i - r_(i-1))^2 / sum r_i^2 has
+    the mean 2 and the variance 4 (n - 2) / (n^2 - 1) (Ann. Math. Statist. 12 (1941) 367); it is
+    nearly normal. Residuals that alternate pass; a false alarm in any column has the probability
+    FALSE_ALARM at most.
+    """
+    residuals, n = one.residuals / one.sigma, len(one.t)
+    power = float(residuals @ residuals)
+    if n < 4 or not power > 0.0:
+        return True
+    ratio = float(np.sum(np.diff(residuals) ** 2)) / power
+    limit = float(stats.norm.isf(0.5 * FALSE_ALARM / tests))
+    return 2.0 - ratio <= limit * math.sqrt(4.0 * (n - 2) / (n**2 - 1.0))
+
+
+def remarks_on(
+    fitted: Sequence[Fitted],
+    correlation: Array,
+    together: Sequence[Sequence[int]],
+    series: Sequence[Series],
+    dof: int,
+    tolerance: float,
+) -> list[str]:
+    """Return what is to be said of a fit whose runs have the relative error `tolerance`.
+
+    `together` are parameters that the data determine only together.
+    """
+    out = []
+    groups = [members for members in together if len(members) > 1]
+    for members in groups:
+        names = " and ".join(fitted[k].key for k in members)
+        out.append(f"the data do not determine {names} separately")
+    for k, one in enumerate(fitted):
+        if one.at_bound:
+            out.append(
+                f"{one.key} stands at its bound, {one.value:.6g} {one.unit}".rstrip()
+                + ": it has no interval, and those of others hold for it so"
+            )
+        elif not one.determined and not any(k in members for members in groups):
+            why = "what was measured feels it no more than the error of the runs"
+            if math.isfinite(one.low) or math.isfinite(one.high):
+                why = f"its interval, {interval_text(one)} {one.unit}".rstrip()
+                why += ", leaves its order of magnitude open"
+            out.append(f"the data do not determine {one.key}: {why}")
+        for i in range(k):
+            if correlation[k, i] ** 2 > SHARED:
+                pair = f"{fitted[i].key} and {one.key}"
+                out.append(f"{pair} are correlated, {correlation[k, i]:+.3f}")
+    # Where less is left, it is the error of the runs.
+    shown = [one for one in series if one.rms > 10.0 * tolerance * np.abs(one.measured).max()]
+    out += [
+        f"the residuals of {one.name} of {one.experiment} are not noise: the scenario leaves "
+        "something out, or the data were filtered, and the intervals are too narrow"
+        for one in shown
+        if not is_noise(one, len(series))
+    ]
+    if all(one.given for one in series):
+        squares = sum(float(np.sum((one.residuals / one.sigma) ** 2)) for one in series)
+        low, high = stats.chi2.ppf([0.5 * FALSE_ALARM, 1 - 0.5 * FALSE_ALARM], dof)
+        if not low <= squares <= high:
+            out.append(
+                f"the residuals are {math.sqrt(squares / dof):.3g} times the standard deviations "
+                "that were given: these are wrong, or the scenario leaves something out"
+            )
+    return out
 
 
 def interval_text(one: Fitted) -> str:

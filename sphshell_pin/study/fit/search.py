@@ -1,235 +1,218 @@
 """The search for the values of parameters at which runs come nearest to the data."""
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from scipy import optimize, stats
 
-from sphshell_pin.base.arrays import Array, Mask
+import sphshell_pin as sp
+from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.dynamics.sensing.sensors import Sensor
+from sphshell_pin.errors import (
+    DataError,
+    Interrupted,
+    SetupWarning,
+    SphshellError,
+    UnitWarning,
+    WeakLawWarning,
+)
+from sphshell_pin.scenario.format.build import Built, rebuild
+from sphshell_pin.study.fit.data import Measured
 from sphshell_pin.study.fit.parameters import Free
-from sphshell_pin.study.fit.remarks import remarks_on
-from sphshell_pin.study.fit.report import Fit, Fitted, Series
-from sphshell_pin.study.fit.runs import Runs, Trial, central_step, forward_step
-from sphshell_pin.study.fit.statistics import Spread, serial_of, spread_of, student_factor
+from sphshell_pin.study.fit.report import Fit, Fitted, Series, is_noise, remarks_on
+from sphshell_pin.study.quantities import row_step
 
 Progress = Callable[[int, float], object]
 
+# Tolerance for integrators with a fixed step: differences see rounding and the kinks at touches.
+_FIXED_STEP_TOLERANCE, _LEAST_TOLERANCE = 1e-9, 1e-12
 # Weights that are estimated change the values, which change the weights.
-_MOST_ROUNDS = 6
-_SAME_SIGMA = 0.02
-# Derivatives: an error that no longer matters, and how often its step is halved to come to it.
+_MOST_ROUNDS, _SAME_SIGMA = 6, 0.02
+# Derivatives: an error that no longer matters, and how often a step is halved to come to it.
 _SMALL_ERROR, _MOST_HALVINGS = 0.01, 8
 # Parts of the experiments' time that are fitted one after the other where all at once fail.
 _STAGES = (0.125, 0.25, 0.5)
-# A value feels the parameters if its slope is so large a part of the largest.
+# A value feels the parameters if its derivative is so large a part of the largest.
 _FELT = 1e-3
 # How far the first step may go in x.
 _FIRST_STEP = 0.5
 
 
-class _Part(NamedTuple):
-    """One column of one experiment, of which nothing is fitted yet, and where it is among all."""
+@dataclass(frozen=True)
+class Trial:
+    """An experiment ready to run: its scenario as `built`, and its data."""
 
-    trial: Trial
-    at: slice
-    data: Series
+    built: Built
+    data: Measured
 
 
 class Search:
-    """The search for the values at which the weighted residuals are least."""
+    """The least squares of all experiments: one function of x (p,) to weighted residuals (N,)."""
 
     def __init__(
-        self, trials: Sequence[Trial], free: tuple[Free, ...], progress: Progress | None
+        self, trials: Sequence[Trial], free: Sequence[Free], progress: Progress | None
     ) -> None:
-        self.free = free
-        self.runs = Runs(trials, free, self._tell)
-        self.x = np.array([one.to_x(one.start) for one in free])
-        self.low = np.array([one.to_x(one.low) for one in free])
-        self.high = np.array([one.to_x(one.high) for one in free])
+        self.trials, self.free, self.count = trials, tuple(free), 0
+        self.x, self.low, self.high = (
+            np.array([one.to_x(getattr(one, end)) for one in free])
+            for end in ("start", "low", "high")
+        )
         self.converged = False
         self._progress = progress
+        self._failure: SphshellError | None = None
         self._misfit = math.nan
-        self.parts: list[_Part] = []
-        begin = 0
-        for trial in trials:
-            for column in trial.data.columns:
-                end = begin + len(column.values)
-                unknown, given = np.full(len(column.values), np.nan), column.sigma is not None
-                data = Series(
-                    trial.data.name,
-                    column.name,
-                    column.quantity.unit,
-                    trial.data.t[column.rows],
-                    column.values,
-                    fitted=unknown,
-                    sigma=unknown if column.sigma is None else column.sigma,
-                    given=given,
-                )
-                self.parts.append(_Part(trial, slice(begin, end), data))
-                begin = end
-        self.measured = np.concatenate([part.data.measured for part in self.parts])
-        means = [np.full_like(part.data.measured, part.data.measured.mean()) for part in self.parts]
-        self.sigma = self._pooled(self.measured - np.concatenate(means), 1.0)
+        self._known: dict[bytes, Array | None] = {}
+        columns = [(trial, column) for trial in trials for column in trial.data.columns]
+        ends = np.cumsum([len(column.values) for _, column in columns]).tolist()
+        self._parts = [slice(*pair) for pair in zip([0, *ends], ends, strict=False)]
+        self._series = [
+            Series(
+                trial.data.name,
+                column.name,
+                column.quantity.unit,
+                trial.data.t[column.rows],
+                column.values,
+                np.full(len(column.values), np.nan),
+                np.ones(len(column.values)) if column.sigma is None else column.sigma,
+                column.sigma is not None,
+            )
+            for trial, column in columns
+        ]
+        self.measured = np.concatenate([one.measured for one in self._series])
+        integrators = [trial.built.simulation.integrator for trial in trials]
+        found = [getattr(one, "rtol", _FIXED_STEP_TOLERANCE) for one in integrators]
+        self.tolerance = float(max(*found, _LEAST_TOLERANCE))
+        middles = [np.full_like(one.measured, one.measured.mean()) for one in self._series]
+        self.sigma = self._pooled(np.concatenate(middles))
 
     def run(self) -> None:
         """Search; weights that are not given are estimated from the residuals, and it goes on."""
-        if self.runs.predict(self.x) is None:
-            assert self.runs.failure is not None
-            self.runs.failure.add_note("this is the run at the start values")
-            raise self.runs.failure
+        if self._predict(self.x) is None:
+            assert self._failure is not None
+            self._failure.add_note("this is the run at the start values")
+            raise self._failure
         start, sigma = self.x, self.sigma
         self._settle()
-        if self._systematic():
-            # Where the run's touches miss the data's, the residuals may have another least place.
-            best = self.x, self.sigma, self.converged, self._scatter()
-            self.x, self.sigma = start, sigma
-            for part in _STAGES:
-                self._minimize(self._until(part))
-            self._settle()
-            if not self._scatter() < best[-1]:
-                self.x, self.sigma, self.converged, _ = best
-
-    def _settle(self) -> None:
-        """Go to the least residuals from where the search is, with weights that fit them."""
-        names = {part.data.name for part in self.parts if not part.data.given}
-        some = any(part.data.given for part in self.parts)
-        # The weight of all data together changes nothing.
-        rounds = _MOST_ROUNDS if len(names) > 1 or (names and some) else 1
-        for _ in range(rounds):
-            self._minimize()
-            before, self.sigma = self.sigma, self._estimated_sigma()
-            if np.abs(self.sigma / before - 1.0).max() < _SAME_SIGMA:
-                break
+        shown = [one for one in self.series() if one.rms > 0.0]
+        if all(is_noise(one, len(shown)) for one in shown):
+            return
+        # Where the run's touches miss the data's, the residuals may have another least place.
+        best = self.x, self.sigma, self.converged
+        scatter, self.x, self.sigma = self._scatter(), start, sigma
+        for share in _STAGES:
+            self._minimize(self._until(share))
+        self._settle()
+        if not self._scatter() < scatter:
+            self.x, self.sigma, self.converged = best
 
     def report(self, scenario: str, level: float) -> Fit:
         """Return the fit at the values found."""
-        jacobian, error, still = self._final_derivatives()
+        jacobian, error = self._final_derivatives()
+        # What cannot be felt stays where it was.
+        felt = np.linalg.norm(jacobian, axis=0) > 2.0 * np.linalg.norm(error, axis=0)
+        back = np.where(felt, self.x, [one.to_x(one.start) for one in self.free])
+        before, after = self._residuals(self.x), self._residuals(back)
+        if after @ after <= (1.0 + 1e-6) * (before @ before):
+            self.x = back
         dof = len(self.measured) - len(self.free)
-        factor = student_factor(dof, level)
-        spread = spread_of(jacobian, error)
-        middle, held = self._beyond(jacobian, factor * spread.deviations)
+        factor = float(stats.t.ppf(0.5 + 0.5 * level, dof))
+        covariance, blind = covariance_of(jacobian, error)
+        # At a bound the residuals would be least beyond it. Where the interval about that place
+        # does not reach back, the bound speaks against the data: the value is held there.
+        at_bound = felt & ((self.x <= self.low) | (self.x >= self.high))
+        beyond = at_bound * np.linalg.lstsq(jacobian, self._residuals(self.x), rcond=None)[0]
+        held = at_bound & (np.abs(beyond) > factor * np.sqrt(np.diag(covariance)))
+        free = np.flatnonzero(~held)
         if held.any():
-            spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held]), held)
-        self._leave_unfelt(spread, still)
-        halves = factor * spread.deviations
-        columns = self.free, self.x.tolist(), middle - halves, middle + halves, held.tolist()
-        fitted = tuple(
-            _fitted(one, x, (float(low), float(high)), held=bound)
-            for one, x, low, high, bound in zip(*columns, strict=True)
-        )
-        series = self._series()
-        remarks = remarks_on(
-            fitted,
-            self.free,
-            spread,
-            series,
-            dof,
-            self.runs.tolerance,
-            still=still,
-            converged=self.converged,
-        )
-        notes = [note for trial in self.runs.trials for note in trial.data.notes]
+            covariance[np.ix_(free, free)], blind = covariance_of(jacobian[:, free], error[:, free])
+            covariance[held, held] = np.nan
+        deviations = np.sqrt(np.diag(covariance))
+        columns = self.free, self.x.tolist(), beyond.tolist(), (factor * deviations).tolist()
+        fitted = tuple(_fitted(*one) for one in zip(*columns, strict=True))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            correlation = covariance / np.outer(deviations, deviations)
+        lost = ~np.isfinite(deviations)
+        correlation[lost], correlation[:, lost] = np.nan, np.nan
+        np.fill_diagonal(correlation, 1.0)
+        series = self.series()
+        together = [free[members].tolist() for members in blind]
+        remarks = remarks_on(fitted, correlation, together, series, dof, self.tolerance)
+        if not self.converged:
+            remarks.insert(0, "the search ended before the residuals were least: start nearer")
         return Fit(
             scenario,
             fitted,
-            spread.correlation,
+            correlation,
             series,
-            (*notes, *remarks),
+            tuple(remarks),
             dof,
             level,
-            self.runs.count,
+            self.count,
             self.converged,
         )
 
-    def _systematic(self) -> bool:
-        """Whether any column's residuals are not noise."""
-        series = [one for one in self._series() if one.rms > 0.0]
-        tests = [serial_of(one.residuals / one.sigma, len(series)) for one in series]
-        return any(not one.independent and one.correlation > 0.0 for one in tests)
-
-    def _scatter(self) -> float:
-        """Return how likely the residuals are, whatever sigma weights them: less is better."""
-        values = self.runs.predict(self.x)
+    def series(self) -> tuple[Series, ...]:
+        """Return all measured columns beside what the scenario says at x."""
+        values = self._predict(self.x)
         assert values is not None
-        sigma = self._estimated_sigma()
-        weighted = (self.measured - values) / sigma
-        return float(np.sum(np.log(sigma)) + 0.5 * weighted @ weighted)
-
-    def _leave_unfelt(self, spread: Spread, still: Mask) -> None:
-        """Put parameters that change nothing that was measured back to where they started."""
-        unfelt = still & (np.abs(spread.blind) == 1.0).any(axis=0)
-        start = np.array([one.to_x(one.start) for one in self.free])
-        x = np.where(unfelt, start, self.x)
-        if unfelt.any() and self.runs.predict(x) is not None:
-            self.x = x
-
-    def _beyond(self, jacobian: Array, half: Array) -> tuple[Array, Mask]:
-        """Return the middles (p,) of the intervals, and which parameters the bounds hold.
-
-        Of a value at a bound the middle is where the residuals would be least without it. Where an
-        interval of `half` width about it does not reach the bound, the bound speaks against the
-        data: the value is held there.
-        """
-        at_bound = (self.x <= self.low) | (self.x >= self.high)
-        if not at_bound.any():
-            return self.x, at_bound
-        step = np.linalg.lstsq(jacobian, self._residuals(self.x), rcond=None)[0]
-        middle = np.where(at_bound, self.x + step, self.x)
-        held = at_bound & ((middle + half < self.low) | (middle - half > self.high))
-        return np.where(held, self.x, middle), held
-
-    def _until(self, share: float) -> Array:
-        """Return 1 for the first values that feel the parameters, a `share` of them, and 0 (N,).
-
-        Values before these are taken, too: the parameters do nothing to them.
-        """
-        derivatives = self._derivatives(self.x)
-        felt = np.linalg.norm(derivatives, axis=1)
-        use = np.zeros(len(felt))
-        for trial in self.runs.trials:
-            parts = [part for part in self.parts if part.trial is trial]
-            feels = [felt[part.at] > _FELT * felt.max() for part in parts]
-            times = np.concatenate([one.data.t[f] for one, f in zip(parts, feels, strict=True)])
-            if len(times):
-                last = np.quantile(times, share)
-                for part in parts:
-                    use[part.at] = part.data.t <= last
-        return use
-
-    def _minimize(self, use: Array | float = 1.0) -> None:
-        """Make the residuals least, each times `use`."""
-        from scipy import optimize
-
-        tolerance = self.runs.tolerance
-        # A value at its bound would hold the search there.
-        inner = np.clip(self.x, self.low + _inset(self.low), self.high - _inset(self.high))
-        start = np.where(self.low < self.high, inner, self.x)
-        # From 0, TRF's first step has the length of x_scale: half of the value.
-        found = optimize.least_squares(
-            lambda x: use * self._residuals(start + x),
-            np.zeros(len(start)),
-            jac=lambda x: -self._derivatives(start + x, use),
-            bounds=(self.low - start, self.high - start),
-            method="trf",
-            x_scale=_FIRST_STEP,
-            # Differences smaller than the error of a run say nothing.
-            ftol=max(1e-8, tolerance),
-            xtol=max(1e-8, tolerance),
-            gtol=1e-12,
-            max_nfev=100,
+        return tuple(
+            replace(one, fitted=values[part], sigma=self.sigma[part])
+            for one, part in zip(self._series, self._parts, strict=True)
         )
-        inside = start + np.asarray(found.x)
-        # TRF stays inside: it says which bounds it was driven to.
-        mask = np.asarray(found.active_mask)
-        self.x = np.where(mask < 0, self.low, np.where(mask > 0, self.high, inside))
-        if mask.any() and self.runs.predict(self.x) is None:
-            self.x = inside
-        self.converged = bool(found.status > 0)
+
+    def _predict(self, x: Array) -> Array | None:
+        """Return the predicted values (N,) at x, experiment by experiment; None where one fails."""
+        key = x.tobytes()
+        if key not in self._known:
+            try:
+                self._known[key] = np.concatenate([self._run(trial, x) for trial in self.trials])
+            except Interrupted:
+                raise
+            except SphshellError as failure:
+                self._failure = failure
+                self._known[key] = None
+        return self._known[key]
+
+    def _run(self, trial: Trial, x: Array) -> Array:
+        texts = {
+            key: one.text(value)
+            for one, value in zip(self.free, x.tolist(), strict=True)
+            for key in one.keys
+        }
+        t = trial.data.t
+        with warnings.catch_warnings():
+            for kind in (WeakLawWarning, SetupWarning, UnitWarning):  # said of the fitted values
+                warnings.simplefilter("ignore", kind)
+            built = rebuild(trial.built, texts, anew=True)
+            sensors = [_quiet(sensor) for sensor in built.simulation.sensors]
+            result = sp.Simulation(built.scene, built.simulation.integrator, sensors).run(
+                built.q0,
+                built.v0,
+                float(t[-1]),
+                built.controller,
+                built.scenario.run.control_dt,
+                record_dt=row_step(t) or None,
+            )
+        self.count += 1
+        if self._progress is not None:
+            self._progress(self.count, self._misfit)
+        parts = []
+        for column in trial.data.columns:
+            values = column.quantity.at(result, t[column.rows])
+            for row in np.flatnonzero(np.isnan(values)):
+                raise DataError(
+                    trial.data.name,
+                    f"no reading of '{column.name}' has arrived at {t[column.rows[row]]:.6g} s: "
+                    "the sensor's first one comes later",
+                )
+            parts.append(values)
+        return np.concatenate(parts)
 
     def _residuals(self, x: Array) -> Array:
-        values = self.runs.predict(x)
+        values = self._predict(x)
         if values is None:
             # The search then takes a shorter step.
             return np.full(len(self.measured), np.nan)
@@ -237,116 +220,182 @@ class Search:
         self._misfit = float(np.sqrt(np.mean(residuals**2)))
         return np.asarray(residuals)
 
-    def _derivatives(self, x: Array, use: Array | float = 1.0) -> Array:
-        """Return the derivatives (N, p) of the weighted predicted values, each times `use`."""
-        derivatives = self.runs.derivatives(
-            x, self.low, self.high, forward_step(self.runs.tolerance)
-        )
-        return np.asarray(derivatives * (use / self.sigma)[:, None])
+    def _settle(self) -> None:
+        """Go to the least residuals from where the search is, with weights that fit them."""
+        for _ in range(_MOST_ROUNDS):
+            self._minimize()
+            before, self.sigma = self.sigma, self._pooled(self._predict(self.x))
+            ratio = self.sigma / before
+            # The weight of all data together changes nothing.
+            if np.ptp(ratio) < _SAME_SIGMA:
+                break
 
-    def _final_derivatives(self) -> tuple[Array, Array, Mask]:
-        """Return the weighted derivatives (N, p) at the solution, their error, which x do nothing.
+    def _minimize(self, use: Array | float = 1.0) -> None:
+        """Make the residuals least, each times `use`."""
+        start, step = self.x, 2.0 * math.sqrt(self.tolerance)
+        # Differences smaller than the error of a run say nothing.
+        least = max(1e-8, self.tolerance)
+        # From 0, TRF's first step has the length of x_scale: half of the value.
+        found = optimize.least_squares(
+            lambda x: use * self._residuals(start + x),
+            np.zeros(len(start)),
+            jac=lambda x: -self._derivatives(start + x, step) * np.reshape(use, (-1, 1)),
+            bounds=(self.low - start, self.high - start),
+            x_scale=_FIRST_STEP,
+            ftol=least,
+            xtol=least,
+            gtol=1e-12,
+            max_nfev=100,
+        )
+        inside = start + np.asarray(found.x)
+        # TRF stays inside: it says which bounds it was driven to.
+        mask = np.asarray(found.active_mask)
+        self.x = np.where(mask < 0, self.low, np.where(mask > 0, self.high, inside))
+        if self._predict(self.x) is None:
+            self.x = inside
+        self.converged = bool(found.status > 0)
+
+    def _derivatives(self, x: Array, step: float) -> Array:
+        """Return the derivatives (N, p) of the weighted predicted values: one-sided differences."""
+        return np.column_stack([self._slope(x, k, step, sides=1) for k in range(len(x))])
+
+    def _slope(self, x: Array, k: int, step: float, sides: int = 2) -> Array:
+        """Return the derivatives (N,) of the weighted predicted values by x[k].
+
+        A side beyond a bound, or whose run fails, is left out; where both fail they are 0.
+        """
+        found: list[tuple[float, Array]] = []
+        for signed in (step, -step):
+            other = x.copy()
+            other[k] += signed
+            inside = len(found) < sides and self.low[k] <= other[k] <= self.high[k]
+            if inside and (values := self._predict(other)) is not None:
+                found.append((float(other[k]), values))
+        here = self._predict(x)
+        assert here is not None
+        (above, one), (below, another) = (*found, (float(x[k]), here), (float(x[k]) - step, here))[
+            :2
+        ]
+        return np.asarray((one - another) / (above - below) / self.sigma)
+
+    def _final_derivatives(self) -> tuple[Array, Array]:
+        """Return the weighted derivatives (N, p) at the solution, and their error.
 
         The error is by how much differences over one step and over twice the step differ, and a
-        column's step is halved as long as that makes it less. An error of truncation is a third of
-        it; one of rounding, of which neither difference knows the other's, is about that much. It
-        is no less than what the tolerance of a run does to a difference. An x (p,) of which no
-        column's slope is longer than twice that does nothing; of any other, an error that is as
-        long as the slope leaves open what it does.
+        column's step is halved as long as that makes it less. It is no less than what the tolerance
+        of a run does to a difference.
         """
-        derivatives, errors, still = [], [], []
-        values = self.runs.predict(self.x)
+        derivatives, errors = [], []
+        values = self._predict(self.x)
         assert values is not None
-        rounding = self.runs.tolerance * np.abs(values) / self.sigma
+        rounding = self.tolerance * np.abs(values) / self.sigma
         for k in range(len(self.x)):
-            step = central_step(self.runs.tolerance)
-            near = self._slope(k, step)
-            error = near - self._slope(k, 2.0 * step)
+            step = float(np.cbrt(3.0 * self.tolerance))
+            near = self._slope(self.x, k, step)
+            error = near - self._slope(self.x, k, 2.0 * step)
             for _ in range(_MOST_HALVINGS):
+                nearer = self._slope(self.x, k, 0.5 * step)
+                if not np.linalg.norm(nearer - near) < np.linalg.norm(error):
+                    break
+                near, error, step = nearer, nearer - near, 0.5 * step
                 if np.linalg.norm(error) <= _SMALL_ERROR * np.linalg.norm(near):
                     break
-                step *= 0.5
-                nearer = self._slope(k, step)
-                less = nearer - near
-                if not np.linalg.norm(less) < np.linalg.norm(error):
-                    break
-                near, error = nearer, less
             derivatives.append(near)
-            least = rounding / step
-            errors.append(np.maximum(np.abs(error), least))
-            # Lengths of each column: one of large values would hide what another feels.
-            lengths = [np.linalg.norm([near[one.at], least[one.at]], axis=1) for one in self.parts]
-            still.append(all(length <= 2.0 * noise for length, noise in lengths))
-        return np.column_stack(derivatives), np.column_stack(errors), np.array(still)
+            errors.append(np.maximum(np.abs(error), rounding / step))
+        return np.column_stack(derivatives), np.column_stack(errors)
 
-    def _slope(self, k: int, step: float) -> Array:
-        return self.runs.slope(self.x, k, self.low, self.high, step, central=True) / self.sigma
+    def _until(self, share: float) -> Array:
+        """Return 1 for the first values that feel the parameters, a `share` of them, else 0 (N,).
 
-    def _tell(self, count: int) -> None:
-        if self._progress is not None:
-            self._progress(count, self._misfit)
+        Values before these are taken, too: the parameters do nothing to them.
+        """
+        derivatives = self._derivatives(self.x, 2.0 * math.sqrt(self.tolerance))
+        felt = np.linalg.norm(derivatives, axis=1)
+        times = np.concatenate([one.t for one in self._series])
+        last = np.quantile(times[felt > _FELT * felt.max(initial=1e-300)], share)
+        return np.asarray(times <= last, dtype=float)
 
-    def _estimated_sigma(self) -> Array:
-        values = self.runs.predict(self.x)
+    def _scatter(self) -> float:
+        """Return how likely the residuals are, whatever sigma weights them: less is better."""
+        values = self._predict(self.x)
+        sigma = self._pooled(values)
+        weighted = (self.measured - values) / sigma
+        return float(np.sum(np.log(sigma)) + 0.5 * weighted @ weighted)
+
+    def _pooled(self, values: Array | None) -> Array:
+        """Return the given sigma, else the rms of the residuals of all columns of one name."""
         assert values is not None
         count = len(self.measured)
-        return self._pooled(self.measured - values, count / (count - len(self.free)))
-
-    def _pooled(self, deviations: Array, factor: float) -> Array:
-        """Return the given sigma, else the rms of `deviations` of all columns of one name."""
-        out = np.zeros(len(self.measured))
-        for name in {part.data.name for part in self.parts}:
-            parts = [part for part in self.parts if part.data.name == name]
-            whole = np.concatenate([deviations[part.at] for part in parts])
-            largest = max(float(np.abs(self.measured[part.at]).max()) for part in parts)
+        factor = count / (count - len(self.free))
+        names = np.repeat([one.name for one in self._series], [len(one.t) for one in self._series])
+        given = np.repeat([one.given for one in self._series], [len(one.t) for one in self._series])
+        out = np.concatenate([one.sigma for one in self._series])
+        for name in set(names[~given]):
+            same = names == name
             # Data without noise are as exact as a run.
-            least = self.runs.tolerance * largest
-            pooled = max(math.sqrt(factor * float(np.mean(whole**2))), least) or 1.0
-            for part in parts:
-                out[part.at] = part.data.sigma if part.data.given else pooled
-        return out
-
-    def _series(self) -> tuple[Series, ...]:
-        values = self.runs.predict(self.x)
-        assert values is not None
-        return tuple(
-            replace(part.data, fitted=values[part.at], sigma=self.sigma[part.at])
-            for part in self.parts
-        )
+            least = self.tolerance * float(np.abs(self.measured[same]).max())
+            rms = math.sqrt(factor * float(np.mean((self.measured - values)[same] ** 2)))
+            out[same & ~given] = max(rms, least) or 1.0
+        return np.asarray(out)
 
 
-def _inset(bound: Array) -> Array:
-    """Return a small part of finite bounds."""
-    return np.where(np.isfinite(bound), 1e-9 * np.maximum(1.0, np.abs(bound)), 0.0)
+def covariance_of(jacobian: Array, error: Array) -> tuple[Array, list[Longs]]:
+    """Return what the Jacobian (N, p) of weighted residuals determines; `error` is its own error.
+
+    That is the covariance (p, p), infinite on the diagonal of what it does not determine, and the
+    members of each direction along which it says nothing. A column that is not longer than twice
+    its error says nothing. The others are brought to one length (van der Sluis, Numer. Math. 14
+    (1969) 14). By Weyl's theorem a singular value below the norm of the error may be 0; by Wedin's
+    its vector is known to an angle of the error over the gap to the other singular values, and a
+    parameter that takes part in it by more is not determined.
+
+    Source of both: Stewart and Sun, Matrix Perturbation Theory (1990), IV.4 and V.4.
+    """
+    count = jacobian.shape[1]
+    lengths = np.linalg.norm(jacobian, axis=0)
+    felt = np.flatnonzero(lengths > 2.0 * np.linalg.norm(error, axis=0))
+    covariance = np.diag(np.full(count, math.inf))
+    if not len(felt):
+        return covariance, []
+    scale = lengths[felt]
+    rows = np.zeros((max(len(felt) - len(jacobian), 0), len(felt)))
+    _, values, vectors = np.linalg.svd(
+        np.vstack((jacobian[:, felt] / scale, rows)), full_matrices=False
+    )
+    floor = max(
+        float(np.linalg.norm(error[:, felt] / scale, 2)),
+        float(np.finfo(float).eps) * max(jacobian.shape) * float(values[0]),
+    )
+    seen = values > floor
+    inner = (vectors[seen].T / values[seen] ** 2) @ vectors[seen] / np.outer(scale, scale)
+    angle = floor / float(values[seen].min()) if seen.any() else 0.0
+    members = [np.flatnonzero(np.abs(one) > angle) for one in vectors[~seen]]
+    for some in members:
+        inner[some, some] = math.inf
+    covariance[np.ix_(felt, felt)] = inner
+    return covariance, [felt[some] for some in members]
 
 
-def _with_held(spread: Spread, held: Mask) -> Spread:
-    """Return the spread of all parameters; those `held` at a bound have none."""
-    if not held.any():
-        return spread
-    count, kept = len(held), np.flatnonzero(~held)
-    covariance = np.zeros((count, count))
-    covariance[np.ix_(kept, kept)] = spread.covariance
-    covariance[held, held] = np.nan
-    blind = np.zeros((len(spread.blind), count))
-    blind[:, kept] = spread.blind
-    return Spread(covariance, blind)
+def _quiet(sensor: Sensor) -> Sensor:
+    """Return a sensor without noise: the data have their own."""
+    noise = [one.name for one in fields(sensor) if one.name.endswith("noise")]
+    return replace(sensor, **dict.fromkeys(noise, 0.0)) if noise else sensor  # type: ignore[arg-type]
 
 
-def _fitted(one: Free, x: float, span: tuple[float, float], *, held: bool) -> Fitted:
-    """Return a parameter with its interval, `span` of x.
+def _fitted(one: Free, x: float, beyond: float, half: float) -> Fitted:
+    """Return a parameter with its interval, `half` to both sides of x + `beyond`; nan if held.
 
     It is not determined if that interval leaves its order of magnitude open: if it reaches from one
     bound to the other, or, for one that is not negative, to 0 by its slope at the value.
     """
-    value, low, high = float(one.text(x)), -math.inf, math.inf
-    if held:
+    value = float(one.text(x))
+    if math.isnan(half):
         return Fitted(one.name, one.unit, one.start, value, math.nan, math.nan, True, True)
-    if math.isinf(span[0]):
-        return Fitted(one.name, one.unit, one.start, value, low, high, False)
-    low, high = map(one.to_value, span)
+    if math.isinf(half):
+        return Fitted(one.name, one.unit, one.start, value, -math.inf, math.inf, False)
+    low, high = one.to_value(x + beyond - half), one.to_value(x + beyond + half)
     # One that must be positive is searched by its logarithm: its relative deviation is that of x.
-    from_zero = 0.5 * (span[1] - span[0]) < 1.0 if one.log else one.low != 0.0 or low > 0.0
+    from_zero = half < 1.0 if one.log else one.low != 0.0 or low > 0.0
     determined = from_zero and not (low <= one.low and high >= one.high)
     low, high = max(low, one.low), min(high, one.high)
     return Fitted(one.name, one.unit, one.start, value, low, high, determined)

@@ -1,37 +1,75 @@
-"""Cases of work and precision with a closed form: a ball on springs, bounces, a stiff plate."""
+"""Motions with a closed form: a ball on a spring, bounces, a stiff plate."""
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics import Result
+from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.study.report.models import model_of
-from sphshell_pin.study.report.motions import Case, decades, rectangle, steps
 from sphshell_pin.study.report.swing import GRAVITY, MASS, RADIUS
 
-Kind = Callable[[float], Integrator]
+DTS = (1e-3, 4e-4, 2e-4, 1e-4, 4e-5, 2e-5, 1e-5)
 
 
-def settings() -> tuple[Integrator, ...]:
-    """Return every integrator, with steps [s] or tolerances from coarse to fine."""
-    fixed: tuple[Kind, ...] = (sp.SemiImplicitEuler, sp.RungeKutta4, sp.LinearlyImplicitEuler)
-    adaptive: tuple[Kind, ...] = (sp.Adaptive, sp.Implicit)
-    dts = (1e-3, 4e-4, 2e-4, 1e-4, 4e-5, 2e-5, 1e-5)
-    return (
-        *(made for kind in fixed for made in steps(kind, *dts)),
-        *(made for kind in adaptive for made in decades(kind, *range(2, 11))),
-    )
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A run of a closed form, and steps `dts` [s] of explicit and of implicit methods.
+
+    `figures` reads dimensionless vectors (n, k) off the rows of a result, `exact` has them at times
+    (n,): the error is the largest length of a difference. Fixed steps divide `record_dt` [s].
+    """
+
+    name: str
+    title: str
+    scene: sp.Scene
+    controller: AnyController = None
+    q0: Array
+    duration: float
+    record_dt: float
+    figures: Callable[[Result], Array]
+    exact: Callable[[Array], Array]
+    dts: tuple[float, ...] = DTS
+    implicit_dts: tuple[float, ...] = DTS
+    finest: int = 10
+
+    @property
+    def integrators(self) -> list[Integrator]:
+        """Every integrator, with steps or tolerances from coarse to fine."""
+        fixed = {sp.SemiImplicitEuler: self.dts, sp.RungeKutta4: self.dts}
+        fixed[sp.LinearlyImplicitEuler] = self.implicit_dts
+        tolerances = [10.0**-digits for digits in range(2, self.finest + 1)]
+        return [
+            *(kind(dt) for kind, dts in fixed.items() for dt in dts),
+            *(kind(rtol) for kind in (sp.Adaptive, sp.Implicit) for rtol in tolerances),
+        ]
+
+    def run(self, integrator: Integrator, duration: float | None = None) -> Result:
+        """Run for `duration` [s], the case's own unless given."""
+        duration = self.duration if duration is None else duration
+        simulation = sp.Simulation(self.scene, integrator)
+        return simulation.run(self.q0, None, duration, self.controller, record_dt=self.record_dt)
+
+    def error(self, result: Result) -> float:
+        """Return the largest error at any row of a result."""
+        off = self.figures(result) - self.exact(result.t)
+        return float(np.linalg.norm(off, axis=1).max())
 
 
 def ball_on_plate(law: sp.ImpactLaw, joint: pin.JointModel) -> sp.Scene:
     """Return a ball on `joint` above the plate z = 0."""
     ball = ("ball", joint, pin.Inertia.FromSphere(MASS, RADIUS))
     scene = sp.Scene(model_of(ball, gravity=GRAVITY))
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), rectangle(0.1, 0.1), law=law)
+    square = sp.Shell(
+        0.1 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2, 3]]
+    )
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), square, law=law)
     return scene
 
 
@@ -43,15 +81,12 @@ def bob() -> Case:
     return Case(
         name="bob",
         title="Ball bobs on a spring",
-        judged="error of height / amplitude, against a cosine",
         scene=ball_on_plate(sp.ImpactLaw(stiffness, 1.0), pin.JointModelPZ()),
         q0=np.array([RADIUS - sag + amplitude]),
         duration=0.1,
         record_dt=0.004,
-        figures=lambda result: [(result.q - RADIUS + sag) / amplitude],
-        exact=lambda t: [np.cos(omega * t)[:, None]],
-        integrators=settings(),
-        quick_dt=4e-5,
+        figures=lambda result: (result.q - RADIUS + sag) / amplitude,
+        exact=lambda t: np.cos(omega * t)[:, None],
     )
 
 
@@ -83,15 +118,12 @@ def bounces() -> Case:
     return Case(
         name="bounces",
         title="Ball bounces five times",
-        judged="error of height / fall, against parabolas and sines",
         scene=ball_on_plate(sp.ImpactLaw(stiffness, 1.0), pin.JointModelPZ()),
         q0=np.array([RADIUS + FALL]),
         duration=0.74,
         record_dt=0.02,
-        figures=lambda result: [(result.q - RADIUS) / FALL],
-        exact=lambda t: [bounce(t, stiffness)[0][:, None] / FALL],
-        integrators=settings(),
-        quick_dt=4e-5,
+        figures=lambda result: (result.q - RADIUS) / FALL,
+        exact=lambda t: bounce(t, stiffness)[0][:, None] / FALL,
     )
 
 
@@ -111,29 +143,23 @@ def glide() -> Case:
     slow, fast = (-damping + root) / (2 * MASS), (-damping - root) / (2 * MASS)
     omega, deeper = math.sqrt(SPRING / MASS), 0.5 * sag  # that much deeper than at rest at first
 
-    def exact(t: Array) -> list[Array]:
+    def exact(t: Array) -> Array:
         decay = (fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (fast - slow)
-        return [np.c_[np.cos(omega * t), np.zeros_like(t), 1 + 0.5 * decay]]
+        return np.stack([np.cos(omega * t), np.zeros_like(t), 1 + 0.5 * decay], axis=1)
 
     return Case(
         name="glide",
         title="Ball glides on a stiff plate",
-        judged="error of way / reach, of depth / depth at rest",
         scene=ball_on_plate(law, pin.JointModelTranslation()),
         controller=sp.JointPD([SPRING, 0, 0], 0.0, np.zeros(3), gravity_compensation=False),
         q0=np.array([REACH, 0.0, RADIUS - sag - deeper]),
         duration=0.5,
         record_dt=0.02,
-        figures=lambda result: [
-            np.c_[result.q[:, :1] / REACH, result.q[:, 1:2], (RADIUS - result.q[:, 2:]) / sag]
+        figures=lambda result: np.c_[
+            result.q[:, :1] / REACH, result.q[:, 1:2], (RADIUS - result.q[:, 2:]) / sag
         ],
         exact=exact,
-        integrators=(
-            *steps(sp.SemiImplicitEuler, 4e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6),
-            *steps(sp.RungeKutta4, 2e-5, 1e-5, 5e-6, 2e-6),
-            *steps(sp.LinearlyImplicitEuler, 1e-2, 4e-3, 2e-3, 1e-3, 4e-4, 2e-4, 1e-4, 4e-5),
-            *decades(sp.Adaptive, 2, 3, 4, 5, 6, 7),
-            *decades(sp.Implicit, 2, 3, 4, 5, 6, 7, 8, 9),
-        ),
-        quick_dt=5e-6,
+        dts=(4e-5, 2e-5, 1e-5, 5e-6, 2e-6),
+        implicit_dts=(1e-2, 4e-3, 2e-3, 1e-3, 4e-4, 2e-4, 1e-4, 4e-5),
+        finest=7,
     )

@@ -42,8 +42,8 @@ class Spread(NamedTuple):
 class Finding:
     """One figure, with its quartiles over the rounds and its aim where there are such.
 
-    `sense` says on which side of `aim` it should be; `shown` replaces the number in text; a
-    `headline` stands at the top of the page too.
+    `sense` says on which side of `aim` it should be; a `headline` stands
+    at the top of the page too.
     """
 
     key: str
@@ -55,7 +55,6 @@ class Finding:
     aim: float | None = None
     sense: Literal["<=", ">="] = "<="
     headline: bool = False
-    shown: str | None = None
 
     @classmethod
     def of_rounds(
@@ -86,8 +85,6 @@ class Finding:
     @property
     def text(self) -> str:
         """The figure with its unit, in as many digits as show on which side of the aim it is."""
-        if self.shown is not None:
-            return self.shown
         text = with_unit(self.value, self.unit)
         if self.aim is None or self.met is not False or text != with_unit(self.aim, self.unit):
             return text
@@ -142,13 +139,12 @@ def columns(*names: str) -> tuple[Column, ...]:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of values, written as NAME.csv with all digits; a `folded` one is shown on demand."""
+    """Rows of values, written as NAME.csv with all digits."""
 
     name: str
     caption: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Value]]
-    folded: bool = False
 
     @property
     def cells(self) -> list[list[str]]:

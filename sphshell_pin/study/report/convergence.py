@@ -12,7 +12,7 @@ elements grows without limit.
 
 import math
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -25,29 +25,22 @@ from sphshell_pin.study.report.contents import (
     Picture,
     Progress,
     Section,
-    Spread,
     Table,
     about,
     columns,
     number,
 )
-from sphshell_pin.study.report.surfaces import DEPTH, RADIUS, SURFACES, Mesh, Surface
+from sphshell_pin.study.report.surfaces import DEPTH, RADIUS, SURFACES, Surface
 from sphshell_pin.study.report.timing import part, per_center, silent, take_turns
 
 PLACES = 300
 EXPONENT = 1.5
 TIMED_PLACES = 2000
 
-UNTIMED = Spread(math.nan, math.nan, math.nan)
-
 
 @dataclass(frozen=True)
 class Row:
-    """Errors of one rule on one mesh, over all places.
-
-    Of the force as a vector, divided by the exact one; of its magnitude alone; of its direction
-    [deg], where there is a force.
-    """
+    """Errors of the force as a vector, over the exact one, of one rule on one mesh."""
 
     surface: str
     rule: str
@@ -55,9 +48,7 @@ class Row:
     side: float  # mean side of the elements / radius of the sphere
     mean: float
     largest: float
-    magnitude: float
-    direction: float
-    time: Spread = UNTIMED  # of a query [s]
+    query: float = math.nan  # median time [s]
 
 
 REPORTED = ("bowl", "dome", "torus", "flat plate")
@@ -94,13 +85,15 @@ def measure(
         exact = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals, faces=False)
         for label, (method, exact_normals) in RULES.items():
             shell = exact if exact_normals else estimated
-            rows.append(row_of(name, label, mesh, relative_forces(shell, method, centers), normals))
-            contestants[str(len(rows) - 1)] = query_contestant(shell, elsewhere, RADIUS, method)
+            off = np.linalg.norm(relative_forces(shell, method, centers) - normals, axis=1)
+            size = len(mesh.triangles), mesh.mean_side / RADIUS
+            rows.append(Row(name, label, *size, float(off.mean()), float(off.max())))
+            contestants[len(rows) - 1] = query_contestant(shell, elsewhere, RADIUS, method)
         progress(0.5 * (k + 1) / len(meshes))
     if rounds == 0:
         return rows
     times = take_turns(contestants, rounds, part(progress, 0.5, 1.0))
-    return [replace(row, time=Spread.of(times[str(k)])) for k, row in enumerate(rows)]
+    return [replace(row, query=float(np.median(times[k]))) for k, row in enumerate(rows)]
 
 
 def query_contestant(
@@ -113,33 +106,14 @@ def query_contestant(
     )
 
 
-def row_of(name: str, label: str, mesh: Mesh, forces: Array, normals: Array) -> Row:
-    """Return the errors of relative forces (n, 3) whose exact values are the normals (n, 3)."""
-    errors = np.linalg.norm(forces - normals, axis=1)
-    magnitudes = np.linalg.norm(forces, axis=1)
-    some = magnitudes > 0
-    sines = np.linalg.norm(np.cross(forces, normals), axis=1)[some]
-    angles = np.arctan2(sines, np.einsum("ij,ij->i", forces, normals)[some])
-    return Row(
-        surface=name,
-        rule=label,
-        triangles=len(mesh.triangles),
-        side=mesh.mean_side / RADIUS,
-        mean=float(errors.mean()),
-        largest=float(errors.max()),
-        magnitude=float(np.abs(magnitudes - 1).mean()),
-        direction=float(np.degrees(angles).mean()),
-    )
-
-
 KEY, TITLE = "forces", "Error of the contact force"
-# Name, color, marker, line: estimated normals are exact on a sphere, and one hides the other.
 LOOKS = {
-    SMOOTH: ("smooth", drawing.BLUE, "o", "-"),
-    ESTIMATED: ("smooth, estimated", drawing.GREEN, "s", drawing.DASHED),
-    "facets": ("facets", drawing.ORANGE, "^", "-"),
-    "elements": ("elements", drawing.RED, "v", "-"),
+    SMOOTH: (drawing.BLUE, "o"),
+    ESTIMATED: (drawing.GREEN, "s"),
+    "facets": (drawing.ORANGE, "^"),
+    "elements": (drawing.RED, "v"),
 }
+"""Color and marker."""
 CURVED = ("bowl", "dome", "torus")
 AT = 0.3  # h / r at which errors are compared
 TEXT = about(__doc__)
@@ -157,7 +131,7 @@ def section(*, quick: bool, progress: Progress) -> Section:
 
 def assemble(names: tuple[str, ...], rows: list[Row]) -> Section:
     """Return the section of measured rows."""
-    tables = [orders_table(names, rows), errors_table(rows)]
+    tables = [orders_table(names, rows)]
     return Section(KEY, TITLE, TEXT, findings_of(rows), [picture(names, rows)], tables)
 
 
@@ -211,7 +185,7 @@ def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
         errors = error_at(line), error_at(line, "largest")
         cells.append(
             (name, rule, None if exact else order(line), *errors)
-            + (fine.triangles, fine.mean, fine.time.median)
+            + (fine.triangles, fine.mean, fine.query)
         )
     return Table(
         "forces_orders",
@@ -225,54 +199,21 @@ def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
     )
 
 
-def errors_table(rows: list[Row]) -> Table:
-    """Return every row that was measured."""
-    return Table(
-        "forces",
-        "All meshes: errors of the force over the force, and time of a query.",
-        columns(
-            "surface; method; triangles; side_over_radius: h/r; mean_error; largest_error: "
-            "largest; mean_magnitude_error: of the magnitude; mean_direction_error_deg: of the "
-            "direction [deg]; query_s: query [us]; query_low_s: lower quartile; query_high_s: "
-            "upper quartile"
-        ),
-        [(*astuple(row)[:-1], row.time.median, row.time.low, row.time.high) for row in rows],
-        folded=True,
-    )
-
-
 def picture(names: tuple[str, ...], rows: list[Row]) -> Picture:
-    """Draw mean errors up to the largest against the number of elements, one panel per surface."""
+    """Draw mean errors against the number of elements, one panel per surface."""
     with drawing.canvas(7.8, 5.8) as figure:
-        figure.set_layout_engine("constrained", h_pad=0.09)
         panels = figure.subplots(2, 2, sharex=True).ravel()
         for axis, name in zip(panels, names, strict=True):
-            flat = name == "flat plate"
-            drawing.logarithmic(axis, counts=True, every=(1, 3 if flat else 2))
-            axis.set_ylim(*((1e-17, 1e3) if flat else (1e-10, 1e2)))
             axis.set_title(name)
-            for rule, (_, color, marker, dashes) in LOOKS.items():
+            for rule, (color, marker) in LOOKS.items():
                 line = of(rows, name, rule)
-                mean, x = [r.mean for r in line], [r.triangles for r in line]
-                axis.plot(x, mean, color=color, marker=marker, linestyle=dashes)
-                largest = [r.largest for r in line]
-                axis.fill_between(x, mean, largest, color=color, alpha=0.15, linewidth=0)
-            if not flat:
-                drawing.guide(axis, (350, 2e-7), 2500, -1, "order 2")
-                drawing.guide(axis, (350, 2e-7), 2500, -2, "order 4")
-        for axis, name in zip(panels, names, strict=True):  # now that all have their limits
-            lasts = [(of(rows, name, rule)[-1], *look[:2]) for rule, look in LOOKS.items()]
-            ends = [(last.triangles, last.mean, label, color) for last, label, color in lasts]
-            drawing.label_ends(axis, ends)
-        figure.supxlabel("elements", fontsize=drawing.SMALL + 1)
-        figure.supylabel("error of the force / force", fontsize=drawing.SMALL + 1)
+                x, mean = [r.triangles for r in line], [r.mean for r in line]
+                axis.loglog(x, mean, color=color, marker=marker, label=rule)
+        panels[0].legend(fontsize=drawing.SMALL)
+        figure.supxlabel("elements")
+        figure.supylabel("mean error of the force / force")
         png = drawing.png_of(figure)
     best = number(error_at(of(rows, names[0], SMOOTH)))
-    return Picture(
-        "force_elements",
-        png,
-        f"Error of the force against the number of elements; smooth reaches {best} on the "
-        f"{names[0]} at h/r = {AT}.",
-        "Mean error (line) and up to the largest (band) against the number of elements, with the "
-        "slopes of orders 2 and 4 in the size of the elements.",
-    )
+    what = "Mean error of the force against the number of elements"
+    at = f"; smooth reaches {best} on the {names[0]} at h/r = {AT}."
+    return Picture("force_elements", png, what + at, f"{what}.")

@@ -14,14 +14,14 @@ from sphshell_pin.base.atomic import AtomicFolder
 from sphshell_pin.base.atomic.files import held_folder
 from sphshell_pin.base.json_text import json_text
 from sphshell_pin.base.regular_file import read_text
-from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
+from sphshell_pin.errors import ResultError, SetupWarning, SphshellError, WeakLawWarning
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report import convergence, integrators, queries, steps, timing
-from sphshell_pin.study.report.contents import Column, Progress, Section, Table, findings_table
+from sphshell_pin.study.report.contents import Progress, Section, findings_table
 from sphshell_pin.study.report.machine import OtherWork, caution_of, describe
-from sphshell_pin.study.report.page import SPEED, Heading, render
+from sphshell_pin.study.report.page import render
 
-PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
+PAGE, DATA = "report.html", "report.json"
 _OWN = (".csv", ".png")
 _STATED = ("key", "title", "error", "seconds", "notes", "unmeasured")
 Tell = Callable[[str, float], None]
@@ -45,7 +45,7 @@ class Part:
 PARTS = (
     Part(convergence.KEY, convergence.TITLE, convergence.section, (8.0, 20.0)),
     Part(queries.KEY, queries.TITLE, queries.section, (30.0, 240.0)),
-    Part(integrators.KEY, integrators.TITLE, integrators.section, (10.0, 120.0)),
+    Part(integrators.KEY, integrators.TITLE, integrators.section, (10.0, 60.0)),
     Part(steps.KEY, steps.TITLE, steps.section, (15.0, 60.0)),
 )
 
@@ -56,7 +56,6 @@ class Report:
 
     sections: list[Section]
     machine: dict[str, str]
-    heading: Heading = SPEED
     caution: str = ""
     """A sentence about a machine that was busy."""
 
@@ -73,13 +72,12 @@ def make_report(
     command: str = "",
     tell: Tell | None = None,
     parts: Sequence[Part] | None = None,
-    heading: Heading = SPEED,
 ) -> Report:
     """Measure everything, then write the page and its tables to the folder `out`.
 
     An error of one section is stated in that section. Nothing is written before all is measured, so
     that an interrupted run leaves what was there. `tell` is called with the progress. `parts` take
-    the place of all that is measured else, under their own `heading`.
+    the place of all that is measured else.
 
     Raises
     ------
@@ -90,8 +88,7 @@ def make_report(
     """
     new_figure(1.0, 1.0)  # raises now what would be raised at the end
     with held_folder(out, DATA) as place:
-        measured_now = _measure(parts or PARTS, quick, command, tell)
-        report = dataclasses.replace(measured_now, heading=heading)
+        report = _measure(parts or PARTS, quick, command, tell)
         _write(report, out, place)
     return report
 
@@ -124,8 +121,10 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
     begin = time.perf_counter()
     try:
         with warnings.catch_warnings():
-            # Steps are timed with a soft sheet, which fast robots might fall through.
-            warnings.simplefilter("ignore", WeakLawWarning)
+            # Steps are timed with a soft sheet, which fast robots might fall through; integrators
+            # are measured with steps that are too long, too.
+            for kind in (WeakLawWarning, SetupWarning):
+                warnings.simplefilter("ignore", kind)
             with timing.on_one_core() if part.pinned else contextlib.nullcontext():
                 section = part.measure(quick=quick, progress=progress)
     except KeyboardInterrupt:  # Interrupted is an Exception, too
@@ -139,11 +138,10 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
 
 def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     """Write page, tables and data; all of them take the place of an earlier report's at once."""
-    tables = [table for section in report.sections for table in section.tables]
-    files = {f"{t.name}.csv": t.csv().encode() for t in [*tables, _findings(report.sections)]}
+    files = {f"{t.name}.csv": t.csv().encode() for s in report.sections for t in s.tables}
     files |= {f"{one.name}.png": one.png for s in report.sections for one in s.pictures}
     files[DATA] = report_json(report, sorted(files)).encode()
-    files[PAGE] = render(report.sections, report.machine, report.heading, report.caution).encode()
+    files[PAGE] = render(report.sections, report.machine, report.caution).encode()
     try:
         staging = place.staging()
         for name, content in files.items():
@@ -160,22 +158,6 @@ def _files_of_old(out: Path) -> list[str]:
         return [name for name in names if Path(name).name == name and name.endswith(_OWN)]
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return []
-
-
-def _findings(sections: list[Section]) -> Table:
-    """Return all findings with all digits."""
-    keys = ("section", "key", "what", "value", "unit", "low", "high", "sense", "aim", "met", "text")
-    return Table(
-        FINDINGS,
-        "All findings.",
-        [Column(key, key) for key in keys],
-        [
-            (section.key, f.key, f.what, f.value, f.unit, f.low, f.high)
-            + ("" if f.aim is None else f.sense, f.aim, f.met, f.text)
-            for section in sections
-            for f in section.findings
-        ],
-    )
 
 
 def report_json(report: Report, files: list[str]) -> str:

@@ -1,7 +1,6 @@
 """The page: one HTML file that makes no external requests, in light and dark, and for paper."""
 
 import base64
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from string import Template
@@ -11,15 +10,7 @@ from sphshell_pin.study.report.contents import Finding, Picture, Section, Table,
 TEMPLATE = Path(__file__).with_name("page.html")
 
 
-@dataclass(frozen=True)
-class Heading:
-    """The title of a page and the text below it."""
-
-    title: str
-    text: str
-
-
-SPEED = Heading(
+TITLE, TEXT = (
     "sphshell_pin: speed against error",
     "Contact of spheres with CAD surfaces, measured on this machine in one run. Figures are "
     "medians; ratios are taken round by round, of contestants that take turns on one core, and are "
@@ -32,24 +23,16 @@ def tally_of(sections: list[Section]) -> str:
     """Return how many aims are met, in a sentence or two."""
     judged = [f.met for section in sections for f in section.findings if f.met is not None]
     failed = sum(section.error is not None for section in sections)
-    tally = f"{sum(judged)} of {len(judged)} aims are met."
-    if failed:
-        tally += f" {failed} section{'s' * (failed > 1)} could not be measured."
-    return tally
+    more = f" {failed} section{'s' * (failed > 1)} could not be measured." if failed else ""
+    return f"{sum(judged)} of {len(judged)} aims are met.{more}"
 
 
 def not_met(sections: list[Section]) -> dict[str, list[str]]:
     """Return the aims that were missed, and those that were not measured, each in a line."""
     findings = [f for section in sections for f in section.findings]
-    named = [whole_name(findings, k) for k in range(len(findings))]
-    missed = [
-        f"{name}: {f.text}, aim {f.aim_text}"
-        for f, name in zip(findings, named, strict=True)
-        if f.met is False
-    ]
-    unmeasured = [
-        f"{name}, aim {f.aim_text}" for f, name in zip(findings, named, strict=True) if f.unmeasured
-    ]
+    named = [(f, whole_name(findings, k)) for k, f in enumerate(findings)]
+    missed = [f"{name}: {f.text}, aim {f.aim_text}" for f, name in named if f.met is False]
+    unmeasured = [f"{name}, aim {f.aim_text}" for f, name in named if f.unmeasured]
     unmeasured += [f"all of: {one.title}" for one in sections if one.error is not None]
     unmeasured += [line for section in sections for line in section.unmeasured]
     return {"Aims that are missed": missed, "Not measured in this run": unmeasured}
@@ -63,9 +46,7 @@ def whole_name(findings: list[Finding], k: int) -> str:
     return what if first == k else f"{findings[first].what}; {what}"
 
 
-def render(
-    sections: list[Section], machine: dict[str, str], heading: Heading = SPEED, caution: str = ""
-) -> str:
+def render(sections: list[Section], machine: dict[str, str], caution: str = "") -> str:
     """Return the page; `caution` is what a reader should know of the machine."""
     findings = [f for section in sections for f in section.findings]
     lists = "".join(
@@ -76,8 +57,8 @@ def render(
     )
     missing = '<span class="missed"> not measured</span>'
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
-        title=escape(heading.title),
-        introduction=escape(heading.text),
+        title=escape(TITLE),
+        introduction=escape(TEXT),
         caution=f'<p class="error" role="note">{escape(caution)}</p>' if caution else "",
         tally=tally_of(sections),
         lists=lists,
@@ -130,9 +111,6 @@ def _picture(picture: Picture) -> str:
 
 def _table(table: Table) -> str:
     caption = f"{escape(table.caption)} <code>{table.name}.csv</code>"
-    if table.folded:
-        caption += f" ({len(table.rows)} rows)"
-        return f"<details><summary>{caption}</summary>{_html(table)}</details>"
     return f'<p class="caption">{caption}</p>{_html(table)}'
 
 

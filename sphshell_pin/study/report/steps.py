@@ -34,6 +34,7 @@ Times = dict[str, Array]
 DT, STEPS, RADIUS = 1e-5, 5000, 0.012
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 START = np.array([0, 0.35, 0, -2.0, 0, 2.35, 0.8])
+PRESSED, AWAY = 5e-4, -1.0  # of the sheet above the height at which it just touches [m]
 LAW = sp.ImpactLaw(1e4, 1.5, 50.0, 1e-4)
 UNDAMPED = sp.ImpactLaw(1e4, 1.5)
 FRICTION = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
@@ -137,41 +138,37 @@ def measure(rounds: int, progress: Progress = silent) -> Times:
     shell = sp.Shell(*wavy_sheet(316, 1.0))
     pd = sp.JointPD(100.0, 10.0)
 
-    def touching(
-        law: sp.ImpactLaw = LAW, friction: sp.CoulombFriction | None = FRICTION
+    def on_sheet(
+        law: sp.ImpactLaw = LAW,
+        friction: sp.CoulombFriction | None = FRICTION,
+        *rises: float,
     ) -> sp.Scene:
-        return with_sheet(panda(), shell, 5e-4, law, friction)
-
-    def plain() -> sp.Scene:
-        return touching(UNDAMPED, None)
+        scene = panda()
+        for rise in rises or (PRESSED,):
+            with_sheet(scene, shell, rise, law, friction)
+        return scene
 
     def zero(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
         return np.zeros_like(v)
 
-    second = "... and a {} second sphere"
-    return take_turns(
-        {
-            BARE: bare(panda()),
-            FREE: runner(panda()),
-            FAR: runner(with_sheet(panda(), shell, -1.0)),
-            TOUCHING: runner(touching()),
-            CONTROL_FREE: runner(panda(), pd),
-            CONTROL_TOUCHING: runner(touching(), pd),
-            "fingers not locked, no contact": runner(panda(lock=())),
-            "far sphere, no damping, no friction": runner(
-                with_sheet(panda(), shell, -1.0, UNDAMPED, None)
-            ),
-            "touching, no damping, no friction": runner(plain()),
-            "... and damping": runner(touching(friction=None)),
-            "... and friction": runner(touching(law=UNDAMPED)),
-            second.format("far"): runner(with_sheet(plain(), shell, -1.0, UNDAMPED, None)),
-            second.format("touching"): runner(with_sheet(plain(), shell, 5e-4, UNDAMPED, None)),
-            "... and the shell on a moving body": runner(with_moving_sheet(shell)),
-            "... and a Python controller": runner(plain(), zero),
-        },
-        rounds,
-        progress,
-    )
+    scenes: dict[str, tuple[sp.Scene, AnyController]] = {
+        FREE: (panda(), None),
+        FAR: (on_sheet(LAW, FRICTION, AWAY), None),
+        TOUCHING: (on_sheet(), None),
+        CONTROL_FREE: (panda(), pd),
+        CONTROL_TOUCHING: (on_sheet(), pd),
+        "fingers not locked, no contact": (panda(lock=()), None),
+        "far sphere, no damping, no friction": (on_sheet(UNDAMPED, None, AWAY), None),
+        "touching, no damping, no friction": (on_sheet(UNDAMPED, None), None),
+        "... and damping": (on_sheet(LAW, None), None),
+        "... and friction": (on_sheet(UNDAMPED), None),
+        "... and a far second sphere": (on_sheet(UNDAMPED, None, PRESSED, AWAY), None),
+        "... and a touching second sphere": (on_sheet(UNDAMPED, None, PRESSED, PRESSED), None),
+        "... and the shell on a moving body": (with_moving_sheet(shell), None),
+        "... and a Python controller": (on_sheet(UNDAMPED, None), zero),
+    }
+    runs = {name: runner(scene, controller) for name, (scene, controller) in scenes.items()}
+    return take_turns({BARE: bare(panda()), **runs}, rounds, progress)
 
 
 KEY, TITLE = "steps", "Cost of a step"

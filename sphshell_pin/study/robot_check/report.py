@@ -1,4 +1,4 @@
-"""What the checks of robots found: verdicts, and the page and the file they are written to."""
+"""What the checks of robots found: verdicts, and the file they are written to."""
 
 from __future__ import annotations
 
@@ -77,41 +77,6 @@ def as_table(reports: Sequence[RobotReport]) -> list[list[str]]:
         ]
         for one in reports
     ]
-
-
-def as_markdown(reports: Sequence[RobotReport], command: str) -> str:
-    """Return a page with the table of all robots; `command` is what writes it."""
-    passed = sum(one.verdict == PASS for one in reports)
-    rows = [
-        [name, f"`{frame}`" if frame else "", *rest] for name, frame, *rest in as_table(reports)
-    ]
-    return "\n".join(
-        [
-            "# Every robot",
-            "",
-            f"{passed} of {len(reports)} robots pass; written by `{command}`. A sphere is attached "
-            "to the frame listed, a curved shell of 800 elements is put under it at random legal "
-            "postures, and each check compares the result with computations independent of the "
-            "compiled core ([testing](testing.md)). Figures are the worst over all postures.",
-            "",
-            *_lines(
-                ["check", "what is compared", "allowed"],
-                [[key, one.compares, f"{one.tolerance:g}"] for key, one in CHECKS.items()],
-            ),
-            "",
-            *_lines(["robot", "frame", "nq/nv", *CHECKS, "verdict"], rows),
-            "",
-            "## Remarks",
-            "",
-            *([f"- {sentence}" for sentence in remarks(reports)] or ["None."]),
-            "",
-        ]
-    )
-
-
-def _lines(headings: list[str], rows: list[list[str]]) -> list[str]:
-    table = [headings, ["---"] * len(headings), *rows]
-    return [f"| {' | '.join(cells)} |" for cells in table]
 
 
 def remarks(reports: Sequence[RobotReport]) -> list[str]:
