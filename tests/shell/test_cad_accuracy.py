@@ -85,6 +85,25 @@ def test_distances_from_a_surface_of_skew_parameters_are_found_in_few_steps(tmp_
     assert surface.distances(points, beside, 1e-9) == pytest.approx(0.3, abs=1e-9)
 
 
+@pytest.mark.parametrize("make", ["roof", "bent_bar", "cone", "ring", "ball"])
+def test_places_on_splines_are_those_of_opencascade(make):
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    from sphshell_pin.shell.cad.face_surface import FaceSurface
+
+    shape = shapes.bent_bar((0.9, 0.9)) if make == "bent_bar" else getattr(shapes, make)()
+    for face in occ_faces(shapes.nurbs(shape)):
+        surface, exact = FaceSurface(face), BRepAdaptor_Surface(face)
+        shares = np.vstack([np.random.default_rng(0).uniform(0, 1, (20, 2)), [[0, 0], [1, 1]]])
+        places = surface.low + shares * (surface.high - surface.low)
+        point, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
+        for place, *found in zip(places, *surface.derivatives(places), strict=True):
+            exact.D1(*place.tolist(), point, by_u, by_v)
+            for one, known in zip(found, (point, by_u, by_v), strict=True):
+                assert one == pytest.approx(known.Coord(), rel=1e-11, abs=1e-11)
+
+
 @pytest.mark.parametrize("turns", [(0.9, 0.9, 0.9, 0.9), (0.9, -0.9, 0.9), (0.9,), (0.5, 0.7)])
 @pytest.mark.parametrize("scale", [1.0, 2.5])
 def test_long_elements_beside_nearly_tangent_joints(turns, scale, tmp_path):
@@ -147,12 +166,12 @@ def test_a_face_that_gets_no_triangles_is_meshed_more_finely(monkeypatch):
     """OpenCASCADE finds none for some faces of real files until its deflection is smaller."""
     shape = shapes.drilled_plate()
     found = tuple(occ_faces(shape))
-    lay, take, laid = tessellation._lay, tessellation.take_mesh, []
+    lay, count, laid = tessellation._lay, tessellation.count_laid, []
     monkeypatch.setattr(tessellation, "_lay", lambda *of: (laid.append(of[1]), lay(*of)))
     monkeypatch.setattr(
         tessellation,
-        "take_mesh",
-        lambda face: None if face is found[0] and laid[-1] > 1e-2 else take(face),
+        "count_laid",
+        lambda face: 0 if face is found[0] and laid[-1] > 1e-2 else count(face),
     )
     made = tessellation.tessellate(shape, found, 50.0, 5e-2, 1e-3)
     assert None not in made.meshes

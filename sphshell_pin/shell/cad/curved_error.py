@@ -156,11 +156,12 @@ class _Places:
             wanted = on_sides[tuple(places.T)]
             triangle, side = places[wanted].T
             borders[triangle, side] = _from_shape(shape[wanted], of_sides[triangle, side])
-        for curve, places, ends in self._curves.others:
-            wanted = on_sides[tuple(places.T)]
-            triangle, side = places[wanted].T
+        for curves, places, ends in self._curves.others:
+            rows = np.flatnonzero(on_sides[tuple(places.T)])
+            triangle, side = places[rows].T
             along, near = of_sides[triangle, side], SETTLED * self._tolerance
-            borders[triangle, side] = _from_curve(curve, along, ends[wanted], near)
+            chosen = [curves[k] for k in rows]
+            borders[triangle, side] = _from_curves(chosen, along, ends[rows], near)
         return Errors(self._sides.spread(sides), middles, borders)
 
     def _find_curves(self, mesh: FaceMesh, own: Longs, nodes: Longs, near: float) -> None:
@@ -205,10 +206,11 @@ class _Sides:
 
 
 def _own_sides(triangles: Ints, face: Longs) -> _Sides:
-    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-    keys = np.column_stack([ends.reshape(-1, 2), np.repeat(face, 3)])
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).astype(np.int64)
+    low, high = np.sort(ends.reshape(-1, 2), axis=1).T
+    keys = (np.repeat(face, 3) * (int(high.max(initial=0)) + 1) + low) * (high.max(initial=0) + 1)
     _, index, number, count = np.unique(
-        keys, axis=0, return_index=True, return_inverse=True, return_counts=True
+        keys + high, return_index=True, return_inverse=True, return_counts=True
     )
     number = number.reshape(-1, 3)
     first = np.zeros(number.size, np.bool_)
@@ -253,15 +255,15 @@ def _note(found: Errors, stated: float, factor: float, count: int, bent: float) 
 
 
 class _Curves:
-    """Exact curves of sides: lines and circles as numbers, all together; others one by one.
+    """Exact curves of sides, all together: lines and circles as numbers, and others.
 
     shapes : rows (n, 7) of point, unit direction or axis, radius (0 of lines), and sides (n, 2)
-    others : curve, sides (n, 2), their parameters (n, 2)
+    others : the curve of each side, sides (n, 2), their parameters (n, 2)
     """
 
     def __init__(self) -> None:
         self.shapes: list[tuple[Array, Longs]] = []
-        self.others: list[tuple[Occ, Longs, Array]] = []
+        self.others: list[tuple[list[Occ], Longs, Array]] = []
 
     def add(self, curve: Occ, places: Longs, ends: Array) -> None:
         kind = curve.GetType()
@@ -273,15 +275,19 @@ class _Curves:
             axis = circle.Axis().Direction().Coord()
             row = (*circle.Location().Coord(), *axis, circle.Radius())
         else:
-            self.others.append((curve, places, ends))
+            self.others.append(([curve] * len(places), places, ends))
             return
         self.shapes.append((np.tile(row, (len(places), 1)), places))
 
     def seal(self) -> None:
-        """Put all lines and circles together."""
+        """Put all lines and circles together, and all others."""
         if self.shapes:
             rows, places = (np.concatenate(parts) for parts in zip(*self.shapes, strict=True))
             self.shapes = [(rows, places)]
+        if self.others:
+            curves, *rest = zip(*self.others, strict=True)
+            places, ends = (np.concatenate(parts) for parts in rest)
+            self.others = [([one for some in curves for one in some], places, ends)]
 
 
 def _from_shape(shape: Array, points: Array) -> Array:
@@ -294,22 +300,25 @@ def _from_shape(shape: Array, points: Array) -> Array:
     return np.asarray(away.max(axis=1, initial=0.0))
 
 
-def _from_curve(curve: Occ, points: Array, ends: Array, settled: float) -> Array:
-    """Largest distances (n,) of points (n, k, 3) along sides from a curve, `ends` (n, 2) on it.
+def _from_curves(curves: list[Occ], points: Array, ends: Array, settled: float) -> Array:
+    """Largest distances (n,) of points (n, k, 3) along sides from n curves, `ends` (n, 2) on them.
 
     Newton's steps shorter than `settled` are the last.
     """
     # Its speed may be anything: the middle of the side need not be near that of the parameters.
     seeds = np.linspace(ends[:, 0], ends[:, 1], CURVE_SEEDS, axis=1)
-    values = [curve.Value(at).Coord() for at in seeds.ravel().tolist()]
+    rows = zip(curves, seeds.tolist(), strict=True)
+    values = [curve.Value(at).Coord() for curve, row in rows for at in row]
     along = np.array(values).reshape(*seeds.shape, 3)
     away = np.linalg.norm(along[:, None] - points[:, :, None], axis=3)
     nearest, seed = away.min(axis=2), np.take_along_axis(seeds, away.argmin(axis=2), axis=1)
-    limits = curve.FirstParameter(), curve.LastParameter()
-    flat = points.reshape(-1, 3)
-    at = stationary_parameters(curve, flat, seed.ravel(), limits, settled)
+    each = [curve for curve in curves for _ in range(points.shape[1])]
+    limits = {curve: (curve.FirstParameter(), curve.LastParameter()) for curve in curves}
+    flat, between = points.reshape(-1, 3), np.array([limits[curve] for curve in each])
+    at = stationary_parameters(each, flat, seed.ravel(), between.reshape(-1, 2), settled)
     found = np.flatnonzero(np.isfinite(at))
-    exact = np.array([curve.Value(one).Coord() for one in at[found].tolist()]).reshape(-1, 3)
+    rows = zip(found.tolist(), at[found].tolist(), strict=True)
+    exact = np.array([each[k].Value(one).Coord() for k, one in rows]).reshape(-1, 3)
     closest = nearest.ravel()
     closest[found] = np.minimum(closest[found], np.linalg.norm(exact - flat[found], axis=1))
     return np.asarray(closest.reshape(nearest.shape).max(axis=1))

@@ -144,7 +144,8 @@ class TrimmedFaces:
             away = np.linalg.norm(mesh.points[border.nodes] - near, axis=1)
             seed, low, high = (float(border.at[k]) for k in (np.argmin(away), 0, -1))
             ends = min(low, high), max(low, high)
-            settled = SETTLED * self._cad.size
-            at = stationary_parameters(border.curve, center[None], np.array([seed]), ends, settled)
+            settled, seeds = SETTLED * self._cad.size, np.array([seed])
+            curves, between = [border.curve], np.array([ends])
+            at = stationary_parameters(curves, center[None], seeds, between, settled)
             for parameter in (*ends, *at[np.isfinite(at)].tolist()):
                 yield StationaryPoint(np.array(border.curve.Value(parameter).Coord()), None)

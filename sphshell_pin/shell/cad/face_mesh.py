@@ -108,8 +108,9 @@ class FaceMesh:
     def sides(self) -> tuple[Longs, Longs]:
         """Sides (s, 2) as pairs of nodes, and the three (t, 3) of each triangle."""
         ends = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], axis=2)
-        keys, place = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
-        return keys, place.reshape(-1, 3)
+        low, high = np.sort(ends.reshape(-1, 2), axis=1).T
+        keys, place = np.unique(low * len(self.points) + high, return_inverse=True)
+        return np.stack(np.divmod(keys, len(self.points)), axis=1), place.reshape(-1, 3)
 
     def refined(self, tolerance: float, rounds: int) -> tuple[FaceMesh, float]:
         """Halve sides inside the face until all points measured are within `tolerance`.
@@ -176,15 +177,14 @@ class FaceMesh:
 
     def _errors(self, sides: Longs, tolerance: float) -> tuple[Array, Array]:
         """Largest distance to the surface along each side, and at the middle of each triangle."""
-        at_sides = np.zeros(len(sides))
-        between = self.parameters(sides)
-        for share in ALONG:
-            points = (1.0 - share) * self.points[sides[:, 0]] + share * self.points[sides[:, 1]]
-            uv = (1.0 - share) * between[:, 0] + share * between[:, 1]
-            at_sides = np.maximum(at_sides, self.surface.distances(points, uv, tolerance))
-        points = self.points[self.triangles].mean(axis=1)
-        uv = self.parameters(self.triangles).mean(axis=1)
-        return at_sides, self.surface.distances(points, uv, tolerance)
+        ends, between = self.points[sides], self.parameters(sides)
+        points = [(1.0 - share) * ends[:, 0] + share * ends[:, 1] for share in ALONG]
+        uv = [(1.0 - share) * between[:, 0] + share * between[:, 1] for share in ALONG]
+        points.append(self.points[self.triangles].mean(axis=1))
+        uv.append(self.parameters(self.triangles).mean(axis=1))
+        away = self.surface.distances(np.concatenate(points), np.concatenate(uv), tolerance)
+        count = len(ALONG) * len(sides)
+        return away[:count].reshape(len(ALONG), -1).max(axis=0), away[count:]
 
     def _split(self, sides: Longs, of_triangle: Longs, marked: Mask) -> FaceMesh:
         """Halve the sides where `marked` (s,) holds, with new nodes on the surface."""
@@ -230,26 +230,32 @@ class FaceMesh:
         return np.asarray(limit / np.where(length > 0.0, length, 1.0))
 
 
+def count_laid(face: Occ) -> int:
+    """Count the triangles that OpenCASCADE has laid on a face, 0 if it could not."""
+    found = BRep_Tool.Triangulation_s(face, TopLoc_Location())
+    return found.NbTriangles() if found is not None and found.HasUVNodes() else 0
+
+
 def take_mesh(face: Occ) -> FaceMesh | None:
     """Return the triangles that OpenCASCADE has laid on a face, None if it could not."""
+    if count_laid(face) == 0:
+        return None
     location = TopLoc_Location()
     found = BRep_Tool.Triangulation_s(face, location)
-    if found is None or found.NbTriangles() == 0 or not found.HasUVNodes():
-        return None
     place = location.Transformation()
     count = range(1, found.NbNodes() + 1)
     uv = np.array([found.UVNode(k).Coord() for k in count])
     rows = [found.Triangle(k).Get() for k in range(1, found.NbTriangles() + 1)]
     surface = FaceSurface(face)
-    exact, normals = surface.nodes(uv)
-    lengths = np.stack([np.linalg.norm(by, axis=1) for by in surface.derivatives(uv)[1:]], axis=1)
+    exact, *along = surface.derivatives(uv)
+    lengths = np.stack([np.linalg.norm(by, axis=1) for by in along], axis=1)
     return FaceMesh(
         surface=surface,
         points=np.array([found.Node(k).Transformed(place).Coord() for k in count]),
         exact=exact,
         uv=uv,
         free=lengths <= SINGULAR * lengths.max(axis=0),
-        normals=normals,
+        normals=surface.normals(*along),
         triangles=np.array(rows) - 1,
         borders=tuple(_borders(face, found, location)),
         reversed=face.Orientation() == TopAbs_REVERSED,

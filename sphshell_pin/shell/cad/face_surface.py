@@ -1,12 +1,15 @@
 """The surface below a CAD face, at many places at once."""
 
+from functools import cached_property
+
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.GeomAbs import GeomAbs_C0
+from OCP.GeomAbs import GeomAbs_BSplineSurface, GeomAbs_C0
 from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell.cad.options import Occ
+from sphshell_pin.shell.cad.spline import SplineSurface
 from sphshell_pin.shell.raw import KINDS, NO_SHAPE
 
 MOST_STEPS = 8
@@ -36,6 +39,13 @@ class FaceSurface:
         self.flat = self._shape[0] == KINDS.index("plane")
         self.kinked = GeomAbs_C0 in (surface.UContinuity(), surface.VContinuity())
 
+    @cached_property
+    def _spline(self) -> SplineSurface | None:
+        surface = self._surface
+        if surface.GetType() != GeomAbs_BSplineSurface or np.isinf(self._highest).any():
+            return None
+        return SplineSurface(surface.BSpline(), self.low, self.high)
+
     def shape(self) -> list[float]:
         """Kind, point, axis and two radii of it, as `CleanedSurface.face_shapes` has them (9,)."""
         number = int(self._surface.GetType())  # OpenCASCADE begins with the same kinds
@@ -63,6 +73,10 @@ class FaceSurface:
     def nodes(self, uv: Array) -> tuple[Array, Array]:
         """Points and unit normals (n, 3) at parameters uv (n, 2); zero where there is no normal."""
         points, by_u, by_v = self.derivatives(uv)
+        return points, self.normals(by_u, by_v)
+
+    def normals(self, by_u: Array, by_v: Array) -> Array:
+        """Return unit normals (n, 3) by the derivatives, zero where there is none."""
         normal = np.cross(by_u, by_v)
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         largest = np.linalg.norm(by_u, axis=1, keepdims=True)
@@ -70,10 +84,12 @@ class FaceSurface:
         if self._scale == 0.0:
             self._scale = float(largest.max(initial=0.0))
         defined = length > SINGULAR * self._scale
-        return points, np.where(defined, normal / np.where(defined, length, 1.0), 0.0)
+        return np.where(defined, normal / np.where(defined, length, 1.0), 0.0)
 
     def derivatives(self, uv: Array) -> tuple[Array, Array, Array]:
         """Points and derivatives by u and by v at parameters uv (n, 2), (n, 3) each."""
+        if self._spline is not None:
+            return self._spline.derivatives(uv)
         place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
         rows, first = [], self._surface.D1
         for u, v in uv.tolist():
@@ -143,19 +159,20 @@ class FaceSurface:
 
 
 def stationary_parameters(
-    curve: Occ, points: Array, seeds: Array, ends: tuple[float, float], settled: float
+    curves: list[Occ], points: Array, seeds: Array, ends: Array, settled: float
 ) -> Array:
-    """Parameters (n,) of stationary points of the distances from points (n, 3) to a curve, or nan.
+    """Parameters (n,) of stationary points of the distances from points (n, 3) to n curves, or nan.
 
-    Between the parameters `ends`, next to `seeds` (n,); Newton's method ends with a step shorter
-    than `settled`.
+    Between the parameters `ends` (n, 2), next to `seeds` (n,); Newton's method ends with a step
+    shorter than `settled`.
     """
     place, first, second = gp_Pnt(), gp_Vec(), gp_Vec()
     at, found, left = seeds.copy(), np.full(len(seeds), np.nan), np.arange(len(seeds))
+    lowest, highest = ends.T
     for _ in range(MOST_STATIONARY_STEPS):
         rows = []
-        for one in at[left].tolist():
-            curve.D2(one, place, first, second)
+        for k, one in zip(left.tolist(), at[left].tolist(), strict=True):
+            curves[k].D2(one, place, first, second)
             rows.append(place.Coord() + first.Coord() + second.Coord())
         table = np.array(rows).reshape(-1, 9)
         offset, tangent = table[:, :3] - points[left], table[:, 3:6]
@@ -164,9 +181,10 @@ def stationary_parameters(
         # Near a center of curvature, or at a place where the derivative vanishes.
         bend = np.where(np.abs(bend) > 1e-3 * square, bend, square)
         step = dot(offset, tangent) / np.where(bend == 0.0, 1.0, bend)
-        moved = np.clip(at[left] - step, *ends)
+        low, high = lowest[left], highest[left]
+        moved = np.clip(at[left] - step, low, high)
         last = np.abs(moved - at[left]) * np.sqrt(square) <= settled
-        inner = last & (bend != 0.0) & (ends[0] < moved) & (moved < ends[1])
+        inner = last & (bend != 0.0) & (low < moved) & (moved < high)
         found[left[inner]] = moved[inner]
         at[left] = moved
         left = left[~last & (bend != 0.0)]

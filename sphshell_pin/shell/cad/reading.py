@@ -34,10 +34,9 @@ IGES_FACES = (143, 144, 510)
 _NO_NAME = re.compile(r"|NONE|SOLID|COMPOUND|COMPSOLID|SHELL|FACE|=>.*|Open CASCADE STEP tr.*")
 """What writers put where there is no name."""
 
-_STEP_NAMES = re.compile(
-    rb"(?:FACE|FACE_SURFACE|BREP|BREP_WITH_VOIDS|SURFACE_MODEL|SHELL)\s*\(\s*'([^']+)'"
-)
-"""Names of faces and bodies: to find the entity of a shape takes long, so not without need."""
+_STEP_BODY = re.compile(rb"(?:BREP|BREP_WITH_VOIDS|SURFACE_MODEL|SHELL)\s*\(\s*'([^']+)'")
+_STEP_FACE = re.compile(rb"(?:FACE|FACE_SURFACE)\s*\(\s*'([^']+)'")
+"""Their names: to find the entity of a shape takes long, so not without need."""
 
 Namer = Callable[[Occ], str]
 
@@ -89,8 +88,11 @@ def _read_step(path: Path, data: bytes) -> CadModel:
         text = entity.Name() if entity is not None and hasattr(entity, "Name") else None
         return "" if text is None else _name(text.ToCString())
 
-    named = any(_name(text.decode(errors="replace")) for text in _STEP_NAMES.findall(data))
-    faces, bodies = _sort(parts, name_of if named else _no_name)
+    namers = (
+        name_of if any(_name(text.decode(errors="replace")) for text in found) else _no_name
+        for found in (_STEP_BODY.findall(data), _STEP_FACE.findall(data))
+    )
+    faces, bodies = _sort(parts, *namers)
     notes = _lost(len(re.findall(rb"=\s*(?:ADVANCED_|)FACE(?:_SURFACE|)\s*\(", data)), faces)
     return CadModel(path, faces, bodies, unit, notes)
 
@@ -137,7 +139,7 @@ def _read_iges(path: Path, data: bytes) -> CadModel:
     parts: list[Part] = [] if shape is None or shape.IsNull() else [("", shape)]
     entities = range(1, model.NbEntities() + 1)
     named = any(model.Entity(k).HasName() for k in entities)
-    faces, bodies = _sort(parts, name_of if named else _no_name)
+    faces, bodies = _sort(parts, *2 * [name_of if named else _no_name])
     held = (model.Entity(k).TypeNumber() for k in entities)
     notes = _lost(sum(kind in IGES_FACES for kind in held), faces)
     return CadModel(path, faces, bodies, unit, notes)
@@ -147,7 +149,7 @@ def _read_brep(path: Path, data: bytes) -> CadModel:
     shape = TopoDS_Shape()
     if not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
         raise ShellFileError(path, "is damaged, its BREP shape cannot be read")
-    return CadModel(path, *_sort([("", shape)], _no_name), NO_UNIT)
+    return CadModel(path, *_sort([("", shape)], _no_name, _no_name), NO_UNIT)
 
 
 def _no_name(_: Occ) -> str:
@@ -168,7 +170,9 @@ def _lost(held: int, faces: tuple[CadFace, ...]) -> tuple[str, ...]:
     return (f"{lost} of the {held} faces of the file could not be read and are missing",)
 
 
-def _sort(parts: list[Part], name_of: Namer) -> tuple[tuple[CadFace, ...], tuple[Part, ...]]:
+def _sort(
+    parts: list[Part], name_of_body: Namer, name_of_face: Namer
+) -> tuple[tuple[CadFace, ...], tuple[Part, ...]]:
     """Sort faces into bodies: each solid, each shell outside of solids, all loose faces of a part.
 
     Returns faces and bodies. Names of bodies are made unique; those of faces are as the file has
@@ -182,12 +186,12 @@ def _sort(parts: list[Part], name_of: Namer) -> tuple[tuple[CadFace, ...], tuple
         loose = list(subshapes(shape, TopAbs_FACE, TopAbs_SHELL))
         groups = [*solids, *shells, *([compound(loose)] if loose else [])]
         for group in groups:
-            own = part if len(groups) == 1 else name_of(group)
+            own = part if len(groups) == 1 else name_of_body(group)
             name = own or (f"{part} {len(bodies) + 1}" if part else f"Body {len(bodies) + 1}")
             bodies.append((_unique(name, [taken for taken, _ in bodies]), group))
             for face in subshapes(group, TopAbs_FACE):
                 number = len(faces) + 1
-                called = name_of(face) or f"Face {number}"
+                called = name_of_face(face) or f"Face {number}"
                 faces.append(CadFace(TopoDS.Face(face), called, number, len(bodies) - 1))
     return tuple(faces), tuple(bodies)
 

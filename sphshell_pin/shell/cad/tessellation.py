@@ -20,7 +20,7 @@ from OCP.TopoDS import TopoDS
 
 from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import InvalidParameter, InvalidShell
-from sphshell_pin.shell.cad.face_mesh import FaceMesh, take_mesh
+from sphshell_pin.shell.cad.face_mesh import FaceMesh, count_laid, take_mesh
 from sphshell_pin.shell.cad.model import CadModel, count_open_edges
 from sphshell_pin.shell.cad.options import Occ
 
@@ -55,13 +55,11 @@ class Tessellation:
     meshes : one per face, None where OpenCASCADE finds no triangles
     interior, border : largest distance measured from the surfaces, and from their borders [units
         of the model]
-    missing : faces without triangles, but slivers
     """
 
     meshes: tuple[FaceMesh | None, ...]
     interior: float
     border: float
-    missing: int = 0
 
     @property
     def error(self) -> float:
@@ -165,25 +163,27 @@ def tessellate(
     target = MARGIN * chord_error
     deflection = target
     best: Tessellation | None = None
+    incomplete: list[tuple[int, float]] = []  # faces without triangles, and the deflection
     for _ in range(MOST_TRIES):
-        found = _mesh(shape, faces, deflection, target)
-        if best is None or found.missing < best.missing:
-            stuck, best = False, found
-        elif found.missing > best.missing:
-            stuck = False
-        elif found.error < MARGIN * best.error:
-            stuck = best.missing == 0 and found.error > 0.8 * best.error
-            best = found
-        else:
-            stuck = best.missing == 0
-        near = best.error <= target and best.missing == 0
-        if near or stuck or found.count > MOST_TRIANGLES // 4:
-            break
-        if found.missing:
+        _lay(shape, deflection)
+        missing = _missing(faces, target)
+        if missing:
+            incomplete.append((missing, deflection))
+            if sum(map(count_laid, faces)) > MOST_TRIANGLES // 4:
+                break
             deflection *= FINER
             continue
+        found = _measure(faces, target)
+        stuck = best is not None and found.error > 0.8 * best.error
+        if best is None or found.error < MARGIN * best.error:
+            best = found
+        if best.error <= target or stuck or found.count > MOST_TRIANGLES // 4:
+            break
         deflection *= min(max(0.8 * target / found.error, 0.2), 0.7)
-    if best is None or best.count == 0:
+    if best is None:
+        _lay(shape, min(incomplete)[1])
+        best = _measure(faces, target)
+    if best.count == 0:
         raise InvalidShell("no face of the model can be given triangles: check it in its CAD")
     return best
 
@@ -198,8 +198,7 @@ def _lay(shape: Occ, deflection: float) -> None:
     BRepMesh_IncrementalMesh(shape, parameters)
 
 
-def _mesh(shape: Occ, faces: tuple[Occ, ...], deflection: float, target: float) -> Tessellation:
-    _lay(shape, deflection)
+def _measure(faces: tuple[Occ, ...], target: float) -> Tessellation:
     meshes = _meet([take_mesh(face) for face in faces])
     interior = border = 0.0
     for k, mesh in enumerate(meshes):
@@ -207,14 +206,14 @@ def _mesh(shape: Occ, faces: tuple[Occ, ...], deflection: float, target: float) 
             border = max(border, mesh.border_error(target))
             meshes[k], error = mesh.refined(target, MOST_ROUNDS)
             interior = max(interior, error)
-    return Tessellation(tuple(meshes), interior, border, _missing(faces, meshes, target))
+    return Tessellation(tuple(meshes), interior, border)
 
 
-def _missing(faces: tuple[Occ, ...], meshes: list[FaceMesh | None], target: float) -> int:
+def _missing(faces: tuple[Occ, ...], target: float) -> int:
     """Count faces that should have triangles: OpenCASCADE finds some only for a finer mesh."""
     count = 0
-    for face, mesh in zip(faces, meshes, strict=True):
-        if mesh is None:
+    for face in faces:
+        if count_laid(face) == 0:
             properties = GProp_GProps()
             BRepGProp.SurfaceProperties_s(face, properties)
             count += abs(properties.Mass()) > target**2

@@ -130,8 +130,8 @@ bool CreaseSearch::reaches_beyond(const Fans& fans, int h) const {
 
 // Which joints the estimates of their two sides explain, and what that is worth as evidence.
 void CreaseSearch::classify_joints() {
-  const Fans now = fans();
-  normals_of(now);
+  divide_normals();
+  const Fans& now = fans();
   const std::size_t count = joints_.size();
   for (auto* list : {&explained_, &alike_, &core_, &smooth_}) list->assign(count, 0);
   off_.assign(count, 0);

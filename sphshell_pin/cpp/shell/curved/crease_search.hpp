@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -62,9 +63,11 @@ class CreaseSearch {
 
   void list_joints();
   void start();
-  Fans fans() const;
-  // Fills normals_ and divided_.
-  void normals_of(const Fans& fans);
+  // Joined where there is no crease by now; kept until crease_ changes.
+  const Fans& fans();
+  // Fills normals_ and divided_ by those fans.
+  void divide_normals();
+  void forget_fans() { fans_.reset(), normals_.clear(); }
   SideEstimate estimate_side(const Fans& fans, int h) const;
   bool reaches_beyond(const Fans& fans, int h) const;
   // Fills what is known of each joint, from estimates of both its sides.
@@ -99,6 +102,7 @@ class CreaseSearch {
   std::vector<float> off_, evidence_;
   std::vector<std::array<float, 2>> run_;  // evidence beyond either side
   std::vector<std::array<SideEstimate, 2>> estimates_;
+  std::optional<Fans> fans_;
 };
 
 }  // namespace sphshell

@@ -58,7 +58,7 @@ void CreaseSearch::start() {
                      ? differ(h, corner_after(g)) || differ(corner_after(h), g)
                      : !topology.edges[e].inner && topology.edges[e].kind != EdgeClass::Smooth;
   }
-  const Fans before = fans();
+  const Fans& before = fans();
   original_count_.resize(original_.size());
   for (std::size_t c = 0; c < original_.size(); ++c)
     original_count_[c] = before.count(before.of(static_cast<int>(c)));
@@ -71,6 +71,7 @@ void CreaseSearch::start() {
     for (std::size_t e = 0; e < joints_.size(); ++e)
       if (!crease_[e] && !is_settled(e) && std::abs(joints_[e].angle) >= angle && also(joints_[e]))
         crease_[e] = any = true;
+    if (any) forget_fans();
     return any;
   };
   bool any =
@@ -78,7 +79,7 @@ void CreaseSearch::start() {
   // A sharper edge beside it divides a fan, whose mean normal was wrong: then the crease angle
   // itself is the limit there, and so on along the surface.
   while (any) {
-    const Fans now = fans();
+    const Fans& now = fans();
     any = sharpen(shell_.crease_angle(), [&](const Joint& joint) {
       const auto whole = [&](int c) { return now.count(now.of(c)) == original_count_[c]; };
       const int h = joint.half_edge[0];
@@ -87,15 +88,19 @@ void CreaseSearch::start() {
   }
 }
 
-Fans CreaseSearch::fans() const {
-  return Fans(shell_, [&](const Edge& edge) {
-    return !crease_[static_cast<std::size_t>(&edge - shell_.topology().edges.data())];
-  });
+const Fans& CreaseSearch::fans() {
+  if (!fans_)
+    fans_.emplace(shell_, [&](const Edge& edge) {
+      return !crease_[static_cast<std::size_t>(&edge - shell_.topology().edges.data())];
+    });
+  return *fans_;
 }
 
 // Fans that were divided have the normal of their own elements, and so have open fans beside them,
 // whose normals were fitted across what is a crease now.
-void CreaseSearch::normals_of(const Fans& fans) {
+void CreaseSearch::divide_normals() {
+  const Fans& fans = this->fans();
+  if (!normals_.empty()) return;
   normals_ = original_;
   divided_.assign(original_.size(), 0);
   const int corners = static_cast<int>(original_.size());
@@ -203,6 +208,7 @@ bool CreaseSearch::add_creases() {
     if (harm >= largest(e) / 2) added.push_back(static_cast<int>(e));
   for (int e : added) crease_[e] = 1;
   extend_lines(std::move(added), [&](int e) { return !smooth_[e]; });
+  forget_fans();
   return true;
 }
 
@@ -218,8 +224,10 @@ void CreaseSearch::separate_straight_walls() {
     if (wall.height > kLongWall * curved.height && left <= kWall * std::abs(curved.curvature))
       added.push_back(static_cast<int>(e));
   }
+  if (added.empty()) return;
   for (int e : added) crease_[e] = 1;
   extend_lines(std::move(added), [&](int e) { return explained_[e] && !alike_[e]; });
+  forget_fans();
 }
 
 // Divided fans lean along each side that leads across smooth joints as the side's other end does;
@@ -266,9 +274,8 @@ CornerNormals CreaseSearch::divide() {
   // Building takes the most memory here.
   std::vector<std::array<SideEstimate, 2>>().swap(estimates_);
   std::vector<std::array<float, 2>>().swap(run_);
-  const Fans now = fans();
-  normals_of(now);
-  lean_as_other_ends(now);
+  divide_normals();
+  lean_as_other_ends(fans());
   CornerNormals out;
   out.creases = static_cast<int>(std::count(crease_.begin(), crease_.end(), 1) - before);
   out.normals = std::move(normals_);

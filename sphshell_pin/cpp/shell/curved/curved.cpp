@@ -26,6 +26,8 @@ constexpr double kOfRounding = 1.8;
 constexpr double kMostMoved = 3;
 // Systems write CAD files whose edges are off the faces by this share of the size.
 constexpr double kFileTolerance = 1e-4;
+// A step in the parameters of an element after which the next would be rounding.
+constexpr double kSettled = 1e-9;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
@@ -162,7 +164,11 @@ class Continuation {
     Eigen::Vector2d at(kU[k], kV[k]);
     for (int i = 0; i < 6; ++i) {
       const Vec3 r = q - patch_.point(at.x(), at.y());
-      at += tangents(at).inverse() * Eigen::Vector2d(r.dot(east_), r.dot(north_));
+      const Eigen::Vector2d step =
+          tangents(at).inverse() * Eigen::Vector2d(r.dot(east_), r.dot(north_));
+      at += step;
+      // Of a share of the element; what is left is its square.
+      if (step.squaredNorm() < kSettled * kSettled) break;
     }
     if (!(at.cwiseAbs().maxCoeff() < 4)) return;
     // 6 u v w is the polynomial that the middle control point moves: zero on all sides.

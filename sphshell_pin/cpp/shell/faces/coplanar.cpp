@@ -20,7 +20,7 @@ constexpr std::size_t kFewToFit = 3, kMostFits = 6;
 }  // namespace
 
 CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
-    : shell_(shell), of_(shell.triangles().size(), -1) {
+    : of_(shell.triangles().size(), -1) {
   const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
   const Topology& topology = shell.topology();
@@ -104,18 +104,18 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     out.extent = box.diagonal().norm();
     regions_.push_back(out);
   }
-}
-
-// Area over the side's length, and no more than the region's extent: a region of several triangles
-// counts as a rectangle over the side.
-double CoplanarRegions::height(int half_edge) const {
-  const int t = triangle_of(half_edge), k = side_of(half_edge);
-  const Triangle& c = shell_.triangles()[t];
-  const std::vector<Vec3>& p = shell_.vertices();
-  const Vec3 side = p[c[next_corner(k)]] - p[c[k]];
-  const Region& region = regions_[of_[t]];
-  if (region.count == 1) return side.cross(p[c[previous_corner(k)]] - p[c[k]]).norm() / side.norm();
-  return std::min(region.area / side.norm(), region.extent);
+  // Area over the side's length, and no more than the region's extent: a region of several
+  // triangles counts as a rectangle over the side.
+  heights_.resize(3 * count);
+  for (std::size_t t = 0; t < count; ++t)
+    for (int k = 0; k < 3; ++k) {
+      const Triangle& c = triangles[t];
+      const Region& region = regions_[of_[t]];
+      const Vec3 side = p[c[next_corner(k)]] - p[c[k]];
+      heights_[3 * t + static_cast<std::size_t>(k)] =
+          region.count == 1 ? side.cross(p[c[previous_corner(k)]] - p[c[k]]).norm() / side.norm()
+                            : std::min(region.area / side.norm(), region.extent);
+    }
 }
 
 }  // namespace sphshell

@@ -19,7 +19,7 @@ class CoplanarRegions {
   double area(int region) const { return regions_[region].area; }
   const Vec3& normal(int region) const { return regions_[region].normal; }
   // How far the region of a half-edge (3 triangle + side) reaches from that side [m].
-  double height(int half_edge) const;
+  double height(int half_edge) const { return heights_[half_edge]; }
 
  private:
   struct Region {
@@ -28,8 +28,8 @@ class CoplanarRegions {
     double extent;  // diagonal of its box
     int count;
   };
-  const Shell& shell_;
   LargeArray<int> of_;
+  LargeArray<double> heights_;  // per half-edge
   std::vector<Region> regions_;
 };
 

@@ -59,7 +59,6 @@ Recognizer::Recognizer(const Shell& shell, const CoplanarRegions& regions, doubl
       of_(shell.triangles().size(), -1),
       inscribed_(static_cast<std::size_t>(regions.size()), Inscribed::No),
       mark_(shell.triangles().size(), 0) {
-  list_neighbors();
   find_candidates();
 }
 
@@ -113,35 +112,30 @@ void Recognizer::mark(const std::vector<int>& triangles) {
   for (const int t : triangles) mark_[t] = round_;
 }
 
-// Over edges that may be inside a face: no creases, and turns below the limit.
-void Recognizer::list_neighbors() {
-  const Topology& topology = shell_.topology();
-  beside_.assign(topology.edge_of.size(), -1);
-  for (const Edge& edge : topology.edges) {
-    if (edge.count != 2 || !(edge.inner || edge.kind == EdgeClass::Smooth)) continue;
-    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
-    if (turn(triangle_of(h), triangle_of(g)) > kMostTurn * shell_.crease_angle()) continue;
-    beside_[h] = triangle_of(g), beside_[g] = triangle_of(h);
-  }
-}
-
-// What turns smoothly somewhere, and is no part of a plane: of few coplanar triangles, or of
-// a strip all of which turn, and not far larger than what lies beside it.
+// Neighbors over edges that may be inside a face: no creases, and turns below the limit.
+// Candidates: what turns smoothly somewhere, and is no part of a plane: of few coplanar triangles,
+// or of a strip all of which turn, and not far larger than what lies beside it.
 void Recognizer::find_candidates() {
+  const Topology& topology = shell_.topology();
   const int count = static_cast<int>(of_.size());
+  beside_.assign(topology.edge_of.size(), -1);
   turn_.assign(of_.size(), 0);
   std::vector<char> straight(static_cast<std::size_t>(regions_.size()), 0);
   std::vector<double> around(straight.size(), 0);
-  for (int t = 0; t < count; ++t) {
-    for (int k = 0; k < 3; ++k) {
-      const int u = beside_[3 * t + k];
-      if (u < 0 || regions_.of(u) == regions_.of(t)) continue;
-      turn_[t] = std::max(turn_[t], static_cast<float>(turn(t, u)));
-      double& most = around[regions_.of(t)];
-      most = std::max(most, regions_.area(regions_.of(u)));
-    }
-    if (!(turn_[t] > kNoTurn)) straight[regions_.of(t)] = 1;
+  for (const Edge& edge : topology.edges) {
+    if (edge.count != 2 || !(edge.inner || edge.kind == EdgeClass::Smooth)) continue;
+    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    const int t = triangle_of(h), u = triangle_of(g), r = regions_.of(t), s = regions_.of(u);
+    const double angle = turn(t, u);
+    if (angle > kMostTurn * shell_.crease_angle()) continue;
+    beside_[h] = u, beside_[g] = t;
+    if (r == s) continue;
+    for (float* most : {&turn_[t], &turn_[u]}) *most = std::max(*most, static_cast<float>(angle));
+    around[r] = std::max(around[r], regions_.area(s));
+    around[s] = std::max(around[s], regions_.area(r));
   }
+  for (int t = 0; t < count; ++t)
+    if (!(turn_[t] > kNoTurn)) straight[regions_.of(t)] = 1;
   curved_.assign(of_.size(), 0);
   for (int t = 0; t < count; ++t) {
     const int r = regions_.of(t);

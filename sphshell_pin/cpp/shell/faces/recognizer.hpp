@@ -124,8 +124,7 @@ class Recognizer {
 
   // recognition.cpp
   bool is_fruitless() const;  // too many
-  void list_neighbors();
-  // Fills curved_: the triangles that a face other than a plane may have.
+  // Fills beside_, turn_ and curved_: the triangles that a face other than a plane may have.
   void find_candidates();
   // Whether it was taken.
   bool take(Growth growth);
