@@ -132,7 +132,7 @@ class Recognizer {
   bool take(Growth growth);
   void drop_zones_of_free_shapes();
   void add_planes(Faces& faces) const;
-  // Of coplanar regions, by their second moments.
+  // Of coplanar regions of several triangles.
   struct Moments {
     double area = 0;             // [m^2]
     Vec3 middle = Vec3::Zero();  // [m]
