@@ -68,6 +68,7 @@ def test_no_sphere_is_lost_or_counted_twice(part, tmp_path):
         disc(80.0, 0.14, 2.2e-5),
         pocket(63.0, 3.3, 0.2),
         pocket(100.0, 3.7, 1.3),
+        pocket(42.0, 0.18, 2.9),
     ],
     ids=lambda part: part.name,
 )

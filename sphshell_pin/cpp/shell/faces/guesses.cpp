@@ -14,6 +14,10 @@ constexpr std::size_t kFewVertices = 8, kManyVertices = 12;
 constexpr double kSimpler[] = {0, 1, 0.98, 0.97, 0.95};
 // A torus whose circle is this small over its tube is none.
 constexpr double kLeastRadius = 1e-3;
+// A side is an end of a column where it leans so little along its axis.
+constexpr double kAcross = 0.5;
+// What is beyond a ring is off it by more windows.
+constexpr double kAtOnce = 100;
 
 }  // namespace
 
@@ -88,6 +92,54 @@ bool Recognizer::try_kinds(int seed, const std::vector<int>& patch, bool torus, 
   return any;
 }
 
+// Each column of a thin ring is a cylinder to rounding. The ring's circle goes through the centers
+// of one and of those beyond both of its ends.
+void Recognizer::try_ring(int seed, Growth& best, double& score) {
+  const Primitive tube = best.shape;
+  Vec3 middle[3] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+  double count[3] = {0, 0, 0};
+  std::vector<int> all = best.triangles;
+  mark(all);
+  const auto add = [&](int t, int to) {
+    middle[to] += centroid(t) - best.sign * tube.radius * facet_normal(t), ++count[to];
+  };
+  for (const int t : best.triangles) {
+    add(t, 0);
+    for (int k = 0; k < 3; ++k) {
+      const int u = beside_[3 * t + k];
+      const Vec3 side = point(corners(t)[next_corner(k)]) - point(corners(t)[k]);
+      if (u < 0 || is_marked(u) || std::abs(side.dot(tube.axis)) > kAcross * side.norm()) continue;
+      add(u, (centroid(u) - centroid(t)).dot(tube.axis) < 0 ? 1 : 2);
+      all.push_back(u);
+    }
+  }
+  const Vec3 a = middle[1] / count[1] - middle[0] / count[0];
+  const Vec3 b = middle[2] / count[2] - middle[0] / count[0], n = a.cross(b);
+  const Vec3 out =
+      (b.squaredNorm() * n.cross(a) + a.squaredNorm() * b.cross(n)) / (2 * n.squaredNorm());
+  Primitive ring{FaceKind::Torus, middle[0] / count[0] + out, n.normalized(), out.norm(),
+                 tube.radius};
+  std::vector<Vec3> points;
+  for (const int v : vertices_of(all)) points.push_back(point(v));
+  // Any three columns are nearly on a ring: it must go on, and end at once.
+  Growth found;
+  double few = 2 * double(all.size()), worth = few;
+  if (!out.allFinite() || !fit_primitive(points, tolerance_, ring) ||
+      !try_shape(seed, ring, found, worth) || !(worth > few))
+    return;
+  mark(found.triangles);
+  for (const int t : found.triangles)
+    for (int k = 0; k < 3; ++k) {
+      const int u = beside_[3 * t + k];
+      if (u < 0 || is_marked(u)) continue;
+      double most = 0;
+      for (const int v : corners(u))
+        most = std::max(most, std::abs(found.shape.distance(point(v))));
+      if (most > found.window && most < kAtOnce * found.window) return;
+    }
+  score = worth, best = std::move(found);
+}
+
 bool Recognizer::recognize_from(int seed) {
   Growth best;
   double score = 0;
@@ -119,6 +171,7 @@ bool Recognizer::recognize_from(int seed) {
         region.push_back(u);
       }
     try_kinds(seed, region, true, true, best, score);
+    if (best.triangles.size() == size) try_ring(seed, best, score);
   }
   if (take(std::move(best))) return true;
   tries_[seed] = 2;

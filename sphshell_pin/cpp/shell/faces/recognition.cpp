@@ -172,10 +172,11 @@ bool Recognizer::take(Growth growth) {
   return true;
 }
 
-// Strips beside what is smooth and was not recognized, or beside each other, may be zones of a free
-// shape: they look like cones. A zone is short against its triangles; or hardly wider than what
-// goes on beyond its border, and an arc that turns as it does there would rise over it hardly more
-// than the face itself does: who divides a free shape keeps that alike in both directions.
+// Strips whose border is smooth for a quarter or more, to what was not recognized or to each other,
+// may be zones of a free shape: they look like cones. A zone is short against its triangles; or
+// hardly wider than what goes on beyond its border, and an arc that turns as it does there would
+// rise over it hardly more than the face itself does: who divides a free shape keeps that alike in
+// both directions.
 void Recognizer::drop_zones_of_free_shapes() {
   std::vector<char> weak(faces_.size(), 0);
   for (std::size_t f = 0; f < faces_.size(); ++f) {
@@ -189,7 +190,7 @@ void Recognizer::drop_zones_of_free_shapes() {
   for (std::size_t f = 0; f < faces_.size(); ++f) {
     if (!weak[f]) continue;
     const Growth& face = faces_[f];
-    int smooth = 0, vague = 0;
+    std::size_t border = 0, vague = 0;
     std::vector<double> shortest, rises, wider;
     double low = 0, high = 0, mean = 0;
     for (const int t : face.triangles) mean += area(t) / double(face.triangles.size());
@@ -201,9 +202,9 @@ void Recognizer::drop_zones_of_free_shapes() {
         const double along = (here - face.shape.point).dot(face.shape.axis);
         if (shortest.empty() && k == 0) low = high = along;
         low = std::min(low, along), high = std::max(high, along);
-        const int u = beside_[3 * t + k];
+        const int u = beside_[3 * t + k], h = shell_.topology().other_half_edge(3 * t + k);
+        border += h < 0 || of_[triangle_of(h)] != int(f);
         if (u < 0 || of_[u] == int(f)) continue;
-        ++smooth;
         if (!(of_[u] >= 0 ? weak[of_[u]]
                           : curved_[u] && !is_own_plane(u) &&
                                 regions_.area(regions_.of(u)) < 2 * kFarLarger * mean))
@@ -215,7 +216,7 @@ void Recognizer::drop_zones_of_free_shapes() {
       }
       shortest.push_back(least);
     }
-    if (smooth == 0 || 2 * vague < smooth) continue;
+    if (4 * vague < border + 1) continue;
     if (high - low < kShort * median(shortest) ||
         (median(wider) < kFarther && median(rises) < kMostRise * face.deviation))
       dropped.push_back(static_cast<int>(f));

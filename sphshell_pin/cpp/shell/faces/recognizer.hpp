@@ -116,6 +116,7 @@ class Recognizer {
   bool try_shape(int seed, const Primitive& guess, Growth& best, double& score);
   bool try_kinds(int seed, const std::vector<int>& patch, bool torus, bool others, Growth& best,
                  double& score);
+  void try_ring(int seed, Growth& best, double& score);
   // Whether a face was found from this triangle.
   bool recognize_from(int seed);
   void recognize_rims(int face);
