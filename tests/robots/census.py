@@ -51,7 +51,6 @@ _ADVICE: dict[str, dict[str, Any]] = {
     "--free-flyer": {"free_flyer": True},
 }
 """What a refusal says to do, and how."""
-_ARGUMENT = re.compile(r"--xacro-arg (?!NAME)(\w+)=VALUE")
 _VALUES = {
     "dof": "7",
     "ur_type": "ur5e",
@@ -183,8 +182,7 @@ def _advised(
         more = {k: v for word, one in _ADVICE.items() if word in reason for k, v in one.items()}
         listed = reason.partition("sets:")[2]
         asked = [name for name in _VALUES if f" {name}" in listed]
-        asked += [] if (one := _ARGUMENT.search(reason)) is None else [one[1]]
-        given = {name: value(name) or ("robot" if "name" in name else "false") for name in asked}
+        given = {name: value(name) for name in asked}
         if given:
             more["xacro_args"] = row.options.get("xacro_args", {}) | given
         if not more or row.options.items() >= more.items():

@@ -23,7 +23,7 @@ _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
 _STEEP = 0.8
 # Places and turns at which links are held against the part: of one side and height, of these once
 # so many were tried in all, and places of one posture that are offered.
-_MOST_TRIED, _FEWER, _MANY, _MOST_OF_STANCE = 160, 32, 1600, 2
+_MOST_TRIED, _FEWER, _MANY, _MOST_OF_STANCE = 160, 16, 1000, 2
 # How far joints may be under the floor [m]: not at all, but for rounding.
 _AT_FLOOR = 1e-6
 
@@ -46,7 +46,7 @@ class Place:
     def with_gap(self, gap: float) -> Place:
         """Return the place with the sphere at the `gap` [m] to the part, which stays if it can."""
         touch, stance = self.touch, self.stance
-        away = (stance.radius + gap) * touch.normal - (touch.center - touch.point)
+        away = (stance.tip.radius + gap) * touch.normal - (touch.center - touch.point)
         center = touch.center + away
         moved, touched = stance.at(self.placement.act(center)), replace(touch, center=center)
         if moved is None:  # its joints do not move the tip that way

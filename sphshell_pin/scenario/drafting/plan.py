@@ -16,7 +16,7 @@ from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.placing import Place
-from sphshell_pin.scenario.drafting.poses import Stance
+from sphshell_pin.scenario.drafting.poses import NO_LIMIT, Stance
 from sphshell_pin.scenario.drafting.tip_contact import (
     GRAVITY,
     Contact,
@@ -48,6 +48,10 @@ RAMP = 0.25
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
 # radii.
 TIP_RATE, TIP_LAG = 20.0, 0.2
+WEAK = (
+    "the effort limits that the robot's file states for its joints are not modeled, because they "
+    "do not bear its own weight, friction and this motion"
+)
 # Sag of a standing robot's joints under its weight [rad].
 SAG = 0.05
 
@@ -150,13 +154,7 @@ def press_force(
 ) -> float:
     """Return the normal force [N]; SphshellError where the joints cannot push as hard."""
     if press is None:
-        force = _suitable_force(stance, tip.radius, materials)
-        if force <= 0:
-            raise SphshellError(
-                "the joints' effort limits do not carry the robot's own weight in this posture: "
-                "correct them in its file"
-            )
-        return rounded(force)
+        return rounded(_suitable_force(stance, tip.radius, materials))
     if press > stance.force:
         raise SphshellError(
             f"the joints' effort limits allow a push of {rounded(stance.force, 3):g} N along "
@@ -192,7 +190,7 @@ def press_plan(
     are too `weak` are not modeled.
     """
     stance, path = place.stance, way.points
-    rate = rounded(PATH_RATE * tip.radius)
+    rate = rounded(min(PATH_RATE * tip.radius, NO_LIMIT if weak else stance.fastest))
     # Over the gap the mass is moved by 3 force (t / rise)^2, the beginning of the rise: the gap is
     # force t^4 / (4 mass rise^2), the speed four times that by t.
     crossing = (4 * stance.mass * FORCE_RISE**2 * gap / force) ** 0.25
@@ -235,11 +233,7 @@ def press_plan(
     why.append(
         f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
     )
-    if weak:
-        why.append(
-            "the effort limits that the robot's file states for its joints are not modeled, "
-            "because they do not bear its own weight and the friction of the joints"
-        )
+    why += [WEAK] if weak else []
     if not way.even:
         why.append("the force on the surface is the resultant of several")
     if len(path) < 2:

@@ -21,6 +21,7 @@ from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, Way, find_way
 from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
 from sphshell_pin.scenario.drafting.plan import (
     TIP_GAP,
+    WEAK,
     Plan,
     Press,
     plan_fall,
@@ -43,8 +44,6 @@ from sphshell_pin.scenario.format.schema import RobotSection
 _MOST_RUNS, _MOST_SLIDES, _MOST_DROPS = 10, 6, 3
 # Places at which the tip cannot slide, before one of them is taken.
 _MOST_STILL = 40
-# Places at which efforts do not carry the robot, before they are taken for wrong.
-_MOST_WEAK = 4
 # Part of a path up to where it failed that is tried again.
 _CUT = 0.8
 # Between links and part at the start, along the approach, in radii of the sphere.
@@ -186,7 +185,7 @@ class _Search:
         for found in self._places():
             stance = found.stance
             pair = chosen_materials(asked, [tip], stance.mass)
-            weak = not stance.force and len(self.tried.errors) >= _MOST_WEAK
+            weak = not stance.force
             stance = replace(stance, force=NO_LIMIT) if weak else stance
             try:
                 force = press_force(stance, tip, pair, asked.press)
@@ -250,6 +249,11 @@ class _Search:
                 self.asked.tell(f"tried, run {tried.runs}: {fault.text}")
             if one.repair == "" and len(tried.stays) < _MOST_STILL and not self.asked.slides:
                 tried.stays += [(section, other) for other in _still(one, fault)]
+            if fault.cut and "effort" in section.joints:
+                kinds = [kind for kind in section.joints if kind != "effort"]
+                section = section.model_copy(update={"joints": kinds})
+                one = replace(plan, why=(*plan.why, WEAK))
+                continue
             one = repaired(one, fault)
             one = None if one and self.asked.slides and one.repair == "cut" else one
         return None

@@ -39,8 +39,7 @@ class Stance:
 
     reach_of: Reach
     """Which moves the joints that move the tip."""
-    radius: float
-    """Radius of the tip's sphere [m]."""
+    tip: Tip
     q: Array
     """Configuration of the whole robot (nq,)."""
     lock: tuple[str, ...]
@@ -63,6 +62,8 @@ class Stance:
     """Largest push along the approach that the joints' effort limits allow [N].
 
     0 where they do not carry the robot's own weight, NO_LIMIT where none is stated."""
+    fastest: float
+    """Speed along the slide [m/s] at which damping takes half of some motor's effort."""
     reach: float
     """From the tip to the farthest joint that moves it [m]."""
     mobility: float
@@ -83,7 +84,7 @@ class Stance:
             return self
         held = self._held_rotation()
         q, off = self.reach_of.solve(self.q, center, turn=held if self.joints >= 6 else None)
-        found = _stance(self.reach_of, q, self.lock, self.approach, self.radius)
+        found = _stance(self.reach_of, q, self.lock, self.approach, self.tip)
         return None if off > _HEIGHT * self.reach or found.mobility < _MOBILE else found
 
     def follows(self, centers: Array, free: Callable[[Array], bool]) -> tuple[int, str]:
@@ -124,7 +125,7 @@ def approaches(
     """
     reach = Reach(model, tip.frame, tip.offset, joints_aside(model, tip))
     axis = reach.jacobian(q)[3:]
-    limb = _limb(reach, tip.radius)
+    limb = _limb(reach, tip)
     k = int(np.argmax(np.abs(limb)))
     home = tuple(np.sign(limb[k]) * np.eye(3)[k] + 0.0)
     found = [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
@@ -159,7 +160,7 @@ def stances(
     place = np.array([0.0, 0.0, height or 0.0])
 
     def along() -> Array:
-        limb = _limb(reach, tip.radius)
+        limb = _limb(reach, tip)
         if len(reach.columns) == 1 and limb @ approach < 0:
             limb = -limb
         return turn_between(limb, approach)
@@ -170,7 +171,7 @@ def stances(
     for k in range(_SEEDS):
         seed = reach.seed(start, rng) if k else start
         at, off = reach.solve(seed, place, rows=rows, turn=along)
-        one = _stance(reach, at, lock, approach, tip.radius)
+        one = _stance(reach, at, lock, approach, tip)
         if off > _HEIGHT * one.reach or one.mobility < least or one.ahead <= _BESIDE:
             continue
         if any(np.abs(pin.difference(model, other.q, at)).max() < _APART for _, other in found):
@@ -201,14 +202,12 @@ def joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
     return tuple(name for name in list(model.names)[1:] if name not in moving)
 
 
-def _stance(
-    reach: Reach, q: Array, lock: tuple[str, ...], approach: Array, radius: float
-) -> Stance:
+def _stance(reach: Reach, q: Array, lock: tuple[str, ...], approach: Array, tip: Tip) -> Stance:
     """Return the stance at q, with its mobility along the approach as a part of the best one."""
     model, columns = reach.model, reach.columns
     jacobian = reach.jacobian(q)
     center = reach.data.oMf[reach.frame].act(reach.offset)
-    limb = _limb(reach, radius)
+    limb = _limb(reach, tip)
     joints = [reach.data.oMi[j].translation for j in _chain(reach)]
     linear, angular = jacobian[:3], jacobian[3:]
     reach_length = max((float(np.linalg.norm(center - one)) for one in joints), default=0.0)
@@ -232,6 +231,10 @@ def _stance(
     limited = stated & (np.abs(pushes) > 1e-9)
     room = (limits - np.sign(pushes) * weight)[limited]
     carried = bool((np.abs(weight) <= limits)[stated].all())
+    # Joint speeds by that of the tip along the slide, with the least kinetic energy.
+    along_slide = np.zeros(3) if slide is None else slide
+    rates = np.abs(response[:, :3] @ along_slide) / max(float(sideways[-1]), 1e-300)
+    taken = np.where(stated, model.damping[columns] * rates / np.maximum(limits, 1e-9), 0.0)
     turning = float(np.trace(angular @ response[:, 3:]))
     turns = int(np.linalg.matrix_rank(angular, tol=1e-6))
     spare = len(columns) - int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max()))
@@ -239,7 +242,7 @@ def _stance(
     usable = min(along, float(sideways[-1])) if len(columns) > 1 else along
     return Stance(
         reach_of=reach,
-        radius=radius,
+        tip=tip,
         q=q,
         lock=lock,
         center=center,
@@ -251,6 +254,7 @@ def _stance(
         joint_inertia=np.diag(mass).copy(),
         force=carried
         * float(np.clip(room / np.abs(pushes[limited]), 0, NO_LIMIT).min(initial=NO_LIMIT)),
+        fastest=0.5 / max(float(taken.max(initial=0.0)), 1e-9),
         reach=reach_length,
         mobility=usable / top,
         dexterity=float(values[-1] / values[0]) if values[0] > 0 else 0.0,
@@ -258,7 +262,7 @@ def _stance(
     )
 
 
-def _limb(reach: Reach, radius: float) -> Array:
+def _limb(reach: Reach, tip: Tip) -> Array:
     """Return the unit vector (3,) along the limb to the tip, from what is in `reach`.
 
     To a sphere before its frame as the frame points, else the frame would be dragged beside it; to
@@ -269,13 +273,15 @@ def _limb(reach: Reach, radius: float) -> Array:
     if motion.shape[1] == 1 and motion.any():
         only: Array = motion[:, 0]
         return only / np.linalg.norm(only)
-    if reach.offset.any():
-        ahead: Array = pose.rotation @ reach.offset
+    # A small ball on a flat end may be far beside the frame.
+    way = tip.offset if tip.ahead is None else tip.ahead
+    if way.any():
+        ahead: Array = pose.rotation @ way
         return ahead / np.linalg.norm(ahead)
     for joint in reversed(_chain(reach)):
         limb: Array = pose.translation - reach.data.oMi[joint].translation
         length = float(np.linalg.norm(limb))
-        if length > radius:
+        if length > tip.radius:
             return limb / length
     return np.array([0.0, 0.0, -1.0])
 
