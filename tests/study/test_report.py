@@ -194,22 +194,6 @@ def test_the_page_in_a_browser(small, tmp_path, browser):
     assert looks[0] != looks[1]
 
 
-def test_small_forces_have_the_error_of_their_method():
-    found = forces(quick=True, progress=lambda share: None)
-    by_key = {f.key: f for f in found.findings}
-    assert by_key["flat_error"].met
-    assert by_key["force_order_estimated"].met
-
-
-def test_the_cheapest_setting_of_an_integrator():
-    rows = [
-        SimpleNamespace(case="a", integrator="Implicit", error=e, cpu=c)
-        for e, c in ((1e-3, 0.1), (1e-5, 0.4), (1e-6, 0.3))
-    ]
-    assert work.cheapest(rows, "a", ("Implicit",), 1e-4) == 0.3
-    assert math.isnan(work.cheapest(rows, "a", ("Implicit",), 1e-7))
-
-
 def test_order_and_error_of_a_power_law():
     line = [
         SimpleNamespace(side=h, mean=0.7 * h**4, largest=3 * h**4) for h in (1.2, 0.61, 0.29, 0.16)
@@ -231,13 +215,6 @@ def test_a_broken_section_does_not_lose_the_others(stubs, tmp_path):
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "could not be measured: ValueError: a &lt;b&gt; broke" in text
     assert "3 of 3 aims are met. 1 section could not be measured." in text
-
-
-def test_exit_code_and_table(stubs, tmp_path):
-    ran = call("report", "--quick", "--out", tmp_path / "new")
-    assert ran.exit_code == 0, ran.output
-    assert "at most 2" in ran.stdout
-    assert str(tmp_path / "new" / PAGE) in ran.stdout
 
 
 def some(*findings, unmeasured=()):

@@ -12,7 +12,6 @@ from concurrent.futures import CancelledError
 from itertools import islice
 from types import ModuleType
 from typing import Any, TypeAlias
-from unittest.mock import patch
 
 from sphshell_pin.errors import SweepError
 from sphshell_pin.study.sweep import worker
@@ -50,9 +49,14 @@ def run_all(
         return
     distributed, waiting = need("distributed"), iter(runs)
     where = f"the Dask scheduler at {scheduler}" if scheduler else "the scheduler on this machine"
-    # New processes load the module that is called __main__: a script would begin its sweep again.
-    no_script = patch.dict(sys.modules, __main__=ModuleType("__main__"))
-    with no_script, contextlib.closing(_client(min(workers, len(runs)), scheduler)) as client:
+    with contextlib.ExitStack() as stack:
+        # A new process loads the module that is called __main__, also one that takes the place of
+        # another: a script would begin its sweep again.
+        stack.callback(sys.modules.update, {"__main__": sys.modules["__main__"]})
+        sys.modules["__main__"] = ModuleType("__main__")
+        client = stack.enter_context(
+            contextlib.closing(_client(min(workers, len(runs)), scheduler))
+        )
         if not client.ncores():
             note(f"{where} has no workers: waiting for some")
         under_way: dict[str, Run] = {}
@@ -70,9 +74,9 @@ def run_all(
             completed.update(submit(1))
             run = under_way.pop(future.key)
             try:
-                yield future.result()
+                outcome = future.result()
             except distributed.KilledWorker:
-                yield Outcome(run.number, FAILED, KILLED, {})
+                outcome = Outcome(run.number, FAILED, KILLED, {})
             except SweepError:
                 raise
             except (CancelledError, OSError):
@@ -82,6 +86,7 @@ def run_all(
                     f"the workers of {where} cannot do the runs, is the same sphshell-pin "
                     f"installed there? ({type(fault).__name__}: {' '.join(str(fault).split())})"
                 ) from None
+            yield outcome
 
 
 def _client(workers: int, scheduler: str | None) -> Client:
