@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes
+from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
-from sphshell_pin.errors import ShellFileError, SphshellError
+from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
-from sphshell_pin.robots.packages import Folders
-from sphshell_pin.robots.plain_mesh import collada_unit, refused_reference
-from sphshell_pin.robots.urdf_tree import add_limits, check_tree, mimics_of
-from sphshell_pin.shell.readers import READERS
+from sphshell_pin.robots.mesh_faults import mesh_fault
+from sphshell_pin.robots.packages import Folders, including
+from sphshell_pin.robots.plain_mesh import collada_unit
+from sphshell_pin.robots.urdf_tree import INCLUDED, add_limits, check_tree, mimics_of
 
 if TYPE_CHECKING:
     from sphshell_pin.robots.mjcf import MjcfRobot
@@ -55,9 +55,6 @@ _REFUSED = {
     (".mjb",): "is a compiled MuJoCo model: give its MJCF (.xml)",
 }
 
-MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
-"""Formats of the meshes that a robot may name."""
-
 # A license before the declaration of XML, which no reader of robots minds.
 _BEFORE_XML = re.compile(rb"\A(?:\s|<!--(?:(?!-->).)*-->)+(?=<\?xml\s)", re.DOTALL)
 _NO_LIMITS = {"effort": "1e30", "velocity": "1e30"}
@@ -83,18 +80,24 @@ def read(
     for folder in folders.given:
         if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
+    assumed = dict[str, object]()
     try:
         if file.suffix.lower() == ".xacro":
             from sphshell_pin.robots.xacro_file import expand
 
-            text = expand(file, folders, xacro_args or {})
+            text, assumed = expand(file, folders, xacro_args or {})
         elif xacro_args:
             raise ValueError("arguments are for files that end in .xacro")
         else:
             text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
         raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
-    return described(text, folders, free_flyer=free_flyer)
+    found = described(text, folders, free_flyer=free_flyer)
+    if assumed:
+        values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
+        note = f"its arguments without a default are taken as {values}: or give others"
+        found = replace(found, notes=(*found.notes, note))
+    return found
 
 
 def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) -> Description:
@@ -106,8 +109,7 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
         if tag == "sdf":
             raise RobotError(f"{file}: {_reason('.sdf')}")
         if tag not in ("robot", "mujoco"):
-            included = "if another file includes this one, name that"
-            raise ValueError(f"its root element is <{tag}>; {_NEXT}; {included}")
+            raise ValueError(f"its root element is <{tag}>; {_NEXT}; or {INCLUDED}")
         root = parsed(text)
         if tag == "mujoco":
             from sphshell_pin.robots.mjcf import read_mjcf
@@ -120,7 +122,9 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
     except (ValueError, OSError, LookupError, RuntimeError) as error:  # the last: Pinocchio's
         if isinstance(error, SphshellError):
             raise
-        raise RobotError(f"{file}: not a {what} that can be read: {_line(error)}") from None
+        said = f"{file}: not a {what} that can be read: {_line(error)}"
+        whole = including(file) if INCLUDED in said and folders.kept is None else None
+        raise RobotError(said if whole is None else f"{said}: {whole}") from None
 
 
 def is_path(robot: str | PathLike[str]) -> bool:
@@ -131,11 +135,9 @@ def is_path(robot: str | PathLike[str]) -> bool:
 
 def check_readable(file: Path) -> None:
     """Raise RobotError for what is no file, or a file that holds no robot, with what to do."""
-    if not os.path.isfile(file):
-        what = "is a folder, not a file" if os.path.isdir(file) else "no such file"
-        raise RobotError(f"{file}: {what}; {_NEXT}")
-    reason = _reason(file.suffix.lower())
-    if reason:
+    if reason := why_no_file(file):
+        raise RobotError(f"{file}: {reason}; {_NEXT}")
+    if reason := _reason(file.suffix.lower()):
         raise RobotError(f"{file}: {reason}")
 
 
@@ -199,7 +201,7 @@ def _geometry(
         text = ET.tostring(root, encoding="unicode")
         return pin.buildGeomFromUrdfString(model, text, kind)
     except (ValueError, RuntimeError) as error:
-        raise _mesh_fault(description, _line(error)) from None
+        raise _cannot_load(description, _line(error)) from None
 
 
 def _geometry_of_mjcf(
@@ -212,8 +214,8 @@ def _geometry_of_mjcf(
             continue
         path, _ = mesh
         if os.path.isfile(path):
-            if reason := _mesh_reason(path):
-                raise _mesh_fault(description, reason)
+            if reason := mesh_fault(path):
+                raise _cannot_load(description, reason)
         elif not robot.touches(g) or description.folders.kept is not None:
             missing[str(path)] = None
         else:
@@ -224,7 +226,7 @@ def _geometry_of_mjcf(
     try:
         return robot.geometry(model, visual=visual, without=missing), list(missing)
     except (ValueError, RuntimeError) as error:
-        raise _mesh_fault(description, _line(error)) from None
+        raise _cannot_load(description, _line(error)) from None
 
 
 def _without_broken(root: ET.Element, model: pin.Model) -> list[str]:
@@ -286,7 +288,7 @@ def _with_meshes(
                 continue
             uri = mesh.get("filename", "")
             found = description.folders.find(uri)
-            reason = "" if found is None else _mesh_reason(found)
+            reason = "" if found is None else mesh_fault(found)
             if found is not None and not reason:
                 mesh.set("filename", str(found.absolute()))
                 if meters and found.suffix.lower() == ".dae":
@@ -296,32 +298,11 @@ def _with_meshes(
                 missing[uri] = None
                 link.remove(part)
             else:
-                raise _mesh_fault(description, reason)
+                raise _cannot_load(description, reason)
     return root, list(missing)
 
 
-def _mesh_reason(path: Path) -> str:
-    """Say why a mesh is not given to the reader that Pinocchio has, which may crash at it.
-
-    It knows 40 formats; those of robots have been tried: damaged .ply files made it crash, damaged
-    .off files go on for ever.
-    """
-    suffix = path.suffix.lower()
-    try:
-        open_regular(path).close()
-    except OSError as error:
-        return f"{path}: {error.strerror}"
-    if suffix not in MESHES:
-        return f"{path}: not one of the formats {', '.join(MESHES)}"
-    if suffix in (".ply", ".off"):
-        try:
-            READERS[suffix](path)
-        except ShellFileError as error:
-            return str(error)
-    return refused_reference(path)
-
-
-def _mesh_fault(description: Description, reason: str) -> RobotError:
+def _cannot_load(description: Description, reason: str) -> RobotError:
     return RobotError(
         f"{description.file}: a mesh cannot be loaded ({reason}); searched in "
         f"{description.folders.searched()}: give the folder above the package with --package-dir, "

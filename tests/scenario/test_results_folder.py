@@ -16,8 +16,6 @@ from sphshell_pin.base.atomic.exchange import exchange
 from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running import run
-from sphshell_pin.study.sweep.job import Outcome
-from sphshell_pin.study.sweep.journal import Journal
 from tests.command import call
 from tests.scenario import races
 from tests.scenario.files import write
@@ -150,20 +148,6 @@ def test_a_folder_that_must_stay_gets_its_files_one_by_one(why, tmp_path, monkey
     assert os.stat(out).st_ino == before
     assert why != "folders of others" or (out / "mine" / "notes.txt").read_text() == "mine"
     assert os.listdir(tmp_path) == ["out"]
-
-
-def test_a_sweep_goes_on_in_the_exchanged_folder(tmp_path):
-    folder, path = tmp_path / "out", tmp_path / "out" / "sweep.parquet.journal"
-    put(folder, "old")
-    inode = folder.stat().st_ino
-    with contextlib.closing(Journal(path, {"scenario": "drop"}, 2)) as journal:
-        for number in range(2):
-            journal.add(Outcome(number, "done", "", {}, 0.0, "here"))
-            assert put(folder, "new")["a"] == "new"
-            assert folder.stat().st_ino != inode
-    with contextlib.closing(Journal(path, {"scenario": "drop"}, 2)) as journal:
-        assert [*journal.outcomes] == [0, 1]
-    assert [one.name for one in tmp_path.iterdir()] == ["out"]
 
 
 def test_a_link_stays_a_link(tmp_path):

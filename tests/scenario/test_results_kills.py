@@ -37,7 +37,7 @@ MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedr
 OTHERS = {
     "notes.txt": b"mine",
     "stopped/run.npz": b"stopped early",
-    "sweep.parquet.journal": b"of a sweep that has ended",
+    "sweep.parquet": b"of a sweep that has ended",
 }
 
 
@@ -222,8 +222,9 @@ def of_report(title):
 
 
 def of_sweep(seed):
-    columns = {"run": np.arange(9), "a": np.random.default_rng(seed).random(9)}
-    return lambda place: write_table(place / "table.parquet", columns, {"scenario": "drop"})
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"run": np.arange(9), "a": np.random.default_rng(seed).random(9)})
+    return lambda place: write_table(place / "table.parquet", table)
 
 
 def of_fit(value):
