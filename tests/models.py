@@ -88,6 +88,13 @@ def free_q(position: Vector) -> Vector:
     return np.concatenate([np.asarray(position, dtype=float), [0.0, 0.0, 0.0, 1.0]])
 
 
+def pose_of(model: pin.Model, q: Vector, frame: str) -> pin.SE3:
+    """Where a frame is at q (nq,)."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId(frame)]
+
+
 def plate(size: float = 1.0, count: int = 8, side: str = "both") -> Shell:
     """Flat plate z = 0."""
     return Shell(*meshes.random_plate(count, seed=count, size=size, slivers=False), side=side)

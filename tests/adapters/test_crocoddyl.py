@@ -6,6 +6,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
+from tests.models import ball, pose_of
 
 crocoddyl = pytest.importorskip("crocoddyl")
 
@@ -46,9 +47,7 @@ def arm_on_moving_plate(joints: sp.JointComponents | None = None) -> tuple[sp.Sc
     model.appendBodyToJoint(turn, pin.Inertia.FromBox(2.0, 0.4, 0.4, 0.02), pin.SE3.Identity())
     model.addFrame(pin.Frame("plate", turn, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     q = np.array([0.2, 0.9, 1.2, 0.1, 0.05])
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    tip_in_plate = data.oMi[turn].actInv(data.oMf[model.getFrameId("tip")].translation)
+    tip_in_plate = pose_of(model, q, "plate").actInv(pose_of(model, q, "tip").translation)
     tilt = pin.rpy.rpyToMatrix(0.1, -0.2, 0.3)
     scene = sp.Scene(model, joints=joints)
     scene.add_contact(
@@ -65,11 +64,7 @@ def arm_on_moving_plate(joints: sp.JointComponents | None = None) -> tuple[sp.Sc
 
 def free_ball() -> tuple[sp.Scene, np.ndarray]:
     """Return a ball that rolls and slides on a plate, and a state: a free-flyer."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root_joint")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.3, 0.02), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model)
+    scene = sp.Scene(ball(mass=0.3, radius=0.02))
     scene.add_contact(sp.Sphere(0.02, "ball"), plate(), law=LAW, friction=SLIDING, name="touch")
     quaternion = pin.Quaternion(pin.rpy.rpyToMatrix(0.3, -0.5, 0.9)).coeffs()
     q = np.concatenate(([0.03, 0.04, 0.02 - 2e-4], quaternion))

@@ -9,7 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, SetupWarning
 from sphshell_pin.scenario import build
-from tests import meshes
+from tests import meshes, models
 from tests.shell.test_faces import torus
 
 mujoco = pytest.importorskip("mujoco")
@@ -92,11 +92,7 @@ def test_steps_are_those_of_a_simulation(friction):
     dt, radius = 1e-5, 0.02
     law = sp.HuntCrossleyLaw(1e6, 1.5, 0.1)
     model, data = model_of(ball(radius, 0.1, options=f'timestep="{dt}"'), {})
-    free = pin.Model()
-    free.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
-    free.appendBodyToJoint(1, pin.Inertia.FromSphere(0.1, radius), pin.SE3.Identity())
-    free.addBodyFrame("ball", 1, pin.SE3.Identity(), 0)
-    scene = sp.Scene(free)
+    scene = sp.Scene(models.ball(mass=0.1, radius=radius))
     scene.add_contact(sp.Sphere(radius, "ball"), plate(), law=law, friction=friction)
     q0 = np.array([0, 0, radius + 1e-5, 0, 0, 0, 1.0])
     v0 = np.array([0.05, 0.02, -0.1, 0, 0, 0])

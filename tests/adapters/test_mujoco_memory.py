@@ -9,6 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, SphshellError
+from tests import models
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -123,11 +124,7 @@ def test_rollouts_over_any_number_of_data_are_the_same(friction):
 def test_rk4_moves_bristles_with_order_four():
     """A ball on springs of contact and bristle: both frictions and depths are smooth."""
     law, friction = sp.HuntCrossleyLaw(1e5, 1.0), sp.BristleFriction(0.6, 0.6, 1e4, 0.0)
-    free = pin.Model()
-    free.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
-    free.appendBodyToJoint(1, pin.Inertia.FromSphere(0.1, 0.02), pin.SE3.Identity())
-    free.addBodyFrame("ball", 1, pin.SE3.Identity(), 0)
-    scene = sp.Scene(free)
+    scene = sp.Scene(models.ball(mass=0.1, radius=0.02, joint=pin.JointModelTranslation()))
     scene.add_contact(sp.Sphere(0.02, "ball"), plate(), law=law, friction=friction)
     q0, v0 = np.array([0, 0, 0.02 - law.depth_at(0.981)]), np.array([3e-4, 0, 2e-4])
     exact = sp.Simulation(scene, sp.Adaptive(1e-12, 1e-16)).run(q0, v0, 0.02).q[-1]

@@ -78,9 +78,8 @@ def on_surface(name: str, law=LAWS["impact"], friction=None, seed: int = 0, **mo
 def arm_on(shell: sp.Shell, point: Array, normal: Array, law, friction, **more) -> State:  # type: ignore[no-untyped-def]
     """An arm whose tip, off its frame's origin, is 5 mm deep at a point of the shell."""
     scene = sp.Scene(models.arm(), **more)
-    data, offset = scene.model.createData(), np.array([0.01, -0.02, 0.015])
-    pin.framesForwardKinematics(scene.model, data, ARM_Q)
-    center = data.oMf[scene.model.getFrameId("ball")] * offset
+    offset = np.array([0.01, -0.02, 0.015])
+    center = models.pose_of(scene.model, ARM_Q, "ball") * offset
     turn = meshes.random_rotation(3)
     place = pin.SE3(turn, center - turn @ (point + (0.05 - 0.005) * normal))
     sphere = sp.Sphere(0.05, "ball", tuple(offset.tolist()))
@@ -117,9 +116,7 @@ def in_groove(law, friction) -> State:  # type: ignore[no-untyped-def]
 def two_pairs(law, friction) -> State:  # type: ignore[no-untyped-def]
     """Two spheres on the arm touch two plates, one of them with bristles, one on a link."""
     scene, q, v = on_plate(law, friction)
-    data = scene.model.createData()
-    pin.framesForwardKinematics(scene.model, data, q)
-    link, tip = (data.oMf[scene.model.getFrameId(name)] for name in ("two", "ball"))
+    link, tip = (models.pose_of(scene.model, q, name) for name in ("two", "ball"))
     scene.add_contact(
         sp.Sphere(0.04, "ball", (0.02, 0.0, 0.01)),
         models.plate(),
@@ -151,9 +148,7 @@ def held_in_frame_j() -> State:
     """A source whose contact stays in frame j and is pressed by the motion of body i there."""
     scene = models.two_free_bodies(LAWS["impact"])
     model, (q, v) = scene.model, models.two_free_state()
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    start_i, start_j = (data.oMf[model.getFrameId(name)].copy() for name in ("ball", "table"))
+    start_i, start_j = (models.pose_of(model, q, name) for name in ("ball", "table"))
     point, normal = start_j.actInv(start_i.translation + 0.02), meshes.random_rotation(5)[:, 0]
     in_i = start_i.actInv(start_j * point)
 
@@ -169,9 +164,7 @@ def held_in_frame_j() -> State:
 def locked() -> State:
     """The arm, one of its joints held, on a plate."""
     scene = sp.Scene(models.arm(), lock=["one_joint"], q_lock=ARM_Q)
-    data = scene.model.createData()
-    pin.framesForwardKinematics(scene.model, data, ARM_Q[1:])
-    tip = data.oMf[scene.model.getFrameId("ball")].translation
+    tip = models.pose_of(scene.model, ARM_Q[1:], "ball").translation
     place = pin.SE3(np.eye(3), tip - 0.045 * UP)
     law, friction = LAWS["impact"], COULOMB
     scene.add_contact(sp.Sphere(0.05, "ball"), models.plate(), "universe", place, law, friction)

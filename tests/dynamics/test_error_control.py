@@ -226,10 +226,7 @@ def zoo() -> sp.Scene:
 def zoo_start(scene: sp.Scene) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(3)
     q = pin.integrate(scene.model, pin.neutral(scene.model), rng.uniform(-0.4, 0.4, scene.model.nv))
-    data = scene.model.createData()
-    pin.framesForwardKinematics(scene.model, data, q)
-    tip = data.oMf[scene.model.getFrameId("b3")].translation[2]
-    q[2] += R - 2e-3 - tip
+    q[2] += R - 2e-3 - models.pose_of(scene.model, q, "b3").translation[2]
     return q, rng.uniform(-2.0, 2.0, scene.model.nv)
 
 

@@ -12,6 +12,7 @@ from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, SetupWarning
 from tests.contact.test_planes import egg, pose, rotations, scene_of, support
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
+from tests.dynamics.test_planes import over_plane, touching
 from tests.meshes import cube, grid_plate, icosphere
 from tests.models import add_body, empty
 
@@ -91,37 +92,11 @@ FRICTIONS = [
     sp.CoulombFriction(0.3, 0.2, 0.05, 0.5),
     sp.BristleFriction(0.4, 0.3, 2e4, 5.0),
 ]
-INERTIA = pin.Inertia(0.5, np.array([0.002, -0.001, -0.003]), np.diag([1.5e-4, 2e-4, 1.8e-4]))
 SHELLS = {
     "box": box,
     "egg": lambda: egg(10, np.array([0.03, 0.02, 0.025])),
     "sheet": lambda: sp.Shell(*grid_plate(2, 2, 0.05)),
 }
-
-
-def tilted(name: str, law, friction, *, ground: bool) -> tuple[sp.Scene, np.ndarray, np.ndarray]:
-    """A body that is partly below a plane, which stands or moves as well, and its state."""
-    model, frame, shell = empty(), "universe", SHELLS[name]()
-    if not ground:
-        frame = "table"
-        add_body(model, frame, pin.JointModelFreeFlyer())
-    add_body(model, "body", pin.JointModelFreeFlyer(), inertia=INERTIA)
-    scene = sp.Scene(model)
-    plane = sp.Plane(frame, (0.0, 0.0, 0.01), (0.1, -0.05, 1.0))
-    scene.add_contact(plane, shell, "body", None, law, friction)
-    rng = np.random.default_rng(5)
-    q = pin.neutral(model)
-    place = plane.placement
-    if not ground:
-        q = pin.integrate(model, q, 0.3 * rng.normal(size=model.nv))
-        data = model.createData()
-        pin.forwardKinematics(model, data, q)
-        place = data.oMi[1] * place
-    turn = place.rotation @ pin.exp3(np.array([0.02, 0.03, 0.4]))
-    lowest = (shell.vertices @ (place.rotation.T @ turn).T)[:, 2].min()
-    q[-7:-4] = place.act(np.array([0.01, 0.02, -lowest - 8e-4]))
-    q[-4:] = pin.Quaternion(turn).coeffs()
-    return scene, q, rng.normal(size=model.nv) * 0.3
 
 
 @pytest.mark.parametrize("ground", [True, False])
@@ -131,7 +106,10 @@ def tilted(name: str, law, friction, *, ground: bool) -> tuple[sp.Scene, np.ndar
     [("egg", sp.ImpactLaw(2e7, 1.5, 20.0, 1e-3)), *((name, LAW) for name in SHELLS)],
 )
 def test_derivatives_are_those_of_finite_differences(name, law, friction, ground: bool) -> None:
-    scene, q, v = tilted(name, law, friction, ground=ground)
+    shell = SHELLS[name]()
+    scene = over_plane(shell, law, friction, ground=ground)
+    turned = pin.exp3(np.array([0.02, 0.03, 0.4]))
+    q, v = touching(scene, 8e-4, 5, turned, lambda turned: -(shell.vertices @ turned.T)[:, 2].min())
     assert_derivatives(scene, q, v)
     assert_rows(scene, q, v)
     if not ground:

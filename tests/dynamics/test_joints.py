@@ -389,10 +389,7 @@ key = "joint.hinge.friction"
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.6, 0.0, 0.8)])
 def test_the_energy_of_an_armature_counts_about_any_axis(axis: tuple[float, ...]) -> None:
-    model = pin.Model()
-    turn = pin.JointModelRevoluteUnaligned(*axis)
-    joint = model.addJoint(0, turn, pin.SE3.Identity(), "turn")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    model = models.ball(0.0, 1.0, 0.1, pin.JointModelRevoluteUnaligned(*axis))
     model.armature, speed = np.array([0.05]), 3.0
     run = sp.Simulation(sp.Scene(model), sp.Adaptive()).run(np.zeros(1), [speed], 0.01)
     inertia = 0.4 * 1.0 * 0.1**2 + 0.05

@@ -8,41 +8,42 @@ import sphshell_pin as sp
 from tests.contact.test_planes import egg as egg_shell
 from tests.contact.test_planes import rotations, support
 from tests.meshes import cube
-from tests.models import add_body, empty
+from tests.models import add_body, empty, pose_of
 
 EGG = np.array([0.03, 0.02, 0.025])
 INERTIA = pin.Inertia(0.5, np.array([0.002, -0.001, -0.003]), np.diag([1.5e-4, 2e-4, 1.8e-4]))
 
 
-def egg(law, friction=None, *, ground: bool = True, cells: int = 10) -> sp.Scene:
-    """An egg over a plane of the world, or of a body that moves as well."""
-    model = empty()
-    frame = "universe"
+def over_plane(shell: sp.Shell, law, friction=None, *, ground: bool = True) -> sp.Scene:
+    """A body over a plane of the world, or of a body that moves as well."""
+    model, frame = empty(), "universe" if ground else "table"
     if not ground:
-        frame = "table"
         add_body(model, frame, pin.JointModelFreeFlyer())
-    add_body(model, "egg", pin.JointModelFreeFlyer(), inertia=INERTIA)
+    add_body(model, "body", pin.JointModelFreeFlyer(), inertia=INERTIA)
     scene = sp.Scene(model)
-    tilt = (0.1, -0.05, 1.0)
-    scene.add_contact(
-        sp.Plane(frame, (0.0, 0.0, 0.01), tilt), egg_shell(cells, EGG), "egg", None, law, friction
-    )
+    plane = sp.Plane(frame, (0.0, 0.0, 0.01), (0.1, -0.05, 1.0))
+    scene.add_contact(plane, shell, "body", None, law, friction)
     return scene
 
 
-def touching(scene: sp.Scene, depth: float = 2e-4, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """A state of `egg` with the egg `depth` deep in the plane."""
+def egg(law, friction=None, *, ground: bool = True) -> sp.Scene:
+    return over_plane(egg_shell(10, EGG), law, friction, ground=ground)
+
+
+def touching(scene: sp.Scene, depth: float = 2e-4, seed: int = 0, turned=None, reach=None):
+    """A state of `over_plane` with the body `depth` deep, `turned` from the plane or anyhow.
+
+    `reach(turned)` is how far down it goes from its origin; an egg's unless given.
+    """
     rng = np.random.default_rng(seed)
     q = pin.neutral(scene.model)
     plane = scene.pairs[0].side_i.plane.placement
     if scene.model.nq > 7:
         q = pin.integrate(scene.model, q, 0.3 * rng.normal(size=scene.model.nv))
-        data = scene.model.createData()
-        pin.forwardKinematics(scene.model, data, q)
-        plane = data.oMi[1] * plane
-    turn = rotations(1, seed)[0]
-    reach = support(EGG, (plane.rotation.T @ turn))
-    q[-7:-4] = plane.act(np.array([0.01, 0.02, reach - depth]))
+        plane = pose_of(scene.model, q, "table") * plane
+    turn = rotations(1, seed)[0] if turned is None else plane.rotation @ turned
+    down = (reach or (lambda turned: support(EGG, turned)))(plane.rotation.T @ turn)
+    q[-7:-4] = plane.act(np.array([0.01, 0.02, down - depth]))
     q[-4:] = pin.Quaternion(turn).coeffs()
     return q, rng.normal(size=scene.model.nv) * 0.3
 
@@ -88,9 +89,8 @@ def test_a_sensor_and_rows_show_the_force_on_the_body_of_the_plane() -> None:
     scene = egg(LAW, FRICTIONS[1], ground=False)
     q, v = touching(scene)
     rows = scene.contacts(q, v)
-    data = scene.model.createData()
-    pin.forwardKinematics(scene.model, data, q)
-    on_table = data.oMi[1].act(scene.external_forces(q, v)[1]).linear
+    place = pose_of(scene.model, q, "table")
+    on_table = place.act(scene.external_forces(q, v)[1]).linear
     assert rows.normal_force * rows.normal_world[0] + rows.friction_force_world[0] == pytest.approx(
         on_table, rel=1e-12
     )
@@ -111,6 +111,6 @@ def test_explanation_of_a_plane() -> None:
     scene = egg(LAW)
     q, v = touching(scene, -0.01)
     figures = scene.explain(q, v).pairs[0]
-    assert "plane on frame 'universe' against shell 'shell' on frame 'egg'" in figures.modelled
+    assert "plane on frame 'universe' against shell 'shell' on frame 'body'" in figures.modelled
     assert figures.gap == pytest.approx(0.01, abs=2e-4)
     assert 0 < figures.effective_mass < INERTIA.mass

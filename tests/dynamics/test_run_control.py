@@ -50,9 +50,10 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.path.insert(0, {root!r})
 from tests.dynamics.test_run_control import START, bouncing
 from sphshell_pin.errors import Interrupted
+simulation = bouncing()
 try:
     print("started", flush=True)
-    bouncing().run(*START, 1e5, record_dt=1e-2, **{options})
+    simulation.run(*START, 1e5, record_dt=1e-2, **{options})
 except Interrupted as stop:
     rows = stop.result
     print("kept", len(rows.t), rows.t[-1] > 0, stop.t >= rows.t[-1], flush=True)

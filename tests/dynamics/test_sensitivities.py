@@ -166,10 +166,8 @@ def test_a_controller_of_the_package(control_dt: float | None, integrator: str) 
     scene = sp.Scene(models.arm())
     plate = models.plate()
     scene.add_contact(sp.Sphere(R, "ball"), plate, law=HUNT, friction=COULOMB, name="tip")
-    data = scene.model.createData()
     q0 = models.ARM_Q.copy()
-    pin.framesForwardKinematics(scene.model, data, q0)
-    height = data.oMf[scene.model.getFrameId("ball")].translation[2]
+    height = models.pose_of(scene.model, q0, "ball").translation[2]
     place = pin.SE3(np.eye(3), np.array([0, 0, height - R - 1e-3]))
     pair = with_value(scene.pairs[0], ("side_j", "placement"), place)
     scene = scene.with_pairs((pair,))

@@ -7,6 +7,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import robots
 from tests.dynamics.test_sensor_wrench import URDF, arm, read, sensor, weight
+from tests.models import pose_of
 
 
 def test_joints_that_mimic_others():
@@ -18,9 +19,7 @@ def test_joints_that_mimic_others():
     result = read(sp.Scene(model), q, sp.GravityCompensation(), sensors)
     hand = model.frames[model.getFrameId("panda_hand_joint")].inertia.mass
     mass = hand + sum(model.inertias[k].mass for k in (model.njoints - 2, model.njoints - 1))
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    turn = data.oMf[model.getFrameId("panda_hand")].rotation
+    turn = pose_of(model, q, "panda_hand").rotation
     force = result.sensors["hand"].values[0, :3]
     assert np.allclose(turn @ force, [0, 0, 9.81 * mass], rtol=0, atol=1e-10)
     follower = sp.JointTorqueSensor(name="s", joint=finger)

@@ -100,10 +100,8 @@ def test_more_than_a_million_rows_are_announced(integrator, record_dt, rows) -> 
 def test_shells_that_go_on_into_each_other_are_named() -> None:
     """Side by side in one plane, not where one leans by more than the crease angle."""
     turn = pin.utils.rotate("y", 0.8)
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "tip")
-    model.addFrame(pin.Frame("tip", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.1, 0.01), pin.SE3.Identity())
+    model = models.empty()
+    models.add_body(model, "tip", pin.JointModelTranslation())
     plate = sp.Shell([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]], name="plate")
     for rotation, smooth in ((np.eye(3), True), (turn, False)):
         scene = sp.Scene(model)

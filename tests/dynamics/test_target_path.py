@@ -177,13 +177,9 @@ def follow(scene: sp.Scene, frame: str, q, v, **more):
         frame, stiffness=50.0, damping=5.0, speed=0.2, spline=True, decoupled=True, **more
     )
     rows = sp.Simulation(scene, sp.Adaptive(1e-9)).run(q, v, 1.5, controller, record_dt=0.01)
-    data = scene.model.createData()
-    places = []
-    for row in rows.q:
-        pin.framesForwardKinematics(scene.model, data, row)
-        places.append(data.oMf[scene.model.getFrameId(frame)].translation.copy())
+    places = np.array([models.pose_of(scene.model, one, frame).translation for one in rows.q])
     curve, timing = controller._motion()
-    return rows, np.array(places), curve.at(timing.at(rows.t))
+    return rows, places, curve.at(timing.at(rows.t))
 
 
 @pytest.mark.parametrize("rotational", [0.0, 3.0])
@@ -195,10 +191,8 @@ def test_a_decoupled_arm_follows_exactly(rotational: float) -> None:
         q = np.array([0.3, 0.8, -0.9, 0.6, 0.4, 0.2])
     else:
         model, q = models.arm(), models.ARM_Q
-    scene, data = sp.Scene(model), model.createData()
-    frame = model.frames[model.nframes - 1].name
-    pin.framesForwardKinematics(model, data, q)
-    start = data.oMf[model.getFrameId(frame)].translation
+    scene, frame = sp.Scene(model), model.frames[model.nframes - 1].name
+    start = models.pose_of(model, q, frame).translation
     way = start + 0.5 * (POINTS - POINTS[0])
     more = {"path": way, "acceleration": 0.5, "jerk": 5.0, "lead_in": 0.1}
     more |= {"rotational_stiffness": rotational, "rotational_damping": 0.1 * rotational}

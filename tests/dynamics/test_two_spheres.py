@@ -31,11 +31,9 @@ from tests.dynamics.scenes import (
 def test_depth_normal_and_point_have_closed_forms(turned: bool) -> None:
     scene = two_spheres(sp.ImpactLaw(1e4, 1.5), turned=turned)
     q, _ = in_touch(1)
-    data = scene.model.createData()
-    pin.framesForwardKinematics(scene.model, data, q)
     first, second = scene.pairs[0].side_i.sphere, scene.pairs[0].side_j.sphere
     centers = [
-        data.oMf[scene.model.getFrameId(s.frame)] * np.array(s.offset) for s in (first, second)
+        models.pose_of(scene.model, q, s.frame) * np.array(s.offset) for s in (first, second)
     ]
     away = centers[0] - centers[1]
     found = scene.contacts(q)

@@ -99,9 +99,7 @@ def grazing() -> Verdicts:
 def finger_scene(press: float, friction: Any = None) -> sp.Scene:
     """Return a straight finger along z, its tip `press` [m] deep in a level wall over it."""
     model = robots.load("three_link_finger").model
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, np.zeros(3))
-    tip = data.oMf[model.getFrameId("tip")].translation
+    tip = models.pose_of(model, np.zeros(3), "tip").translation
     scene = sp.Scene(model)
     scene.add_contact(
         sp.Sphere(RADIUS, "tip"),

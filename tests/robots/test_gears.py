@@ -4,11 +4,11 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from sphshell_pin import robots, scenarios
 from sphshell_pin.robots import gear_mesh
+from tests.models import pose_of
 
 
 @pytest.fixture(scope="module")
@@ -21,10 +21,8 @@ def gears():
 
 
 def poses(model, angle_1, angle_2):
-    data = model.createData()
     q = np.array([np.cos(angle_1), np.sin(angle_1), np.cos(angle_2), np.sin(angle_2)])
-    pin.framesForwardKinematics(model, data, q)
-    return data.oMf[model.getFrameId("gear_2")], data.oMf[model.getFrameId("gear_1")]
+    return pose_of(model, q, "gear_2"), pose_of(model, q, "gear_1")
 
 
 def test_pitch_tooth_thickness():

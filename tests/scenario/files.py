@@ -4,10 +4,10 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-import pinocchio as pin
 
 from sphshell_pin.scenario import judge
 from sphshell_pin.scenario.running.run import simulate
+from tests.models import pose_of
 
 DROP = """
 title = "a ball falls on a box"
@@ -84,13 +84,6 @@ def run_well(built):
     assert stopped is None
     assert [one.figure for one in judge(built, result) if not one.met] == []
     return result
-
-
-def pose_of(model, q, frame):
-    """Return where a frame is at q (nq,), a pin.SE3."""
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    return data.oMf[model.getFrameId(frame)]
 
 
 def center_of(built, q):

@@ -63,8 +63,9 @@ def race(processes: int) -> str:
         if len(children) == 1:
             os.close(let)
         child, status = os.wait()
-        children.remove(child)
-        codes[os.waitstatus_to_exitcode(status)] += 1
+        if child in children:  # not one that an earlier test left
+            children.remove(child)
+            codes[os.waitstatus_to_exitcode(status)] += 1
     os.close(computing)
     begun = len(os.read(computed, processes))
     for one in (start, computed, go):

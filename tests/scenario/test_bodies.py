@@ -11,7 +11,8 @@ from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import RobotWarning, ScenarioError
 from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.format.reading import read_scenario
-from tests.scenario.files import pose_of, write
+from tests.models import pose_of
+from tests.scenario.files import write
 
 TWO = """
 title = "a finger and a ball"
@@ -224,9 +225,7 @@ def test_one_joint_of_a_group_locks_all(tmp_path):
         found = gripper(tmp_path, f'lock = ["{name}"]\nstart = {{ {name} = 0.03 }}')
         scene = Scene(found.model, found.lock, found.q0)
         assert list(scene.model.names)[1:] == ["lift"]
-        data = scene.model.createData()
-        pin.framesForwardKinematics(scene.model, data, np.zeros(1))
-        right = data.oMf[scene.model.getFrameId("right", pin.FrameType.BODY)]
+        right = pose_of(scene.model, np.zeros(1), "right")
         assert np.allclose(right.translation, [-0.06, 0, -0.02])
         assert reduce_visual(found).ngeoms == found.visual_model.ngeoms
 

@@ -17,6 +17,7 @@ from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.part import Part, word_primitive
 from sphshell_pin.scenario.format.shape_tables import Box, Cylinder
+from tests.models import pose_of
 from tests.scenario.files import run_well
 from tests.studies import mostly_studies
 
@@ -144,11 +145,9 @@ def test_torques_do_the_work_of_the_forces(tmp_path):
     forces = np.random.default_rng(0).normal(size=(3, 3))
     torques = hand.torques(Grasp(q, along_y, points, normals, forces, 0.0))
     model, step = hand.model, 1e-6
-    data = model.createData()
 
     def moved(q):
-        pin.framesForwardKinematics(model, data, q)
-        return [data.oMf[model.getFrameId(tip.frame)] for tip in hand.tips]
+        return [pose_of(model, q, tip.frame) for tip in hand.tips]
 
     local = [pose.actInv(point) for pose, point in zip(moved(q), points, strict=True)]
     for k in range(model.nv):

@@ -6,7 +6,8 @@ import pytest
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
-from tests.scenario.files import DROP, pose_of, write
+from tests.models import pose_of
+from tests.scenario.files import DROP, write
 
 LAW = "contact.ball-plate.law"
 G = 9.81

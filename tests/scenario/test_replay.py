@@ -4,7 +4,6 @@ import dataclasses
 import json
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
@@ -12,6 +11,7 @@ from sphshell_pin.errors import ResultError, SphshellError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.view.live.opening import player_of
+from tests import models
 from tests.scenario.files import DROP, without_pictures, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -126,13 +126,7 @@ def test_a_finished_run_has_nothing_to_turn(replay):
 
 
 def test_a_scene_of_ones_own_is_played_where_it_ran():
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "z")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    model.addBodyFrame("ball", joint, pin.SE3.Identity(), 0)
-    floor = sp.Shell([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], elements=[[0, 1, 2, 3]])
-    scene = sp.Scene(model)
-    scene.add_contact(sp.Sphere(0.1, frame="ball"), floor, law=sp.ImpactLaw(1e5, 1.5, 10.0, 1e-3))
+    scene = models.on_plate(models.slider(), sp.ImpactLaw(1e5, 1.5, 10.0, 1e-3), radius=0.1)
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(np.array([0.12]), duration=0.1)
     replay = Replay(result)
     assert replay.scene is scene

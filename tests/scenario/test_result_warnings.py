@@ -12,7 +12,8 @@ from sphshell_pin.scenario import build, explain_built
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
 from tests.command import call
-from tests.scenario.files import DROP, pose_of, write
+from tests.models import pose_of
+from tests.scenario.files import DROP, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 

@@ -10,7 +10,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.shell.curvature import curvature_report
 from sphshell_pin.shell.curved import curved_mesh
-from tests import meshes
+from tests import meshes, models
 
 from .surfaces import CUBE, CUBE_QUADS, plate
 
@@ -174,15 +174,11 @@ def test_needles_along_a_bend_are_nothing_to_look_at():
 
 
 def test_explain_shows_the_report():
-    model = pin.Model()
-    frame = pin.JointModelTranslation()
-    joint = model.addJoint(0, frame, pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    model.addFrame(pin.Frame("tip", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model = models.ball(joint=pin.JointModelTranslation())
     for method, shown in (("smooth", True), ("facets", False)):
         scene = sp.Scene(model)
         law = sp.ImpactLaw(1e6, 1.5, 0.0, 1e-3)
-        scene.add_contact(sp.Sphere(0.1, frame="tip"), tilted_plate(), law=law, method=method)
+        scene.add_contact(sp.Sphere(0.1, frame="ball"), tilted_plate(), law=law, method=method)
         found = scene.explain(np.array([0.0, 0.0, 1.2]), np.zeros(3))
         text = str(found)
         assert ("off the flat ones by up to" in text) == shown

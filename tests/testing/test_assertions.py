@@ -20,6 +20,7 @@ from tests.models import (
     linear_law,
     on_plate,
     plate,
+    pose_of,
     slider,
     two_free_bodies,
     two_free_state,
@@ -34,9 +35,8 @@ EVERY_FRICTION = [None, FRICTION, sp.BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05)]
 
 def arm_scene(kind=sp.Scene, friction=FRICTION):
     """Arm whose tip is 5 mm deep in a plate that stands askew."""
-    model, data = arm(), arm().createData()
-    pin.framesForwardKinematics(model, data, ARM_Q)
-    tip = data.oMf[model.getFrameId("ball")].translation
+    model = arm()
+    tip = pose_of(model, ARM_Q, "ball").translation
     rotation = meshes.random_rotation(3)
     scene = kind(model)
     scene.add_contact(

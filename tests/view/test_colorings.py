@@ -12,19 +12,16 @@ from sphshell_pin.view.display import Display
 from sphshell_pin.view.distance import RAMP, check_coloring, draw_distance
 from sphshell_pin.view.recording import render_recording
 from sphshell_pin.view.surface import FACE_COLORS, hex_colors, ramp_colors
+from tests import models
 from tests.shell.test_curvature import ball
 from tests.view.drawn import Film, attribute
 
 
 def scene_of(*shells, method="smooth"):
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "tip")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    model.addFrame(pin.Frame("tip", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model)
+    scene = sp.Scene(models.ball(joint=pin.JointModelTranslation()))
     law = sp.ImpactLaw(1e6, 1.5, 0.0, 1e-3)
     for shell in shells:
-        scene.add_contact(sp.Sphere(0.1, frame="tip"), shell, law=law, method=method)
+        scene.add_contact(sp.Sphere(0.1, frame="ball"), shell, law=law, method=method)
     return scene
 
 

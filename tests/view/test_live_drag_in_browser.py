@@ -3,11 +3,11 @@
 import time
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
+from tests.models import pose_of
 from tests.scenario.arms import write_arm
 from tests.scenario.files import DROP, write
 from tests.view.test_live_in_browser import opened  # noqa: F401  (a fixture)
@@ -32,9 +32,7 @@ def arm(opened, tmp_path):  # noqa: F811
 
 def point_of(live):
     """Return where IN_LOWER is [m]."""
-    model, data = live.player.scene.model, live.player.scene.model.createData()
-    pin.framesForwardKinematics(model, data, live.player.q)
-    return data.oMf[model.getFrameId("lower")].act(IN_LOWER)
+    return pose_of(live.player.scene.model, live.player.q, "lower").act(IN_LOWER)
 
 
 def drag_right(tab, start, steps=8):

@@ -3,11 +3,11 @@
 import json
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
+from tests.models import pose_of
 from tests.scenario.arms import write_arm
 from tests.scenario.files import write
 from tests.view.live_driver import OTHER_TAB, TAB, frames, say
@@ -63,9 +63,8 @@ def test_a_drag_pulls_the_point_of_the_node_that_was_hit(arm):
     frames(arm, 1, wall=0.0)
     assert arm.told == []
     # The box of the link is drawn around its middle, 0.15 m from the joint.
-    shown, data = live.drag, model.createData()
-    pin.framesForwardKinematics(model, data, live.q)
-    expected = data.oMf[model.getFrameId("lower")].act(np.array([0.0, 0.0, 0.25]))
+    shown = live.drag
+    expected = pose_of(model, live.q, "lower").act(np.array([0.0, 0.0, 0.25]))
     np.testing.assert_allclose(shown.point_world, expected, atol=1e-6)
     held, cursor, line = drawn(arm)
     np.testing.assert_allclose(held[:3, 3], shown.point_world, atol=1e-6)
