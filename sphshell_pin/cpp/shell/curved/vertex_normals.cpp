@@ -18,7 +18,8 @@ namespace {
 constexpr double kMostUneven = 0.1;
 // Smallest pivot of the scaled normal equations: below, the points do not tell the terms apart.
 constexpr double kLeastPivot = 1e-6;
-// A tilt of the frame that settles it [rad].
+// The frame turns with the normal: a few rounds settle both. A tilt that settles it [rad].
+constexpr int kMostRounds = 3;
 constexpr double kSettledTilt = 1e-7;
 // Normals agree within this angle [rad] and share of the spread of the normals around.
 constexpr double kSmallTurn = 0.005, kLikely = 0.25;
@@ -72,8 +73,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
   // Distances of about one, so that one pivot threshold serves all sizes.
   const double scale = std::sqrt(double(points.size()) / size2);
   Vec3 n = normal;
-  // The frame turns with the normal: a few rounds settle both.
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < kMostRounds; ++round) {
     const Vec3 east = n.unitOrthogonal(), north = n.cross(east);
     Square square = Square::Zero();
     Row along = Row::Zero();
@@ -90,8 +90,10 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
       row.template head<5>() << x, y, arc * x * x, arc * x * y, arc * y * y;
       if constexpr (Terms == 9)
         row.template tail<4>() << x * x * x, x * x * y, x * y * y, y * y * y;
-      // Normal equations.
-      square.noalias() += weight * row * row.transpose();
+      // Normal equations, of which the solver reads the lower triangle.
+      const Row weighted = weight * row;
+      for (int j = 0; j < Terms; ++j)
+        for (int i = j; i < Terms; ++i) square(i, j) += weighted[i] * row[j];
       along += weight * z * row;
       heights2 += weight * z * z;
     }
@@ -104,6 +106,12 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
     const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
     const double left = std::max(heights2 - fit.dot(along), kLeastLeft * heights2);
     if (round > 0 && left > most_uneven * heights2) return false;
+    // The gradient of the height at the origin tilts the normal.
+    n = (n - fit[0] * east - fit[1] * north).normalized();
+    // What a further round would turn it by is smaller than this by as much as it is small.
+    if (round + 1 < kMostRounds &&
+        (round == 0 || fit.template head<2>().squaredNorm() >= kSettledTilt * kSettledTilt))
+      continue;
     // The variances of the first two coefficients: what is left, over the degrees of freedom, times
     // the diagonal of the inverse.
     double variance = 0;
@@ -112,10 +120,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
       variance = std::max(variance, left / double(points.size() - Terms) * inverse);
     }
     doubt = std::sqrt(variance);
-    // The gradient of the height at the origin tilts the normal.
-    n = (n - fit[0] * east - fit[1] * north).normalized();
-    // What a further round would turn it by is smaller than this by as much as it is small.
-    if (round > 0 && fit.template head<2>().squaredNorm() < kSettledTilt * kSettledTilt) break;
+    break;
   }
   normal = n;
   return true;

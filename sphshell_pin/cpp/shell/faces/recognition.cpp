@@ -13,7 +13,8 @@ namespace sphshell {
 namespace {
 
 // Where nothing has been found from so many seeds, nothing is looked for any longer; and so many
-// triangles per seed more.
+// triangles per seed more. Nor where more seeds than these have failed in all than triangles were
+// found: a free shape has strips here and there that look like cones.
 constexpr std::size_t kPatience = 60, kTrianglesPerSeed = 3000;
 // Growths that lead to nothing look at so many triangles in all, and at so many times those that
 // there are: else seeds on a large free shape cost the square of its size.
@@ -234,6 +235,7 @@ std::vector<Recognizer::Moments> Recognizer::moments_of_regions() const {
   std::vector<Vec3> origin(out.size());
   for (std::size_t t = 0; t < of_.size(); ++t) {
     const int r = regions_.of(int(t));
+    if (regions_.count(r) == 1) continue;
     if (out[r].area == 0) origin[r] = point(corners(int(t))[0]);
     out[r].area += area(int(t));
     out[r].middle += area(int(t)) * (centroid(int(t)) - origin[r]);
@@ -241,6 +243,7 @@ std::vector<Recognizer::Moments> Recognizer::moments_of_regions() const {
   for (std::size_t r = 0; r < out.size(); ++r)
     out[r].middle = origin[r] + out[r].middle / std::max(out[r].area, 1e-300);
   for (std::size_t t = 0; t < of_.size(); ++t) {
+    if (regions_.count(regions_.of(int(t))) == 1) continue;
     Moments& of = out[regions_.of(int(t))];
     const double share = area(int(t)) / std::max(of.area, 1e-300);
     // A triangle has the moments of its corners and its middle, weighted 1 : 1 : 1 : 9.
@@ -343,14 +346,16 @@ Faces Recognizer::run() {
     state = state * 6364136223846793005u + 1442695040888963407u;
     std::swap(seeds[i - 1], seeds[(state >> 33) % i]);
   }
-  std::size_t failures = 0;
+  const std::size_t patience = kPatience + seeds.size() / kTrianglesPerSeed;
+  std::size_t failures = 0, all_failures = 0, explained = 0;
   for (const int seed : seeds) {
-    if (failures >= kPatience + seeds.size() / kTrianglesPerSeed) break;
-    if (is_fruitless()) break;
+    if (failures >= patience || all_failures >= patience + explained || is_fruitless()) break;
     if (of_[seed] >= 0 || tries_[seed] >= 2) continue;
     const std::size_t before = visits_;
     const bool found = recognize_from(seed);
     failures = found ? 0 : failures + 1;
+    all_failures += !found;
+    explained += found ? faces_.back().triangles.size() : 0;
     fruitless_ += found ? 0 : visits_ - before;
   }
   fruitless_ = 0;
