@@ -189,11 +189,12 @@ SOLIDS = {
 }
 
 
-@pytest.mark.parametrize("friction", FRICTIONS[1:])
-@pytest.mark.parametrize(
-    "integrator", [sp.Adaptive(1e-6, 1e-9), sp.Implicit(1e-6, 1e-9), sp.RungeKutta4(5e-5)]
-)
-@pytest.mark.parametrize("name", SOLIDS)
+INTEGRATORS = [sp.Adaptive(1e-6, 1e-9), sp.Implicit(1e-6, 1e-9), sp.RungeKutta4(5e-5)]
+FALLS = [("box", one, friction) for one in INTEGRATORS for friction in FRICTIONS[1:]]
+FALLS += [(name, one, FRICTIONS[1]) for name in ("coin", "cone") for one in INTEGRATORS[:2]]
+
+
+@pytest.mark.parametrize(("name", "integrator", "friction"), FALLS)
 def test_solids_come_to_rest_at_an_ordinary_cost(name: str, integrator, friction) -> None:
     """They fall, rattle, and lie still; the energies close.
 
@@ -206,8 +207,9 @@ def test_solids_come_to_rest_at_an_ordinary_cost(name: str, integrator, friction
     turn = pin.rpy.rpyToMatrix(*turned, 0.2)
     height = 0.005 - (shell.vertices @ turn[2]).min()
     q = np.r_[0, 0, height, pin.Quaternion(turn).coeffs()]
-    result = sp.Simulation(scene, integrator).run(q, np.array(v, float), 1.0)
-    assert result.stats.steps <= 20_000
+    duration = 1.0 if name == "box" else 0.5
+    result = sp.Simulation(scene, integrator).run(q, np.array(v, float), duration, record_dt=0.1)
+    assert result.stats.steps <= 20_000 * duration
     assert np.abs(result.v[-1]).max() < 1e-6
     assert np.abs(result.energy.residual).max() < 5e-4 * result.energy.exchanged
 
