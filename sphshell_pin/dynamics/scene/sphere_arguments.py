@@ -81,7 +81,7 @@ def corner_warning(pair: ContactPair) -> str | None:
         return None
     return (
         f"contact '{pair.name}': shell '{shell.name}' has a flat face with a notch or rounded "
-        f"corners, which with {type(pair.law).__name__} stands on one point at a time and rattles: "
+        f"borders, which with {type(pair.law).__name__} stands on one point at a time and rattles: "
         "take a FoundationLaw, for which the face is one contact"
     )
 

@@ -79,6 +79,17 @@ class Search {
     return bends ? -2 : -1;
   }
 
+  // Whether the surface goes on smoothly over a side: then the lowest point leaves the face there.
+  bool is_smooth(int h) const {
+    const int g = shell_.facet_half_edge(h), f = triangle_of(g);
+    const int other = topology_.other_half_edge(h);
+    if (!surface_.face_of(f))
+      return topology_.edge_at(h).kind == EdgeClass::Smooth && !is_plane(triangle_of(other));
+    const FaceCell& cell = surface_.face_cells()[f];
+    return cell.side[side_of(g)] == FaceCell::Side::Border &&
+           surface_.faces().joints[cell.joint[side_of(g)]].tangent;
+  }
+
   // The outer border of each planar face.
   void find_outlines() {
     const std::vector<int>& face = topology_.planar_face;
@@ -144,7 +155,7 @@ class Search {
     if (!outline.convex || !(outline.straight || outline.circle >= 0)) return false;
     bool above = false, below = false;
     for (const int h : outline.sides) {
-      if (!bounds_neighbors(start(h), outline.normal, above, below)) return false;
+      if (is_smooth(h) || !bounds_neighbors(start(h), outline.normal, above, below)) return false;
       const int other = topology_.other_half_edge(h);
       if (other < 0 || !is_plane(triangle_of(other))) continue;
       const Outline& beside = outlines_[topology_.planar_face[triangle_of(other)]];
@@ -191,7 +202,8 @@ class Search {
     std::vector<std::pair<double, double>> ends;  // height on the axis, radius
     for (const FaceJoint& joint : faces.joints) {
       if (joint.face[0] != face && joint.face[1] != face) continue;
-      if (joint.kind == FaceJoint::Kind::Line) return;  // only a part of its circumference
+      // Only a part of its circumference, or one that goes on.
+      if (joint.kind == FaceJoint::Kind::Line || joint.tangent) return;
       const Vec3 from = joint.point - shape.point;
       if (joint.kind == FaceJoint::Kind::Circle && joint.axis.cross(shape.axis).norm() < kBeyond &&
           from.cross(shape.axis).norm() < kBeyond * shell_.size())
