@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.errors import InvalidParameter, SetupWarning
+from sphshell_pin.errors import InvalidParameter
 from tests.contact.test_planes import egg, pose, rotations, scene_of, support
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
 from tests.dynamics.test_planes import over_plane, touching
@@ -276,9 +276,7 @@ def test_a_tall_block_tips_where_its_corner_says() -> None:
     assert stands == [False, True]
 
 
-def test_a_flat_face_with_a_law_of_a_point_is_warned_of() -> None:
-    with pytest.warns(SetupWarning, match="stands on one corner at a time"):
-        scene_of(box(), sp.ImpactLaw(1e6))
+def test_laws_and_friction_that_need_a_radius_are_refused() -> None:
     with pytest.raises(InvalidParameter, match=r"take law.on_plane\(radius\), or a FoundationLaw"):
         scene_of(box(), sp.HertzLaw(1e9, 0.3))
     with pytest.raises(InvalidParameter, match="follows from the radius"):

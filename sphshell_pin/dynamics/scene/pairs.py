@@ -152,15 +152,18 @@ class ContactPair(Summarized):
     def _check_plane(self) -> None:
         """Refuse what follows from the radius of a sphere, and flat elements.
 
-        A bristle on the area of a foundation resists spin: else a part would spin on its face
-        without end.
+        A bristle under what can lie flat resists spin: else a part would spin on its face without
+        end.
         """
         why = "beside a Plane: it follows from the radius of a Sphere"
         if self.law.needs_shape and not isinstance(self.law, FoundationLaw):
             must = "take law.on_plane(radius), or a FoundationLaw, which needs no radius"
             raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}; {must}")
         friction = self.friction
-        if isinstance(friction, BristleFriction) and isinstance(self.law, FoundationLaw):
+        lies = isinstance(self.law, FoundationLaw) or any(
+            one.shell.core_for(one.method).has_flats for one in self.shells if one.is_smooth
+        )
+        if isinstance(friction, BristleFriction) and lies:
             object.__setattr__(self, "friction", replace(friction, torsional=True))
         elif friction is not None and (
             isinstance(friction, MindlinFriction) or friction._binding.torsional

@@ -77,22 +77,13 @@ def corner_warning(pair: ContactPair) -> str | None:
     if not isinstance(pair.side_i, PlaneSide) or isinstance(pair.law, FoundationLaw):
         return None
     shell = pair.shells[0].shell
-    corners, normals = shell.vertices[shell.triangles], shell.triangle_normals
-    patch = shell.element_patch[shell.triangle_element]
-    sides = corners[:, 1:] - corners[:, :1]
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
-    first = np.unique(patch, return_index=True)[1]
-    along = np.einsum("ij,ij->i", normals, normals[first][patch])
-    total = np.bincount(patch, area)
-    flat = np.bincount(patch, area * along) > (1 - 1e-9) * total
-    for k in first[flat & (total > 1e-3 * shell.size**2)]:
-        if ((shell.vertices - corners[k, 0]) @ normals[k]).max() < 1e-6 * shell.size:
-            return (
-                f"contact '{pair.name}': shell '{shell.name}' has a flat face, which with "
-                f"{type(pair.law).__name__} stands on one corner at a time and rattles: take a "
-                "FoundationLaw, for which the face is one contact"
-            )
-    return None
+    if not shell.core_for("smooth").has_other_flats:
+        return None
+    return (
+        f"contact '{pair.name}': shell '{shell.name}' has a flat face with a notch or rounded "
+        f"borders, which with {type(pair.law).__name__} stands on one point at a time and rattles: "
+        "take a FoundationLaw, for which the face is one contact"
+    )
 
 
 def seam_warning(pair: ContactPair, other: ContactPair) -> str | None:

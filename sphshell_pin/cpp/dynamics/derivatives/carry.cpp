@@ -30,9 +30,8 @@ MatrixX beside_kinks(const MatrixX& before, const MatrixX& here, const MatrixX& 
 
 }  // namespace
 
-// Methods without derivatives of their own: along the dense output, which solves the same equations
-// to their tolerance.
-void Stepper::carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
+// Along the dense output, which solves the same equations to their tolerance.
+void Stepper::carry_along(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
   slopes.along(chart, *this, h, 1, tangent);
 }
 
@@ -48,7 +47,7 @@ void SemiImplicitEuler::carry(StepSlopes& slopes, Chart& chart, double h, Tangen
 }
 
 // Every stage's state changes with the stages before it.
-void RungeKutta4::carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
+void ExplicitRungeKutta::carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
   const double t = chart.origin().t;
   const Changes start = slopes.at_origin();
   // One set of changes for each stage.

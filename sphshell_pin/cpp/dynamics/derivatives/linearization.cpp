@@ -177,7 +177,7 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
       active.contact, state.center, pair.has_sphere(),   pair.radius, scene_.disc_radius(active),
       twist,          {},           scene_.shape(active)};
   if (!site.follows) site.place = site.contact.point;
-  if (pair.on_plane() && pair.law.foundation()) {
+  if (scene_.is_wide(active)) {
     // Derivatives by turns are given besides those by the place.
     site.follows = true, site.place.setZero();
   } else if (pair.on_plane()) {

@@ -24,6 +24,7 @@ class ExplicitRungeKutta : public Stepper {
  public:
   void begin(Chart& chart) override;
   void step(Chart& chart, double h, State& out) override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
 
  protected:
   struct Row {
@@ -45,7 +46,6 @@ class RungeKutta4 : public ExplicitRungeKutta {
  public:
   static constexpr const char* kind = "runge-kutta-4";  // in files
   RungeKutta4();
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
 };
 
 // Order 5 with an estimate of order 4 (Dormand and Prince, J. Comput. Appl. Math. 6, 1980), dense
@@ -55,6 +55,9 @@ class DormandPrince : public ExplicitRungeKutta {
   static constexpr const char* kind = "adaptive";  // in files
   DormandPrince();
   void step(Chart& chart, double h, State& out) override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override {
+    carry_along(slopes, chart, h, tangent);
+  }
   int order_of_error() const override { return 5; }
   void interpolate(double theta, VectorX& y) const override;
 };

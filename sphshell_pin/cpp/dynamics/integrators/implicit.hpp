@@ -57,6 +57,9 @@ class Rodas : public ImplicitStepper {
   using ImplicitStepper::ImplicitStepper;
   void step(Chart& chart, double h, State& out) override;
   void complete(Chart& chart, State& out) override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override {
+    carry_along(slopes, chart, h, tangent);
+  }
   int order_of_error() const override { return 4; }
   void interpolate(double theta, VectorX& y) const override;
 

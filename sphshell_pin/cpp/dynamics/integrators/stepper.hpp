@@ -29,15 +29,17 @@ class Stepper {
   const VectorX& rate() const { return rate_; }
   // y within the last step, at the share theta of it, or a little beyond.
   virtual void interpolate(double /*theta*/, VectorX& /*y*/) const {}
-  // Moves changes of the origin to the end of the last step, of h; by default along the dense
-  // output.
-  virtual void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const;
+  // Moves changes of the origin to the end of the last step, of h.
+  virtual void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const = 0;
   // True where the loop adds up the work of contacts, by the trapezoidal rule.
   virtual bool leaves_work() const { return false; }
   // True where no stiffness limits the step.
   virtual bool is_implicit() const { return false; }
 
  protected:
+  // carry() of methods with a dense output, whose steps it follows to their tolerance.
+  void carry_along(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const;
+
   VectorX start_, rate_, y_, error_;
 };
 

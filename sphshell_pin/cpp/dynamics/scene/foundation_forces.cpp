@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/laws/bristle_slopes.hpp"
 #include "contact/laws/dual.hpp"
 #include "dynamics/scene/patch.hpp"
 #include "dynamics/scene/scene_data.hpp"
@@ -53,32 +54,6 @@ void add_by_twist(const Mat3& by_velocity, const Vec3& x, Matrix6& by_twist) {
   by_twist.bottomRightCorner<3, 3>() -= arm * by_velocity * arm;
 }
 
-// A contact of a constant normal force with and without friction, and how the wrench and the rates
-// of bristles answer that force. The force passes for one in proportion to the depth.
-struct BristleSlopes {
-  ContactSlopes all, without, more;
-  Vector6 by_force;
-  double share;  // depth over force
-
-  BristleSlopes(const FrictionLaw& friction, double relaxation, const ContactSite& at,
-                double normal_force) {
-    const double size = std::max(normal_force, 1e-300);
-    share = at.contact.depth / size;
-    NormalLaw held, steep;
-    held.law = ImpactLaw({size, 0});
-    steep.law = ImpactLaw({size / at.contact.depth, 1});
-    contact_slopes(held, friction, relaxation, at, all);
-    contact_slopes(held, FrictionLaw(), relaxation, at, without);
-    contact_slopes(steep, friction, relaxation, at, more);
-    Vector6 normal_by_depth;
-    normal_by_depth << at.contact.normal, at.contact.point.cross(at.contact.normal);
-    by_force = (more.by_depth - all.by_depth) * share - normal_by_depth;
-  }
-  Vec3 rate_by_force(int ring) const {
-    return (more.rings[ring].rate_by_depth - all.rings[ring].rate_by_depth) * share;
-  }
-};
-
 // Mean square of the distance of the pressure beside a plane from its center [m^2].
 double spread_of(const Foundation& foundation) {
   const FoundationRow& row = foundation.rows()[0];
@@ -89,9 +64,9 @@ double spread_of(const Foundation& foundation) {
 }
 
 // For the laws, whose disc of contact is Hertz's: a^2 = radius depth. Over a sphere's patch it is
-// as wide as that, else it has the same second moment under Hertz's pressure.
+// as wide as that.
 double disc_radius(const Pair& pair, const Foundation& foundation, double depth) {
-  return pair.on_plane() ? 2.5 * spread_of(foundation) / depth : 2 * pair.disc_radius();
+  return pair.on_plane() ? disc_of_spread(spread_of(foundation), depth) : 2 * pair.disc_radius();
 }
 
 // The derivative of the pressure at a point this far from the sphere's center by that center.
@@ -290,7 +265,6 @@ void FoundationForces::add_bristle(const Pair& pair, std::size_t i, double relax
 // well adds nothing. All in the frame of the plane, z = 0.
 void FoundationForces::slopes_below(const Pair& pair, double relaxation, const ContactSite& site,
                                     double normal_force, ContactSlopes& out) const {
-  using Row6 = Eigen::Matrix<double, 1, 6>;
   const FoundationLaw& law = *pair.law.foundation();
   const double kappa = law.modulus / law.thickness;
   const Vec3 n = Vec3::UnitZ();
@@ -343,30 +317,9 @@ void FoundationForces::slopes_below(const Pair& pair, double relaxation, const C
   if (pair.friction.has_state()) {
     const double spread = spread_of(foundation_);
     const Matrix36 point_by = (first_by - first / sum * sum_by) / sum;
-    const Row6 normal_by = by.row(2), normal_by_twist = out.by_twist.row(2);
-    static const Mat3 kCarried = Mat3::Identity();
-    ContactSite at = site;
-    at.place = at.contact.point, at.point_by = &kCarried,
-    at.disc_radius = 2.5 * spread / at.contact.depth;
-    const BristleSlopes bristle(pair.friction, relaxation, at, normal_force);
-    // The disc's radius goes with the root of the depth where the pressure is held, and really with
-    // that of its spread.
     spread_by -= 2 * off_center.transpose() * point_by + spread * sum_by;
-    const Row6 depth_by =
-        spread > 0 ? Row6(at.contact.depth / (spread * sum) * spread_by) : Row6::Zero();
-    out.wrench += bristle.all.wrench - bristle.without.wrench;
-    by += (bristle.all.by_place - bristle.without.by_place) * point_by +
-          (bristle.all.by_depth - bristle.without.by_depth) * depth_by +
-          bristle.by_force * normal_by;
-    out.by_twist +=
-        bristle.all.by_twist - bristle.without.by_twist + bristle.by_force * normal_by_twist;
-    for (int k = 0; k < pair.friction.rings(); ++k) {
-      ContactSlopes::Ring& ring = out.rings[k] = bristle.all.rings[k];
-      const Matrix36 rate_by = ring.rate_by_place * point_by + ring.rate_by_depth * depth_by +
-                               bristle.rate_by_force(k) * normal_by;
-      ring.rate_by_place = rate_by.leftCols<3>(), ring.rate_by_turn = rate_by.rightCols<3>();
-      ring.rate_by_twist += bristle.rate_by_force(k) * normal_by_twist;
-    }
+    sphshell::add_bristle(pair.friction, relaxation, site, normal_force,
+                          {spread, point_by, spread_by / sum}, by, out);
   }
   out.by_place = by.leftCols<3>(), out.by_turn = by.rightCols<3>();
   out.depth_by_place = -n.transpose(), out.depth_by_turn = -lowest_.point.cross(n).transpose();

@@ -48,10 +48,13 @@ double ShellSurface::depth_behind(const Vec3& center, double radius) const {
   return outside < 0 && is_closed(*shell) ? radius - outside : 0;
 }
 
-void PlaneBelow::find(const SE3& plane_from_shell, Query& query) const {
+void PlaneBelow::find(const SE3& plane_from_shell, double height, Query& query) const {
   const Mat3& turn = plane_from_shell.rotation();
-  query.find_below(*shell, turn.row(2).transpose(), -plane_from_shell.translation().z());
+  const Vec3 up = turn.row(2);
+  const double offset = -plane_from_shell.translation().z();
+  query.find_below(*shell, up, offset + height);
   for (Contact& contact : query.contacts) {
+    if (height > 0) contact.depth = offset - up.dot(contact.point);
     // In the plane, over the lowest point: friction acts in the surface of the solid.
     contact.point = plane_from_shell.act(contact.point);
     contact.point.z() = 0;

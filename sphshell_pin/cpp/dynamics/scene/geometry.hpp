@@ -13,6 +13,7 @@
 #include "contact/laws/foundation.hpp"
 #include "contact/query/ball.hpp"
 #include "contact/query/query.hpp"
+#include "shell/curved/curved.hpp"
 
 namespace sphshell {
 
@@ -102,12 +103,16 @@ struct PlaneBelow : AnyGeometry {
   static constexpr bool kHasSphere = false;
   std::shared_ptr<const Shell> shell;
 
+  // What the shell can lie on.
+  const Flats& flats() const { return shell->curved()->flats(*shell); }
+
   bool has_dn_dc() const { return false; }
   template <class Pose>
   void find(const Pose& pose_i, const SE3& pose_j, const Vec3&, double, Query& query) const {
-    find(pose_j.actInv(pose_i()), query);
+    find(pose_j.actInv(pose_i()), 0, query);
   }
-  void find(const SE3& plane_from_shell, Query& query) const;
+  // Those of points up to a height above the plane as well, of a negative depth.
+  void find(const SE3& plane_from_shell, double height, Query& query) const;
   Contact nearest(const SE3& pose_i, const SE3& pose_j, const Vec3& center, double radius,
                   Query& query) const;
   void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }

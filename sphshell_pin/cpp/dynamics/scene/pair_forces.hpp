@@ -4,6 +4,7 @@
 #include <variant>
 #include <vector>
 
+#include "contact/faces/crown.hpp"
 #include "contact/laws/foundation.hpp"
 #include "contact/laws/wrench_derivatives.hpp"
 #include "dynamics/scene/contact_row.hpp"
@@ -20,25 +21,44 @@ struct ActiveContact;
 // - find: the contacts of the pair at a center, with dn_dc where `slopes` and where it is known;
 // - complete: what the law at a point, which has been evaluated, leaves out; power and energy of
 //   the contact;
+// - is_wide: whether it has a shell's area, or several of its corners, for its contact: derivatives
+//   by turns are then given besides those by the place;
 // - patch: where the bodies touch, under the force of the row;
 // - slopes: the wrench and the rates of bristles by the motion;
 // - changed: the same of a pair with another parameter; false where it has no such contact.
 
-// Each contact is a point where the laws of the pair act on a depth.
-struct PointForces {
+// Each contact is a point where the laws of the pair act on a depth. Beside a plane those of flat
+// faces and lines are shared: damping and friction act at each place with its share.
+class PointForces {
+ public:
   static constexpr bool kDepthHeld = true;
 
   template <class Pose>
   void find(const Pair& pair, const Pose& pose_i, const SE3& pose_j, const Vec3& center, bool,
             Query& query) {
+    num_shared_ = 0;
+    const PlaneBelow* plane = std::get_if<PlaneBelow>(&pair.geometry);
+    if (plane && plane->flats().any()) return find_shared(*plane, pose_j.actInv(pose_i()), query);
     pair.ask([&](const auto& one) { one.find(pose_i, pose_j, center, pair.radius, query); });
   }
+  bool is_wide(const Pair&, const Contact& contact) const { return shared(contact) != nullptr; }
   void complete(const SceneData& scene, ActiveContact& active) const;
   PatchRow patch(SceneData& scene, const ActiveContact& active, const ContactRow& row) const;
   void slopes(const SceneData& scene, const ActiveContact& active, const ContactSite& site,
               ContactSlopes& out) const;
   bool changed(SceneData& scene, const Pair& pair, const ActiveContact& active,
                const ContactSite& site, ContactSlopes& out) const;
+
+ private:
+  void find_shared(const PlaneBelow& plane, const SE3& plane_from_shell, Query& query);
+  // Of a contact, or null.
+  const SharedContact* shared(const Contact& contact) const;
+  void slopes(const Pair& pair, double relaxation, const SharedContact& shared,
+              const ContactSite& site, ContactSlopes& out) const;
+
+  Crown crown_;
+  std::vector<SharedContact> shared_;
+  std::size_t num_shared_ = 0;  // of them; the rest is kept for its memory
 };
 
 // What acts on the sphere at one row, in the shell's frame.
@@ -62,12 +82,13 @@ class FoundationForces {
     if (!plane) return find(pair, center, slopes || pair.friction.has_state(), query.contacts);
     // Its lowest point first: most often there is none.
     plane_from_shell_ = pose_j.actInv(pose_i());
-    plane->find(plane_from_shell_, query);
+    plane->find(plane_from_shell_, 0, query);
     if (query.contacts.empty()) return;
     lowest_ = query.contacts.front();
     find_below(pair, *plane, query.contacts);
   }
   void find(const Pair& pair, const Vec3& center, bool slopes, std::vector<Contact>& contacts);
+  bool is_wide(const Pair& pair, const Contact&) const { return pair.on_plane(); }
   // Of a shell whose lowest point is known.
   void find_below(const Pair& pair, const PlaneBelow& plane, std::vector<Contact>& contacts);
   void complete(const SceneData& scene, ActiveContact& active) const;

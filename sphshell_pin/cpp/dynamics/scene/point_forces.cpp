@@ -1,11 +1,63 @@
+#include <algorithm>
+
+#include "contact/laws/bristle_slopes.hpp"
 #include "dynamics/scene/patch.hpp"
 #include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {
+namespace {
+
+// The friction that acts at each place: none where there is a bristle, which is the contact's.
+FrictionLaw friction_of_places(const Pair& pair) {
+  return pair.friction.has_state() ? FrictionLaw() : pair.friction;
+}
+
+// The spread that a bristle's arm follows, whose root that is, and its derivative by the spread:
+// less where that is small, as the root of a spread that begins grows without bound.
+std::pair<double, double> spread_of_arm(const Pair& pair, double spread) {
+  constexpr double kSmall = 0.05;  // of the size
+  const double size = kSmall * std::get<PlaneBelow>(pair.geometry).flats().size;
+  const double share = spread / (spread + size * size);
+  return {share * spread, share * (2 - share)};
+}
+
+}  // namespace
+
+void PointForces::find_shared(const PlaneBelow& plane, const SE3& plane_from_shell, Query& query) {
+  const Flats& flats = plane.flats();
+  plane.find(plane_from_shell, Crown::height(flats), query);
+  std::vector<Contact>& contacts = query.contacts;
+  for (Contact& contact : contacts) {
+    if (contact.weight < 0) continue;
+    if (num_shared_ == shared_.size()) shared_.emplace_back();
+    SharedContact& out = shared_[num_shared_];
+    if (!crown_.share(*plane.shell, flats, plane_from_shell.rotation(),
+                      plane_from_shell.translation(), contact, out))
+      continue;
+    ++num_shared_;
+    // In the plane.
+    for (SharedContact::Place& place : out.places)
+      place.point.z() = 0, place.point_by.row(2).setZero();
+    out.point.z() = 0;
+    contact.depth = out.depth, contact.point = out.point, contact.group = -1;
+    contact.dn_dc.setZero();
+  }
+  contacts.erase(std::remove_if(contacts.begin(), contacts.end(),
+                                [](const Contact& one) { return !(one.depth > 0); }),
+                 contacts.end());
+}
+
+const SharedContact* PointForces::shared(const Contact& contact) const {
+  for (std::size_t i = 0; i < num_shared_; ++i)
+    if (shared_[i].facet == contact.facet && shared_[i].index == contact.index &&
+        contact.weight > 0)
+      return &shared_[i];
+  return nullptr;
+}
 
 void PointForces::complete(const SceneData& scene, ActiveContact& active) const {
   const Pair& pair = scene.pair_of(active);
-  const ContactForce<double>& f = active.force;
+  ContactForce<double>& f = active.force;
   const ContactKinematics<double>& m = active.kinematics;
   const double weight = active.contact.weight;
   // The weight of several as one is the length of the sum of their normals.
@@ -16,6 +68,33 @@ void PointForces::complete(const SceneData& scene, ActiveContact& active) const 
   // Contacts that come or go are events, and so is a force that begins or ends.
   active.pieces = weight > 0 ? 1 : -1;
   active.clamped = f.normal == 0;
+  const SharedContact* shared = this->shared(active.contact);
+  if (!shared) return;
+  const FrictionLaw friction = friction_of_places(pair);
+  const SE3& world_from_j = scene.state_of(active).world_from_j;
+  ContactForce<double> whole;
+  whole.elastic = f.elastic, whole.slip = f.slip;
+  active.damping = active.sliding = 0, active.moment.setZero();
+  for (const SharedContact::Place& place : shared->places) {
+    const Vec3 point = world_from_j.act(place.point);
+    ContactKinematics<double> there = m;
+    if (pair.needs_velocity()) there.relative = scene.relative_velocity(pair, point);
+    const ContactForce<double> at = contact_force(pair.law, friction, 0, 0, there);
+    whole.normal += place.share * at.normal;
+    whole.friction += place.share * at.friction;
+    active.moment += place.share * (point - active.point).cross(at.normal * m.normal + at.friction);
+    active.damping += place.share * damping_power(at, there);
+    active.sliding += place.share * friction_power(at, there);
+  }
+  active.clamped = whole.normal == 0;
+  if (pair.friction.has_state()) {
+    const double spread = spread_of_arm(pair, shared->spread()).first;
+    const double disc = disc_of_spread(spread, m.depth);
+    std::visit([&](const auto& one) { one.add(whole, m, disc, scene.relaxation(pair)); },
+               pair.friction.law);
+    active.sliding = friction_power(whole, m);
+  }
+  f = whole;
 }
 
 PatchRow PointForces::patch(SceneData& scene, const ActiveContact& active,
@@ -31,12 +110,52 @@ PatchRow PointForces::patch(SceneData& scene, const ActiveContact& active,
 void PointForces::slopes(const SceneData& scene, const ActiveContact& active,
                          const ContactSite& site, ContactSlopes& out) const {
   const Pair& pair = scene.pair_of(active);
+  if (const SharedContact* shared = this->shared(active.contact))
+    return slopes(pair, scene.relaxation(pair), *shared, site, out);
   contact_slopes(pair.law, pair.friction, scene.relaxation(pair), site, out);
+}
+
+// In the frame of the plane: of each place the law's slopes, and how the place, its share and the
+// common depth follow the shell.
+void PointForces::slopes(const Pair& pair, double relaxation, const SharedContact& shared,
+                         const ContactSite& site, ContactSlopes& out) const {
+  static const Mat3 kCarried = Mat3::Identity();
+  const FrictionLaw friction = friction_of_places(pair);
+  Matrix6 by = Matrix6::Zero();
+  const auto [wide, wide_by] = spread_of_arm(pair, shared.spread());
+  SpreadSlopes spread{wide, Matrix36::Zero(), Row6::Zero()};
+  ContactSlopes one;
+  ContactSite at = site;
+  at.point_by = &kCarried;
+  out.wrench.setZero(), out.by_twist.setZero();
+  for (const SharedContact::Place& place : shared.places) {
+    at.contact.point = at.place = place.point;
+    contact_slopes(pair.law, friction, relaxation, at, one);
+    out.wrench += place.share * one.wrench;
+    out.by_twist += place.share * one.by_twist;
+    by += place.share * (one.by_place * place.point_by + one.by_depth * shared.depth_by) +
+          one.wrench * place.share_by;
+    const Vec3 from = place.point - shared.point;
+    spread.point_by += place.share * place.point_by + place.point * place.share_by;
+    spread.spread_by +=
+        from.squaredNorm() * place.share_by + 2 * place.share * from.transpose() * place.point_by;
+  }
+  spread.spread_by *= wide_by;
+  if (pair.friction.has_state())
+    add_bristle(pair.friction, relaxation, site, out.wrench[2], spread, by, out);
+  out.by_place = by.leftCols<3>(), out.by_turn = by.rightCols<3>();
+  out.depth_by_place = shared.depth_by.leftCols<3>();
+  out.depth_by_turn = shared.depth_by.rightCols<3>();
+  out.normal_by_place.setZero();
 }
 
 // At the same depth, so that only the laws, and where the contact is on the bodies, have changed.
 bool PointForces::changed(SceneData& scene, const Pair& pair, const ActiveContact& active,
                           const ContactSite& site, ContactSlopes& out) const {
+  if (const SharedContact* shared = this->shared(active.contact)) {
+    slopes(pair, scene.relaxation(pair), *shared, site, out);
+    return true;
+  }
   ContactSite other = site;
   ContactShape shape;
   other.disc_radius = pair.disc_radius();

@@ -149,6 +149,12 @@ class SceneData {
   // How the contact's pair makes forces of contacts.
   const PairForces& forces_of(const ActiveContact& active) const { return forces_[active.pair]; }
   const Pair& pair_of(const ActiveContact& active) const { return pairs_[active.pair]; }
+  // See PairForces.
+  bool is_wide(const ActiveContact& active) const {
+    return std::visit(
+        [&](const auto& one) { return one.is_wide(pairs_[active.pair], active.contact); },
+        forces_[active.pair]);
+  }
   const PairState& state_of(const ActiveContact& active) const { return states_[active.pair]; }
   // Of body i against body j, in the world.
   Vec3 relative_velocity(const Pair& pair, const Vec3& point_world) const;

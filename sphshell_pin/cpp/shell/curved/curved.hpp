@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
 #include "shell/curved/cell_bounds.hpp"
 #include "shell/curved/face_search.hpp"
 #include "shell/faces/face_cells.hpp"
+#include "shell/faces/flats.hpp"
 #include "shell/faces/recognition.hpp"
 #include "shell/shell.hpp"
 
@@ -143,6 +145,11 @@ class CurvedShell {
   // FaceCells::intruders, and why faces do not give closest points.
   const std::vector<std::pair<int, int>>& intruders() const { return intruders_; }
   const std::vector<Inexact>& inexact() const { return inexact_; }
+  // What the shell can lie on, found at first use.
+  const Flats& flats(const Shell& shell) const {
+    std::call_once(flats_found_, [&] { flats_ = find_flats(shell); });
+    return flats_;
+  }
   // By so much regions of features overlap where faces give closest points [m].
   double gap() const { return gap_; }
   // That which gives the closest points of a facet; null: the facet's own cubic does.
@@ -191,6 +198,8 @@ class CurvedShell {
   Tangents tangents_;
   double bulge_ = 0;
   bool exact_;
+  mutable std::once_flag flats_found_;
+  mutable Flats flats_;
 };
 
 }  // namespace sphshell

@@ -1,0 +1,223 @@
+"""Flat faces and lines beside a plane under laws of a point: potential, derivatives, rest."""
+
+import itertools
+import warnings
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin import testing
+from sphshell_pin.errors import SetupWarning
+from tests.contact.test_planes import pose, scene_of
+from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
+from tests.dynamics.test_foundation_on_plane import FRICTIONS, INERTIA, box, thrown
+from tests.meshes import cube, grid_plate
+from tests.models import add_body, empty, linear_law
+
+LAW = sp.ImpactLaw(1e6, 1.5, 50.0, 1e-4)
+CROWN = 1e3  # its radius over the size of the shell
+SIDES = np.array([0.06, 0.05, 0.04])
+
+
+def prism(outline: np.ndarray, height: float) -> sp.Shell:
+    """A right prism over a polygon."""
+    n = len(outline)
+    ends = [np.c_[outline, np.full(n, z)] for z in (0.0, height)]
+    walls = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
+    middle = np.array([[*outline.mean(axis=0), z] for z in (0.0, height)])
+    caps = [[(k + 1) % n, k, 2 * n, -1] for k in range(n)]
+    caps += [[n + k, n + (k + 1) % n, 2 * n + 1, -1] for k in range(n)]
+    return sp.Shell(np.vstack([*ends, middle]), np.array(walls + caps))
+
+
+TRIANGLE = np.array([[0.0, 0.0], [0.05, 0.0], [0.01, 0.03]])
+# What lies on a plane: a shell, and how it is turned.
+SHELLS = {
+    "box": (box, np.eye(3)),
+    "box on an edge": (box, pin.utils.rotate("x", 0.6)),
+    "wedge": (lambda: prism(TRIANGLE, 0.02), np.eye(3)),
+    "coin": (lambda: sp.Shell.from_geometry(coal.Cylinder(0.02, 0.004), segments=48), np.eye(3)),
+    "roller": (
+        lambda: sp.Shell.from_geometry(coal.Cylinder(0.02, 0.06), segments=48),
+        pin.utils.rotate("x", np.pi / 2),
+    ),
+    "cone": (
+        lambda: sp.Shell.from_geometry(coal.Cone(0.03, 0.06), segments=48),
+        pin.utils.rotate("y", np.pi / 2 + np.arctan2(0.03, 0.06)),
+    ),
+    "sheet": (lambda: sp.Shell(*grid_plate(2, 2, 0.05)), np.eye(3)),
+}
+
+
+def lying(
+    name: str, law, friction, *, ground: bool = True, tilt: float = 0.2, seed: int = 5
+) -> tuple[sp.Scene, np.ndarray, np.ndarray]:
+    """A body that lies flat but for a share of the crown's tilt, and its state."""
+    model, frame = empty(), "universe"
+    make, flat = SHELLS[name]
+    shell = make()
+    if not ground:
+        frame = "table"
+        add_body(model, frame, pin.JointModelFreeFlyer())
+    add_body(model, "body", pin.JointModelFreeFlyer(), inertia=INERTIA)
+    scene = sp.Scene(model)
+    plane = sp.Plane(frame, (0.0, 0.0, 0.01), (0.1, -0.05, 1.0))
+    scene.add_contact(plane, shell, "body", None, law, friction)
+    rng = np.random.default_rng(seed)
+    q = pin.neutral(model)
+    place = plane.placement
+    if not ground:
+        q = pin.integrate(model, q, 0.3 * rng.normal(size=model.nv))
+        data = model.createData()
+        pin.forwardKinematics(model, data, q)
+        place = data.oMi[1] * place
+    lean = rng.normal(size=3) * [1, 1, 0]
+    lean *= tilt / CROWN / np.linalg.norm(lean)
+    turn = pin.exp3(lean) @ pin.utils.rotate("z", 0.4) @ flat
+    lowest = (shell.vertices @ turn.T)[:, 2].min()
+    q[-7:-4] = place.act(np.array([0.01, 0.02, -lowest - 2e-4]))
+    q[-4:] = pin.Quaternion(place.rotation @ turn).coeffs()
+    return scene, q, rng.normal(size=model.nv) * 0.02  # so that all corners press
+
+
+@pytest.mark.parametrize("ground", [True, False])
+@pytest.mark.parametrize("friction", FRICTIONS)
+@pytest.mark.parametrize("name", SHELLS)
+def test_derivatives_are_those_of_finite_differences(name: str, friction, ground: bool) -> None:
+    # Steps of the differences are a share of the crown's tilt.
+    scene, q, v = lying(name, LAW, friction, ground=ground)
+    assert len(scene.contacts(q, v)) == 1
+    assert_derivatives(scene, q, v)
+    assert_rows(scene, q, v)
+    if not ground:
+        testing.assert_wrenches_cancel(scene, q, v)
+
+
+@pytest.mark.parametrize("name", SHELLS)
+def test_the_force_is_the_gradient_of_a_potential(name: str) -> None:
+    """Round closed ways through states that lie flat, on edges and on corners."""
+    law = sp.ImpactLaw(1e6, 1.5)
+    rng = np.random.default_rng(1)
+    for tilt in (0.3, 1.0):
+        scene, q, _ = lying(name, law, None, tilt=0.0)
+        model = scene.model
+        ways = rng.normal(size=(2, 6)) * np.r_[[1e-5] * 3, [tilt / CROWN] * 3]
+        turns, weights = np.polynomial.legendre.leggauss(12)
+        parts = np.linspace(0, 2 * np.pi, 61)
+        total = size = 0.0
+        for begin, end in itertools.pairwise(parts):
+            for x, share in zip(turns, weights, strict=True):
+                angle = (begin + end) / 2 + (end - begin) / 2 * x
+                at = np.cos(angle) * ways[0] + np.sin(angle) * ways[1]
+                along = -np.sin(angle) * ways[0] + np.cos(angle) * ways[1]
+                here = pin.integrate(model, q, at)
+                rate = pin.dIntegrate(model, q, at)[1] @ along
+                force = scene.external_forces(here, np.zeros(6))[1].vector
+                total += share * (end - begin) / 2 * force @ rate
+                size += share * (end - begin) / 2 * abs(force @ rate)
+        assert abs(total) < 1e-5 * size  # kinks within the rule
+
+
+def enclosing(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Middle and radius of the smallest circle round points, by trial of all pairs and triples."""
+    best = (points[0], np.inf)
+    for a in range(len(points)):
+        for b in range(a):
+            middles = [(points[a] + points[b]) / 2]
+            for c in range(b):
+                sides = np.array([points[a] - points[c], points[b] - points[c]])
+                if abs(np.linalg.det(sides)) > 1e-12:
+                    squares = (sides**2).sum(axis=1) / 2
+                    middles.append(points[c] + np.linalg.solve(sides, squares))
+            for middle in middles:
+                radius = np.linalg.norm(points - middle, axis=1).max()
+                if radius < best[1]:
+                    best = middle, radius
+    return best
+
+
+@pytest.mark.parametrize("corners", [3, 4, 5, 8])
+def test_a_level_face_is_one_contact_in_the_middle_of_its_circle(corners: int) -> None:
+    """However the face is divided; the crown raises it by the circle's radius squared over 2 R."""
+    rng = np.random.default_rng(corners)
+    angles = np.sort(rng.uniform(0, 2 * np.pi, corners))
+    outline = 0.03 * np.c_[np.cos(angles), 0.6 * np.sin(angles)]
+    shell = prism(outline, 0.02)
+    middle, radius = enclosing(outline)
+    found = scene_of(shell, linear_law(1e4)).contacts(pose(np.eye(3), -1e-4))
+    rise = radius**2 / (2 * CROWN * shell.size)
+    assert found.depth == pytest.approx([1e-4 + rise], abs=1e-4 * shell.size / CROWN)
+    assert found.point_world[0, :2] == pytest.approx(middle + [0.3, -0.2], abs=1e-4)
+
+
+def test_division_of_a_face_changes_nothing() -> None:
+    turn = pin.exp3(np.array([2e-6, -1e-5, 0.3]))
+    found = []
+    for cells in (1, 2, 7):
+        vertices, elements = grid_plate(cells, cells, 0.05)
+        scene = scene_of(sp.Shell(vertices - vertices.mean(axis=0), elements), linear_law(1e4))
+        rows = scene.contacts(pose(turn, -1e-4))
+        found.append((rows.depth, rows.point_world))
+    for depth, point in found[1:]:
+        assert depth == pytest.approx(found[0][0], abs=1e-15)
+        assert point == pytest.approx(found[0][1], abs=1e-9)
+
+
+def test_one_corner_has_its_own_depth() -> None:
+    """As soon as the others are above it by the square of their distance over 2 R."""
+    shell = box()
+    scene = scene_of(shell, linear_law(1e4))
+    for tilt in (4.0 / CROWN, 1e-2, 0.5):
+        turn = pin.exp3(tilt * np.array([0.6, -0.8, 0.0]))
+        lowest = (shell.vertices @ turn.T)[:, 2].min()
+        found = scene.contacts(pose(turn, -lowest - 1e-4))
+        assert found.depth == pytest.approx([1e-4], abs=1e-16)
+        corner = shell.vertices @ turn.T + [0.3, -0.2, 0]
+        corner = corner[np.argmin(corner[:, 2])]
+        assert found.point_world[0, :2] == pytest.approx(corner[:2], abs=1e-15)
+
+
+# Shell, inertia, and how they fall: on a corner, with a spin, or, as a coin or cone that is thrown
+# rolls on its rim without loss, put down obliquely.
+SOLIDS = {
+    "box": (box, pin.Inertia.FromBox(0.2, *SIDES), (0.5, 0.3), [0.1, 0, -0.2, 1.0, 2.0, 5.0]),
+    "coin": (SHELLS["coin"][0], pin.Inertia.FromCylinder(0.2, 0.02, 0.004), (0.3, 0.1), [0] * 6),
+    "cone": (SHELLS["cone"][0], pin.Inertia.FromCylinder(0.2, 0.02, 0.06), (2.03, 0.0), [0] * 6),
+}
+
+
+INTEGRATORS = [sp.Adaptive(1e-6, 1e-9), sp.Implicit(1e-6, 1e-9), sp.RungeKutta4(5e-5)]
+FALLS = [("box", one, friction) for one in INTEGRATORS for friction in FRICTIONS[1:]]
+FALLS += [(name, one, FRICTIONS[1]) for name in ("coin", "cone") for one in INTEGRATORS[:2]]
+
+
+@pytest.mark.parametrize(("name", "integrator", "friction"), FALLS)
+def test_solids_come_to_rest_at_an_ordinary_cost(name: str, integrator, friction) -> None:
+    """They fall, rattle, and lie still; the energies close.
+
+    But for what damping loses while it holds the force at zero, which is no part of the motion and
+    of its control of errors.
+    """
+    make, inertia, turned, v = SOLIDS[name]
+    shell = make()
+    scene = thrown(shell, inertia, LAW, friction)
+    turn = pin.rpy.rpyToMatrix(*turned, 0.2)
+    height = 0.005 - (shell.vertices @ turn[2]).min()
+    q = np.r_[0, 0, height, pin.Quaternion(turn).coeffs()]
+    duration = 1.0 if name == "box" else 0.5
+    result = sp.Simulation(scene, integrator).run(q, np.array(v, float), duration, record_dt=0.1)
+    assert result.stats.steps <= 20_000 * duration
+    assert np.abs(result.v[-1]).max() < 1e-6
+    assert np.abs(result.energy.residual).max() < 5e-4 * result.energy.exchanged
+
+
+def test_a_face_with_a_notch_is_warned_of() -> None:
+    notched = np.array([[0, 0], [0.04, 0], [0.04, 0.02], [0.02, 0.02], [0.02, 0.04], [0, 0.04]])
+    with pytest.warns(SetupWarning, match="stands on one point at a time"):
+        scene_of(prism(notched, 0.02), LAW)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene_of(sp.Shell(*cube(0.2)), LAW)
