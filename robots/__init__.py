@@ -1,6 +1,5 @@
 """Robots by name (own small URDFs, example-robot-data's) and by file, and their fingertips."""
 
-import os
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
+from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.mimic import Mimic, shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
@@ -333,8 +332,8 @@ def _mimicking(robot: LoadedRobot, rules: Iterable[Mimic], what: str) -> LoadedR
 def _load_poses(model: pin.Model, srdf: str | PathLike[str] | None) -> None:
     if srdf is None:
         return
-    if not os.path.isfile(srdf):
-        raise RobotError(f"{srdf}: no such SRDF file")
+    if reason := why_no_file(srdf):
+        raise RobotError(f"{srdf}: {reason}")
     try:
         text = read_bytes(srdf, MOST_TEXT)
         check_size(text)

@@ -1,11 +1,14 @@
 """Descriptions of robots, and what pinocchio may read: its parser calls itself for every link."""
 
+from __future__ import annotations
+
 import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 import numpy as np
@@ -15,6 +18,9 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.texts import number_of, visible
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.robots.packages import Folders
+
+if TYPE_CHECKING:
+    from sphshell_pin.robots.mjcf import MjcfRobot
 
 DEEPEST = 100
 """Elements of the file one within another; robots need seven."""
@@ -37,7 +43,7 @@ Python copies it once.
 
 @dataclass(frozen=True)
 class Description:
-    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of mjcf.py."""
+    """A robot's file, read: `root` is a URDF, or an MJCF with what it includes."""
 
     file: Path
     folders: Folders
@@ -49,10 +55,8 @@ class Description:
     """What else the file states that is not modeled, one sentence each."""
     start: Mapping[str, Array] = field(default_factory=dict)
     """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
-    finish: Callable[[pin.Model], None] | None = None
-    """Puts into the model what pinocchio's reader leaves out of MJCF."""
-    stated: ET.Element | None = None
-    """An MJCF as it was before it was brought into the plain form, with what it includes."""
+    mjcf: MjcfRobot | None = None
+    """What MuJoCo makes of an MJCF."""
 
     def q0(self, model: pin.Model) -> Array:
         """Return the configuration (nq,) that the file draws, of the model of `build_model`."""
@@ -65,7 +69,7 @@ class Description:
     @property
     def is_mjcf(self) -> bool:
         """Whether it is MJCF."""
-        return self.root.tag == "mujoco"
+        return self.mjcf is not None
 
 
 def check_memory(nv: int) -> None:

@@ -1,28 +1,32 @@
 """Robots' files of all formats: read into one description, then into Pinocchio's models."""
 
+from __future__ import annotations
+
 import copy
 import os
 import re
-import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes
+from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
-from sphshell_pin.errors import ShellFileError, SphshellError
+from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
-from sphshell_pin.robots.packages import Folders
-from sphshell_pin.robots.plain_mesh import collada_unit, refused_reference
-from sphshell_pin.robots.urdf_tree import add_limits, check_tree, mimics_of
-from sphshell_pin.shell.readers import READERS
+from sphshell_pin.robots.mesh_faults import mesh_fault
+from sphshell_pin.robots.packages import Folders, including
+from sphshell_pin.robots.plain_mesh import collada_unit
+from sphshell_pin.robots.urdf_tree import INCLUDED, add_limits, check_tree, mimics_of
+
+if TYPE_CHECKING:
+    from sphshell_pin.robots.mjcf import MjcfRobot
 
 
 class RobotError(SphshellError, ValueError):
@@ -51,9 +55,6 @@ _REFUSED = {
     (".mjb",): "is a compiled MuJoCo model: give its MJCF (.xml)",
 }
 
-MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
-"""Formats of the meshes that a robot may name."""
-
 # A license before the declaration of XML, which no reader of robots minds.
 _BEFORE_XML = re.compile(rb"\A(?:\s|<!--(?:(?!-->).)*-->)+(?=<\?xml\s)", re.DOTALL)
 _NO_LIMITS = {"effort": "1e30", "velocity": "1e30"}
@@ -79,18 +80,24 @@ def read(
     for folder in folders.given:
         if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
+    assumed = dict[str, object]()
     try:
         if file.suffix.lower() == ".xacro":
             from sphshell_pin.robots.xacro_file import expand
 
-            text = expand(file, folders, xacro_args or {})
+            text, assumed = expand(file, folders, xacro_args or {})
         elif xacro_args:
             raise ValueError("arguments are for files that end in .xacro")
         else:
             text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
         raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
-    return described(text, folders, free_flyer=free_flyer)
+    found = described(text, folders, free_flyer=free_flyer)
+    if assumed:
+        values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
+        note = f"its arguments without a default are taken as {values}: or give others"
+        found = replace(found, notes=(*found.notes, note))
+    return found
 
 
 def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) -> Description:
@@ -102,21 +109,22 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
         if tag == "sdf":
             raise RobotError(f"{file}: {_reason('.sdf')}")
         if tag not in ("robot", "mujoco"):
-            included = "if another file includes this one, name that"
-            raise ValueError(f"its root element is <{tag}>; {_NEXT}; {included}")
+            raise ValueError(f"its root element is <{tag}>; {_NEXT}; or {INCLUDED}")
         root = parsed(text)
         if tag == "mujoco":
-            from sphshell_pin.robots.mjcf import plain
+            from sphshell_pin.robots.mjcf import read_mjcf
 
             what = "MJCF"
-            return plain(root, folders, floats=free_flyer)
+            return read_mjcf(root, folders, floats=free_flyer)
         check_tree(root)
         notes = tuple(add_limits(root))
         return Description(file, folders, root, tuple(mimics_of(root)), notes=notes)
     except (ValueError, OSError, LookupError, RuntimeError) as error:  # the last: Pinocchio's
         if isinstance(error, SphshellError):
             raise
-        raise RobotError(f"{file}: not a {what} that can be read: {_line(error)}") from None
+        said = f"{file}: not a {what} that can be read: {_line(error)}"
+        whole = including(file) if INCLUDED in said and folders.kept is None else None
+        raise RobotError(said if whole is None else f"{said}: {whole}") from None
 
 
 def is_path(robot: str | PathLike[str]) -> bool:
@@ -127,11 +135,9 @@ def is_path(robot: str | PathLike[str]) -> bool:
 
 def check_readable(file: Path) -> None:
     """Raise RobotError for what is no file, or a file that holds no robot, with what to do."""
-    if not os.path.isfile(file):
-        what = "is a folder, not a file" if os.path.isdir(file) else "no such file"
-        raise RobotError(f"{file}: {what}; {_NEXT}")
-    reason = _reason(file.suffix.lower())
-    if reason:
+    if reason := why_no_file(file):
+        raise RobotError(f"{file}: {reason}; {_NEXT}")
+    if reason := _reason(file.suffix.lower()):
         raise RobotError(f"{file}: {reason}")
 
 
@@ -151,23 +157,18 @@ def build_model(
     if mimic:
         description, wound = unwound(description)
     try:
-        if not description.is_mjcf:
-            root = [pin.JointModelFreeFlyer()] if free_flyer else []
-            text = ET.tostring(description.root, encoding="unicode")
-            model = pin.buildModelFromXML(text, *root)
-        else:
-            with _written(description.root) as path:
-                model = pin.buildModelFromMJCF(path)
-            if description.finish is not None:
-                description.finish(model)
+        if description.mjcf is not None:
+            return description.mjcf.model()
+        root = [pin.JointModelFreeFlyer()] if free_flyer else []
+        model = pin.buildModelFromXML(ET.tostring(description.root, encoding="unicode"), *root)
         check_memory(model.nv)
     except (ValueError, RuntimeError, OSError) as error:
-        what = "MJCF" if description.is_mjcf else "URDF"
+        what = "URDF" if description.mjcf is None else "MJCF"
         raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None
     for name in wound:
         at = model.joints[model.getJointId(name)].idx_q
         model.lowerPositionLimit[at], model.upperPositionLimit[at] = -np.inf, np.inf
-    if free_flyer and not description.is_mjcf:
+    if free_flyer:
         _check_root(model, file)
     return model
 
@@ -181,11 +182,13 @@ def build_geometry(
     unit. Raises RobotError for a collision mesh that cannot be read.
     """
     visual = kind == pin.GeometryType.VISUAL
+    if description.mjcf is not None:
+        return _geometry_of_mjcf(description, description.mjcf, model, visual=visual)
     root, missing = _with_meshes(description, visual=visual, meters=not (visual and drawn))
     try:
         return _geometry(description, root, model, kind), missing
     except RobotError:
-        if not visual or description.is_mjcf:
+        if not visual:
             raise
     missing += _without_broken(root, model)
     return _geometry(description, root, model, kind), missing
@@ -195,13 +198,35 @@ def _geometry(
     description: Description, root: ET.Element, model: pin.Model, kind: pin.GeometryType
 ) -> pin.GeometryModel:
     try:
-        if description.is_mjcf:
-            with _written(root) as path:
-                return pin.buildGeomFromMJCF(model, path, kind)
         text = ET.tostring(root, encoding="unicode")
         return pin.buildGeomFromUrdfString(model, text, kind)
     except (ValueError, RuntimeError) as error:
-        raise _mesh_fault(description, _line(error)) from None
+        raise _cannot_load(description, _line(error)) from None
+
+
+def _geometry_of_mjcf(
+    description: Description, robot: MjcfRobot, model: pin.Model, *, visual: bool
+) -> tuple[pin.GeometryModel, list[str]]:
+    """Return the geometry without the meshes that are missing, and their files."""
+    missing: dict[str, None] = {}
+    for g in robot.geoms:
+        if (mesh := robot.mesh(g)) is None:
+            continue
+        path, _ = mesh
+        if os.path.isfile(path):
+            if reason := mesh_fault(path):
+                raise _cannot_load(description, reason)
+        elif not robot.touches(g) or description.folders.kept is not None:
+            missing[str(path)] = None
+        else:
+            raise RobotError(
+                f"{description.file}: a mesh cannot be loaded ({path} does not exist): correct "
+                "file= of the mesh, or meshdir= of <compiler>"
+            )
+    try:
+        return robot.geometry(model, visual=visual, without=missing), list(missing)
+    except (ValueError, RuntimeError) as error:
+        raise _cannot_load(description, _line(error)) from None
 
 
 def _without_broken(root: ET.Element, model: pin.Model) -> list[str]:
@@ -222,36 +247,29 @@ def _without_broken(root: ET.Element, model: pin.Model) -> list[str]:
 
 def keep_spheres(description: Description) -> None:
     """Drop every geometry but the spheres of collision geometry, and so all meshes."""
-
-    def is_sphere(_: str, part: ET.Element) -> bool:
-        return part.get("type") == "sphere" or part.find("geometry/sphere") is not None
-
-    _keep(description, is_sphere)
-    for asset in description.root.findall("asset"):
-        description.root.remove(asset)
+    if (mjcf := description.mjcf) is not None:
+        mjcf.geoms = [g for g in mjcf.geoms if mjcf.touches(g) and mjcf.is_sphere(g)]
+    _keep(description, lambda _, part: part.find("geometry/sphere") is not None)
 
 
 def keep_geometry_of(
     description: Description, links: Collection[str], kind: str = "collision"
 ) -> None:
     """Drop every geometry but that of a `kind`, "collision" or "visual", of some links."""
+    if (mjcf := description.mjcf) is not None:
+        own = [g for g in mjcf.geoms if mjcf.body(g) in links]
+        mjcf.geoms = [g for g in own if mjcf.touches(g) == (kind == "collision")]
     _keep(description, lambda name, _: name in links, kind)
 
 
 def _keep(
     description: Description, wanted: Callable[[str, ET.Element], bool], kind: str = "collision"
 ) -> None:
-    """Drop every geometry but that of a `kind` that is `wanted`, by its link and element."""
-    for link in description.root.iter("body" if description.is_mjcf else "link"):
-        for part in [one for one in link if one.tag in ("geom", "visual", "collision")]:
-            if _is_visual(part) != (kind == "visual") or not wanted(link.get("name", ""), part):
+    """Drop every geometry of a URDF but that of a `kind` that is `wanted`, by link and element."""
+    for link in description.root.iter("link"):
+        for part in [one for one in link if one.tag in ("visual", "collision")]:
+            if part.tag != kind or not wanted(link.get("name", ""), part):
                 link.remove(part)
-
-
-def _is_visual(part: ET.Element) -> bool:
-    """Whether a geometry touches nothing, as URDF or MuJoCo has it."""
-    touches_nothing = part.get("contype") == "0" and part.get("conaffinity") == "0"
-    return part.tag == "visual" or touches_nothing
 
 
 def _with_meshes(
@@ -263,25 +281,6 @@ def _with_meshes(
     """
     root = copy.deepcopy(description.root)
     missing: dict[str, None] = {}
-    if description.is_mjcf:
-        assets = {one.get("name"): one for one in root.iter("mesh")}
-        for body in root.iter("body"):
-            for geom in body.findall("geom"):
-                mesh = assets.get(geom.get("mesh"))
-                if mesh is None:
-                    continue
-                if os.path.isfile(mesh.get("file", "")):
-                    if reason := _mesh_reason(Path(mesh.get("file", ""))):
-                        raise _mesh_fault(description, reason)
-                elif _is_visual(geom) or description.folders.kept is not None:
-                    missing[mesh.get("file", "")] = None
-                    body.remove(geom)
-                else:
-                    raise RobotError(
-                        f"{description.file}: a mesh cannot be loaded ({mesh.get('file')} does not "
-                        "exist): correct file= of the mesh, or meshdir= of <compiler>"
-                    )
-        return root, list(missing)
     for link in root.iter("link"):
         for part in link.findall("visual" if visual else "collision"):
             mesh = part.find("geometry/mesh")
@@ -289,7 +288,7 @@ def _with_meshes(
                 continue
             uri = mesh.get("filename", "")
             found = description.folders.find(uri)
-            reason = "" if found is None else _mesh_reason(found)
+            reason = "" if found is None else mesh_fault(found)
             if found is not None and not reason:
                 mesh.set("filename", str(found.absolute()))
                 if meters and found.suffix.lower() == ".dae":
@@ -299,32 +298,11 @@ def _with_meshes(
                 missing[uri] = None
                 link.remove(part)
             else:
-                raise _mesh_fault(description, reason)
+                raise _cannot_load(description, reason)
     return root, list(missing)
 
 
-def _mesh_reason(path: Path) -> str:
-    """Say why a mesh is not given to the reader that Pinocchio has, which may crash at it.
-
-    It knows 40 formats; those of robots have been tried: damaged .ply files made it crash, damaged
-    .off files go on for ever.
-    """
-    suffix = path.suffix.lower()
-    try:
-        open_regular(path).close()
-    except OSError as error:
-        return f"{path}: {error.strerror}"
-    if suffix not in MESHES:
-        return f"{path}: not one of the formats {', '.join(MESHES)}"
-    if suffix in (".ply", ".off"):
-        try:
-            READERS[suffix](path)
-        except ShellFileError as error:
-            return str(error)
-    return refused_reference(path)
-
-
-def _mesh_fault(description: Description, reason: str) -> RobotError:
+def _cannot_load(description: Description, reason: str) -> RobotError:
     return RobotError(
         f"{description.file}: a mesh cannot be loaded ({reason}); searched in "
         f"{description.folders.searched()}: give the folder above the package with --package-dir, "
@@ -373,15 +351,6 @@ def _check_root(model: pin.Model, file: Path) -> None:
             f"{file}: the root link '{link}' is to float but has no mass, nor has what is fixed to "
             "it: give it an <inertial>, or leave out the free-flyer (--free-flyer, free_flyer)"
         )
-
-
-@contextmanager
-def _written(root: ET.Element) -> Iterator[str]:
-    """Yield the path of a file with the XML of `root`."""
-    with tempfile.NamedTemporaryFile(suffix=".xml") as file:
-        file.write(ET.tostring(root, encoding="utf-8"))
-        file.flush()
-        yield file.name
 
 
 def _line(error: Exception) -> str:

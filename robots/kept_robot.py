@@ -28,15 +28,15 @@ from sphshell_pin.robots.packages import Folders
 
 def text_of(description: Description) -> str:
     """Return the URDF or MJCF of a description."""
-    root = description.root if description.stated is None else description.stated
-    return ET.tostring(root, encoding="unicode")
+    return ET.tostring(description.root, encoding="unicode")
 
 
 def meshes_of(description: Description) -> dict[str, Path | None]:
     """Return the files of the meshes that show the robot by name, None for one that is missing."""
-    if description.is_mjcf:
-        paths = [Path(one.get("file", "")) for one in description.root.iter("mesh")]
-        return {str(path): path if path.is_file() else None for path in paths}
+    if description.mjcf is not None:
+        meshes = map(description.mjcf.mesh, description.mjcf.geoms)
+        paths = {mesh[0] for mesh in meshes if mesh is not None}
+        return {str(path): path if path.is_file() else None for path in sorted(paths)}
     names = [one.get("filename", "") for one in description.root.iterfind("link/visual//mesh")]
     return {name: description.folders.find(name) for name in names}
 
@@ -56,7 +56,7 @@ def load_kept(
     No file is read but `meshes`, by their names. Warns with RobotWarning of those that are missing.
     Raises RobotError as `robots.load_file` does.
     """
-    description = described(text.encode(), Folders(Path(file), kept=meshes))
+    description = described(text.encode(), Folders(Path(file), kept=meshes), free_flyer=free_flyer)
     model = build_model(description, free_flyer=free_flyer, mimic=mimic)
     visual, missing = build_geometry(description, model, pin.GeometryType.VISUAL)
     keep_spheres(description)

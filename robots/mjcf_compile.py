@@ -2,6 +2,7 @@
 
 import copy
 import io
+import itertools
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
@@ -9,22 +10,38 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sphshell_pin._interrupts import interrupts_delayed
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.regular_file import read_bytes
-from sphshell_pin.robots.description import MOST_LINKS
+from sphshell_pin.robots.description import MOST_LINKS, check_memory
+from sphshell_pin.robots.mjcf_includes import MOST_FILES
 from sphshell_pin.robots.packages import Folders
 
 LEFT_OUT = "geoms of these kinds are left out"
 
+FREE, BALL, SLIDE, HINGE = range(4)
+"""Types of joints of MuJoCo's mjtJoint."""
+
+MESH = 7
+"""Of MuJoCo's mjtGeom."""
+
 # What MuJoCo is given: the tables, and the attributes of those that could name files.
-_GIVEN = ("compiler", "default", "asset", "worldbody", "keyframe")
-_COMPILER = {"angle", "autolimits", "coordinate", "eulerseq", "boundmass", "boundinertia"}
-_COMPILER |= {"settotalmass", "balanceinertia", "inertiafromgeom", "inertiagrouprange"}
-_MESH = {"name", "class", "scale", "refpos", "refquat", "inertia", "vertex", "face"}
+_GIVEN = ("compiler", "default", "asset", "worldbody", "keyframe", "equality", "tendon")
+_ATTRIBUTES = {
+    "compiler": {"angle", "autolimits", "coordinate", "eulerseq", "boundmass", "boundinertia"},
+    "mesh": {"name", "class", "scale", "refpos", "refquat", "inertia", "vertex", "face"},
+    "material": {"name", "class", "rgba"},
+    "key": {"name", "qpos"},  # of actuators and speeds nothing is read
+}
+_ATTRIBUTES["compiler"] |= {"settotalmass", "balanceinertia", "inertiafromgeom"}
+_ATTRIBUTES["compiler"] |= {"inertiagrouprange"}
 _DROPPED = ("camera", "light")
+# What makes bodies of its own, without end, or runs a plugin.
+_UNKNOWN = ("composite", "flexcomp", "replicate", "deformable", "flex", "plugin")
 _MOST_MESH = 1e9  # [B]
 _POINT = "0 0 0 1 0 0 0 1 0 0 0 1"  # a mesh that nothing weighs
-_MESH_GEOM = 7  # of mjtGeom
 _HULLS = "masses of meshes that are not closed are those of their convex hulls"
 
 
@@ -44,76 +61,107 @@ def silent(mujoco: Any) -> Iterator[None]:
 class Compiled:
     """An MJCF as MuJoCo compiles it: `model`, `files` of its meshes with their scales, `notes`.
 
-    ValueError says what MuJoCo cannot read.
+    `floats` frees the only body of the world or fixes it; None: as it states. ValueError says what
+    MuJoCo cannot read.
     """
 
-    def __init__(self, mujoco: Any, root: ET.Element, folders: Folders) -> None:
-        self.mujoco, self.given, self.folders = mujoco, root, folders
+    def __init__(self, mujoco: Any, root: ET.Element, folders: Folders, floats: bool | None):
+        self.mujoco, self.folders = mujoco, folders
         # What is not modeled: the names that each sentence is about.
         self.notes: defaultdict[str, list[str]] = defaultdict(list)
-        self.files: dict[str, tuple[Path, str]] = {}
+        self.files: dict[str, tuple[Path, Array]] = {}
+        self._links, self._attached = 0, itertools.count()
         with silent(mujoco):
-            self.model = self._compiled(self._spec())
+            spec = self._spec(root)
+            freedoms = {FREE: 6, BALL: 3}
+            check_memory(sum(freedoms.get(int(joint.type), 1) for joint in spec.joints))
+            if len(spec.bodies) < 2:
+                raise ValueError("its <worldbody> has no <body>")
+            _name_all(spec)
+            if floats is not None:
+                _set_base(spec, floats=floats)
+            self._weigh(spec)
+            self.model = spec.compile()
 
-    def _spec(self) -> Any:
-        """Return what MuJoCo reads: nothing that names a file, all bodies and joints with names."""
+    def _spec(self, given: ET.Element, prefix: str = "") -> Any:
+        """Return what MuJoCo reads of a model: nothing that names a file; models are attached."""
+        models = {one.get("name"): one for one in given.iterfind("asset/model")}
         root = ET.Element("mujoco", model="robot")
-        for one in copy.deepcopy(self.given):
-            if one.tag in _GIVEN:
-                root.append(one)
+        for one in given:
+            # Of a model that is attached no keys: it has not all joints.
+            if one.tag in _GIVEN and not (prefix and one.tag == "keyframe"):
+                root.append(copy.deepcopy(one))
+        for tag in _UNKNOWN:  # plugins of actuators and sensors are not read
+            if any(given.find(path + tag) is not None for path in ("", "worldbody//", "asset//")):
+                raise ValueError(
+                    f"<{tag}> is not supported: let MuJoCo write the bodies out "
+                    "(mujoco.MjSpec.from_file(...), compile(), to_xml())"
+                )
+        self._links += sum(1 for _ in root.iterfind("worldbody//body"))
+        if self._links > MOST_LINKS:
+            raise ValueError(f"it has {self._links} links; at most {MOST_LINKS} can be read")
+        self._drop_files(root, prefix)
+        attached = []
+        for one in list(root.iter("attach")):
+            frame, stated = f"attached {next(self._attached)}", dict(one.attrib)
+            attached.append((frame, stated))
+            one.tag, one.attrib = "frame", {"name": frame}
+        spec = self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+        for frame, stated in attached:
+            self._attach(spec, spec.frame(frame), stated, models, prefix)
+        return spec
+
+    def _attach(
+        self,
+        spec: Any,
+        frame: Any,
+        stated: Mapping[str, str],
+        models: Mapping[str | None, ET.Element],
+        prefix: str,
+    ) -> None:
+        """Put a model that <attach> names, or one body of it, into a frame."""
+        name, own, body = (stated.get(key, "") for key in ("model", "prefix", "body"))
+        inside = models[name].find("mujoco") if name in models else None
+        if inside is None:
+            raise ValueError(f"it attaches the model '{name}', which no <asset> names")
+        if next(self._attached) > 2 * MOST_FILES:
+            raise ValueError(f"it attaches more than {MOST_FILES} models")
+        child = self._spec(inside, f"{prefix}{own}")
+        if not body:
+            spec.attach(child, prefix=own, frame=frame)
+        elif child.body(body) is None:
+            raise ValueError(f"it attaches the body '{body}', which the model '{name}' has not")
+        else:
+            frame.attach_body(child.body(body), own, "")
+
+    def _drop_files(self, root: ET.Element, prefix: str) -> None:
+        """Take out of a model what names files; stand-ins that weigh nothing are its meshes."""
         compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
-        for one in root.findall("compiler"):
-            one.attrib = {k: v for k, v in one.attrib.items() if k in _COMPILER}
-            one[:] = []
-        for one in root.iterfind("keyframe/key"):  # of actuators and speeds nothing is read
-            one.attrib = {k: v for k, v in one.attrib.items() if k in ("name", "qpos")}
-        for asset in root.findall("asset"):
-            for one in list(asset):
-                if one.tag == "mesh":
-                    self._mesh(one, compiler)
-                elif one.tag == "material" and "name" in one.attrib:
-                    color = {k: v for k, v in one.attrib.items() if k in ("name", "class", "rgba")}
-                    one.attrib = color
-                    one[:] = []
-                else:
-                    asset.remove(one)
-        for default in root.iter("default"):
-            for one in default:
-                if one.tag in ("material", "mesh"):
-                    one.attrib.pop("texture", None)
-                    one.attrib.pop("file", None)
+        for mesh in root.iterfind("asset/mesh[@file]"):
+            if "refpos" in mesh.attrib or "refquat" in mesh.attrib:
+                file = mesh.get("file")
+                raise ValueError(f"mesh {file} states refpos or refquat: move its geoms instead")
+            path = Path(mesh.attrib["file"])
+            path = Path(path.name) if compiler.get("strippath") == "true" else path
+            name = mesh.attrib.setdefault("name", path.stem)
+            path = Path(compiler.get("meshdir", compiler.get("assetdir", ""))) / path
+            self.files[prefix + name] = self.folders.beside(str(path)), np.ones(3)
+            mesh.set("vertex", _POINT)
         for element in root.iter():
             for one in list(element):
                 if "hfield" in one.attrib:  # of a file
                     self.notes[LEFT_OUT].append("hfield")
-                if one.tag in _DROPPED or "hfield" in one.attrib:
+                unread = element.tag == "asset" and one.tag not in ("mesh", "material")
+                if unread or one.tag in _DROPPED or "hfield" in one.attrib:
                     element.remove(one)
+            if kept := _ATTRIBUTES.get(element.tag):
+                element.attrib = {k: v for k, v in element.attrib.items() if k in kept}
+                element[:] = []
             if element.tag == "freejoint":
                 element.attrib.pop("align", None)
-        count = iter(range(MOST_LINKS))
-        taken = {one.get("name", "") for one in root.iterfind("worldbody//joint")}
-        taken |= {one.get("name", "") for one in root.iterfind("worldbody//freejoint")}
-        for world in root.findall("worldbody"):
-            _name_bodies(world, "world", count, taken)
-        return self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
 
-    def _mesh(self, one: ET.Element, compiler: Mapping[str, str]) -> None:
-        """Put a mesh that weighs nothing in the place of one of a file."""
-        stated, file = one.attrib, one.get("file")
-        one.attrib = {k: v for k, v in stated.items() if k in _MESH}
-        if file is None:
-            return
-        if "refpos" in stated or "refquat" in stated:
-            raise ValueError(f"mesh {file} states refpos or refquat: move its geoms instead")
-        strip = compiler.get("strippath") == "true"
-        path = Path(Path(file).name if strip else file)
-        name = one.attrib.setdefault("name", path.stem)
-        folder = Path(compiler.get("meshdir", compiler.get("assetdir", "")))
-        self.files[name] = self.folders.beside(str(folder / path)), "1 1 1"
-        one.set("vertex", _POINT)
-
-    def _compiled(self, spec: Any) -> Any:
-        """Return the compiled model; meshes are read where something weighs what they hold."""
+    def _weigh(self, spec: Any) -> None:
+        """Read meshes where something weighs what they hold."""
         moves = {"world": False}
         total = spec.compiler.settotalmass > 0.0
         always = int(spec.compiler.inertiafromgeom) == 1
@@ -130,19 +178,15 @@ class Compiled:
                 if geom.meshname not in self.files:
                     continue
                 own = low <= geom.group <= high and geom.mass != 0.0 and geom.density != 0.0
-                if int(geom.type) != _MESH_GEOM or (weighs and own):
+                if int(geom.type) != MESH or (weighs and own):
                     needed[geom.meshname] = body.name
                 else:
                     geom.mass = 0.0
         for mesh in spec.meshes:
             if mesh.name in self.files:
-                self.files[mesh.name] = (
-                    self.files[mesh.name][0],
-                    " ".join(map(repr, mesh.scale.tolist())),
-                )
+                self.files[mesh.name] = self.files[mesh.name][0], mesh.scale.copy()
         for name, body in needed.items():
             self._read_mesh(spec.mesh(name), body)
-        return spec.compile()
 
     def _read_mesh(self, mesh: Any, body: str) -> None:
         """Let `mesh` have the corners of its file; one that is open weighs as its hull."""
@@ -165,21 +209,36 @@ class Compiled:
             ) from None
 
 
-def _name_bodies(element: ET.Element, body: str, count: Iterator[int], taken: set[str]) -> None:
-    """Give the bodies and joints below an element names, where they have none.
+def _name_all(spec: Any) -> None:
+    """Give bodies and joints names where they have none, beside those that are stated."""
+    taken = {joint.name for joint in spec.joints}
+    for k, body in enumerate(spec.bodies):
+        body.name = body.name or f"{body.parent.name}_body{k - 1}"
+        for joint in body.joints:
+            if not joint.name:
+                stem = f"{body.name}_{'free' if int(joint.type) == FREE else 'joint'}"
+                names = (f"{stem}{n or ''}" for n in itertools.count())
+                joint.name = next(name for name in names if name not in taken)
+                taken.add(joint.name)
 
-    Frames within a body hold joints of it, so that `taken` has all joints' names.
-    """
-    for one in element:
-        if one.tag == "body":
-            number = next(count)
-            name = one.attrib.setdefault("name", f"{body}_body{number}")
-            _name_bodies(one, name, count, taken)
-        elif one.tag == "frame":
-            _name_bodies(one, body, count, taken)
-        elif one.tag in ("joint", "freejoint") and "name" not in one.attrib:
-            free = one.tag == "freejoint" or one.get("type") == "free"
-            stem = f"{body}_{'free' if free else 'joint'}"
-            names = (f"{stem}{k or ''}" for k in range(len(taken) + 1))
-            one.set("name", next(name for name in names if name not in taken))
-            taken.add(one.attrib["name"])
+
+def _set_base(spec: Any, *, floats: bool) -> None:
+    """Give the only body of the world a free joint, or take it; its keys lose what was of it."""
+    bodies = [body for body in spec.bodies[1:] if body.parent.name == "world"]
+    if len(bodies) != 1:
+        raise ValueError(f"its world has {len(bodies)} bodies: state in it which of them are free")
+    (body,) = bodies
+    free = [joint for joint in body.joints if int(joint.type) == FREE]
+    if floats and body.joints and not free:
+        raise ValueError(f"body '{body.name}' has a joint already: it cannot float")
+    if floats == bool(free):
+        return
+    drawn = spec.copy().compile()  # meshes that change cannot be compiled twice
+    if floats:
+        body.add_freejoint(name=f"{body.name}_free")
+    for joint in free:
+        spec.delete(joint)
+    for key in spec.keys:
+        if len(key.qpos):  # a key without is as drawn
+            place = [*drawn.body_pos[1], *drawn.body_quat[1]]
+            key.qpos = [*place, *key.qpos] if floats else list(key.qpos)[7:]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import os
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +21,10 @@ from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
 _DEEPEST = 5
 # Folders that are looked at below one, and above a package, in search of another package.
 _MOST_FOLDERS, _ABOVE = 5000, 3
+
+
+# A robot has a name, files of macros have none.
+NAMED_ROBOT = re.compile(rb"<robot\b[^>]*\bname\s*=|<mujoco\b")
 
 
 @dataclass(frozen=True)
@@ -173,6 +180,27 @@ def workspaces(folder: Path) -> list[Path]:
         roots.insert(0, packages[-1])
     ends = [k for k, one in enumerate(roots) if one.name == "src" or (one / ".git").exists()]
     return roots[: ends[-1] + 1] if ends else [packages[-1].parent]
+
+
+def including(file: Path) -> Path | None:
+    """Return a robot's file of the workspace that includes `file`, be it through others."""
+    root, texts = workspaces(file.resolve().parent)[-1], dict[Path, bytes]()
+    for place, _, names in itertools.islice(os.walk(root), _MOST_FOLDERS):
+        for one in (Path(place, name) for name in names if name.endswith((".xacro", ".xml"))):
+            with contextlib.suppress(OSError, ValueError):
+                texts[one] = read_bytes(one, MOST_TEXT)
+    wanted, seen = [file.name], set[Path]()
+    for name in wanted:
+        stated = re.compile(
+            rb'(?:file(?:name)?=["\'])(?:[^"\']*/)?' + re.escape(name.encode()) + b"[\"']"
+        )
+        for one in sorted(set(texts) - seen, key=lambda one: (len(one.name), one)):
+            if stated.search(texts[one]):
+                if NAMED_ROBOT.search(texts[one]) and "macro" not in one.name:
+                    return one
+                seen.add(one)
+                wanted.append(one.name)
+    return None
 
 
 def _below(root: Path, name: str) -> Iterator[Path]:

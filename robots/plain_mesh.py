@@ -5,17 +5,15 @@ assimp finds such names in more places than a filter would: what is written here
 takes time in proportion to the size.
 """
 
-import json
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from urllib.parse import unquote
 
 import numpy as np
 
-from sphshell_pin.base.regular_file import MOST_TEXT, open_regular, read_bytes
+from sphshell_pin.base.regular_file import read_bytes
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots.description import check_size
+from sphshell_pin.robots.mesh_faults import collada_root
 from sphshell_pin.shell.readers.mesh import STL_RECORD, stl_corners
 from sphshell_pin.shell.readers.ply import parse_ply
 
@@ -36,9 +34,7 @@ _NUMBERS = frozenset(_OF_NUMBERS.split())
 _KNOWN = _NUMBERS.union(_PLAIN.split())
 _LINKS = ("url", "source", "target")
 _UNIT = re.compile(rb"<unit\b[^<>]*?\bmeter\s*=\s*[\"']\s*([-+.\deE]+)")
-_ODD, _CONTINUED = re.compile(rb"[\0\f\v]|\\\r(?!\n)"), re.compile(rb"\\\r?\n")
-_MATERIALS = re.compile(rb"mtllib([^\r\n]*)")
-_CORNER = re.compile(r"(-?\d+)(?:/-?\d*)?(?:/(-?\d+))?")
+_CORNER = re.compile(r"(-?\d{1,10})(?:/-?\d*)?(?:/(-?\d{1,10}))?", re.ASCII)
 
 
 def collada_unit(path: Path) -> float:
@@ -59,44 +55,6 @@ def plain_mesh(suffix: str, content: bytes) -> bytes | None:
         return written(content)
     except (SphshellError, ValueError, IndexError, OverflowError, ET.ParseError, LookupError):
         return None
-
-
-def refused_reference(path: Path) -> str:
-    """Say why what a mesh names must not be opened, as assimp would; "" if nothing hinders it.
-
-    Materials of an .obj and buffers of a glTF may be in regular files of at most MOST_TEXT bytes.
-    """
-    suffix, names = path.suffix.lower(), list[str]()
-    if suffix not in (".obj", ".gltf", ".glb"):
-        return ""
-    content = read_bytes(path)
-    if suffix == ".obj":
-        if _ODD.search(content):
-            return f"{path}: it holds control characters"
-        found = _MATERIALS.findall(_CONTINUED.sub(b"", content))
-        names += [f"{path.stem}.mtl", f"{path.name}.mtl"]
-        names += [name.decode("utf-8", "replace").strip() for name in found]
-    else:
-        if suffix == ".glb":
-            content = content[20 : 20 + int.from_bytes(content[12:16], "little")]
-
-        def take(pairs: list[tuple[str, object]]) -> dict[str, object]:
-            uris = [str(value) for key, value in pairs if key == "uri"]
-            names.extend(unquote(uri) for uri in uris if not uri.startswith("data:"))
-            return dict(pairs)
-
-        try:
-            json.loads(content, object_pairs_hook=take)
-        except (ValueError, RecursionError):
-            return f"{path}: its JSON cannot be read"
-    for name in dict.fromkeys(names):
-        try:
-            open_regular(f"{path.parent}/{name}", MOST_TEXT).close()
-        except FileNotFoundError:
-            continue
-        except (OSError, ValueError) as error:
-            return f"{path}: it names '{name[:80]}': {getattr(error, 'strerror', error)}"
-    return ""
 
 
 def _stl(content: bytes) -> bytes:
@@ -140,8 +98,7 @@ def _wavefront(content: bytes) -> bytes:
 
 
 def _collada(content: bytes) -> bytes:
-    check_size(content)
-    root = _element(ET.fromstring(content))
+    root = _element(collada_root(content))
     if root is None or root.tag != "COLLADA":
         raise ValueError("it is no Collada file")
     root.set("xmlns", "http://www.collada.org/2005/11/COLLADASchema")

@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.mimic import Mimic
 
+INCLUDED = "name the file of the robot that includes this one"
+
 
 def check_tree(root: ET.Element) -> None:
     """Raise ValueError if two joints move one link (a closed kinematic chain), or one none."""
     movers = defaultdict(list)
     links = {link.get("name") for link in root.findall("link")}
     if not links:
-        raise ValueError("it has no <link>: name the file of the robot that includes this one")
+        raise ValueError(f"it has no <link>: {INCLUDED}")
     for joint in root.findall("joint"):
         for end in ("parent", "child"):
             elements = joint.findall(end)
@@ -26,7 +28,7 @@ def check_tree(root: ET.Element) -> None:
             if link is not None and link not in links:
                 raise ValueError(
                     f"joint '{joint.get('name')}' has the {end} '{link}', but there is no such "
-                    "link: correct it, or name the file of the robot that includes this one"
+                    f"link: correct it, or {INCLUDED}"
                 )
             if end == "child" and link is not None:
                 movers[link].append(str(joint.get("name")))

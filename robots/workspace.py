@@ -1,7 +1,6 @@
 """The robots in a folder: files that describe one, with what they need."""
 
 import os
-import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,11 +11,10 @@ from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.files import build_model, read
 from sphshell_pin.robots.inertia import mass_fault
+from sphshell_pin.robots.packages import NAMED_ROBOT
 
 _MOST_FOLDERS, _MOST_FILES = 5000, 60
-# Beginnings of files [bytes]: a robot has a name, files of macros have none.
-_HEAD = 4000
-_NAMED = re.compile(rb"<robot\b[^>]*\bname\s*=|<mujoco\b")
+_HEAD = 4000  # beginnings of files [bytes]
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ def find_robots(folder: str | PathLike[str]) -> Iterator[FoundRobot]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 description = read(file)
-                if description.root.find("link" if not description.is_mjcf else ".//body") is None:
+                if not description.is_mjcf and description.root.find("link") is None:
                     continue  # macros alone
                 model = build_model(description, mimic=True)
         except SphshellError as error:
@@ -71,6 +69,6 @@ def _candidates(folder: Path) -> Iterator[Path]:
                     head = opened.read(_HEAD)
             except OSError:
                 continue
-            if _NAMED.search(head) and count < _MOST_FILES:
+            if NAMED_ROBOT.search(head) and count < _MOST_FILES:
                 count += 1
                 yield file

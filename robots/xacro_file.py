@@ -5,6 +5,7 @@ process that evaluates them has limits of time and memory.
 """
 
 import importlib.util
+import itertools
 import json
 import re
 import signal
@@ -28,20 +29,61 @@ WAIT = 60.0
 CHILD = "sphshell_pin.robots.xacro_child"
 """The module whose `serve` runs in the process."""
 
-_LISTED = 12  # arguments, in a sentence
+# Arguments, in a sentence; files of a package that may state one, and their ends.
+_LISTED, _MOST_FILES = 12, 2000
+_STATING = (".launch", ".txt", ".xml", ".py", ".sh", ".xacro", ".yaml", ".yml")
 
 MEMORY_LIMIT = 1e9
 """What a file may take [bytes]."""
 
 
-def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> bytes:
-    """Return the URDF that the xacro file makes with `arguments`.
+def expand(
+    file: Path, folders: Folders, arguments: Mapping[str, object]
+) -> tuple[bytes, dict[str, object]]:
+    """Return the URDF that the xacro file makes with `arguments`, and with others it needs.
 
-    `$(find package)` is searched in `folders`. Raises MissingExtra without the package xacro, and
-    ValueError with the reason of a file that cannot be expanded, or not within the limits.
+    Those have no default in it: each has the value that another file of the package states, else
+    that of a condition is false, any other its own name. `$(find package)` is searched in
+    `folders`. Raises MissingExtra without the package xacro, and ValueError with the reason of a
+    file that cannot be expanded, or not within the limits.
     """
     if importlib.util.find_spec("xacro") is None:
         raise MissingExtra("xacro", "robots", f"the xacro file {file}")
+    assumed = dict[str, object]()
+    while True:
+        try:
+            return _expanded(file, folders, {**assumed, **arguments}), assumed
+        except ValueError as error:
+            needed = re.search(r"Undefined substitution argument (\w+)", str(error))
+            if needed is None or needed[1] in assumed or len(assumed) == _LISTED:
+                raise
+            assumed[needed[1]] = _usual(needed[1], file)
+
+
+def _usual(argument: str, file: Path) -> str:
+    """Return the value that a file of the package, or else of the folder, states."""
+    stated = re.compile(
+        rf'\b{argument}:=([\w./+-]+)|<arg\s+name="{argument}"\s+(?:default|value)="([\w./+-]+)"'
+    )
+    tested = re.compile(rf'(?:if|unless)\s+value="[^"]*\b{argument}\b')
+    is_tested = False
+    above = file.absolute().parents
+    package = next((one for one in above[:4] if (one / "package.xml").is_file()), None)
+    files = above[0].glob("*") if package is None else package.rglob("*")
+    stating = (one for one in files if one.suffix in _STATING)
+    for one in itertools.islice(stating, _MOST_FILES):
+        try:
+            text = read_bytes(one, MOST_TEXT).decode(errors="replace")
+        except (OSError, ValueError):
+            continue
+        found = stated.search(text)
+        if found is not None:
+            return str(found[1] or found[2])
+        is_tested = is_tested or tested.search(text) is not None
+    return "false" if is_tested else argument
+
+
+def _expanded(file: Path, folders: Folders, arguments: Mapping[str, object]) -> bytes:
     request = {
         "file": str(file),
         "folders": [str(one) for one in folders.given],
@@ -83,10 +125,7 @@ def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> byt
 
 def _advised(reason: str, file: Path) -> str:
     """Return a reason with the arguments that may be to blame."""
-    argument = re.search(r"Undefined substitution argument (\w+)", reason)
-    if argument is not None:
-        return f"{reason}: give it, --xacro-arg {argument[1]}=VALUE (xacro_args in a scenario)"
-    if "there is no package" in reason or not file.is_file():
+    if re.search("there is no package|Undefined sub", reason) or not file.is_file():
         return reason
     text = read_bytes(file, MOST_TEXT).decode(errors="replace")
     stated = [

@@ -185,7 +185,7 @@ def link_inside(built: Built, q: np.ndarray) -> str:
     assembly, section = built.assembly, built.scenario.shell[0]
     model, geometry = assembly.model, assembly.loaded[0].collision_model
     data, at = model.createData(), pin.GeometryData(geometry)
-    pin.updateGeometryPlacements(model, data, geometry, at, whole_posture(built, q))
+    pin.updateGeometryPlacements(model, data, geometry, at, whole_posture(built, q, model))
     pin.updateFramePlacements(model, data)
     spheres = []
     for contact in built.scenario.contact:

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from sphshell_pin.base.atomic.file import write_whole
 from sphshell_pin.base.regular_file import open_regular, read_bytes, read_text
+from sphshell_pin.errors import ResultError
 from tests.programs import python
 
 PACKAGE = Path(__file__).parents[1]
@@ -60,6 +62,16 @@ def test_larger_files_than_stated_are_refused(tmp_path):
     with pytest.raises(OSError, match=r"it holds 1\.1e\+03 GB, more than 4 GB"):
         read_bytes(file)
     assert read_bytes("/proc/self/stat" if Path("/proc/self/stat").exists() else os.devnull)
+
+
+def test_a_pipe_that_nobody_reads_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ResultError, match="a pipe that nobody reads"):
+        write_whole(tmp_path / "pipe", b"1")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_whole(tmp_path / "pipe", b"1")
+    assert os.read(reader, 2) == b"1"
+    os.close(reader)
 
 
 READS = re.compile(
@@ -120,3 +132,4 @@ def test_commands_say_what_a_special_file_is(kind, tmp_path):
     assert "Traceback" not in done.stderr
     ends = [line.split() for line in done.stdout.splitlines() if line[:2] == "a."]
     assert [end for _, end in ends] == ["2"] * (len(COMMANDS) - 1), done.stderr
+    assert done.stderr.count("is a pipe, a socket or a device") == len(COMMANDS) - 1, done.stderr

@@ -18,6 +18,21 @@ MOST_TEXT = 100e6
 SMALL = 1 << 16
 """Files of the system state no size [bytes]."""
 
+_SPECIAL = "is a pipe, a socket or a device, not a file"
+
+
+def why_no_file(path: str | PathLike[str]) -> str:
+    """Return what keeps `path` from being a regular file, as the end of a sentence, or ""."""
+    try:
+        mode = os.stat(path).st_mode
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # a name with a null character
+        return "no such file"
+    except OSError as error:
+        return f"cannot be read ({error.strerror})"
+    if stat.S_ISDIR(mode):
+        return "is a folder, not a file"
+    return "" if stat.S_ISREG(mode) else _SPECIAL
+
 
 def open_regular(path: str | PathLike[str], most: float = MOST) -> io.BufferedReader:
     """Open a regular file of at most `most` bytes for reading.
@@ -31,7 +46,7 @@ def open_regular(path: str | PathLike[str], most: float = MOST) -> io.BufferedRe
     try:
         about = os.fstat(file.fileno())
         if not stat.S_ISREG(about.st_mode):
-            raise OSError(errno.EINVAL, "is a pipe, a socket or a device, not a file")
+            raise OSError(errno.EINVAL, _SPECIAL)
         if about.st_size > most:
             size = f"{about.st_size / 1e9:.3g} GB, more than {most / 1e9:.3g} GB"
             raise OSError(errno.EFBIG, f"it holds {size}")

@@ -66,4 +66,4 @@ def write_parquet(file: IO[bytes], table: Table, metadata: Mapping[str, str]) ->
         # The type of an empty list would be unknown.
         columns[name] = arrow.array(array.tolist(), arrow.string()) if text else values
     whole = arrow.table(columns).replace_schema_metadata(metadata)
-    parquet.write_table(whole, file, compression="zstd")
+    parquet.write_table(whole, file, compression="zstd", write_page_checksum=True)

@@ -1,4 +1,4 @@
-"""Pictures of sampled runs: histogram, tornado, Sobol indices; quantiles of curves over time."""
+"""Pictures of sampled runs: histogram, tornado, Sobol indices."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import column
-from sphshell_pin.plot.figure import count, finish_axis, label_axis, new_figure, say
+from sphshell_pin.plot.figure import count, finish_axis, new_figure, say
 from sphshell_pin.plot.sweep import figure_label, units_of
 
 if TYPE_CHECKING:
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 
 LOW_COLOR, HIGH_COLOR = "#2f6fde", "#d4202a"
-BAND_COLOR = "#2f6fde"
-_CURVE_UNITS = {"normal_force": ("normal force", "N"), "friction_force": ("friction force", "N")}
-_CURVE_UNITS["depth"] = ("largest depth", "m")
 _MOST_BINS = 60
 _MOST_INPUTS = 20
 
@@ -65,45 +62,6 @@ def plot_uncertainty(
         _draw_tornado(next(axes), tornado, figure, units)
     if indices is not None:
         _draw_indices(next(axes), indices)
-    return canvas
-
-
-def plot_bands(bands: pd.DataFrame, curve: str) -> Figure:
-    """Return a matplotlib Figure of the quantiles of a curve over time.
-
-    `bands` is what `sphshell_pin.study.sweep.quantile_bands` returns. Raises MissingExtra without
-    matplotlib.
-    """
-    canvas = new_figure(9.0, 4.6)
-    axis = canvas.subplots()
-    t = bands["t"].to_numpy(float)
-    quantiles = {one: bands[one].to_numpy(float) for one in (5, 25, 50, 75, 95)}
-    finite = np.array([one[np.isfinite(one)] for one in quantiles.values()]).ravel()
-    factor = 1.0
-    name, unit = _CURVE_UNITS.get(curve.rpartition(".")[2], ("", ""))
-    if curve.startswith("pairs.") and unit:
-        factor = label_axis(axis, name, unit, float(np.abs(finite).max(initial=0.0)))
-    else:
-        axis.set_ylabel(curve)
-    if not len(finite):
-        say(axis, "No run has this curve.")
-    for (low, high), alpha in {(5, 95): 0.18, (25, 75): 0.35}.items():
-        axis.fill_between(
-            t,
-            quantiles[low] * factor,
-            quantiles[high] * factor,
-            color=BAND_COLOR,
-            alpha=alpha,
-            linewidth=0.0,
-            label=f"{low} to {high} %",
-        )
-    axis.plot(t, quantiles[50] * factor, color=BAND_COLOR, linewidth=1.4, label="median")
-    axis.set_xlabel("time [s]")
-    axis.margins(x=0.01)
-    finish_axis(axis, legend=True)
-    fewest, most = int(bands["runs"].min()), int(bands["runs"].max())
-    of = count(most, "run", "runs") if fewest == most else f"{fewest} to {most} runs"
-    canvas.suptitle(f"{curve}: quantiles of {of}", fontsize=12)
     return canvas
 
 

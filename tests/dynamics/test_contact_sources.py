@@ -6,7 +6,7 @@ import pytest
 
 from sphshell_pin import CoulombFriction, RungeKutta4, Scene, SemiImplicitEuler, Simulation
 from sphshell_pin.dynamics.scene.sides import SourceSide, SphereSide
-from sphshell_pin.errors import FrameNotFound, SphshellError
+from sphshell_pin.errors import SphshellError
 from tests.models import add_body, ball, empty, free_q, linear_law, on_plate
 
 RADIUS = 0.05
@@ -124,10 +124,3 @@ def test_a_wrong_answer_is_named(answer) -> None:
     scene = by_source(ball(), lambda pose_i, pose_j: answer)
     with pytest.raises(SphshellError, match="mine"):
         scene.external_forces(*START)
-
-
-def test_unknown_frames() -> None:
-    with pytest.raises(FrameNotFound) as caught:
-        Scene(ball()).add_contact_source(plate_points, "bal", "universe", LAW, None, name="mine")
-    assert caught.value.name == "bal"
-    assert "ball" in caught.value.valid

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +133,28 @@ def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
     assert residual(result) < 1e-6
     stored = result.energy.potential[0] - result.energy.potential[-1]
     assert result.energy.friction_loss[-1] == pytest.approx(stored, rel=1e-3)
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)])
+def test_compensated_friction_leaves_the_motion_as_it_is_without(integrator) -> None:
+    """The motor does the work that friction takes; beyond its effort limit friction is back."""
+    hold = sp.JointPD(kp=20.0, kd=1.0, q_ref=[0.5])
+    free = sp.JointComponents()
+    brakes = sp.JointComponents.from_model(link(), ["damping", "friction"])
+    ends = []
+    for joints, compensated in ((free, False), (brakes, True), (brakes, False)):
+        controller = replace(hold, friction_compensation=compensated)
+        scene = sp.Scene(link(9.81), joints=joints)
+        result = sp.Simulation(scene, integrator).run([0.0], [0.5], 1.0, controller=controller)
+        assert residual(result) < 1e-6
+        ends.append((result.q[-1, 0], result.energy.friction_loss[-1]))
+    assert ends[1][0] == pytest.approx(ends[0][0], abs=1e-7)
+    assert abs(ends[2][0] - ends[0][0]) > 1e-3
+    assert ends[1][1] > 0.1
+    weak = brakes.replaced("hinge", effort=0.2)
+    scene = sp.Scene(link(), joints=weak)
+    result = sp.Simulation(scene, integrator).run([0.0], None, 0.5, controller=controller)
+    assert abs(result.q[-1, 0]) < 2e-3  # 0.2 N m do not move what dry friction of 0.3 holds
 
 
 def test_torques_are_cut_at_the_effort_limit_and_the_result_says_when() -> None:

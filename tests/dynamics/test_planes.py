@@ -5,10 +5,8 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import testing
 from tests.contact.test_planes import egg as egg_shell
 from tests.contact.test_planes import rotations, support
-from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
 from tests.meshes import cube
 from tests.models import add_body, empty
 
@@ -57,15 +55,6 @@ FRICTIONS = [
 ]
 
 
-@pytest.mark.parametrize("ground", [True, False])
-@pytest.mark.parametrize("friction", FRICTIONS)
-def test_derivatives_are_those_of_finite_differences(friction, ground: bool) -> None:
-    """With a plane that stands and one that moves; rows are those of the plane's own body."""
-    scene = egg(LAW, friction, ground=ground)
-    assert_derivatives(scene, *touching(scene))
-    assert_rows(scene, *touching(scene))
-
-
 def test_rolling_loses_no_energy() -> None:
     """Free of friction and damping."""
     scene = egg(sp.ImpactLaw(2e7, 1.5, 0.0, 1e-4))
@@ -93,12 +82,6 @@ def test_a_box_stays_on_its_face(face: float) -> None:
     assert np.abs(result.q[:, 3:] - q[3:]).max() < 1e-9
     assert np.abs(result.q[:, :2] - q[:2]).max() < 1e-9
     assert result.q[-1, 2] == pytest.approx(-low - 9.81 / 1e6, abs=1e-6)
-
-
-def test_action_and_reaction() -> None:
-    """With a plane that moves."""
-    scene = egg(LAW, FRICTIONS[1], ground=False)
-    testing.assert_wrenches_cancel(scene, *touching(scene))
 
 
 def test_a_sensor_and_rows_show_the_force_on_the_body_of_the_plane() -> None:

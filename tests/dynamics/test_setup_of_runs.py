@@ -53,34 +53,6 @@ def test_the_figures_of_pairs_do_not_depend_on_the_other_pairs() -> None:
             np.testing.assert_equal(astuple(figures), astuple(alone))
 
 
-def test_the_effective_mass_is_that_of_the_jacobian_of_the_place() -> None:
-    """By another way: the velocity of the place, differentiated along each coordinate."""
-    scene, q = of_all_kinds()
-    model = scene.model
-    q, v = scene.check_state(q, np.linspace(-1, 1, q.size))
-    pair = scene.pair("smooth-2")
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    center = (data.oMi[pair.joint_i] * pair.placement_i).translation
-    local = pair.placement_j.actInv(center)
-    point = pair.placement_j.act(pair.side_j.shell.closest_points([local]).points[0])
-    normal = (center - point) / np.linalg.norm(center - point)
-    in_joint = data.oMi[pair.joint_i].actInv(point)
-    row = np.empty(model.nv)
-    for k in range(model.nv):
-        step = np.eye(model.nv)[k] * 1e-6
-        ahead, behind = model.createData(), model.createData()
-        pin.forwardKinematics(model, ahead, q + step)
-        pin.forwardKinematics(model, behind, q - step)
-        moved = ahead.oMi[pair.joint_i].act(in_joint) - behind.oMi[pair.joint_i].act(in_joint)
-        row[k] = normal @ moved / 2e-6
-    mass = pin.crba(model, model.createData(), q)
-    mass = np.triu(mass) + np.triu(mass, 1).T
-    figures = next(one for one in explain_pairs(scene, q, v) if one.name == pair.name)
-    expected = 1 / (row @ np.linalg.solve(mass, row))
-    assert figures.effective_mass == pytest.approx(expected, rel=1e-7)
-
-
 def test_what_is_kept_of_a_pair_goes_with_it() -> None:
     scene = sp.Scene(models.ball())
     scene.add_contact(sp.Sphere(0.006, "ball"), models.plate(), law=LAW, name="c")

@@ -149,20 +149,6 @@ def test_nothing_touches(stepper: str) -> None:
 
 
 @every_stepper
-def test_a_ballistic_step_in_closed_form(stepper: str) -> None:
-    """A sliding mass in gravity: q + dt v + ..., v + dt (tau / m - g)."""
-    scene = models.on_plate(models.slider(mass=2.0), LAWS["impact"])
-    simulation = sp.Simulation(scene, STEPPERS[stepper])
-    got = simulation.step_derivatives([1.0], [0.3], [0.7])
-    np.testing.assert_allclose(got.by_state, [[1.0, DT], [0.0, 1.0]], rtol=0, atol=1e-15)
-    half = 0.5 if stepper == "runge-kutta" else 1.0
-    np.testing.assert_allclose(got.by_tau, [[half * DT**2 / 2.0], [DT / 2.0]], rtol=1e-12)
-    assert got.v[0] == pytest.approx(0.3 + DT * (0.35 - 9.81), rel=1e-14)
-    assert got.parameters == ()
-    assert got.by_parameters.shape == (2, 0)
-
-
-@every_stepper
 def test_a_step_on_a_linear_spring_in_closed_form(stepper: str) -> None:
     """q'' = -w^2 q: each method has its own matrix."""
     k, m = 4e5, 2.0

@@ -249,7 +249,6 @@ STRUCTURES: dict[str, Structure] = {
     ".zip": damaged_folder,
     ".npz": tables.damaged_npz,
     ".toml": tables.damaged_toml,
-    ".journal": tables.damaged_journal,
     ".csv": damaged_csv,
 }
 """By suffix: what changes the structure of a file."""

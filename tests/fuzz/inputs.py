@@ -70,7 +70,6 @@ KINDS: dict[str, Kind] = {
     # The reader with the most to check comes more often.
     "npz": _file(".npz", tables.npz_corpus, readers.read_result, 24),
     "toml": _file(".toml", tables.toml_corpus, readers.read_scenario, 16),
-    "journal": _file(".journal", tables.journal_corpus, readers.read_journal),
     "urdf": _file(".urdf", tables.urdf_corpus, readers.read_robot),
     "mjcf": _file(".xml", tables.mjcf_corpus, readers.read_robot),
     "fit": _file(".csv", folders.fit_corpus, readers.read_measured),

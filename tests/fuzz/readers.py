@@ -26,11 +26,10 @@ from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.study.compare import compare, measured, tables_of
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.robot_check.models import load_subject
-from sphshell_pin.study.sweep.journal import Journal
 from sphshell_pin.view.live.opening import player_of
 from sphshell_pin.view.recording import render_recording
 from tests.fuzz.folders import results_corpus, unpacked
-from tests.fuzz.tables import HEAD, OUTCOMES, prepare
+from tests.fuzz.tables import prepare
 from tests.scenario.files import write
 
 
@@ -55,16 +54,6 @@ def read_result(path: Path) -> None:
 def read_scenario(path: Path) -> None:
     built = build(path)
     built.scene.contacts(built.q0, built.v0)
-
-
-def read_journal(path: Path) -> None:
-    journal = Journal(path, HEAD, len(OUTCOMES))
-    try:
-        for number, outcome in journal.outcomes.items():
-            # Damage is noticed: what is read is what was written.
-            assert repr(outcome) == repr(OUTCOMES[number]), outcome
-    finally:
-        journal.close()
 
 
 def read_robot(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Damaged results, scenarios, sweep journals and robots."""
+"""Damaged results, scenarios and robots."""
 
 import functools
 import io
@@ -19,8 +19,6 @@ from sphshell_pin import robots
 from sphshell_pin.results import Sensitivities
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
-from sphshell_pin.study.sweep.job import Outcome
-from sphshell_pin.study.sweep.journal import Journal
 from tests.fuzz.mutate import NUMBERS, alter, damage, odd_value
 from tests.scenario.files import DROP, write
 
@@ -91,23 +89,6 @@ BOX = """OFF
 0 0 0\n0 0 1\n0 1 0\n0 1 1\n1 0 0\n1 0 1\n1 1 0\n1 1 1
 4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3
 """
-
-HEAD = {
-    "scenario": "drop",
-    "settings": "0" * 64,
-    "vary": [["run.dt", [1e-4, 2e-4, 3e-4, 4e-4]]],
-    "together": False,
-    "verdicts": False,
-    "files": {},
-    "versions": {"numpy": "2"},
-}
-OUTCOMES = (
-    Outcome(0, "done", "", {"figures.depth": 1.25e-5, "final.q.z": -0.5}, 0.25, "host:1"),
-    Outcome(1, "failed", "ScenarioError: drop.toml: run.dt: wrong", {}, 0.5, "host:2"),
-    Outcome(2, "done", "", {"figures.depth": 3.5e-5, "final.q.z": float("nan")}, 0.125, "host:1"),
-    Outcome(3, "done", "", {"figures.depth": 4.75e-5, "final.q.z": 2.0}, 0.25, "host:2"),
-)
-
 
 EXPRESSIONS = (
     *("${9**9**9}", "${'x' * 10**10}", "${open('x').read()}", "${(lambda: 0)()}", "${", "${1 / 0}"),
@@ -306,29 +287,6 @@ def _toml(value: Any) -> str:
         else:
             pieces.append(json.dumps(one if isinstance(one, str) else ""))
     return "".join(pieces)
-
-
-@functools.cache
-def journal_corpus() -> tuple[bytes, ...]:
-    with tempfile.TemporaryDirectory() as home:
-        path = Path(home) / "journal"
-        journal = Journal(path, HEAD, len(OUTCOMES))
-        for outcome in OUTCOMES:
-            journal.add(outcome)
-        journal.close()
-        return (path.read_bytes(),)
-
-
-def damaged_journal(rng: random.Random, data: bytes) -> bytes:
-    """Return a journal some of whose values were changed, but not their checksums."""
-    lines = data.split(b"\n")
-    for _ in range(rng.choice((1, 1, 2))):
-        k = rng.randrange(len(lines) - 1)
-        values = json.loads(lines[k])
-        name = rng.choice([*values])
-        values[name] = rng.choice((None, 1, 0.5, "", "[]", {}, [values[name]], "[" * 100_000))
-        lines[k] = json.dumps(values).encode()
-    return b"\n".join(lines)
 
 
 def urdf_corpus() -> tuple[bytes, ...]:

@@ -24,12 +24,15 @@ def mitre(rng: Rng) -> Solid:
 
 def unequal_mitre(rng: Rng) -> Solid:
     """Fillets of two radii along the edges of the top."""
-    solid, radii = occ.box([0, 0, 0], SIDES), (_size(rng, 0.3, 3), _size(rng, 3, 8))
+    return mitred(_size(rng, 0.3, 3), _size(rng, 3, 8))
+
+
+def mitred(short: float, long: float) -> Solid:
+    """Fillets of one radius along the short edges of the top, of another along the long ones."""
+    solid = occ.box([0, 0, 0], SIDES)
     edges = occ.edges_at(solid, 20.0)
-    long = [np.argmax(occ.span(edge)) == 0 for edge in edges]
-    return occ.filleted_each(
-        solid, [(edge, radii[int(one)]) for edge, one in zip(edges, long, strict=True)]
-    )
+    radii = [long if np.argmax(occ.span(edge)) == 0 else short for edge in edges]
+    return occ.filleted_each(solid, zip(edges, radii, strict=True))
 
 
 def tray(rng: Rng) -> Solid:

@@ -4,8 +4,22 @@ import numpy as np
 import pytest
 from scipy import ndimage, sparse
 
+import sphshell_pin as sp
+from tests.joints.boxes import mitred
 from tests.joints.running import walk_outline, walk_part
-from tests.joints.solids import Part, bar, cones, d_shaft, disc, dome, pocket, ring, shaft, slot
+from tests.joints.solids import (
+    Part,
+    bar,
+    cones,
+    d_shaft,
+    disc,
+    dome,
+    pocket,
+    ring,
+    shaft,
+    slot,
+    write_stl,
+)
 from tests.joints.trimmed import TrimmedSolid
 from tests.joints.verdict import MM
 from tests.joints.walk import spheres
@@ -67,6 +81,18 @@ def test_none_is_on_meshes_of_single_precision(part, tmp_path):
 def test_no_contact_is_lost_or_made_up_at_corners(family, tmp_path):
     verdict = walk_part(family, tmp_path, np.random.default_rng(0), most=1000)
     assert verdict.found() == {}
+
+
+@pytest.mark.parametrize("radii", [(0.38, 3.7), (1.5, 3.4), (2.4, 5.3)])
+def test_none_is_lost_where_a_mitre_ends_in_a_plane(radii, tmp_path):
+    """In single precision, where both fillets are tangent to it."""
+    solid = mitred(*radii)
+    shell = sp.Shell.from_file(write_stl(solid, tmp_path / "part.stl", 0.022), unit="mm")
+    rng = np.random.default_rng(0)
+    for near in (1e-3, 1e-2):
+        away = np.c_[rng.uniform(-near, near, (500, 2)), rng.choice([0.03, 0.3, 3.0], 500)]
+        depths, _ = shell.contacts_batch(([*radii, 20.0] + away) * MM, (away[:, 2] + 0.01) * MM)
+        assert depths.min() > 0
 
 
 @pytest.mark.parametrize(

@@ -5,23 +5,11 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from tests import meshes, models
 from tests.public_cases import case
-from tests.public_cases.shapes import block, terrain
+from tests.public_cases.shapes import terrain
 
 GRAVITY = 9.81
-
-
-def ball(mass: float, radius: float) -> pin.Model:
-    """Return a free ball with the frame "ball"."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(mass, radius), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    return model
-
-
-def at(*xyz: float) -> np.ndarray:
-    return np.array([*xyz, 0.0, 0.0, 0.0, 1.0])
 
 
 def ramp(strips: int) -> tuple[float, float]:
@@ -35,7 +23,7 @@ def ramp(strips: int) -> tuple[float, float]:
     vertices = [s * along + [0, y, 0] for s in np.linspace(-2, 2, strips + 1) for y in (-1, 1)]
     k = 2 * np.arange(strips)[:, None]
     elements = np.vstack((k + [0, 2, 3], k + [0, 3, 1]))
-    scene = sp.Scene(ball(1.0, radius))
+    scene = sp.Scene(models.ball(radius=radius))
     scene.add_contact(
         sp.Sphere(radius, frame="ball"),
         sp.Shell(vertices, elements),
@@ -46,7 +34,7 @@ def ramp(strips: int) -> tuple[float, float]:
     depth = (GRAVITY * np.cos(slope) / stiffness) ** (2 / 3)
     start = -1.5 * along + 0.3 * np.eye(3)[1] + (radius - depth) * normal
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
-        at(*start), duration=1.0, record_dt=0.01
+        models.free_q(start), duration=1.0, record_dt=0.01
     )
     places = result.q[:, :3]
     acceleration = GRAVITY * np.sin(slope) / (1 + 0.4 * (radius / (radius - depth)) ** 2)
@@ -87,9 +75,12 @@ def rolling_down_a_ramp() -> float:
     bound=1e-12,
 )
 def over_the_seam_of_two_cubes() -> float:
-    (left, corners), (right, others) = block((-1, -1, -2), (1, 1, 0)), block((1, -1, -2), (3, 1, 0))
-    shell = sp.Shell(np.vstack((left, right)), np.vstack((corners, others + len(left))))
-    scene = sp.Scene(ball(1.0, 0.1))
+    corners, triangles = meshes.cube(2.0)
+    shell = sp.Shell(
+        np.vstack((corners - [0, 0, 1], corners + [2, 0, -1])),
+        np.vstack((triangles, triangles + len(corners))),
+    )
+    scene = sp.Scene(models.ball(radius=0.1))
     scene.add_contact(
         sp.Sphere(0.1, frame="ball"),
         shell,
@@ -99,7 +90,7 @@ def over_the_seam_of_two_cubes() -> float:
     )
     depth = (GRAVITY / 1e5) ** (2 / 3)
     result = sp.Simulation(scene, sp.SemiImplicitEuler(5e-5)).run(
-        at(0, 0, 0.1 - depth), v0=[5, 0, 0, 0, 50, 0], duration=0.5, record_dt=1e-3
+        models.free_q([0, 0, 0.1 - depth]), v0=[5, 0, 0, 0, 50, 0], duration=0.5, record_dt=1e-3
     )
     return float(np.ptp(result.q[:, 2]))
 
@@ -115,12 +106,14 @@ def over_the_seam_of_two_cubes() -> float:
 )
 def restitution_one_keeps_the_height() -> float:
     height = 1.0
-    scene = sp.Scene(ball(1.0, 0.1))
+    scene = sp.Scene(models.ball(radius=0.1))
     plate = sp.Shell([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]], [[0, 1, 2, 3]])
     law = sp.HuntCrossleyLaw(1e6, 1.5, 0.0)
     scene.add_contact(sp.Sphere(0.1, frame="ball"), plate, law=law, name="ball-plate")
     result = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
-        at(0, 0, 0.1 + height), duration=40 * np.sqrt(2 * height / GRAVITY), record_dt=2e-3
+        models.free_q([0, 0, 0.1 + height]),
+        duration=40 * np.sqrt(2 * height / GRAVITY),
+        record_dt=2e-3,
     )
     # A row may miss the top: height and speed give it.
     energy = result.q[:, 2] - 0.1 + result.v[:, 2] ** 2 / (2 * GRAVITY)
@@ -135,8 +128,8 @@ def restitution_one_keeps_the_height() -> float:
     bound=0,
 )
 def onto_open_hills() -> float:
-    shell = sp.Shell(*terrain(61, 2.0, lambda x, y: 0.3 * np.sin(4 * x) * np.sin(3 * y)))
-    scene = sp.Scene(ball(0.1, 0.05))
+    shell = terrain(60, 2.0, lambda x, y: 0.3 * np.sin(4 * x) * np.sin(3 * y))
+    scene = sp.Scene(models.ball(mass=0.1))
     scene.add_contact(
         sp.Sphere(0.05, frame="ball"),
         shell,
@@ -146,7 +139,7 @@ def onto_open_hills() -> float:
     )
     sim, rng, fell = sp.Simulation(scene, sp.SemiImplicitEuler(1e-3)), np.random.default_rng(1), 0
     for _ in range(12):
-        start = at(*rng.uniform(-0.7, 0.7, 2), 1.5)
+        start = models.free_q([*rng.uniform(-0.7, 0.7, 2), 1.5])
         falling = [0, 0, -rng.uniform(0, 60), 0, 0, 0]
         x, y, z = sim.run(start, v0=falling, duration=1.0, record_dt=0.01).q[:, :3].T
         above = z > 0.3 * np.sin(4 * x) * np.sin(3 * y)
@@ -162,16 +155,13 @@ def onto_open_hills() -> float:
     bound=1e-12,
 )
 def pinched_rod() -> float:
-    model, radius, force = pin.Model(), 0.004, 12.0
+    model, radius, force = models.empty(), 0.004, 12.0
     for name in ("left", "right"):
-        joint = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), name)
-        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.05, 0.01), pin.SE3.Identity())
-        model.addFrame(pin.Frame(f"pad_{name}", joint, pin.SE3.Identity(), pin.OP_FRAME))
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "rod")
+        pad = pin.Inertia.FromSphere(0.05, 0.01)
+        models.add_body(model, name, pin.JointModelPX(), inertia=pad)
     across, along = 0.045 * 0.03**2 / 3, 0.5 * 0.045 * radius**2
     inertia = pin.Inertia(0.045, np.zeros(3), np.diag([across, along, across]))
-    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-    model.addFrame(pin.Frame("held", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    models.add_body(model, "held", pin.JointModelFreeFlyer(), inertia=inertia)
     turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     vertices = [
         [radius * np.cos(a), y, radius * np.sin(a)]
@@ -185,7 +175,7 @@ def pinched_rod() -> float:
     scene, law = sp.Scene(model), sp.HuntCrossleyLaw(1e8, 1.5, 0.5)
     friction = sp.BristleFriction(0.7, 0.7, 2e5, 30.0, torsional=True)
     for name in ("left", "right"):
-        pad = sp.Sphere(0.01, frame=f"pad_{name}")
+        pad = sp.Sphere(0.01, frame=name)
         scene.add_contact(pad, rod, frame="held", law=law, friction=friction, name=name)
     x = 0.01 + radius - (force / 1e8) ** (2 / 3)
     result = sp.Simulation(scene, sp.SemiImplicitEuler(2e-5)).run(
@@ -233,7 +223,7 @@ def pressing_hard_on_a_wall() -> float:
 
 def plate_scene(model: pin.Model, friction: object, law: object = None) -> sp.Scene:
     """Return a scene of a ball of 0.1 m over a level square of 2 x 16 x 16 triangles."""
-    shell = sp.Shell(*terrain(17, 4.0, lambda x, _: 0.0 * x))
+    shell = sp.Shell(*meshes.grid_plate(16, 16, 8.0))
     scene = sp.Scene(model)
     law = sp.HuntCrossleyLaw(1e6, 1.5, 0.5) if law is None else law
     sphere = sp.Sphere(0.1, frame="ball")
@@ -251,9 +241,20 @@ def plate_scene(model: pin.Model, friction: object, law: object = None) -> sp.Sc
 )
 def weight_of_a_ball_at_rest() -> float:
     depth = (GRAVITY / 1e6) ** (2 / 3)
-    sim = sp.Simulation(plate_scene(ball(1.0, 0.1), None), sp.SemiImplicitEuler(1e-4))
-    log = sim.run(at(0, 0, 0.1 - depth), duration=0.5, record_dt=1e-2).contacts
+    sim = sp.Simulation(plate_scene(models.ball(radius=0.1), None), sp.SemiImplicitEuler(1e-4))
+    log = sim.run(models.free_q([0, 0, 0.1 - depth]), duration=0.5, record_dt=1e-2).contacts
     return float(log.normal_force[log.row == log.row[-1]].sum() / GRAVITY)
+
+
+def rolled(spin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return velocity and spin in the world of a ball that slid at first, spinning about z."""
+    depth = (GRAVITY / 1e6) ** (2 / 3)
+    scene = plate_scene(models.ball(radius=0.1), sp.CoulombFriction(0.2, 0.2, 1e-3, 2e-3))
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
+        models.free_q([-1.5, 0.2, 0.1 - depth]), [2.0, 0, 0, 0, 0, spin], 0.6, record_dt=0.01
+    )
+    rotation = pin.Quaternion(result.q[-1, 3:]).toRotationMatrix()
+    return rotation @ result.v[-1, :3], rotation @ result.v[-1, 3:]
 
 
 @case(
@@ -264,15 +265,9 @@ def weight_of_a_ball_at_rest() -> float:
     bound=2e-4,
 )
 def sliding_then_rolling() -> float:
-    depth = (GRAVITY / 1e6) ** (2 / 3)
-    scene = plate_scene(ball(1.0, 0.1), sp.CoulombFriction(0.2, 0.2, 1e-3, 2e-3))
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
-        at(-1.5, 0.2, 0.1 - depth), v0=[2.0, 0, 0, 0, 0, 0], duration=0.6, record_dt=0.01
-    )
-    rotation = pin.Quaternion(result.q[-1, 3:]).toRotationMatrix()
-    speed = (rotation @ result.v[-1, :3])[0] / 2.0
-    lever = 1.0 - depth / 0.1
-    return float(speed * (1 + 0.4 / lever**2) / 1.4)
+    velocity, _ = rolled(0.0)
+    lever = 1.0 - (GRAVITY / 1e6) ** (2 / 3) / 0.1
+    return float(velocity[0] / 2.0 * (1 + 0.4 / lever**2) / 1.4)
 
 
 @case(
@@ -283,13 +278,7 @@ def sliding_then_rolling() -> float:
     bound=1e-9,
 )
 def spin_while_rolling() -> float:
-    depth = (GRAVITY / 1e6) ** (2 / 3)
-    scene = plate_scene(ball(1.0, 0.1), sp.CoulombFriction(0.2, 0.2, 1e-3, 2e-3))
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
-        at(-1.5, 0.2, 0.1 - depth), v0=[2.0, 0, 0, 0, 0, 5.0], duration=0.6, record_dt=0.01
-    )
-    rotation = pin.Quaternion(result.q[-1, 3:]).toRotationMatrix()
-    return float((rotation @ result.v[-1, 3:])[2] / 5.0)
+    return float(rolled(5.0)[1][2] / 5.0)
 
 
 @case(
@@ -300,11 +289,10 @@ def spin_while_rolling() -> float:
     bound=1e-6,
 )
 def reflected_at_a_seam() -> float:
-    model = ball(1.0, 0.1)
-    model.gravity.linear = np.zeros(3)
+    model = models.ball(gravity=0.0, radius=0.1)
     scene = plate_scene(model, None, sp.HuntCrossleyLaw(1e7, 1.5, 0.0))
     result = sp.Simulation(scene, sp.Adaptive(1e-9)).run(
-        at(-0.2, 0.01, 0.3), v0=[3.0, 0, -3.0, 0, 0, 0], duration=0.2, record_dt=0.01
+        models.free_q([-0.2, 0.01, 0.3]), v0=[3.0, 0, -3.0, 0, 0, 0], duration=0.2, record_dt=0.01
     )
     return float(result.v[-1, 2] / np.hypot(*result.v[-1, :2]))
 
@@ -318,10 +306,8 @@ def reflected_at_a_seam() -> float:
     bound=1e-12,
 )
 def held_on_a_slope() -> float:
-    model, slope = pin.Model(), np.radians(20)
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "slides")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    slope = np.radians(20)
+    model = models.ball(radius=0.1, joint=pin.JointModelTranslation())
     model.gravity.linear = GRAVITY * np.array([np.sin(slope), 0.0, -np.cos(slope)])
     scene = plate_scene(model, sp.BristleFriction(0.5, 0.4, 1e5, 20.0))
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(

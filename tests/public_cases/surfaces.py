@@ -7,8 +7,9 @@ import numpy as np
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from tests.meshes import cube
 from tests.public_cases import case
-from tests.public_cases.shapes import binary_stl, block, terrain
+from tests.public_cases.shapes import binary_stl, terrain
 
 HEIGHT = 0.2
 
@@ -21,8 +22,8 @@ HEIGHT = 0.2
     bound=1e-15,
 )
 def deeper_than_half() -> float:
-    box = sp.Shell(*block((-0.5, -0.5, -0.5), (0.5, 0.5, 0)), side="outside")
-    return float(box.contacts([0, 0, 0.005 - 0.009], 0.005).depth.max())
+    box = sp.Shell(*cube(), side="outside")
+    return float(box.contacts([0, 0, 0.5 + 0.005 - 0.009], 0.005).depth.max())
 
 
 @case(
@@ -37,7 +38,7 @@ def above_a_terrain() -> float:
     def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return HEIGHT * np.sin(3 * x) * np.cos(2 * y)
 
-    shell = sp.Shell(*terrain(41, 1.0, height))
+    shell = terrain(40, 1.0, height)
     rng = np.random.default_rng(0)
     x, y = rng.uniform(-0.8, 0.8, (2, 2000))
     above = rng.uniform(0.02, 0.5, 2000)
@@ -49,23 +50,18 @@ def above_a_terrain() -> float:
 
 def bored_plate(suffix: str) -> sp.Shell:
     """Return a plate of 20 mm with a bore of 10 mm, from a CAD file or its STL."""
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
-    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
-    from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
     from OCP.StlAPI import StlAPI_Writer
 
-    box = BRepPrimAPI_MakeBox(gp_Pnt(-20, -20, -10), 40, 40, 20).Shape()
-    bore = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(0, 0, -15), gp_Dir(0, 0, 1)), 5.0, 30).Shape()
-    plate = BRepAlgoAPI_Cut(box, bore).Shape()
+    from tests.parts import occ
+    from tests.shell.cad_shapes import write_step
+
+    plate = occ.box((-20, -20, -10), (20, 20, 10))
+    plate = occ.cut(plate, occ.cylinder(5.0, 30.0, (0, 0, -15)))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"plate.{suffix}"
         if suffix == "step":
-            writer = STEPControl_Writer()
-            writer.Transfer(plate, STEPControl_AsIs)
-            writer.Write(str(path))
-            return sp.Shell.from_file(path)
+            return sp.Shell.from_file(write_step(path, ("plate", plate)))
         BRepMesh_IncrementalMesh(plate, 0.1, False, 0.5)
         StlAPI_Writer().Write(plate, str(path))
         return sp.Shell.from_file(path, unit="mm")
@@ -159,19 +155,12 @@ def mirrored_mesh() -> float:
     bound=1e-14,
 )
 def units_of_a_step_file() -> float:
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-    from OCP.Interface import Interface_Static
-    from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+    from tests.shell.cad_shapes import box, write_step
 
-    sides = []
+    cube, sides = ("cube", box(25.4, 25.4, 25.4)), []
     with tempfile.TemporaryDirectory() as folder:
-        for unit in ("INCH", "M", "FT", "UM", "MM"):  # the last is the setting of a new process
-            STEPControl_Writer()
-            Interface_Static.SetCVal_s("write.step.unit", unit)
-            writer = STEPControl_Writer()
-            writer.Transfer(BRepPrimAPI_MakeBox(25.4, 25.4, 25.4).Shape(), STEPControl_AsIs)
-            path = Path(folder) / f"{unit}.step"
-            writer.Write(str(path))
+        for unit in ("INCH", "M", "FT", "UM", "MM"):
+            path = write_step(Path(folder) / f"{unit}.step", cube, unit=unit)
             sides += list(np.ptp(sp.Shell.from_file(path).vertices, axis=0))
     return float(max(sides, key=lambda side: abs(side - 0.0254)))
 

@@ -217,7 +217,11 @@ ARM = (
         ('<weld body1="b"/>', r"<weld> closes between 'b' and 'world', of the joints 'j1', 'j2'"),
         ('<joint joint1="j1" joint2="j2" polycoef="0 1 2"/>', r"'j1' follow 'j2' by a polynomial"),
         ('<joint joint1="j1" polycoef="0.5"/>', r"holds joint 'j1' at 0.5 \(lock it"),
-        ('<tendon tendon1="t"/>', r"<tendon> of <equality>"),
+        (
+            '<tendon tendon1="t"/></equality><tendon><fixed name="t"><joint joint="j1" coef="1"/>'
+            "</fixed></tendon><equality>",
+            r"<tendon> of <equality>",
+        ),
     ],
 )
 def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, words):
@@ -263,7 +267,7 @@ def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, monkeypatch, inside
     ],
 )
 def test_files_included_count_in_total(tmp_path, monkeypatch, part, count, words):
-    monkeypatch.setattr("sphshell_pin.robots.mjcf.MOST_LINKS", 50)
+    monkeypatch.setattr("sphshell_pin.robots.mjcf_compile.MOST_LINKS", 50)
     for k in range(count):
         text = part.format(k + 1) if k + 1 < count else "<body/>"
         (tmp_path / f"{k}.xml").write_text(f"<mujocoinclude>{text}</mujocoinclude>")
@@ -387,10 +391,11 @@ def test_what_only_shows_or_moves_the_robot_is_not_read(tmp_path):
 
 
 def test_models_that_are_attached_weigh_and_move_as_in_mujoco(tmp_path):
-    """Their defaults stay theirs, and those of two copies apart."""
+    """Their defaults and units stay theirs, and those of two copies apart."""
     (tmp_path / "link.xml").write_text(
-        '<mujoco><default><geom density="500"/><default class="heavy"><geom density="4000"/>'
-        '</default></default><worldbody><body name="b" pos="0 0 .1"><joint name="j" axis="0 1 0"/>'
+        '<mujoco><compiler angle="radian"/><default><geom density="500"/><default class="heavy">'
+        '<geom density="4000"/></default></default><worldbody>'
+        '<body name="b" pos="0 0 .1" euler="0 0.3 0"><joint name="j" axis="0 1 0"/>'
         '<geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/><body pos="0 0 .3">'
         '<joint name="k" axis="1 0 0"/><geom class="heavy" size=".03"/></body></body></worldbody>'
         "</mujoco>"

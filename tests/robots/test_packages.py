@@ -100,13 +100,15 @@ def test_a_workspace_lists_its_robots(tmp_path: Path) -> None:
         '<parent link="a"/><child link="b"/></joint></robot>'
     )
     asking = file.with_name("asking.xacro")
-    asking.write_text(XACRO.replace("<link", '<link name="$(arg which)"/><link', 1))
+    asking.write_text(
+        XACRO.replace("<link", '<xacro:include filename="$(find far)/a.xacro"/><link', 1)
+    )
     found = {one.file.name: one for one in find_robots(tmp_path)}
     assert sorted(found) == ["arm.xacro", "asking.xacro", "bare.urdf"]
     assert found["arm.xacro"].frames == ("tip",)
     assert not found["arm.xacro"].missing
     assert "--density" in found["bare.urdf"].missing
-    assert "--xacro-arg which=VALUE" in found["asking.xacro"].missing
+    assert "there is no package 'far'" in found["asking.xacro"].missing
     told = call("new", "--robot", tmp_path)
     assert told.exit_code == 2
     assert "say which of these 3 robots" in told.output
@@ -191,7 +193,6 @@ def test_a_package_whose_meshes_were_put_into_more_folders_and_the_nearer_of_two
     ("line", "said"),
     [
         ('<xacro:include filename="$(arg kind).xacro"/>', "sets: kind (none)"),
-        ('<link name="$(arg size)"/>', "give it, --xacro-arg size=VALUE"),
         ('<xacro:arg name="size"/>', "xacro:arg: missing attribute 'default'"),
         ('<xacro:include filename="$(find far)/a.xacro"/>', "expand it: there is no package 'far'"),
     ],
@@ -204,3 +205,34 @@ def test_a_xacro_that_fails_says_which_arguments_it_has(
     file.write_text(f'{head} default="none"/>{line}</robot>')
     with pytest.raises(robots.RobotError, match=re.escape(said)):
         robots.load_file(file)
+
+
+def test_arguments_without_a_default_are_taken_from_the_package_and_said(tmp_path: Path) -> None:
+    (tmp_path / "package.xml").write_text("<package><name>arms</name></package>")
+    (tmp_path / "up.launch").write_text('<launch><arg name="kind" default="long"/></launch>')
+    file = tmp_path / "arm.xacro"
+    file.write_text(
+        '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><xacro:if value="$(arg crane)">'
+        '<link name="crane"/></xacro:if><link name="$(arg kind)_$(arg prefix)"/></robot>'
+    )
+    said = "taken as --xacro-arg crane=false --xacro-arg kind=long --xacro-arg prefix=prefix"
+    with pytest.warns(robots.RobotWarning, match=said):
+        robot = robots.load_file(file)
+    assert robot.model.existFrame("long_prefix")
+    given = robots.load_file(file, xacro_args={"crane": False, "kind": "a", "prefix": "b"})
+    assert given.model.existFrame("a_b")
+
+
+@pytest.mark.parametrize("name", ["part.xacro", "part.xml"])
+def test_a_part_of_a_robot_names_the_robot_that_includes_it(tmp_path: Path, name: str) -> None:
+    part, whole = tmp_path / name, tmp_path / f"robot{Path(name).suffix}"
+    if part.suffix == ".xml":
+        part.write_text('<mujocoinclude><body name="a"/></mujocoinclude>')
+        whole.write_text(f'<mujoco><worldbody><include file="{name}"/></worldbody></mujoco>')
+    else:
+        head = '<robot xmlns:xacro="http://wiki.ros.org/xacro"'
+        part.write_text(f"{head}/>")
+        (tmp_path / "macro.xacro").write_text(f'{head}><xacro:include filename="{name}"/></robot>')
+        whole.write_text(f'{head} name="arm"><xacro:include filename="macro.xacro"/></robot>')
+    with pytest.raises(robots.RobotError, match=f"that includes this one: {re.escape(str(whole))}"):
+        robots.load_file(part)

@@ -1,6 +1,7 @@
 """Meshes written anew: the same points, faces and colors, and nothing that they name."""
 
 import importlib.util
+import json
 import os
 import sysconfig
 import time
@@ -13,7 +14,8 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.errors import RobotWarning
-from sphshell_pin.robots.plain_mesh import FORMATS, collada_unit, plain_mesh, refused_reference
+from sphshell_pin.robots.mesh_faults import mesh_fault
+from sphshell_pin.robots.plain_mesh import FORMATS, collada_unit, plain_mesh
 
 HEAD = '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">'
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2//1 3\n"
@@ -106,6 +108,88 @@ def test_a_collada_file_keeps_what_is_drawn_and_no_names_of_files():
     assert plain_mesh(".dae", f"{HEAD}<translate>a b</translate></COLLADA>".encode()) is None
 
 
+TRIANGLE = (
+    HEAD
+    + '<library_geometries><geometry id="g"><mesh><source id="s"><float_array id="a" count="9">'
+    '0 0 0 1 0 0 0 1 0</float_array><technique_common><accessor source="#a" count="3" stride="3">'
+    '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>'
+    '</accessor></technique_common></source><vertices id="v"><input semantic="POSITION" '
+    'source="#s"/></vertices><triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/>'
+    "<p>{p}</p></triangles></mesh></geometry></library_geometries><library_nodes>{library}"
+    '</library_nodes><library_visual_scenes><visual_scene id="w"><node id="n">{node}</node>'
+    '</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#w"/></scene>'
+    "</COLLADA>"
+)
+DRAWN = '<instance_geometry url="#g"/>'
+ROWS = [[k + 1] * 10 for k in range(9)]
+
+
+def collada(p="0 1 2", library="", node=DRAWN):
+    return TRIANGLE.format(p=p, library=library, node=node).encode()
+
+
+def many_nodes():
+    rows = [f'<node id="m0">{DRAWN}</node>']
+    for k in range(9):
+        rows += [f'<node id="m{k + 1}">' + f'<instance_node url="#m{k}"/>' * 10 + "</node>"]
+    return collada(library="".join(rows), node='<instance_node url="#m9"/>')
+
+
+def gltf(**of):
+    accessor = {"componentType": 5126, "count": 3, "type": "VEC3"}
+    mesh = {"primitives": [{"attributes": {"POSITION": 0}}]}
+    nodes = [{"mesh": 0}]
+    made = {"asset": {"version": "2.0"}, "accessors": [accessor], "meshes": [mesh], "nodes": nodes}
+    return json.dumps(made | of).encode()
+
+
+WRONG = {
+    "point": (".dae", collada(p="0 1 ."), "<p> holds what is no index"),
+    "entity": (".dae", collada(p="0 1 &#46;"), "<p> holds what is no index"),
+    "comment": (".dae", collada(p="0 1 <!-- 2 -->."), "<p> holds what is no index"),
+    "utf-16": (".dae", collada(p="0 1 x").decode().encode("utf-16"), "<p> holds what is no index"),
+    "itself": (".dae", collada(node='<instance_node url="#n"/>'), "holds itself"),
+    "scene": (".dae", collada(node='<instance_node url="#w"/>'), "holds itself"),
+    "deep": (".dae", collada(node="<node>" * 300 + "</node>" * 300), "deep"),
+    "many": (".dae", many_nodes(), "stand for more than 100000 nodes"),
+    "digits": (".obj", OBJ + b"f 1 2 " + b"10" * 500, "400 digits"),
+    "digits joined": (".obj", OBJ + b"f 1 2 " + b"10\\\n" * 500, "400 digits"),
+    "no index": (".obj", OBJ + b"f 1 2 12345678901", ""),
+    "glTF itself": (".gltf", gltf(nodes=[{"children": [0]}]), "holds itself"),
+    "glTF deep": (".gltf", gltf(nodes=[{"children": [k + 1]} for k in range(300)] + [{}]), "deep"),
+    "glTF many": (".gltf", gltf(nodes=[{"children": row} for row in ROWS] + [{}]), "stand for"),
+    "glTF huge": (
+        ".gltf",
+        gltf(accessors=[{"count": 10**6}], meshes=[{"primitives": [{"indices": 0}] * 100}]),
+        "stand for more than 20000000 triangles",
+    ),
+    "glTF nested": (".gltf", b"[" * 100_000, "cannot be read"),
+    "glTF other": (".gltf", gltf(nodes=[3]), "not that of a glTF"),
+    "ply": (
+        ".ply",
+        b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        b"property float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n"
+        b"0 0 0\n1 0 0\n0 1 0\n3 0 1 99999999\n",
+        "uses vertex 100000000",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_assimp_is_not_given_what_it_cannot_bear(name, tmp_path):
+    """It crashes, takes all memory or goes on without end at each of these."""
+    suffix, content, reason = WRONG[name]
+    file = tmp_path / f"m{suffix}"
+    file.write_bytes(content)
+    assert reason in mesh_fault(file)
+    made = plain_mesh(suffix, content)
+    if made is not None:
+        file.write_bytes(made)
+        assert mesh_fault(file) == ""
+    file.write_bytes({".dae": collada(), ".obj": OBJ, ".gltf": gltf()}.get(suffix, b""))
+    assert suffix == ".ply" or mesh_fault(file) == ""
+
+
 def bounds(path):
     mesh = coal.MeshLoader().load(str(path), np.ones(3))
     points = mesh.vertices()
@@ -160,6 +244,6 @@ def test_time_is_in_proportion_to_the_size(suffix, tmp_path):
             file.write_bytes(content)
             start = time.process_time()
             plain_mesh(suffix, content)
-            refused_reference(file)
+            mesh_fault(file)
             collada_unit(file)
             assert time.process_time() - start < 3.0, (text, token)

@@ -232,7 +232,7 @@ def test_its_knobs_turn(tmp_path):
         (("pandda",), {}, NameNotFound, "no robot 'pandda'"),
         (("nix.urdf",), {}, SphshellError, "nix.urdf: no such file"),
         (("ball", "blub"), {}, NameNotFound, "plane, box, sphere, cylinder, bowl"),
-        (("ball", "blub.stl"), {}, SphshellError, "no such surface file: blub.stl"),
+        (("ball", "blub.stl"), {}, SphshellError, "surface blub.stl: no such file"),
         (("ball", BLADE), {}, UnitMissing, "must be stated"),
         (("ball", "plane"), {"unit": "mm"}, SphshellError, "sized in meters"),
         (("ball", "plane"), {"faces": [3]}, SphshellError, "not to the plane"),

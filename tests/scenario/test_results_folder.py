@@ -16,8 +16,6 @@ from sphshell_pin.base.atomic.exchange import exchange
 from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running import run
-from sphshell_pin.study.sweep.job import Outcome
-from sphshell_pin.study.sweep.journal import Journal
 from tests.command import call
 from tests.scenario import races
 from tests.scenario.files import write
@@ -152,20 +150,6 @@ def test_a_folder_that_must_stay_gets_its_files_one_by_one(why, tmp_path, monkey
     assert os.listdir(tmp_path) == ["out"]
 
 
-def test_a_sweep_goes_on_in_the_exchanged_folder(tmp_path):
-    folder, path = tmp_path / "out", tmp_path / "out" / "sweep.parquet.journal"
-    put(folder, "old")
-    inode = folder.stat().st_ino
-    with contextlib.closing(Journal(path, {"scenario": "drop"}, 2)) as journal:
-        for number in range(2):
-            journal.add(Outcome(number, "done", "", {}, 0.0, "here"))
-            assert put(folder, "new")["a"] == "new"
-            assert folder.stat().st_ino != inode
-    with contextlib.closing(Journal(path, {"scenario": "drop"}, 2)) as journal:
-        assert [*journal.outcomes] == [0, 1]
-    assert [one.name for one in tmp_path.iterdir()] == ["out"]
-
-
 def test_a_link_stays_a_link(tmp_path):
     (tmp_path / "far").mkdir()
     (tmp_path / "out").symlink_to("far")
@@ -214,13 +198,12 @@ def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
 def test_what_somebody_else_puts_beside_the_folder_is_left_alone(tmp_path):
     (tmp_path / "precious").write_text("precious")
     (tmp_path / ".out.lock").symlink_to("precious")
-    (tmp_path / "theirs" / "files").mkdir(parents=True)
-    (tmp_path / "theirs" / "ready.json").write_text('{"new": [], "old": []}')
-    (tmp_path / "theirs" / "files" / "bad.html").touch()
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs" / "bad.html").touch()
     (tmp_path / ".out.writing").symlink_to("theirs")
     assert put(tmp_path / "out", "new") == {"a": "new", LAST: "new"}
     assert (tmp_path / "precious").read_text() == "precious"
-    assert (tmp_path / "theirs" / "files" / "bad.html").exists()
+    assert (tmp_path / "theirs" / "bad.html").exists()
 
 
 def test_a_folder_called_like_a_result_is_told(no_pictures, tmp_path):

@@ -75,6 +75,55 @@ def test_a_flat_on_a_shaft_or_in_a_bore_is_plane(seed):
 
 
 @pytest.mark.parametrize("seed", range(10))
+def test_a_flat_between_oblique_ends_is_plane(seed):
+    """Ends in planes that lean: there the steps are unequal, and none is as wide as the flat."""
+    rng = np.random.default_rng(seed)
+    half, step = np.radians([rng.uniform(4, 25), rng.uniform(3, 7)])
+    count = int(np.ceil((2 * np.pi - 2 * half) / step))
+    widths = rng.uniform(0.8, 1.0, count)
+    angles = half + (2 * np.pi - 2 * half) * np.cumsum([0.0, *widths]) / widths.sum()
+    x, y = RADIUS * np.cos(angles), RADIUS * np.sin(angles)
+    lean = rng.uniform(-0.8, 0.8, (2, 2))
+    ends = [x * a + y * b + z for (a, b), z in zip(lean, (0.0, 4 * LENGTH), strict=True)]
+    points = np.concatenate([np.stack([x, y, z], axis=1) for z in ends])
+    m = len(x)
+    i = np.arange(m)
+    walls = np.stack([i, (i + 1) % m, m + (i + 1) % m, m + i], axis=1)
+    triangles = np.concatenate(
+        [walls[:, [0, 1, 2]], walls[:, [0, 2, 3]]]
+        + [np.stack([0 * i + k, k + i, k + (i + 1) % m], axis=1)[1:-1] for k in (0, m)]
+    )
+    shell = sp.Shell(points.astype(np.float32).astype(float), triangles)
+    steps = (2 * np.pi - 2 * half) * widths / widths.sum()
+    if 2 * half > 1.3 * steps.max():
+        middle = (RADIUS * np.cos(half) + 5e-4, 0.0, 2 * LENGTH)
+        assert error(shell, middle, 5e-4) < 1e-8
+    kinds = [face.kind for face in shell.faces]
+    assert kinds.count("plane") == 2 + int(2 * half > 1.3 * steps.max())
+    assert kinds.count("cylinder") == 1
+
+
+def test_a_band_beyond_whose_end_the_face_goes_on_is_no_plane():
+    """Beside a slot the bands of a shaft are as wide as its triangles happen to be."""
+    turn = 2 * np.pi / 24 * np.arange(1, 24)
+    edge = np.radians([-13.0, 13.0])
+    rows = [(z, turn) for z in (0.0, LENGTH)] + [(z, edge) for z in (0.3 * LENGTH, 0.7 * LENGTH)]
+    points = [(RADIUS * np.cos(a), RADIUS * np.sin(a), z) for z, all_of in rows for a in all_of]
+    n = len(turn)
+    triangles = [(i, i + 1, n + i + 1) for i in range(n - 1)]
+    triangles += [(i, n + i + 1, n + i) for i in range(n - 1)]
+    # On both sides of the slot, and beyond its ends.
+    low, high = 2 * n, 2 * n + 2
+    triangles += [(n - 1, low, 2 * n - 1), (low, high, 2 * n - 1)]
+    triangles += [(0, n, low + 1), (low + 1, n, high + 1)]
+    triangles += [(n - 1, 0, low), (low, 0, low + 1), (high, high + 1, 2 * n - 1)]
+    triangles += [(2 * n - 1, high + 1, n)]
+    shell = sp.Shell(np.float32(points).astype(float), triangles)
+    (face,) = shell.faces
+    assert face.kind == "cylinder"
+
+
+@pytest.mark.parametrize("seed", range(10))
 def test_a_belt_on_a_ball_is_a_cylinder(seed):
     rng = np.random.default_rng(seed)
     half, step = np.radians([rng.uniform(4, 20), rng.uniform(3, 9)])

@@ -1,9 +1,6 @@
 """A fast scenario for sweeps: a ball settles on a plate, where its depth has a closed form."""
 
-import json
-from collections import Counter
 from pathlib import Path
-from typing import Any
 
 RADIUS = 0.012
 GRAVITY = 9.81
@@ -81,19 +78,3 @@ def write(folder: Path, figure: str | None = None) -> Path:
     path = folder / "resting.toml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def entries(table: Path) -> list[dict[str, Any]]:
-    """Return the rows of a table's journal; none while there is no journal."""
-    journal = table.with_name(table.name + ".journal")
-    if not journal.exists():
-        return []
-    return [json.loads(line) for line in journal.read_text().splitlines()[1:]]
-
-
-def check_once(table: Path, runs: int) -> None:
-    """Check that the journal and the table have every run once."""
-    import pandas as pd
-
-    assert Counter(one["run"] for one in entries(table)) == Counter(range(runs))
-    assert pd.read_parquet(table)["run"].tolist() == list(range(runs))

@@ -303,7 +303,7 @@ def test_exit_codes_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         (["ball", "--radius", "wide"], "--radius = 'wide' must be a length"),
         (["ball", "--json", tmp_path / "no" / "x.json"], "there is no folder"),
         (["ball", "--json", tmp_path], "is a folder"),
-        ([tmp_path], "is a folder, not a URDF file"),
+        ([tmp_path], "is a folder, not a file"),
     ):
         assert message in refused("check-robot", *wrong)
     broken = tmp_path / "broken.urdf"

@@ -6,11 +6,10 @@ import numpy as np
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import Finding
-from tests.validation import maw
 from tests.validation.balls import Ball, head_on
 from tests.validation.cases import Data, Outcome, case, read, within
 from tests.validation.kharaz import RINGS, THEORY
-from tests.validation.oblique import Setting, rms
+from tests.validation.oblique import MOBILITY, Setting, rms
 from tests.validation.pictures import Panel, draw
 
 STEEL = Setting(1e-5, 7850.0, 2.08e11, 0.3, 0.3)
@@ -76,8 +75,8 @@ CONTRADICTED = (
 
 def by_theory(one: Setting, incident: Array, quantity: str) -> Array:
     """Return what `after_sliding` does, by the theory with micro-slip."""
-    recoil = maw.recoil(incident, maw.kappa(*one.materials))
-    return recoil if quantity == "recoil" else 2.5 * (recoil - incident) / maw.MOBILITY
+    recoil = one.recoil(incident)
+    return recoil if quantity == "recoil" else 2.5 * (recoil - incident) / MOBILITY
 
 
 def _points(data: Data, name: str, x: str) -> tuple[str, Array, Array]:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import Finding
-from tests.validation import maw
 from tests.validation.cases import Data, Outcome, case, read, within
-from tests.validation.oblique import Rebound, Setting, of, rms, thrown
+from tests.validation.oblique import MOBILITY, Rebound, Setting, of, rms, thrown
 from tests.validation.pictures import Panel, draw
 
 SPEED = 3.9
@@ -55,11 +54,10 @@ def with_micro_slip(setting: Setting, quantity: str, angles: Array) -> Array:
     radians = np.radians(angles)
     normal, along = SPEED * np.cos(radians), SPEED * np.sin(radians)
     back = setting.restitution or 1.0
-    stiffness = maw.kappa(*setting.materials)
     dissipation = setting.laws(1.0)[0].dissipation
     incident = along / (setting.mu * normal)
-    patch = setting.mu * normal * maw.recoil(incident, stiffness, dissipation)
-    tangential = along + (patch - along) / maw.MOBILITY
+    patch = setting.mu * normal * setting.recoil(incident, dissipation)
+    tangential = along + (patch - along) / MOBILITY
     if quantity == "restitution":
         return tangential / along
     if quantity == "spin":

@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.friction import Friction
+from tests.oracle import oblique as oracle
 from tests.validation.balls import Ball, Impact, head_on, on_plane
 
+MOBILITY = 1 + 1 / oracle.SOLID  # of the contact patch of a solid ball, times its mass
 RIGID = 1e20  # Young's modulus [Pa] of what the benchmarks call rigid
 
 
@@ -43,6 +45,15 @@ class Setting:
         """Young's modulus [Pa] and Poisson's ratio of the ball and of the other body."""
         other = self.poisson if self.poisson_2 is None else self.poisson_2
         return self.young, self.poisson, self.young_2, other
+
+    def recoil(self, incident: Array, dissipation: float = 0.0) -> Array:
+        """Return the patch's velocity after an impact with micro-slip, like `incident` (n,).
+
+        That is over mu and the normal speed; `dissipation` is Hunt and Crossley's b times it.
+        """
+        kappa = oracle.kappa(*self.materials)
+        psi = oracle.micro_slip(kappa * incident, kappa, dissipation, steps=4000, springs=200)
+        return psi / kappa
 
     def laws(self, speed: float) -> tuple[sp.HertzLaw, Friction]:
         """Return the law along the normal and that of friction at a normal `speed` [m/s]."""

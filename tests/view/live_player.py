@@ -31,6 +31,7 @@ class BallPlayer:
     visual_model = None
     start = 0.0
     duration = None
+    planned = None
 
     def __init__(self, height=0.049, stiffness=5e3, friction=None, wall_per_second=0.0):
         self.model, self.plate = sliding_ball_model(), plate()
@@ -116,6 +117,7 @@ class FilmPlayer(BallPlayer):
     """A finished run: the ball moves along x with 0.1 m/s for two seconds, whatever happens."""
 
     duration = 2.0
+    planned = None
     bodies = ()
     parameters = ()
 

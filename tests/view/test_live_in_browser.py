@@ -143,6 +143,20 @@ def test_the_button_and_the_keys(opened):
     tab.wait("state.t === 0")
 
 
+def test_what_is_over_may_be_repeated(opened):
+    player = BallPlayer()
+    player.planned = 1000.0
+    _, tab = opened(player)
+    tab.wait("document.getElementById('reset').textContent === 'Reset'")
+    tab.page.locator("#run").click()
+    tab.wait("!state.running")
+    player.time = 1001.0
+    tab.page.keyboard.press("s")
+    tab.wait("document.getElementById('reset').textContent === 'Repeat'")
+    tab.page.locator("#reset").click()
+    tab.wait("state.running && document.getElementById('reset').textContent === 'Reset'")
+
+
 def test_a_slider_changes_what_the_simulation_uses(opened):
     live, tab = opened(LiveRun(build("sphere_on_shell")))
     law = live.player.scene.pairs[0].law

@@ -65,7 +65,14 @@ def _aside(path: str | PathLike[str], suffix: str) -> Iterator[tuple[IO[bytes], 
     target = Path(os.path.realpath(path))
     mode = target.stat().st_mode if target.exists() else None
     if mode is not None and not stat.S_ISREG(mode):
-        with open(target, "wb") as file:
+        try:  # a pipe that nobody reads would be waited for, without end
+            descriptor = os.open(target, os.O_WRONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        except OSError as fault:
+            if fault.errno == errno.ENXIO:
+                fault.strerror = "it is a pipe that nobody reads, or a socket"
+            raise
+        os.set_blocking(descriptor, True)
+        with os.fdopen(descriptor, "wb") as file:
             yield file, target
         return
     # The longest names leave no room for more; files that share a part are written in turn.

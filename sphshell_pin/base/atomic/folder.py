@@ -2,13 +2,11 @@
 
 The new files are written to a folder beside the old one, and the two exchange their names in one
 system call. Files that are not ours are hard-linked into the new folder before. In a folder that
-cannot be exchanged (see `AtomicFolder.replace`) the files are replaced one by one; a list on disk,
-as in a redo log, lets the next process complete what a killed one began.
+cannot be exchanged (see `AtomicFolder.replace`) the files are replaced one by one.
 """
 
 import contextlib
 import errno
-import json
 import os
 import shutil
 import stat
@@ -19,15 +17,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.atomic.exchange import exchange
 from sphshell_pin.base.atomic.file import sync_file, sync_folder
 from sphshell_pin.base.atomic.lock import holder, lock_file, sign
-from sphshell_pin.base.regular_file import read_text
 
 # Another process can remove the parent that long between two steps of this one.
 _MOST_TRIES = 100
-# In the folder where the new ones are made: they, and the list written once all are complete.
-_FILES, _READY = "files", "ready.json"
 
 
 class FolderInUse(OSError):
@@ -38,7 +34,7 @@ class AtomicFolder:
     """The folder at `path`, locked by this process while the `with` block lasts.
 
     It is made if it does not exist, and removed again if the block leaves it empty. At the
-    beginning, what a killed process left is removed or completed, see `replace`.
+    beginning, what a killed process left is removed.
 
     Parameters
     ----------
@@ -97,17 +93,12 @@ class AtomicFolder:
     def staging(self) -> Path:
         """Make the empty folder for the new files, and return it."""
         beside, inside = self._places()
-        place = beside if self._may_leave() else inside
-        try:
-            place.mkdir()
-        except OSError:
-            if place == inside:
-                raise
-            place = inside
-            place.mkdir()
-        staging = place / _FILES
-        staging.mkdir()
-        return staging
+        if self._may_leave():
+            with contextlib.suppress(OSError):  # the parent cannot be written
+                beside.mkdir()
+                return beside
+        inside.mkdir()
+        return inside
 
     def replace(self, staging: Path, old: Iterable[str]) -> None:
         """Replace the files called `old` by all files of the `staging`; other files stay.
@@ -116,7 +107,7 @@ class AtomicFolder:
         folder cannot be exchanged: a mount point, the working directory, a folder whose parent
         cannot be written, one with subfolders, or one on a file system without the exchange of
         names or without hard links. There the files are replaced one by one, and `last` is missing
-        meanwhile; if the process is killed then, the next `AtomicFolder` completes the change.
+        meanwhile, for ever if the process is killed then.
 
         Raises
         ------
@@ -132,23 +123,39 @@ class AtomicFolder:
                 raise IsADirectoryError(errno.EISDIR, f"{name} there is a folder")
         for name in new:
             sync_file(staging / name)
-        beside, inside = self._places()
-        if staging.parent == beside:
-            _write_list(beside, new, old)
-            try:
-                self._link_others(self._folder, staging, ours)
-                sync_folder(staging)
-                exchange(staging, self._folder)
-            except OSError:
-                inside.mkdir()
-                shutil.move(staging, inside / _FILES)
-                for name in new:
-                    sync_file(inside / _FILES / name)
-            else:
+        with interrupts_delayed():
+            if staging.parent != self._folder and self._exchange(staging, ours):
+                _bring_back(staging, self._folder, ours)
                 sync_folder(self._folder.parent)
-                return
-        _write_list(inside, new, old)
-        self._move_in(inside)
+            else:
+                self._move_in(staging, new, ours)
+
+    def _exchange(self, staging: Path, ours: set[str]) -> bool:
+        """Exchange the two folders, the files of others in both; whether that was possible."""
+        try:
+            self._link_others(self._folder, staging, ours)
+            sync_folder(staging)
+            exchange(staging, self._folder)
+        except OSError:
+            return False
+        return True
+
+    def _move_in(self, staging: Path, new: Sequence[str], ours: set[str]) -> None:
+        """Move the new files into the folder, one by one, and remove the others of `ours`."""
+
+        def flush() -> None:
+            with contextlib.suppress(OSError):  # a full disk: the names change all the same
+                sync_folder(self._folder)
+
+        (self._folder / self._last).unlink(missing_ok=True)
+        flush()
+        for name in ours.difference(new):
+            (self._folder / name).unlink(missing_ok=True)
+        for name in sorted(new, key=lambda name: name == self._last):
+            if name == self._last:
+                flush()
+            os.replace(staging / name, self._folder / name)
+        flush()
 
     def _take(self) -> None:
         """Lock the folder, then make it: only its holder makes it, and removes it again."""
@@ -226,35 +233,10 @@ class AtomicFolder:
         return True
 
     def _clear(self) -> None:
-        """Complete or undo what this process or a killed one has begun."""
-        beside, inside = self._places()
-        if _is_left(beside):
-            ours = _read_list(beside)
-            if ours is not None and (beside / _FILES).is_dir():
-                # The new folder before an exchange, or the old one after it.
-                _bring_back(beside / _FILES, self._folder, {*ours[0], *ours[1]})
-            shutil.rmtree(beside)
-        if _is_left(inside):
-            if _read_list(inside) is not None:
-                self._move_in(inside)
-                (inside / _READY).unlink()
-            shutil.rmtree(inside)
-
-    def _move_in(self, inside: Path) -> None:
-        """Move the files into the folder, one by one; may be begun again at any time."""
-        new, old = _read_list(inside) or ((), ())
-        folder, files = self._folder, inside / _FILES
-        waiting = sorted(set(new) & set(os.listdir(files)), key=lambda name: name == self._last)
-        if waiting:
-            (folder / self._last).unlink(missing_ok=True)
-            sync_folder(folder)
-        for name in set(old) - set(new):
-            (folder / name).unlink(missing_ok=True)
-        for name in waiting:
-            if name == self._last:
-                sync_folder(folder)
-            os.replace(files / name, folder / name)
-        sync_folder(folder)
+        """Remove what this process or a killed one left."""
+        for place in self._places():
+            if _is_left(place):
+                shutil.rmtree(place)
 
     def _link_others(self, source: Path, target: Path, ours: set[str]) -> None:
         """Link all files of `source` but `ours` into `target`, which becomes like it."""
@@ -282,24 +264,6 @@ def _is_left(place: Path) -> bool:
     except OSError:
         return False
     return stat.S_ISDIR(about.st_mode) and about.st_uid == os.geteuid()
-
-
-def _write_list(place: Path, new: Iterable[str], old: Iterable[str]) -> None:
-    """Write, once all is on disk, which files are ours: those that come, and those that go."""
-    sync_folder(place / _FILES)
-    path = place / _READY
-    path.write_text(json.dumps({"new": sorted(new), "old": sorted(old)}), encoding="utf-8")
-    sync_file(path)
-    sync_folder(place)
-
-
-def _read_list(place: Path) -> tuple[list[str], list[str]] | None:
-    """Return the names that come and those that go; None if not all of it was written."""
-    try:
-        names = json.loads(read_text(place / _READY))
-        return list(names["new"]), list(names["old"])
-    except (FileNotFoundError, ValueError):
-        return None
 
 
 def _bring_back(left: Path, folder: Path, ours: set[str]) -> None:

@@ -174,6 +174,7 @@ class JointPD(Controller, kind="joint-pd"):
     kd : damping of the joints
     q_ref : posture; by default that of the start
     gravity_compensation : add the torques that carry the weight
+    friction_compensation : add the torques that damping and dry friction of the joints take
     """
 
     posture_gain: ClassVar[str | None] = "kp"
@@ -181,6 +182,7 @@ class JointPD(Controller, kind="joint-pd"):
     kd: Gain = parameter(unit="N m s/rad", label="joint damping")
     q_ref: Posture | None = parameter(None)
     gravity_compensation: bool = parameter(True)
+    friction_compensation: bool = parameter(False)
     joints: Iterable[str] | None = None
 
     def _fields(self, scene: Scene, q0: Array) -> dict[str, ArrayLike]:
@@ -189,6 +191,7 @@ class JointPD(Controller, kind="joint-pd"):
             **{name: self.gain(name, model) for name in ("kp", "kd")},
             "q_ref": self.posture(model, q0),
             "gravity": self.gravity_compensation,
+            "friction_compensation": self.friction_compensation,
             "actuated": self.actuated(model),
         }
 

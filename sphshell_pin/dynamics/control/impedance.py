@@ -46,7 +46,7 @@ _MOST_ROWS = 200
 # What the C++ class takes as it is.
 _NUMBERS = (
     *("stiffness", "damping", "normal_force", "force_rise"),
-    *("rotational_stiffness", "rotational_damping", "decoupled"),
+    *("rotational_stiffness", "rotational_damping", "decoupled", "friction_compensation"),
 )
 
 
@@ -101,6 +101,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     jerk : limit of the target's along the path
     decoupled : the robot's inertia, posture and joint damping do not act on the frame
     force_rise : time in which the normal force comes on, smoothly
+    friction_compensation : add the torques that damping and dry friction of the joints take
     """
 
     posture_gain: ClassVar[str | None] = "posture_stiffness"
@@ -128,6 +129,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     jerk: float | None = parameter(None, above=0, unit="m/s3", label="path jerk")
     decoupled: bool = parameter(False)
     force_rise: float = parameter(0.0, at_least=0, unit="s", label="force rise")
+    friction_compensation: bool = parameter(False)
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for wrong types, and for a shell's place without a shell."""

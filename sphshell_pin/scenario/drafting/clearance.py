@@ -1,5 +1,6 @@
 """Whether links of a robot are in a part: their collision geometry against its surface, by Coal."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -28,7 +29,8 @@ class Intrusion:
 class Links:
     """The collision geometry of a robot, to be held against the surface of a part.
 
-    `model` is the whole robot, `lock` names the joints that do not move. What a sphere of `tips`
+    `model` is the whole robot, `lock` names the joints that do not move. With q (nq,), a posture,
+    links that do not touch each other there may not do so elsewhere. What a sphere of `tips`
     stands for is left out: a sphere with the same center, whatever its radius, and of the tip's own
     link (with all that is fixed to it) what is near the sphere.
     """
@@ -40,9 +42,20 @@ class Links:
         shell: Shell,
         tips: Sequence[Tip],
         lock: Sequence[str],
+        q: Array | None = None,
     ) -> None:
-        self._model, self._geometry = model, geometry
-        self._data, self._geometry_data = model.createData(), pin.GeometryData(geometry)
+        self.model, self._data, self._geometry = model, model.createData(), geometry.copy()
+        self._geometry.removeAllCollisionPairs()
+        joints, parents = [int(one.parentJoint) for one in geometry.geometryObjects], model.parents
+        for (i, one), (j, other) in itertools.combinations(enumerate(joints), 2):
+            if q is not None and one != other and other != parents[one] and one != parents[other]:
+                self._geometry.addCollisionPair(pin.CollisionPair(i, j))
+        self._geometry_data = pin.GeometryData(self._geometry)
+        if q is not None:
+            self._collide(q, first=False)
+        for k, result in enumerate(self._geometry_data.collisionResults):
+            if result.isCollision():
+                self._geometry_data.deactivateCollisionPair(k)
         self.shell, self._tips = shell, tuple(tips)
         self._surface = _tree(shell)
         self._box = shell.box
@@ -55,12 +68,20 @@ class Links:
             if not any(_is_sphere(one, model, frames[k], tips[k]) for k in at):
                 self._objects.append((i, tuple(at)))
 
+    def _collide(self, q: Array, *, first: bool = True) -> bool:
+        geometry = self._geometry, self._geometry_data
+        return bool(pin.computeCollisions(self.model, self._data, *geometry, q, first))
+
+    def crossed(self, q: Array) -> bool:
+        """Whether links touch each other at q (nq,) that may not."""
+        return self._collide(q)
+
     def within(self, q: Array, placement: pin.SE3, *, whole: bool = False) -> Intrusion | None:
         """Return a link that is in the part at `placement` with the robot at q (nq,).
 
         With `whole` a link that is inside as a whole, and touches nothing, counts too.
         """
-        model, geometry = self._model, self._geometry
+        model, geometry = self.model, self._geometry
         pin.updateGeometryPlacements(model, self._data, geometry, self._geometry_data, q)
         pin.updateFramePlacements(model, self._data)
         centers = [
@@ -143,35 +164,3 @@ def _is_sphere(one: pin.GeometryObject, model: pin.Model, frame: pin.Frame, tip:
 def _link_of(model: pin.Model, one: pin.GeometryObject) -> str:
     name = str(model.frames[one.parentFrame].name)
     return name if name != "universe" else str(one.name)
-
-
-class SelfContact:
-    """Which links of a robot may not touch each other: those that do not at the posture q (nq,)."""
-
-    def __init__(self, model: pin.Model, geometry: pin.GeometryModel, q: Array) -> None:
-        self._model, self._data = model, model.createData()
-        self._geometry = geometry.copy()
-        self._geometry.removeAllCollisionPairs()
-        objects = list(geometry.geometryObjects)
-        for i, one in enumerate(objects):
-            for j, other in enumerate(objects[:i]):
-                if not _neighbors(model, int(one.parentJoint), int(other.parentJoint)):
-                    self._geometry.addCollisionPair(pin.CollisionPair(j, i))
-        self._geometry_data = pin.GeometryData(self._geometry)
-        self.found(q, first=False)
-        for k, result in enumerate(self._geometry_data.collisionResults):
-            if result.isCollision():
-                self._geometry_data.deactivateCollisionPair(k)
-
-    def found(self, q: Array, *, first: bool = True) -> bool:
-        """Whether links touch at q (nq,); without `first` all pairs are looked at."""
-        return bool(
-            pin.computeCollisions(
-                self._model, self._data, self._geometry, self._geometry_data, q, first
-            )
-        )
-
-
-def _neighbors(model: pin.Model, one: int, other: int) -> bool:
-    parents = model.parents
-    return one == other or parents[one] == other or parents[other] == one

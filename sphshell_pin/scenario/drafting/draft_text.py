@@ -12,12 +12,13 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.part import part_file
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.schema import RobotSection, ShellSection
 
-HELD = 0.05
-"""How well a scenario holds its normal force, as a part of it."""
+HELD, HELD_IN_HAND = 0.05, 0.15
+"""How well a scenario holds its normal force, as a part of it, and a hand its largest one."""
 
 _SIDES = {
     "both": "spheres may touch it from both sides",
@@ -37,71 +38,84 @@ _TEMPLATES = dict(zip(_PARTS[1::2], _PARTS[2::2], strict=True))
 
 def draft_text(name: str, title: str, robot: RobotSection, shell: ShellSection, plan: Plan) -> str:
     """Return the text of the scenario called `name`."""
-    pairs = pair_names(plan.tips, shell.name)
-    digits = decimals(plan.gap)
-    left_out = ""
-    if plan.left_out:
-        left_out = f", without {' and '.join(plan.left_out)}: the tip would not hold its force"
-    text = _fill("robot", name=name, title=title, robot=robot, left_out=left_out)
+    digits, part, contact, tips = decimals(plan.gap), plan.part, plan.contact, plan.tips
+    text = _fill(
+        "robot", name=name, title=title, robot=robot, table="[[robot]]" if part else "[robot]"
+    )
     if not robot.mimic:
         text += "mimic = false # joints that mimic others move freely\n"
-    if plan.root is not None:
-        text += _fill("root", root=_rounded(plan.root, digits))
-    elif robot.start:
-        text += _fill("posture")
-        text += "".join(f"{_key(joint)} = {toml(q)}\n" for joint, q in robot.start.items())
-    primitive = shell.model_dump()["primitive"]
-    text += _fill("shell", shell=shell, primitive=primitive, side=_SIDES[shell.side])
+    root = None if plan.root is None else _rounded(plan.root, 9 if part else digits)
+    if robot.start:
+        text += _fill("posture") + _table(robot.start)
+    if part:
+        text += _fill("part", body=part, material=contact.against, urdf=part_file(name), root=root)
+    elif root:
+        text += _fill("root", root=root)
+    sides = {"side": _SIDES[shell.side], "frame": "part/part" if part else shell.frame}
+    text += _fill("shell", shell=shell, primitive=shell.model_dump()["primitive"], **sides)
     if plan.root is None:
         angles = np.rad2deg(pin.rpy.matrixToRpy(plan.placement.rotation))
         angles[np.abs(angles) < 1e-6] = 0.0
         xyz, rpy = _rounded(plan.placement.translation, digits), _rounded(angles, digits)
         text += _fill("placement", gap=1e3 * plan.gap, xyz=xyz, rpy_deg=rpy)
-    for tip, pair in zip(plan.tips, pairs, strict=True):
-        sphere: dict[str, object] = {"frame": tip.frame, "radius": tip.radius}
-        if tip.offset.any():
-            sphere["offset"] = _rounded(tip.offset, digits)
-        text += _fill("contact", pair=pair, sphere=sphere, shell=shell, tip=tip, plan=plan)
-        materials = f"{plan.contact.material.name} on {plan.contact.against.name}"
-        friction = {"materials": materials, "v_dynamic": float(f"{10 * plan.contact.v_static:.2g}")}
-        kind = "coulomb" if plan.contact.bristle is None else "bristle"
-        text += _fill(kind, contact=plan.contact, **friction)
+    label = f"{robot.label}/" if robot.label else ""
+    group = f"tip{'s' if len(tips) > 1 else ''}-{shell.name}"
+    text += _contact_text(group, shell, plan, label, digits)
+    brakes = bool({"damping", "friction"} & set(robot.joints))
+    pair = _pair_name(group, tips, label, plan.strongest)
     control, mean_force = plan.control, None
     if isinstance(control, Press):
         path = _rounded(control.path, digits)
         offset = _rounded(plan.tips[0].offset, digits)
         moves = "follows a path on the surface and presses on it"
         told = f"The tip {moves if len(path) > 1 else 'presses on one place of the surface'}."
-        values = {"offset": offset, "path": path, "told": told}
-        text += _fill("press", tip=plan.tips[0], shell=shell, press=control, **values)
+        values = {"offset": offset, "path": path, "told": told, "brakes": brakes}
+        text += _fill("press", tip=tips[0], shell=shell, press=control, **values)
         if control.even:
             # Over the time of contact; while the force comes on, half of it on average.
             full = plan.duration - 0.5 * control.force_rise
             mean = control.force * full / (plan.duration - control.first_touch)
             mean_force = {"value": rounded(mean, 3), "rtol": HELD}
     elif isinstance(control, Hold):
-        text += _fill("hold", hold=control)
+        text += _fill("hold", hold=control, brakes=brakes and part is not None)
+        if part:
+            text += _fill("drawn") + _table(control.drawn)
+            mean_force = {"value": rounded(control.force, 3), "rtol": HELD_IN_HAND}
     # Measured on balls, arms, hands and legs: the implicit integrator is never much slower than
     # others, and ten times faster than fixed steps that resolve the contact.
     record_dt, slow = (1e-3, 0.5) if control is None else (5e-3, None)
     text += _fill("run", plan=plan, record_dt=record_dt, slow=slow)
-    for key, limits in _parameters(plan, pairs).items():
-        text += f"[[knob]]\nkey = {toml(key)}\n"
-        text += "".join(f"{bound} = {toml(value)}\n" for bound, value in limits.items()) + "\n"
-    # A rough surface may leave one of several feet in the air.
-    return text + _fill("expect", pair=pairs[0], mean_force=mean_force)
+    for key, limits in _parameters(plan, f"contact.{group}").items():
+        text += f"[[knob]]\nkey = {toml(key)}\n{_table(limits)}\n"
+    return text + _fill("expect", pair=pair, mean_force=mean_force)
 
 
-def pair_names(tips: Sequence[Tip], shell: str) -> list[str]:
-    """Return the names of the contacts of the `tips` with the `shell`."""
-    if len(tips) == 1:
-        return [f"tip-{shell}"]
-    frames = [tip.frame for tip in tips]
-    # A foot may stand on several spheres.
-    numbers = [
-        frames[:i].count(one) + 1 if frames.count(one) > 1 else "" for i, one in enumerate(frames)
+def _contact_text(group: str, shell: ShellSection, plan: Plan, label: str, digits: int) -> str:
+    """Return the tables of the contact of all tips, whose robot has a `label`."""
+    contact, tips = plan.contact, plan.tips
+    spheres = [
+        {"frame": label + tip.frame, "radius": tip.radius}
+        | ({"offset": _rounded(tip.offset, digits)} if tip.offset.any() else {})
+        for tip in tips
     ]
-    return [f"{one}{k}-{shell}" for one, k in zip(frames, numbers, strict=True)]
+    one, several = (spheres[0], None) if len(tips) == 1 else (None, spheres)
+    radius = min(tip.radius for tip in tips)
+    values = {"sphere": one, "spheres": several, "shell": shell, "radius": radius}
+    materials = f"{contact.material.name} on {contact.against.name}"
+    slip = float(f"{10 * contact.v_static:.2g}")
+    friction = {"materials": materials, "v_dynamic": slip, "torsional": plan.part is not None}
+    kind = "coulomb" if contact.bristle is None else "bristle"
+    text = _fill("contact", pair=group, plan=plan, **values)
+    return text + _fill(kind, contact=contact, **friction)
+
+
+def _pair_name(group: str, tips: Sequence[Tip], label: str, k: int) -> str:
+    """Return the name of the contact of `tips[k]`, one of a `group`."""
+    if len(tips) == 1:
+        return group
+    frames = [tip.frame for tip in tips]
+    number = f"-{frames[:k].count(frames[k])}" if frames.count(frames[k]) > 1 else ""
+    return f"{group}/{label}{frames[k]}{number}"
 
 
 def decimals(gap: float) -> int:
@@ -109,25 +123,24 @@ def decimals(gap: float) -> int:
     return max(4, math.ceil(-math.log10(gap / 200)))
 
 
-def _parameters(plan: Plan, pairs: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Return the keys of the parameters that get a slider, and its ends where they are stated."""
-    contact = plan.contact
-    found: dict[str, dict[str, float]] = {}
-    for pair in pairs:
-        at = f"contact.{pair}"
-        found |= {
-            f"{at}.law.young": {},
-            f"{at}.law.restitution": {"min": 0.05, "max": 1.0},
-            f"{at}.friction.mu_static": {"min": contact.mu_dynamic, "max": 1.5},
-            f"{at}.friction.mu_dynamic": {"min": 0.0, "max": contact.mu_static},
-        }
-    if plan.control is None:
-        return found | {"gravity.2": {"min": -20.0, "max": 0.0}}
-    keys = ["kp", "kd"]
-    if isinstance(plan.control, Press):
-        speed = ["speed"] if len(plan.control.path) > 1 else []
+def _parameters(plan: Plan, at: str) -> dict[str, dict[str, float]]:
+    """Return the keys of the parameters that get a slider, and its ends where they are stated.
+
+    `at` is the key of the contact.
+    """
+    contact, control = plan.contact, plan.control
+    keys = [] if control is None else ["kp", "kd"]
+    if isinstance(control, Press):
+        speed = ["speed"] if len(control.path) > 1 else []
         keys = ["normal_force", *speed, "stiffness", "damping"]
-    return found | {f"controller.{key}": {} for key in keys}
+    return {
+        f"{at}.law.young": {},
+        f"{at}.law.restitution": {"min": 0.05, "max": 1.0},
+        f"{at}.friction.mu_static": {"min": contact.mu_dynamic, "max": 1.5},
+        f"{at}.friction.mu_dynamic": {"min": 0.0, "max": contact.mu_static},
+        **({} if isinstance(control, Press) else {"gravity.2": {"min": -20.0, "max": 0.0}}),
+        **{f"controller.{key}": {} for key in keys},
+    }
 
 
 def _fill(part: str, **values: object) -> str:
@@ -162,6 +175,11 @@ def _fill(part: str, **values: object) -> str:
         if lines and lines[-1].startswith("#"):
             lines.pop()
     return "\n".join(lines) + "\n"
+
+
+def _table(values: Mapping[str, object]) -> str:
+    """Return lines of a table."""
+    return "".join(f"{_key(name)} = {toml(value)}\n" for name, value in values.items())
 
 
 def _rounded(values: ArrayLike, digits: int) -> list[float]:

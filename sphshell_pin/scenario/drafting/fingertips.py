@@ -21,7 +21,7 @@ _ASKED = "as it was asked for"
 # Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at
 # the end of a limb.
 _TOOL_WORDS = ("tcp", "tool", "ee", "eef", "effector", "grasp", "grip", "flange")
-_END_WORDS = ("tcp", "tip", "tool", "ee_link", "eef", "end_effector", "foot", "feet")
+_END_WORDS = ("tip", "tcp", "tool", "foot", "feet")
 
 
 def find_tips(
@@ -188,28 +188,21 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
 
     The joints `held` are those of grippers, whose jaws are no ends.
     """
-    leaves = _leaves(model, held)
+    leaves, free = _leaves(model, held), floats(model)
     carriers = {int(one.parentFrame) for one in model.frames}
     childless = [
         one
         for i, one in enumerate(model.frames)
         if int(one.parentJoint) in limbs and i not in carriers
     ]
-    if not floats(model):
-        for word in _TOOL_WORDS:
-            tools = [
-                one
-                for one in childless
-                if any(part.startswith(word) for part in re.split(r"[^a-z0-9]+", one.name.lower()))
-                and (len(word) > 2 or word in re.split(r"[^a-z0-9]+", one.name.lower()))
-            ]
-            if tools:
-                best = max(
-                    tools, key=lambda one: (len(model.supports[one.parentJoint]), -len(one.name))
-                )
-                several = f", one of {len(tools)}" if len(tools) > 1 else ""
-                return [(best.name, f"a frame called '{word}'{several}")]
     names = [one.name for one in childless if int(one.parentJoint) in leaves]
+    for word in () if free else _TOOL_WORDS:
+        begins = re.compile(rf"(?<![a-z0-9]){word}{'(?![a-z0-9])' if len(word) == 2 else ''}")
+        tools = [one for one in childless if begins.search(one.name.lower())]
+        if tools:
+            tools.sort(key=lambda one: (-len(model.supports[one.parentJoint]), len(one.name)))
+            several = f", one of {len(tools)}" if len(tools) > 1 else ""
+            return [(tools[0].name, f"a frame called '{word}'{several}")]
     jaws = {int(model.parents[one]) for one in held} - set(held)
     if not names and len(leaves) == 1 and leaves <= jaws:
         (joint,) = leaves
@@ -218,12 +211,12 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
         return [(names[0], "the only end of the robot" if len(names) == 1 else "its only body")]
     for word in _END_WORDS:
         found = [name for name in names if word in name.lower()]
-        if len(found) == 1 or (found and floats(model)):
-            return [(name, f"an end of the robot called '{word}'") for name in found]
-        if found:
+        if len(found) > 1 and not free:
             return [(_freest(model, found), f"the freest of {len(found)} ends called '{word}'")]
+        if found:
+            return [(name, f"an end of the robot called '{word}'") for name in found]
     last = max(sorted(leaves), key=lambda j: len(model.supports[j]))
-    if floats(model) or len(model.supports[last]) <= 2:
+    if free or len(model.supports[last]) <= 2:
         raise SphshellError(
             "the robot has several ends: state which frame carries the sphere with --frame, for "
             f"instance one of {', '.join(names[:8]) or ', '.join(f.name for f in model.frames)}"

@@ -12,6 +12,7 @@ from sphshell_pin.dynamics.scene.mimic import leader_of, mimics
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.shell.shell import Shell
 
 # Hands that are tried: random postures, and how many of them, the best, get a part.
@@ -67,43 +68,34 @@ class Hand:
     def __init__(self, model: pin.Model, tips: Sequence[Tip]) -> None:
         self.model, self.tips = model, tuple(tips)
         self.radii = np.array([tip.radius for tip in tips])
-        self._data = model.createData()
-        self._frames = [find_frame(model, tip.frame) for tip in tips]
-        self._ends = parents = [int(model.frames[one].parentJoint) for one in self._frames]
-        chain = {int(j) for parent in parents for j in model.supports[parent]} - {0}
+        ends = [int(model.frames[find_frame(model, tip.frame)].parentJoint) for tip in tips]
         rules = mimics(model)
-        leaders = {int(model.getJointId(leader_of(rules, model.names[j]))) for j in chain}
-        self.joints = tuple(sorted(leaders))
+        chains = [{model.names[j] for j in list(model.supports[end])[1:]} for end in ends]
+        moving = {leader_of(rules, name) for name in set.union(*chains)}
+        self.joints = tuple(sorted(int(model.getJointId(name)) for name in moving))
         """Joints that move a tip, without those that mimic them."""
-        self.low, self.high = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)
-        for j in self.joints:
-            joint = model.joints[j]
-            if joint.nq == 1:
-                low = model.lowerPositionLimit[joint.idx_q]
-                high = model.upperPositionLimit[joint.idx_q]
-                if np.isfinite(low) and np.isfinite(high) and low < high:
-                    room = _MARGIN * (high - low)
-                    self.low[joint.idx_q], self.high[joint.idx_q] = low + room, high - room
-
-    def ranks(self) -> list[list[int]]:
-        """Return the coordinates that move each tip alone, from the tip on."""
-        chains = [set(map(int, self.model.supports[one])) & set(self.joints) for one in self._ends]
-        own = [chain - set().union(*(c for c in chains if c is not chain)) for chain in chains]
-        joints = self.model.joints
-        return [[joints[j].idx_q for j in sorted(one, reverse=True)] for one in own]
+        self.lock = tuple(n for n in list(model.names)[1:] if leader_of(rules, n) not in moving)
+        self.reaches = [Reach(model, tip.frame, tip.offset, self.lock) for tip in tips]
+        self.ranks = []
+        """The coordinates that move each tip alone, from the tip on."""
+        for chain in chains:
+            own = (chain & moving) - set().union(*(one for one in chains if one is not chain))
+            at = sorted((int(model.getJointId(name)) for name in own), reverse=True)
+            self.ranks.append([model.joints[j].idx_q for j in at])
 
     def centers(self, q: Array) -> Array:
         """Return the centers (k, 3) [m] of the tips' spheres."""
-        pin.framesForwardKinematics(self.model, self._data, q)
-        return self._placed()
-
-    def _placed(self) -> Array:
-        poses = [self._data.oMf[frame] for frame in self._frames]
-        return np.array([pose.act(tip.offset) for pose, tip in zip(poses, self.tips, strict=True)])
+        return np.array([reach.center(q) for reach in self.reaches])
 
     def limbs(self) -> Array:
         """Return unit vectors (k, 3) from the last joints to the `centers` that were asked last."""
-        out = self._placed() - [self._data.oMi[joint].translation for joint in self._ends]
+        out = np.array(
+            [
+                reach.data.oMf[reach.frame].act(reach.offset)
+                - reach.data.oMi[self.model.frames[reach.frame].parentJoint].translation
+                for reach in self.reaches
+            ]
+        )
         unit: Array = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
         return unit
 
@@ -112,14 +104,11 @@ class Hand:
 
         With `beside` (k, 3) [m], in the world, those of points beside them that move with the tips.
         """
-        pin.computeJointJacobians(self.model, self._data, q)
-        pin.updateFramePlacements(self.model, self._data)
-        out = np.empty((len(self.tips), 3, self.model.nv))
-        offsets = np.broadcast_to(beside, (len(self.tips), 3))
-        for k, (frame, tip) in enumerate(zip(self._frames, self.tips, strict=True)):
-            local = pin.getFrameJacobian(self.model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
-            arm = self._data.oMf[frame].rotation @ tip.offset + offsets[k]
-            out[k] = local[:3] - pin.skew(arm) @ local[3:]
+        out = np.zeros((len(self.tips), 3, self.model.nv))
+        for k, reach in enumerate(self.reaches):
+            moves = reach.jacobian(q)
+            offset = np.broadcast_to(beside, (len(self.tips), 3))[k]
+            out[k][:, reach.columns] = moves[:3] - pin.skew(offset) @ moves[3:]
         return out
 
     def torques(self, grasp: Grasp) -> Array:
@@ -136,7 +125,6 @@ class Hand:
         With the points on it (k, 3) [m] and its outward normals (k, 3), in the world. None where
         the tips do not get there.
         """
-        model = self.model
         for _ in range(_STEPS):
             centers = self.centers(q)
             local = (centers - placement.translation) @ placement.rotation
@@ -149,7 +137,7 @@ class Hand:
             square = rows @ rows.T + _DAMPING * np.eye(len(rows))
             step = -rows.T @ np.linalg.solve(square, error)
             step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-12))
-            q = np.clip(pin.integrate(model, q, step), self.low, self.high)
+            q = self.reaches[0].into_limits(pin.integrate(self.model, q, step))
         return None
 
 
@@ -161,26 +149,24 @@ def grasps(
     total: float,
     mu: float,
     gap: float,
-    free_of_itself: Callable[[Array], bool],
-    free_of_part: Callable[[Array, pin.SE3], bool],
+    free: Callable[..., bool],
 ) -> list[Grasp]:
     """Return grasps of the part, those that use less friction first.
 
     The hand's other joints are as in q0 (nq,). `wrench(placement)` (6,) is what acts on the part
     beside the tips, about the world's origin; `total` [N] all their normal forces; `mu` the
-    friction there is; `gap` [m] that of each tip. `free_of_itself(q)` and
-    `free_of_part(q, placement)` say whether no link is in another one, or in the part. The same
-    call returns the same.
+    friction there is; `gap` [m] that of each tip. `free(q)` and `free(q, placement)`
+    say whether no link is in another one, or in the part. The same call returns the same.
     """
     found: list[Grasp] = []
-    places = itertools.islice(_places(hand, q0, shell, free_of_itself), _MOST_PLACES)
+    places = itertools.islice(_places(hand, q0, shell, free), _MOST_PLACES)
     for q_open, placement in places:
         closed = hand.close_on(q_open, shell, placement, gap)
         if closed is None:
             continue
         q, points, normals = closed
         # The quickest first.
-        if not (free_of_itself(q) and free_of_part(q, placement)):
+        if not (free(q) and free(q, placement)):
             continue
         balance = least_friction(points, normals, wrench(placement), total, _USED * mu)
         if balance is None:
@@ -193,7 +179,7 @@ def grasps(
 
 
 def _places(
-    hand: Hand, q0: Array, shell: Shell, free_of_itself: Callable[[Array], bool]
+    hand: Hand, q0: Array, shell: Shell, free: Callable[..., bool]
 ) -> Iterator[tuple[Array, pin.SE3]]:
     """Yield postures of the hand with the part between its tips, the best fitting first.
 
@@ -205,7 +191,7 @@ def _places(
     root = _root(hand, q0)
     turns = np.round(Rotation.create_group("O").as_matrix())
     found: list[tuple[int, float, int, Array, pin.SE3]] = []
-    for _, q, thumb in itertools.islice(_postures(hand, q0, free_of_itself), _BEST):
+    for _, q, thumb in itertools.islice(_postures(hand, q0, free), _BEST):
         centers = hand.centers(q)
         others = np.delete(centers, thumb, axis=0)
         across = others.mean(axis=0) - centers[thumb]
@@ -216,11 +202,11 @@ def _places(
         ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-9)
         frame = np.column_stack([across, ahead, np.cross(across, ahead)])
         center = 0.5 * (others.mean(axis=0) + centers[thumb])
-        free = width - 2 * float(hand.radii.mean())
+        room = width - 2 * float(hand.radii.mean())
         own: list[tuple[float, pin.SE3]] = []
         for turn in turns:
             sizes = np.abs(turn) @ extent  # along across, ahead and the third
-            misfit = abs(free - sizes[0]) / width
+            misfit = abs(room - sizes[0]) / width
             if misfit > _WIDER:
                 continue
             rotation = frame @ turn
@@ -237,23 +223,21 @@ def _places(
 
 
 def _postures(
-    hand: Hand, q0: Array, free_of_itself: Callable[[Array], bool]
+    hand: Hand, q0: Array, free: Callable[..., bool]
 ) -> Iterator[tuple[float, Array, int]]:
     """Yield postures in which one tip, the thumb, stands against all others; how well they do."""
     rng = np.random.default_rng(0)
     found: list[tuple[float, Array, int]] = []
-    bounded = np.isfinite(hand.low) & np.isfinite(hand.high)
-    low, high = hand.low[bounded], hand.high[bounded]
-    ranks = hand.ranks()
+    bounded, (low, high) = hand.reaches[0].bounded, (hand.reaches[0].low, hand.reaches[0].high)
     for k in range(_POSTURES):
         thumb = k % len(hand.tips)
         # Fingers close alike, the thumb by itself.
         parts, alike = rng.uniform(size=(2, hand.model.nq))
-        for one, chain in enumerate(ranks):
+        for one, chain in enumerate(hand.ranks):
             if one != thumb:
                 parts[chain] = alike[: len(chain)] + rng.normal(0, _ALIKE, len(chain))
         q = q0.copy()
-        q[bounded] = low + np.clip(parts[bounded], 0, 1) * (high - low)
+        q[bounded] = low + np.clip(parts[bounded], _MARGIN, 1 - _MARGIN) * (high - low)
         centers, limbs = hand.centers(q), hand.limbs()
         others = np.delete(centers, thumb, axis=0)
         across = others.mean(axis=0) - centers[thumb]
@@ -269,7 +253,7 @@ def _postures(
         if uneven < _UNEVEN and inward.min() > _INWARD and apart:
             found.append((uneven, q, thumb))
     found.sort(key=lambda one: one[0])
-    yield from (one for one in found if free_of_itself(one[1]))
+    yield from (one for one in found if free(one[1]))
 
 
 def _root(hand: Hand, q0: Array) -> Array:

@@ -14,13 +14,14 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import floats, is_path
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
 from sphshell_pin.scenario.drafting.fingertips import find_tips
-from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand
+from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand, with_part
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
@@ -182,24 +183,20 @@ def _written(asked: Asked) -> NewScenario:
     built = _sided(built, tips, inside=asked.inside)
     (shell,) = built.scenario.shell
 
-    def read(text: str, reuse: Built) -> Built:
-        scenario = parse_scenario(text, file)
-        check_knobs(scenario, file, ranges=True)
-        return build_scenario(scenario, file, reuse)
-
     def draft(section: RobotSection, plan: Plan) -> tuple[str, Built]:
-        title = f"{loaded.name} {_DOES[type(plan.control)]} {shell.name}"
+        does = "holds" if plan.part else _DOES[type(plan.control)]
+        title = f"{loaded.name} {does} {shell.name}"
         if loaded.assumed:
             title += f", its masses from its geometry at {section.density:g} kg/m^3"
         text = draft_text(file.stem, title, section, shell, plan)
-        return text, read(text, built)
+        scenario = parse_scenario(text, file)
+        check_knobs(scenario, file, ranges=True)
+        reuse = with_part(built, plan.part, file.stem) if plan.part else built
+        return text, build_scenario(scenario, file, reuse)
 
     # What is written is what was built, and tried.
     try:
-        if in_hand:
-            made = hold_in_hand(asked, built, tips, file.stem, read)
-        else:
-            made = find_working(asked, built, tips, draft)
+        made = (hold_in_hand if in_hand else find_working)(asked, built, tips, draft)
     except CannotStand:
         raise
     except SphshellError as error:
@@ -334,7 +331,7 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
         )
     if word not in WORDS:
         if file.suffix:
-            raise SphshellError(f"no such surface file: {file}")
+            raise SphshellError(f"surface {file}: {why_no_file(file)}")
         raise NameNotFound("surface", word, "the command (beside files)", WORDS)
     if asked.unit is not None:
         raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in meters")

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
+from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.poses import Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
@@ -94,7 +94,6 @@ class Bench:
         self._data, self._at = self._model.createData(), pin.GeometryData(self._geometry)
         self._q, self._tip, self._links, self._shell = q, tip, links, links.shell
         self._depth, self._searched = depth, searched
-        self._touching = SelfContact(self._model, self._geometry, q)
         self._floor = _floor(self._geometry)
         self._found: dict[tuple[float | None, ...], list[Stance]] = {}
 
@@ -104,13 +103,13 @@ class Bench:
         spots: Sequence[TouchPoint],
         approach: Array,
         *,
-        lift: float | None,
+        on_floor: bool,
         room: float,
     ) -> Iterator[Place]:
         """Yield places where the part has `side` (3,) to a tip that presses along `approach` (3,).
 
-        It stands `lift` [m] above the floor, or wherever the posture has the tip, `room` [m] before
-        the links. First those of each posture where the sphere touches one face.
+        It stands on the floor, or wherever the posture has the tip, `room` [m] before the links.
+        First those of each posture where the sphere touches one face.
         """
         facing = turned_to(side, -approach)
         lowest = float((self._shell.vertices @ facing.T)[:, 2].min())
@@ -118,9 +117,7 @@ class Bench:
         most = self._searched.places + (_FEWER if self._searched.places > _MANY else _MOST_TRIED)
 
         def height(spot: TouchPoint) -> float | None:
-            if lift is None:
-                return None
-            return self._floor + lift - lowest + float(facing[2] @ spot.center)
+            return self._floor - lowest + float(facing[2] @ spot.center) if on_floor else None
 
         for posture in self._stances(approach, height(spots[0])):
             self._searched.postures += 1
@@ -171,7 +168,7 @@ class Bench:
 
     def _usable(self, q: Array, floor: float | None) -> bool:
         """Whether links are free of each other and above the `floor` [m] at q (nq,)."""
-        if self._touching.found(q):
+        if self._links.crossed(q):
             return False
         pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._at, q)
         heights = [

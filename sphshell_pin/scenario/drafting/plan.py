@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +13,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.placing import Place
 from sphshell_pin.scenario.drafting.poses import Stance
@@ -81,9 +83,10 @@ class Press:
         return self.smooth and len(self.path) > 2
 
     def calmed(self) -> Press:
-        """Return it with four times the damping: friction shakes the tip less."""
+        """Return it with four times the damping, and joints that nothing pulls to a posture."""
         return replace(
             self,
+            posture_stiffness=(),
             damping=rounded(4.0 * self.damping),
             rotational_damping=rounded(4.0 * self.rotational_damping),
             damped=4.0 * self.damped,
@@ -111,6 +114,12 @@ class Hold:
 
     kp: float
     kd: float
+    sag: float = SAG
+    """How far the load draws the springs, about [rad]."""
+    drawn: Mapping[str, object] = field(default_factory=dict)
+    """Where the springs of fingers would take them, by joint."""
+    force: float = 0.0
+    """Largest normal force of fingers [N]."""
 
 
 @dataclass(frozen=True)
@@ -128,8 +137,10 @@ class Plan:
     """Where the free root starts: x y z and quaternion x y z w."""
     why: tuple[str, ...] = ()
     """One sentence for each choice that was made for the user."""
-    left_out: tuple[str, ...] = ()
-    """Left out of what the robot's file states of its joints."""
+    part: Part | None = None
+    """The free part that carries the shell, at `root`."""
+    strongest: int = 0
+    """Which of the tips is checked, the one that presses most."""
     repair: str = ""
     """What was changed of a draft that failed; "" of the first draft."""
 
@@ -167,11 +178,18 @@ def press_gap(radius: float, force: float, materials: tuple[Material, Material])
 
 
 def press_plan(
-    tip: Tip, place: Place, way: Way, materials: tuple[Material, Material], force: float, gap: float
+    tip: Tip,
+    place: Place,
+    way: Way,
+    materials: tuple[Material, Material],
+    force: float,
+    gap: float,
+    weak: bool,
 ) -> Plan:
     """Plan a scenario in which a tip of a robot with a fixed base presses with `force` [N].
 
-    The sphere begins with the `gap` [m] at the first point of the `way`.
+    The sphere begins with the `gap` [m] at the first point of the `way`; the efforts of motors that
+    are too `weak` are not modeled.
     """
     stance, path = place.stance, way.points
     rate = rounded(PATH_RATE * tip.radius)
@@ -217,6 +235,11 @@ def press_plan(
     why.append(
         f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
     )
+    if weak:
+        why.append(
+            "the effort limits that the robot's file states for its joints are not modeled, "
+            "because they do not bear its own weight and the friction of the joints"
+        )
     if not way.even:
         why.append("the force on the surface is the resultant of several")
     if len(path) < 2:

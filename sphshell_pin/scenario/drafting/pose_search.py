@@ -10,14 +10,14 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
-from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix, model_reach
+from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING, floats
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
 from sphshell_pin.scenario.drafting.asked_places import asked_touches
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.paths import Way, find_way
+from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, Way, find_way
 from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
 from sphshell_pin.scenario.drafting.plan import (
     TIP_GAP,
@@ -34,7 +34,7 @@ from sphshell_pin.scenario.drafting.refusals import Tried, cannot_stand, refusal
 from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
 from sphshell_pin.scenario.drafting.trial import Fault, try_out
-from sphshell_pin.scenario.drafting.wording import rounded
+from sphshell_pin.scenario.drafting.wording import mm, rounded
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.schema import RobotSection
@@ -45,8 +45,8 @@ _MOST_RUNS, _MOST_SLIDES, _MOST_DROPS = 10, 6, 3
 _MOST_STILL = 40
 # Places at which efforts do not carry the robot, before they are taken for wrong.
 _MOST_WEAK = 4
-# Heights of the part above the floor, in turn, as parts of the robot's reach.
-_LIFTS = (0.0, 0.1, 0.25)
+# Part of a path up to where it failed that is tried again.
+_CUT = 0.8
 # Between links and part at the start, along the approach, in radii of the sphere.
 _ROOM = 0.1
 # Time to settle of a draft that failed while the tip slid or after a hard touch [s].
@@ -69,26 +69,30 @@ class Working(NamedTuple):
     """The URDF of a free part that it names."""
 
 
-def repaired(one: Plan, fault: Fault, joints: Sequence[str]) -> Plan | str | None:
-    """Return what to try in place of a draft that failed; None: nothing.
-
-    Another plan, or the kind of what acts in the `joints` that is to be left out.
-    """
-    press = one.control if isinstance(one.control, Press) else None
-    if fault.kind in ("links", "run") or (fault.excess and not (press and press.slides)):
-        joints = ()  # They are not the cause.
-    # Friction in the joints keeps the tip off the part, and against its motion.
-    if "friction" in joints:
-        return "friction"
-    shaken = fault.kind == "force"
-    if press and shaken and one.repair == "" and any(press.posture_stiffness):
-        return replace(one, control=replace(press, posture_stiffness=()), repair="loose")
-    # The tip creeps to the surface, or drags behind.
-    if "damping" in joints:
-        return "damping"
-    if press and shaken and one.repair != "calmed" and press.slides:
+def repaired(one: Plan, fault: Fault) -> Plan | None:
+    """Return what to try in place of a draft that failed; None: nothing."""
+    press = one.control
+    if not isinstance(press, Press) or one.repair in ("stays", "cut"):
+        return None
+    if fault.kind == "force" and not one.repair:
         return replace(one, control=press.calmed(), repair="calmed")
-    return None
+    # Up to where it failed the path will do.
+    along = np.cumsum([0.0, *np.linalg.norm(np.diff(press.path, axis=0), axis=1)])
+    count = int((along < _CUT * press.speed * (fault.t - press.lead_in)).sum())
+    if not press.slides or along[max(count - 1, 0)] < SHORTEST_PATH * one.tips[0].radius:
+        return None
+    length = along[count - 1]
+    return replace(
+        one,
+        control=replace(press, path=press.path[:count]),
+        duration=rounded(one.duration - (along[-1] - length) / press.speed, 3),
+        why=(*_still_true(one), f"the tip slides over {mm(length)}: farther {fault.text}"),
+        repair="cut",
+    )
+
+
+def _still_true(plan: Plan) -> tuple[str, ...]:
+    return tuple(one for one in plan.why if not one.startswith("the tip slides"))
 
 
 def find_working(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Working:
@@ -127,6 +131,8 @@ class Candidate(NamedTuple):
     materials: tuple[Material, Material]
     force: float
     gap: float
+    weak: bool
+    """Whether the efforts that its file states do not carry the robot."""
 
 
 class _Search:
@@ -143,7 +149,9 @@ class _Search:
                 "float with --free-flyer"
             )
         geometry, aside = built.assembly.loaded[0].collision_model, joints_aside(model, tip)
-        self.links = Links(model, geometry, self.shell, [tip], aside)
+        known = WORKING.get(self.section.name or "", ())
+        self.q = np.array(known) if len(known) == model.nq else built.assembly.q0
+        self.links = Links(model, geometry, self.shell, [tip], aside, self.q)
         self.room = _ROOM * tip.radius
 
     def find(self) -> Working | None:
@@ -178,11 +186,8 @@ class _Search:
         for found in self._places():
             stance = found.stance
             pair = chosen_materials(asked, [tip], stance.mass)
-            if "effort" in self.tried.without:
-                stance = replace(stance, force=NO_LIMIT)
-            elif not stance.force and len(self.tried.errors) == _MOST_WEAK:
-                self.tried.leave_out("effort", "they do not carry the robot's own weight")
-                stance = replace(stance, force=NO_LIMIT)
+            weak = not stance.force and len(self.tried.errors) >= _MOST_WEAK
+            stance = replace(stance, force=NO_LIMIT) if weak else stance
             try:
                 force = press_force(stance, tip, pair, asked.press)
             except SphshellError as error:  # of this posture: another one may do
@@ -191,14 +196,15 @@ class _Search:
             gap = press_gap(tip.radius, force, pair)
             place = found.with_gap(gap)
             way = find_way(asked, place, self.links, tip.radius, gap, self.room)
-            yield Candidate(place, way, pair, force, gap)
+            yield Candidate(place, way, pair, force, gap, weak)
 
     def _planned(self, one: Candidate) -> tuple[RobotSection, Plan]:
         stance = one.place.stance
+        kinds = stated_kinds(self.model, stance.lock)
         stands = {
             "lock": list(stance.lock),
             "start": _changed_joints(self.model, self.built.assembly.q0, stance.q),
-            "joints": stated_kinds(self.model, stance.lock),
+            "joints": [kind for kind in kinds if not (one.weak and kind == "effort")],
         }
         return self.section.model_copy(update=stands), press_plan(self.tip, *one)
 
@@ -208,13 +214,10 @@ class _Search:
         The tip presses down if nothing else is asked for, else as its limb points, else sideways.
         """
         asked, model, shell, tip = self.asked, self.model, self.shell, self.tip
-        known = WORKING.get(self.section.name or "", ())
-        q_work = np.array(known) if len(known) == model.nq else self.built.assembly.q0
         gap = TIP_GAP * tip.radius
-        bench = Bench(self.built, tip, self.links, q_work, 2 * gap, self.tried)
+        bench = Bench(self.built, tip, self.links, self.q, 2 * gap, self.tried)
         directions = [PLACES[asked.place]] if asked.place else list(PLACES.values())
-        pressed = approaches(model, q_work, tip, directions)
-        lifts = [part * model_reach(model) for part in _LIFTS]
+        pressed = approaches(model, self.q, tip, directions)
         if asked.fixed:
             spots = asked_touches(asked, shell, tip.radius, gap)
             choices = [(nearest_side(spots[0].normal), spots)]
@@ -229,18 +232,15 @@ class _Search:
             ordered = sorted(choices, key=lambda one: abs(one[0][2] + approach[2]) > 1e-3)
             for room in (self.room, 0.0):
                 for side, some in ordered:
-                    for lift in (*lifts, None):
-                        yield from bench.places(side, some, approach, lift=lift, room=room)
+                    for on_floor in (True, False):
+                        yield from bench.places(side, some, approach, on_floor=on_floor, room=room)
 
     def _repaired(self, section: RobotSection, plan: Plan) -> Working | None:
         """Run a draft, and those that repair it; return the first that works."""
-        tried, changed = self.tried, plan
-        while tried.runs < _MOST_RUNS:
-            one = changed
-            if tried.without and not one.left_out:
-                one = replace(one, left_out=tried.without, why=(*one.why, tried.note))
-            joints = [kind for kind in section.joints if kind not in one.left_out]
-            text, built = self.draft(section.model_copy(update={"joints": joints}), one)
+        tried = self.tried
+        one: Plan | None = plan
+        while one is not None and tried.runs < _MOST_RUNS:
+            text, built = self.draft(section, one)
             fault = try_out(built, one, self.links)
             tried.runs += 1
             if fault is None:
@@ -250,12 +250,8 @@ class _Search:
                 self.asked.tell(f"tried, run {tried.runs}: {fault.text}")
             if one.repair == "" and len(tried.stays) < _MOST_STILL and not self.asked.slides:
                 tried.stays += [(section, other) for other in _still(one, fault)]
-            other = repaired(one, fault, joints)
-            if other is None:
-                break
-            if isinstance(other, str):
-                tried.leave_out(other, f"with it {fault.text}")
-            changed = plan if isinstance(other, str) else other
+            one = repaired(one, fault)
+            one = None if one and self.asked.slides and one.repair == "cut" else one
         return None
 
 
@@ -273,8 +269,10 @@ def _still(plan: Plan, fault: Fault) -> list[Plan]:
     if not isinstance(control, Press) or (fault.kind == "links" and fault.t < control.lead_in):
         return []
     if control.slides:
-        why = tuple(one for one in why if not one.startswith("the tip slides"))
-        why = (*why, f"the tip presses in one place and does not slide: with a path {fault.text}")
+        why = (
+            *_still_true(plan),
+            f"the tip presses in one place and does not slide: with a path {fault.text}",
+        )
     stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
     return [replace(plan, control=stays, duration=_CALM_LEAD_IN + 0.5, repair="stays", why=why)]
 

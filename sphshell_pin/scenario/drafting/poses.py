@@ -223,10 +223,12 @@ def _stance(
     sideways, slides = np.linalg.eigh(across @ mobility @ across)
     slide = _upright(slides[:, -1]) if sideways[-1] > _MOBILE * top else None
     pushes = linear.T @ approach
-    limits = np.array(model.upperEffortLimit)[columns]
+    efforts, dry = model.upperEffortLimit[columns], model.upperDryFrictionLimit[columns]
+    stated = (efforts < NO_LIMIT) & (efforts > 0)
+    # Motors bear the friction of their joints, too.
+    limits = efforts - np.where(dry < NO_LIMIT, dry, 0.0)
     # What the weight of the links leaves of the efforts.
     weight = pin.computeGeneralizedGravity(model, model.createData(), q)[columns]
-    stated = (limits < NO_LIMIT) & (limits > 0)
     limited = stated & (np.abs(pushes) > 1e-9)
     room = (limits - np.sign(pushes) * weight)[limited]
     carried = bool((np.abs(weight) <= limits)[stated].all())

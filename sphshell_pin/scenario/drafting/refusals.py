@@ -40,25 +40,11 @@ class Tried(Searched):
 
     runs: int = 0
     faults: list[Fault] = field(default_factory=list)
-    without: tuple[str, ...] = ()
-    """Kinds of what acts in the joints that are left out."""
-    note: str = ""
-    """Why they are."""
     errors: list[SphshellError] = field(default_factory=list)
     stays: list[tuple[RobotSection, Plan]] = field(default_factory=list)
     """Plans that press in one place, where a path failed."""
     ways: list[str] = field(default_factory=list)
     """Why a path that was asked for could not be taken."""
-
-    def leave_out(self, kind: str, why: str) -> None:
-        """Leave one more kind of what the file states of the joints out: `why` is a clause."""
-        self.without = (*self.without, kind)
-        kinds = " and ".join(self.without).replace("effort", "effort limits")
-        be = "are" if kinds.endswith("s") or " and " in kinds else "is"
-        self.note = (
-            f"the {kinds} that the robot's file states for its joints {be} not modeled, because "
-            f"{why}"
-        )
 
 
 def cannot_stand(tried: Tried) -> CannotStand:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,15 +15,15 @@ if TYPE_CHECKING:
 
 
 # A path on a surface ends before a turn this sharp from one of its points to the next.
-_SHARPEST = np.cos(np.deg2rad(35.0))
+_SHARP_ANGLE = np.deg2rad(35.0)
+_SHARPEST = np.cos(_SHARP_ANGLE)
 # Cosine of a contact's normal with the surface's, where a face is touched and not an edge.
 _ALIGNED = 0.98
 # A sheet's mean normal, as a part of that of a plane.
 _SHEET = 0.3
-# How far from the middle other places are looked for, as parts of half the box.
-_PARTS = (0.15, 0.35, 0.6)
-# Planes on which a place is looked for, and points on each.
-_MOST_PLANES, _SAMPLES = 4, 200
+# Places beside the middle: samples, how many are taken, how far apart as a part of the size, and
+# the cosine between their normals and the side that is touched.
+_SAMPLES, _MOST_PLACES, _APART, _FACING = 200, 16, 0.05, 0.5
 # Points at the end of a path that are left out, so that it ends before a rim and not on it.
 _SPARE = 2
 # Directions in which a path is tried when the asked one is too short.
@@ -86,42 +85,48 @@ def sides(shell: Shell) -> list[Array]:
 def touch_points(
     shell: Shell, radius: float, gap: float, *, toward: Array, inside: bool = False
 ) -> Iterator[TouchPoint]:
-    """Yield touch points: that of `find_touch_point`, wide planes, then others around the first."""
-    middle, half = shell.box.mean(axis=0), 0.5 * (shell.box[1] - shell.box[0])
-    around = [
-        part * half * np.array(signs)
-        for part, signs in itertools.product(_PARTS, itertools.product((0, 1, -1), repeat=3))
-        if any(signs)
-    ]
-    level = [aside for aside in around if abs(toward @ aside) <= 1e-9 * shell.size]
-    planes = [] if inside else [point - middle for point in _wide_planes(shell, toward)]
-    for beside in (np.zeros(3), *planes, *level):
+    """Yield touch points: that of `find_touch_point`, then those farthest from edges."""
+    middle = shell.box.mean(axis=0)
+    for point in (middle, *_roomy_places(shell, -toward if inside else toward)):
+        beside = point - middle - toward * (toward @ (point - middle))
         yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=beside)
 
 
-def _wide_planes(shell: Shell, toward: Array) -> list[Array]:
-    """Return points (3,) far from the borders of planes that face `toward`, the farthest first."""
-    corners, found = shell.vertices[shell.triangles], list[tuple[float, Array]]()
+def _roomy_places(shell: Shell, toward: Array) -> list[Array]:
+    """Return points (3,) apart from each other on what faces `toward`, the best one first.
+
+    The best is the farthest from where the surface ends, or turns sharply.
+    """
+    corners, rng = shell.vertices[shell.triangles], np.random.default_rng(0)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    rng = np.random.default_rng(0)
-    for face in shell.faces:
-        own = np.flatnonzero(np.isin(shell.triangle_element, face.elements))
-        areas = np.linalg.norm(normals[own], axis=1)
-        if face.kind != "plane" or normals[own].sum(axis=0) @ toward < _ALIGNED * areas.sum():
-            continue
-        edges = np.sort(shell.triangles[own][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges, count = np.unique(edges, axis=0, return_counts=True)
-        start, end = (shell.vertices[edges[count == 1, k]] for k in (0, 1))
-        weights = rng.dirichlet(np.ones(3), _SAMPLES)
-        some = rng.choice(own, _SAMPLES, p=areas / areas.sum())
-        points = np.einsum("ij,ijk->ik", weights, corners[some])
-        along, away = end - start, points[:, None] - start
-        part = (away * along).sum(axis=2) / (along * along).sum(axis=1)
-        off = away - np.clip(part, 0.0, 1.0)[..., None] * along
-        room = (off * off).sum(axis=2).min(axis=1)
-        best = int(np.argmax(room))
-        found.append((float(room[best]), points[best]))
-    return [point for _, point in sorted(found, key=lambda one: -one[0])[:_MOST_PLANES]]
+    areas = np.linalg.norm(normals, axis=1)
+    normals = normals / np.maximum(areas, 1e-300)[:, None]
+    facing = np.flatnonzero(normals @ toward > _FACING)
+    if not len(facing):
+        return []
+    ends = np.sort(shell.triangles[facing][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    ends, owner, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    # An edge of two facets is sharp where their normals differ, any other always.
+    total = np.zeros((len(ends), 3))
+    np.add.at(total, owner.ravel(), np.repeat(normals[facing], 3, axis=0))
+    sharp = (count != 2) | (np.linalg.norm(total, axis=1) < 2 * np.cos(0.5 * _SHARP_ANGLE))
+    start, along = (
+        shell.vertices[ends[sharp, 0]],
+        np.diff(shell.vertices[ends[sharp]], axis=1)[:, 0],
+    )
+    some = rng.choice(facing, _SAMPLES, p=areas[facing] / areas[facing].sum())
+    points = np.einsum("ij,ijk->ik", rng.dirichlet(np.ones(3), _SAMPLES), corners[some])
+    room = np.full(_SAMPLES, np.inf)
+    for k, point in enumerate(points):
+        away = point - start
+        part = (away * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300)
+        off = away - np.clip(part, 0.0, 1.0)[:, None] * along
+        room[k] = (off * off).sum(axis=1).min(initial=np.inf)
+    found = list[Array]()
+    for point in points[np.argsort(-room, kind="stable")]:
+        if all(np.linalg.norm(point - one) > _APART * shell.size for one in found):
+            found.append(point)
+    return found[:_MOST_PLACES]
 
 
 def touches_once(

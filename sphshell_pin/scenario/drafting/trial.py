@@ -25,8 +25,9 @@ _MOST_ROWS = 300
 _SETTLED, _SHAKEN = 0.6, 0.1
 # How far the tip may stay behind its path, in radii: its spring gives way by a fifth of one.
 _BEHIND = 0.6
-# Time at the end of a run in which a robot stands still [s].
-_LAST = 0.3
+# Time at the end of a run in which a robot stands still [s]. Parts of a run in which fingers touch,
+# and after which they have closed; how far the part may move from then on, in radii.
+_LAST, _HELD, _CLOSED, _MOVED = 0.3, 0.9, 0.4, 0.2
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,6 @@ class Fault:
     t: float = 0.0
     """When [s]."""
     link: str = ""
-    excess: bool = False
-    """Whether the force is too large: nothing in the joints keeps it off."""
 
 
 def try_out(built: Built, plan: Plan, links: Links) -> Fault | None:
@@ -49,25 +48,44 @@ def try_out(built: Built, plan: Plan, links: Links) -> Fault | None:
     if stopped is not None:
         return Fault("run", f"the run stops: {stopped}")
     return (
-        _touch_fault(result)
-        or _link_fault(built, result, links)
+        _touch_fault(plan, result)
+        or _link_fault(built, plan, result, links)
         or _force_fault(built, plan, result)
         or _path_fault(built, plan, result)
+        or _part_fault(built, plan, result)
         or figure_fault(built, result)
     )
 
 
-def _touch_fault(result: Result) -> Fault | None:
-    if any(one.contact_time > 0 for one in result.stats.pairs.values()):
+def _touch_fault(plan: Plan, result: Result) -> Fault | None:
+    times = {name: one.contact_time for name, one in result.stats.pairs.items()}
+    least = min(times, key=times.__getitem__)
+    if plan.part and times[least] < _HELD * plan.duration:
+        return Fault("touch", f"'{least}' loses the part")
+    return None if any(times.values()) else Fault("touch", "the sphere never touches the surface")
+
+
+def _part_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
+    """Say how far a part moves in the fingers that have closed on it, if it does."""
+    if plan.part is None:
         return None
-    return Fault("touch", "the sphere never touches the surface")
+    span, _ = joint_spans(built.scene.model, "part/root_joint")
+    held = result.q[result.t >= _CLOSED * plan.duration][:, span][:, :3]
+    moved = float(np.linalg.norm(held - held[0], axis=1).max())
+    if moved <= _MOVED * min(tip.radius for tip in plan.tips):
+        return None
+    return Fault("path", f"the part moves by {1e3 * moved:.2g} mm in the hand")
 
 
-def _link_fault(built: Built, result: Result, links: Links) -> Fault | None:
+def _link_fault(built: Built, plan: Plan, result: Result, links: Links) -> Fault | None:
     placement = to_se3(built.scenario.shell[0].placement)
     some = slice(None, None, -(-len(result.t) // _MOST_ROWS))
     for k, (t, q) in enumerate(zip(result.t[some], result.q[some], strict=True)):
-        found = links.within(whole_posture(built, q), placement, whole=k == 0)
+        if plan.part:
+            span, _ = joint_spans(built.scene.model, "part/root_joint")
+            placement = pin.XYZQUATToSE3(q[span])
+        whole = whole_posture(built, q, links.model)
+        found = links.within(whole, placement, whole=k == 0)
         if found is not None:
             return Fault("links", f"link '{found.link}' is in the part", float(t), found.link)
     return None
@@ -84,17 +102,20 @@ def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     behind = math.sqrt(max(float(away @ away) - tip.radius**2, 0.0))
     if behind < _BEHIND * tip.radius:
         return None
-    return Fault("path", f"the tip stays {1e3 * behind:.2g} mm behind the end of its path")
+    reached = float(np.linalg.norm(np.diff(control.path, axis=0), axis=1).sum()) - behind
+    said = f"the tip stays {1e3 * behind:.2g} mm behind the end of its path"
+    return Fault("path", said, control.lead_in + reached / control.speed)
 
 
-def whole_posture(built: Built, q: Array) -> Array:
-    """Return the configuration of the whole robot for that of the scene, q (nq,)."""
-    whole, model = built.assembly.q0.copy(), built.scene.model
+def whole_posture(built: Built, q: Array, model: pin.Model) -> Array:
+    """Return the configuration of the whole robot, a `model`, for that of the scene, q (nq,)."""
+    whole, prefix = pin.neutral(model).copy(), built.scenario.robot[0].label
+    moving, start = (built.scene.model, q), (built.assembly.model, built.assembly.q0)
     for name in list(model.names)[1:]:
-        to_q, _ = joint_spans(built.assembly.model, name)
-        from_q, _ = joint_spans(model, name)
-        whole[to_q] = q[from_q]
-    return whole
+        called = f"{prefix}/{name}" if prefix else name
+        source, values = moving if moving[0].existJointName(called) else start
+        whole[joint_spans(model, name)[0]] = values[joint_spans(source, called)[0]]
+    return np.asarray(whole)
 
 
 def _force_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
@@ -102,7 +123,7 @@ def _force_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     if isinstance(control, Press):
         force, after = control.force, t >= _SETTLED * control.lead_in
         what = f"the force of {force:g} N is not held"
-    elif isinstance(control, Hold) and len(plan.tips) > 2:
+    elif isinstance(control, Hold) and len(plan.tips) > 2 and plan.part is None:
         force = GRAVITY * float(pin.computeTotalMass(built.scene.model))
         after = t >= t[-1] - _LAST
         what = f"the weight of {force:.3g} N is not carried"
@@ -112,16 +133,15 @@ def _force_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     off = np.abs(held / force - 1) > HELD
     if (held == 0).any():
         k = int(np.flatnonzero(held == 0)[0])
-        return Fault("force", f"{what}: nothing touches at t = {t[after][k]:.3g} s")
+        return Fault("force", f"{what}: nothing touches at t = {t[after][k]:.3g} s", t[after][k])
     mean = float(held.mean())
     if abs(mean / force - 1) > HELD:
         text = f"{what}: the surface bears {mean:.3g} N on average"
-        return Fault("force", text, excess=mean > force)
+        return Fault("force", text)
     if off.mean() > _SHAKEN:
         k = int(np.argmax(np.abs(held / force - 1)))
-        return Fault(
-            "force", f"{what}: the surface bears {held[k]:.3g} N at t = {t[after][k]:.3g} s"
-        )
+        text = f"{what}: the surface bears {held[k]:.3g} N at t = {t[after][k]:.3g} s"
+        return Fault("force", text, t[after][k])
     return None
 
 

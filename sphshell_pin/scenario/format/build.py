@@ -1,6 +1,5 @@
 """From a scenario file to what runs: the scene, its start state, its controller, its simulation."""
 
-import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.parameters import Component, parameters_of
+from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.function_friction import FunctionFrictionFile
@@ -313,8 +313,8 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
             shell = section.primitive.shell(segments=section.segments, **options)
         else:
             file = path.parent / str(section.file)
-            if not os.path.isfile(file):
-                raise SphshellError(f"no such surface file: {file}")
+            if reason := why_no_file(file):
+                raise SphshellError(f"surface {file}: {reason}")
             of_files = ("unit", "scale", "bodies", "faces", "time_limit", "memory_limit")
             options |= {name: getattr(section, name) for name in of_files}
             shell = sp.Shell.from_file(file, **options)

@@ -5,11 +5,11 @@ They are the only code that a scenario can name, and this is the only place that
 
 import importlib.util
 import inspect
-import os
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
+from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario.format.bodies import blamed_on
 
@@ -32,8 +32,8 @@ def load_function(where: str, path: Path, key: str, modules: Modules) -> Callabl
     if not colon or not file_name.endswith(".py") or not function:
         raise ScenarioError(path, key, 'must be "file.py:function"', where)
     file = path.parent / file_name
-    if not os.path.isfile(file):
-        raise ScenarioError(path, key, f"no such file: {file}", where)
+    if reason := why_no_file(file):
+        raise ScenarioError(path, key, f"{file}: {reason}", where)
     if file not in modules:
         modules[file] = _run(file, where, path, key)
     module = modules[file]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 from pydantic import ValidationError
 
 from sphshell_pin.base.parameters import parameters_of
-from sphshell_pin.base.regular_file import MOST_TEXT, read_text
+from sphshell_pin.base.regular_file import MOST_TEXT, read_text, why_no_file
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError, did_you_mean
@@ -65,7 +65,7 @@ def find_scenario(name: str | PathLike[str]) -> Path:
     if os.path.isdir(path):
         raise ScenarioError(path, "", "is a folder: give the .toml file of a scenario")
     if path.suffix == ".toml" or len(path.parts) > 1:
-        raise ScenarioError(path, "", "no such file")
+        raise ScenarioError(path, "", why_no_file(path))
     raise NameNotFound("scenario", str(name), "beside .toml files, sphshell-pin", shipped)
 
 

@@ -152,6 +152,11 @@ class LiveRun:
         return series_of(pairs, self.scene.model, sensors, torque=torque)
 
     @property
+    def planned(self) -> float | None:
+        """How long the scenario runs [s]: the live run goes on, but nothing new is to be seen."""
+        return float(self.built.scenario.run.duration)
+
+    @property
     def now(self) -> Rows:
         """The state of now as one row."""
         return self._rows(self._row)

@@ -102,6 +102,8 @@ class Replay:
         """Simulated time from the first row to the last [s]."""
         return float(self.result.t[self._count - 1] - self.result.t[0])
 
+    planned: float | None = None
+
     @property
     def row(self) -> int:
         """The recorded row that is shown: the last one that is not later than `time`."""

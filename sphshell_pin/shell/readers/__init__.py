@@ -1,11 +1,11 @@
 """Surface files: which reader takes which suffix."""
 
 import os
-import stat
 from collections.abc import Callable
 from pathlib import Path
 
 from sphshell_pin.base.checks import check_type
+from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.options import CAD_SUFFIXES
 from sphshell_pin.shell.raw import RawSurface
@@ -43,14 +43,8 @@ def reader_for(path: str | os.PathLike[str]) -> tuple[Path, str]:
         raise InvalidParameter(
             "path", str(path), f"must end in one of: {', '.join(SUFFIXES)}, not '{path.suffix}'"
         )
-    try:
-        found = path.stat()
-    except (FileNotFoundError, NotADirectoryError, ValueError):  # a name with a null character
-        raise ShellFileError(path, "there is no such file") from None
-    except OSError as error:
-        raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
-    if not stat.S_ISREG(found.st_mode):
-        raise ShellFileError(path, "is not a file")
-    if found.st_size == 0:
+    if reason := why_no_file(path):
+        raise ShellFileError(path, reason)
+    if path.stat().st_size == 0:
         raise ShellFileError(path, "is empty")
     return path, suffix

@@ -281,11 +281,12 @@ def _read_csv(path: Path) -> _Table:
     if all(_number(one) is not None for one in head):
         reason = f"the first line must be a header, as '{_EXAMPLE}'"
         raise DataError(source, reason, numbers[0])
-    values = np.full((len(rows) - 1, len(head)), math.nan)
-    for k, (number, row) in enumerate(zip(numbers[1:], rows[1:], strict=True)):
+    values: list[Array] = []
+    for number, row in zip(numbers[1:], rows[1:], strict=True):
         if len(row) != len(head):
             reason = f"has {len(row)} values, the header has {len(head)} columns"
             raise DataError(source, reason, number)
+        values.append(np.full(len(head), math.nan))
         for i, cell in enumerate(row):
             if not cell.strip():
                 continue
@@ -295,8 +296,9 @@ def _read_csv(path: Path) -> _Table:
                 if head[i].partition(" ")[0] != TIME:
                     reason += "; leave the cell empty where nothing was measured"
                 raise DataError(source, reason, number)
-            values[k, i] = value
-    return _Table.of(source, zip(head, values.T, strict=True), numbers[1:])
+            values[-1][i] = value
+    columns = np.reshape(values, (-1, len(head))).T
+    return _Table.of(source, zip(head, columns, strict=True), numbers[1:])
 
 
 def _number(text: str) -> float | None:

@@ -1,7 +1,6 @@
 """Robots without their meshes: the physics of contact needs none, and most time goes into them."""
 
 import copy
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -12,6 +11,7 @@ import pinocchio as pin
 
 from sphshell_pin import robots
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 
 
@@ -38,9 +38,8 @@ def check_known(names: Iterable[str]) -> None:
     known = all_names()
     for robot in names:
         if robots.is_path(robot):
-            if not os.path.isfile(robot):
-                what = "is a folder, not a URDF file" if os.path.isdir(robot) else "no such file"
-                raise SphshellError(f"{robot}: {what}")
+            if reason := why_no_file(robot):
+                raise SphshellError(f"{robot}: {reason}")
         elif robot not in known and not robots.is_library_name(robot):
             raise NameNotFound("robot", robot, "sphshell_pin.robots", known, "sphshell-pin list")
 

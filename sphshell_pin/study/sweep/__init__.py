@@ -3,7 +3,7 @@
 from sphshell_pin.study.sweep.distributions import Distribution, LogNormal, Normal, Uniform
 from sphshell_pin.study.sweep.driver import SweepReport, run_plan, sweep
 from sphshell_pin.study.sweep.grid import Axis, axes_of
-from sphshell_pin.study.sweep.indices import quantile_bands, quantiles, sobol_indices, tornado
+from sphshell_pin.study.sweep.indices import quantiles, sobol_indices, tornado
 from sphshell_pin.study.sweep.plan import Plan, plan_sweep
 
 __all__ = [
@@ -16,7 +16,6 @@ __all__ = [
     "Uniform",
     "axes_of",
     "plan_sweep",
-    "quantile_bands",
     "quantiles",
     "run_plan",
     "sobol_indices",

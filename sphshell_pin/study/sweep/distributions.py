@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
+from types import ModuleType
 
 import numpy as np
 
@@ -27,6 +28,9 @@ class Distribution(Component):
 
         Raises MissingExtra without scipy.
         """
+        return self._ppf(need("scipy.stats"), share)
+
+    def _ppf(self, stats: ModuleType, share: Array) -> Array:
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -46,9 +50,8 @@ class Normal(Distribution, kind="normal"):
     mean: float = parameter()
     deviation: float = parameter(above=0)
 
-    def quantile(self, share: Array) -> Array:
-        """Return the values that `share` (n,) of the distribution lies below."""
-        return np.asarray(need("scipy.stats").norm.ppf(share, self.mean, self.deviation))
+    def _ppf(self, stats: ModuleType, share: Array) -> Array:
+        return np.asarray(stats.norm.ppf(share, self.mean, self.deviation))
 
 
 @dataclass(frozen=True)
@@ -70,17 +73,13 @@ class Uniform(Distribution, kind="uniform"):
         if not self.low < self.high:
             raise InvalidParameter("high", self.high, f"must be more than low = {self.low:g}")
 
-    def quantile(self, share: Array) -> Array:
-        """Return the values that `share` (n,) of the distribution lies below."""
-        found = need("scipy.stats").uniform.ppf(share, self.low, self.high - self.low)
-        return np.asarray(found)
+    def _ppf(self, stats: ModuleType, share: Array) -> Array:
+        return np.asarray(stats.uniform.ppf(share, self.low, self.high - self.low))
 
 
 @dataclass(frozen=True)
 class LogNormal(Distribution, kind="lognormal"):
-    """The logarithm is normal; 68 % of the values lie from median / factor to median * factor.
-
-    The logarithm has mean log(median) and standard deviation log(factor).
+    """The logarithm is normal, with mean log(median) and standard deviation log(factor).
 
     Parameters
     ----------
@@ -91,23 +90,8 @@ class LogNormal(Distribution, kind="lognormal"):
     median: float = parameter(above=0)
     factor: float = parameter(above=1)
 
-    def __post_init__(self) -> None:
-        """Check the values; InvalidParameter where they look like those of the logarithm."""
-        if isinstance(self.factor, int | float) and 0 < self.factor <= 1:
-            raise InvalidParameter(
-                "factor",
-                self.factor,
-                "must be more than 1: 68 % of the values lie from median / factor to median * "
-                "factor; a mean m and a deviation s of the logarithm are written "
-                f"lognormal(exp(m),exp(s)), where exp({self.factor:g}) = "
-                f"{math.exp(self.factor):.6g}",
-            )
-        super().__post_init__()
-
-    def quantile(self, share: Array) -> Array:
-        """Return the values that `share` (n,) of the distribution lies below."""
-        ppf = need("scipy.stats").lognorm.ppf
-        return np.asarray(ppf(share, math.log(self.factor), scale=self.median))
+    def _ppf(self, stats: ModuleType, share: Array) -> Array:
+        return np.asarray(stats.lognorm.ppf(share, math.log(self.factor), scale=self.median))
 
 
 def forms() -> str:
@@ -139,26 +123,15 @@ def distributions_of(dist: Dist | Iterable[str]) -> dict[str, Distribution]:
 
 def _parse(key: str, text: object) -> Distribution:
     call = _CALL.fullmatch(text) if isinstance(text, str) else None
-    if call is None:
-        raise InvalidParameter(f"dist {key}", text, f"must be one of {forms()}")
-    name, given = call[1], [one.strip() for one in call[2].split(",")]
-    family = Distribution.kinds.get(name.lower())
-    if family is None:
-        raise InvalidParameter(
-            f"dist {key}", text, f"names no distribution that is known: {forms()}"
-        )
-    names = [one.name for one in fields(family)]
+    family = Distribution.kinds.get(call[1].lower()) if call else None
     try:
-        values = [float(one) for one in given]
+        values = [float(one) for one in call[2].split(",")] if call else []
     except ValueError:
         values = []
-    if len(values) != len(names):
-        raise InvalidParameter(
-            f"dist {key}", text, f"must have {len(names)} numbers: {name}({','.join(names)})"
-        )
+    if family is None or len(values) != len(fields(family)):
+        raise InvalidParameter(f"dist {key}", text, f"must be one of {forms()}")
     try:
         made = family(*values)
     except InvalidParameter as fault:
         raise InvalidParameter(f"dist {key}", text, f"is no distribution: {fault}") from None
-    assert isinstance(made, Distribution)
-    return made
+    return made  # type: ignore[return-value]  # the kinds of Distribution

@@ -44,7 +44,7 @@ def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:
     InvalidParameter
         A text that says no values, a key or a value given twice, or nothing to vary.
     """
-    axes: list[Axis] = []
+    axes: dict[str, Axis] = {}
     for key, given in stated_pairs("--vary", vary, f"must be {HOW}"):
         if not isinstance(given, Iterable):
             raise InvalidParameter(f"vary {key}", given, "must be a list of values, or a text")
@@ -53,17 +53,15 @@ def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:
             raise InvalidParameter("vary", key, "must have at least one value", key)
         # 1 and 1.0 are one value, true is another; as text: a nan is not even equal to itself.
         texts = [text_of(_as_number(value)) for value in values]
-        seen = set[str]()
         for value, text in zip(values, texts, strict=True):
-            if text in seen:
+            if texts.count(text) > 1:
                 raise InvalidParameter(f"vary {key}", text_of(value), "is given twice")
-            seen.add(text)
-        if key in (axis.key for axis in axes):
+        if key in axes:
             raise InvalidParameter("vary", key, "is given twice: put all its values together")
-        axes.append(Axis(key, values))
+        axes[key] = Axis(key, values)
     if not axes:
         raise InvalidParameter("vary", {}, f"must say what varies: {HOW}")
-    return tuple(axes)
+    return tuple(axes.values())
 
 
 def points_of(axes: Sequence[Axis], together: bool) -> list[tuple[Value, ...]]:

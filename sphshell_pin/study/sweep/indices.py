@@ -10,7 +10,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.study.sweep.job import need
 from sphshell_pin.study.sweep.sampling import DRAWN, HIGH, LOW, MEDIAN, A, B, at_quantile, swapped
-from sphshell_pin.study.sweep.table import DESIGN, varied_keys
+from sphshell_pin.study.sweep.table import DESIGN, figures_of, varied_keys
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,12 +36,6 @@ def drawn(table: pd.DataFrame) -> pd.DataFrame:
             "table", None, "no sample, only a tornado: make the sweep with sample = sobol", "has"
         )
     return rows
-
-
-def figures_of(table: pd.DataFrame) -> list[str]:
-    """Return the figures of a table."""
-    names = [str(name) for name in table.columns]
-    return [name for name in names[names.index("error") + 1 :] if name not in (DESIGN, "settings")]
 
 
 def quantiles(table: pd.DataFrame) -> pd.DataFrame:
@@ -177,31 +171,6 @@ def tornado(table: pd.DataFrame, figure: str) -> pd.DataFrame:
     ends = found[["low", "median", "high"]]
     change = ends.max(axis=1) - ends.min(axis=1)
     return found.loc[change.sort_values(ascending=False, kind="stable").index]
-
-
-def quantile_bands(curves: pd.DataFrame, curve: str) -> pd.DataFrame:
-    """Return the quantiles of a curve at each time, of the curves that a sweep with `bands` left.
-
-    Returns
-    -------
-    pandas.DataFrame : a row for each time of the common grid: columns `t` [s], 5, 25, 50, 75, 95
-        [%, SI units], and `runs`, how many have a value then.
-
-    Raises
-    ------
-    NameNotFound
-        There is no such curve.
-    """
-    known = [str(name) for name in curves.columns if name not in ("run", "t")]
-    if curve not in known:
-        raise NameNotFound("curve", curve, "the table of curves", known)
-    wide = curves.pivot(index="t", columns="run", values=curve)
-    values = wide.to_numpy(float)
-    found = [_quantiles(row[~np.isnan(row)]) for row in values]
-    made = need("pandas").DataFrame(found, columns=list(QUANTILES))
-    made.insert(0, "t", wide.index.to_numpy())
-    made["runs"] = np.sum(~np.isnan(values), axis=1)
-    return made
 
 
 def _quantiles(values: Array) -> list[float]:

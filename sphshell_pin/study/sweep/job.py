@@ -9,18 +9,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import import_extra
 from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.scenario.format.schema import Scenario
 
-if TYPE_CHECKING:
-    from sphshell_pin.study.sweep.curves import Curves
-
 DONE, FAILED = "done", "failed"
-JsonObject = dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -29,13 +24,11 @@ class Run:
 
     number: int
     changes: Mapping[str, str]
-    recorded: bool = False
-    """Whether it leaves the curves of the job."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run left behind; `wall_time` [s] and `worker` are no part of the table."""
+    """What a run left behind."""
 
     number: int
     status: str
@@ -43,10 +36,6 @@ class Outcome:
     error: str
     """Why it failed, in one sentence; empty otherwise."""
     figures: Mapping[str, float]
-    wall_time: float = 0.0
-    worker: str = ""
-    curves: bytes = b""
-    """As `Curves.of` returns them; empty where the run records none, or failed."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +56,6 @@ class Job:
     versions: Mapping[str, str]
     token: str
     """Identifies this job."""
-    curves: Curves | None = None
-    """What its recorded runs leave."""
 
     @property
     def path(self) -> Path:
@@ -85,11 +72,6 @@ def need(module: str) -> ModuleType:
         It is not installed.
     """
     return import_extra(module, "sweep", "a sweep")
-
-
-def digest_settings(scenario: Scenario) -> str:
-    """Return the SHA-256 of all settings of `scenario`, in hexadecimal digits."""
-    return digest(scenario.model_dump(mode="json"))
 
 
 def digest(data: object) -> str:
@@ -118,9 +100,8 @@ def digest_files(folder: Path, names: Iterable[str]) -> dict[str, str]:
     found = {}
     for name in sorted(names):
         path = folder / name
-        if not os.path.isfile(path):
-            found[name] = "absent"
-            continue
-        with open_regular(path) as file:
-            found[name] = hashlib.file_digest(file, "sha256").hexdigest()
+        found[name] = "absent"
+        if os.path.isfile(path):
+            with open_regular(path) as file:
+                found[name] = hashlib.file_digest(file, "sha256").hexdigest()
     return found

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError
 from sphshell_pin.scenario import Built, Scenario, find_scenario, read_scenario, shipped_scenarios
@@ -20,19 +17,11 @@ from sphshell_pin.scenario.format.reading import full_name, look_up
 from sphshell_pin.scenario.format.sliders import meaning
 from sphshell_pin.scenario.running.figures import check_expectations, figure_units
 from sphshell_pin.scenario.running.run import versions
-from sphshell_pin.study.sweep.curves import curves_of
 from sphshell_pin.study.sweep.distributions import Dist
 from sphshell_pin.study.sweep.grid import HOW, Axis, Value, Vary, axes_of, points_of, text_of
-from sphshell_pin.study.sweep.job import (
-    Job,
-    Run,
-    digest,
-    digest_files,
-    digest_settings,
-    files_of,
-)
-from sphshell_pin.study.sweep.sampling import DRAWN, Design, design_of
-from sphshell_pin.study.sweep.table import frame_of, varied_columns
+from sphshell_pin.study.sweep.job import Job, Run, digest, digest_files, files_of, need
+from sphshell_pin.study.sweep.sampling import Design, design_of
+from sphshell_pin.study.sweep.table import varied_columns
 from sphshell_pin.study.sweep.worker import changed, sweep_figures, verdict_names
 
 if TYPE_CHECKING:
@@ -55,16 +44,17 @@ class Plan:
     """Columns that a finished run fills."""
     job: Job
     head: Mapping[str, object]
-    """What distinguishes this sweep from another."""
-    design: Design | None = None
+    """What the runs of this sweep share; those of another may not stand in its table."""
+    design: Design | None
     """What the runs of a sample are for."""
-    units: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str]
     """Units of keys and figures, those that are known."""
 
     @property
     def varied(self) -> pd.DataFrame:
         """The columns of the varied keys, as a pandas.DataFrame."""
-        return frame_of(varied_columns(self.axes, self.points))
+        frame: pd.DataFrame = need("pandas").DataFrame(varied_columns(self.axes, self.points))
+        return frame
 
 
 def plan_sweep(
@@ -80,57 +70,33 @@ def plan_sweep(
     seed: int = 0,
     indices: bool = False,
     tornado: bool = False,
-    bands: Sequence[str] = (),
-    band_steps: int | None = None,
 ) -> Plan:
     """Check all runs of a sweep, see `sweep`, and return what it will do."""
-    design = None
+    refused: dict[str, object] = {"vary": vary, "together": together}
+    must = "is for values in a grid, dist for a sample: leave one of the two out"
     if dist is None:
-        _refuse(
-            "is for uncertain inputs: say them with dist",
-            sample=sample,
-            n=n,
-            seed=seed,
-            indices=indices,
-            tornado=tornado,
-            bands=bands,
-            band_steps=band_steps,
-        )
-        if vary is None:
-            raise InvalidParameter(
-                "vary",
-                None,
-                f"what varies, as {HOW}; or dist what is uncertain, as key=normal(mean,deviation)",
-                "must say",
-            )
-        given = axes_of(vary)
-    else:
-        must = "is for values in a grid, dist for a sample: leave one of the two out"
-        _refuse(must, vary=vary, together=together)
+        refused = {"sample": sample, "n": n, "seed": seed, "indices": indices, "tornado": tornado}
+        must = "is for uncertain inputs: say them with dist"
+    for name, value in refused.items():
+        if value:
+            raise InvalidParameter(name, value, must)
+    design = None
+    if dist is not None:
         design = design_of(dist, sample, n, seed=seed, indices=indices, tornado=tornado)
-        given = design.axes
-        if band_steps is not None and not bands:
-            raise InvalidParameter("band_steps", band_steps, "is for bands: say which curves")
-        if bands and sample is None:
-            raise InvalidParameter(
-                "bands", bands, "need a sample: give sample, sobol or lhs, and n"
-            )
+        word, axes, points = "dist", design.axes, design.points
+    elif vary is not None:
+        word, axes = "vary", axes_of(vary)
+        points = points_of(axes, together)
+    else:
+        what = f"what varies, as {HOW}; or dist what is uncertain, as key=normal(mean,deviation)"
+        raise InvalidParameter("vary", None, what, "must say")
     path = find_scenario(scenario)
-    word = "vary" if design is None else "dist"
-    _check_keys(given, changes or {}, path, word)
-    points = points_of(given, together) if design is None else design.points
+    _check_keys(axes, changes or {}, path, word)
     fixed = read_scenario(path, changes)
-    axes = tuple(given)
     runs = [
-        Run(
-            number=i,
-            changes={axis.key: text_of(value) for axis, value in zip(axes, point, strict=True)},
-            recorded=design is not None and bool(bands) and design.parts[i] in DRAWN,
-        )
+        Run(i, {axis.key: text_of(value) for axis, value in zip(axes, point, strict=True)})
         for i, point in enumerate(points)
     ]
-    if design is not None:
-        _check_medians(design, fixed, path)
     digests, names = _check_runs(runs, fixed, path, design)
     probe, built = _build_one(runs, fixed, path)
     figures = sweep_figures(built)
@@ -144,20 +110,9 @@ def plan_sweep(
                 axis.key,
                 "is what a column of figures is called: give each routine a figure of its own",
             )
-    recorded = sum(run.recorded for run in runs)
-    curves = curves_of(built, bands, band_steps, recorded)
     shipped = path == shipped_scenarios().get(path.stem)
     files, used = digest_files(path.parent, names), versions()
-    varied = [[axis.key, list(axis.values)] for axis in axes]
-    head: dict[str, object] = {
-        "scenario": path.stem,
-        "settings": digest_settings(fixed),
-        "vary": varied if design is None else dict(design.description),
-        "together": together,
-        "verdicts": verdicts,
-        "files": files,
-        "versions": used,
-    } | ({} if curves is None else {"bands": [list(curves.names), curves.steps]})
+    head = {"scenario": path.stem, "verdicts": verdicts, "files": files, "versions": used}
     job = Job(
         name=path.stem if shipped else str(path.absolute()),
         shipped=shipped,
@@ -166,23 +121,10 @@ def plan_sweep(
         verdicts=verdicts,
         files=files,
         versions=used,
-        token=digest([str(path.absolute()), head]),
-        curves=curves,
+        token=digest([str(path.absolute()), head, digests]),
     )
     units = _units(axes, runs, fixed, built)
     return Plan(axes, points, runs, digests, tuple(figures), job, head, design, units)
-
-
-def _refuse(must: str, **given: object) -> None:
-    for name, value in given.items():
-        if value:
-            raise InvalidParameter(name, value, must)
-
-
-def _check_medians(design: Design, scenario: Scenario, path: Path) -> None:
-    """Refuse a key that no scenario has, or that takes no number, by its own sentence."""
-    medians = {key: one.quantile(np.array([0.5]))[0] for key, one in design.dists.items()}
-    changed(scenario, Run(0, {key: repr(float(one)) for key, one in medians.items()}), path)
 
 
 def _check_runs(
@@ -193,7 +135,7 @@ def _check_runs(
     Raises
     ------
     ScenarioError
-        A value that no run may have.
+        A key that no scenario has, or a value that no run may have.
     InvalidParameter
         A distribution that reaches such values.
     """
@@ -203,25 +145,19 @@ def _check_runs(
         try:
             one = changed(scenario, run, path)
         except ScenarioError as fault:
-            if design is None:
-                raise
             faults.append(fault)
+            if design is None or len(faults) == len(runs):
+                raise
         else:
-            digests.append(digest_settings(one))
+            digests.append(digest(one.model_dump(mode="json")))
             names |= files_of(one)
     if faults:
-        advice = (
-            "take a distribution that does not reach it: lognormal(median,factor) is positive, "
-            "uniform(low,high) has two ends"
-        )
-        with contextlib.suppress(ScenarioError):
-            if type(look_up(scenario, faults[0].key, path).value) is int:
-                advice = "give whole numbers by vary, a distribution has others"
         raise InvalidParameter(
             "dist",
             len(faults),
             f"points of {len(runs)} have a value that is not allowed; the first: {faults[0]}; "
-            f"{advice}",
+            "take a distribution that does not reach it: lognormal(median,factor) is positive, "
+            "uniform(low,high) has two ends",
             f"does not fit: {len(faults)}",
         )
     return digests, names

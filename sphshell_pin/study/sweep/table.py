@@ -6,86 +6,83 @@ import contextlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.tables import write_parquet
-from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.errors import InvalidParameter, ResultError, SweepError
 from sphshell_pin.study.sweep.grid import Axis, Value
 from sphshell_pin.study.sweep.job import Outcome, need
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from sphshell_pin.study.sweep.plan import Plan
+
 Columns = dict[str, NDArray[np.generic]]
 
-PARQUET = (".parquet", ".pq")
-HDF5 = (".h5", ".hdf5")
-DATASET = "sweep"
-"""Name of the dataset in an HDF5 file, and of the description in either kind of file."""
-
-
+HEAD = "sweep"
+"""Name of the description of the sweep among the attrs of its table."""
 _ATTRS = "PANDAS_ATTRS"  # where pandas looks for them
-
 DESIGN = "design"
 """The column that says what each run of a sampled sweep is for."""
-
-
-def check_suffix(path: Path) -> None:
-    """Refuse a file whose kind is not known, and one that an optional package is missing for.
-
-    Raises
-    ------
-    InvalidParameter, MissingExtra
-    """
-    suffix = path.suffix.lower()
-    if suffix not in PARQUET + HDF5:
-        raise InvalidParameter("out", str(path), "must end in .parquet or .h5")
-    need("pyarrow" if suffix in PARQUET else "h5py")
+_MUST_AGREE = {
+    "scenario": "another scenario",
+    "files": "other contents of the files",
+    "versions": "other versions of the libraries",
+    "verdicts": "other columns (--verdicts)",
+}
 
 
 def check_place(path: Path) -> None:
-    """Refuse a folder, and a file that no sweep wrote: a table would take its place.
+    """Make the folder of a table, and prove that the table can be written and read.
 
     Raises
     ------
-    ResultError
+    InvalidParameter, MissingExtra, ResultError
     """
+    if path.suffix.lower() != ".parquet":
+        raise InvalidParameter("out", str(path), "must end in .parquet")
+    need("pyarrow")
     if path.is_dir():
         raise ResultError(path, "is a folder: give another --out")
-    if path.is_file() and path.stat().st_size and not _is_table(path):
-        raise ResultError(path, "is a file that no sweep wrote: give another --out, or delete it")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        (path.parent / f".{path.name}.try").touch()
+        (path.parent / f".{path.name}.try").unlink()
+    except OSError as fault:
+        why = f"the folder cannot be written: {fault.strerror}; give another with --out"
+        raise ResultError(path.parent, why) from None
 
 
-def columns_of(
-    axes: Sequence[Axis],
-    points: Sequence[tuple[Value, ...]],
-    digests: Sequence[str],
-    outcomes: Mapping[int, Outcome],
-    figures: Sequence[str],
-    design: Sequence[str] = (),
-) -> Columns:
-    """Return the columns of the table by name, each (n,) for n runs.
+def table_of(plan: Plan, outcomes: Mapping[int, Outcome]) -> pd.DataFrame:
+    """Return the table of the runs that have an outcome, their numbers in order.
 
-    They are `run`, the varied keys, `status`, `error`, `design` if it is given, the figures
-    (float64; NaN where a run has none), and `settings`, the digest of the run's settings. Columns
-    of `figures` come first, then those that only some runs have (where robots or contacts vary).
+    Its columns are `run`, the varied keys, `status`, `error`, `design` of a sample, the figures
+    (float64; NaN where a run has none; those that only some runs have, where robots or contacts
+    vary, come last), and `settings`, the digest of the run's settings.
     """
-    rows = [outcomes[i] for i in range(len(points))]
-    names = list(dict.fromkeys([*figures, *(name for row in rows for name in row.figures)]))
-    columns: Columns = {"run": np.arange(len(points), dtype=np.int64)}
-    columns |= varied_columns(axes, points)
+    numbers = sorted(outcomes)
+    rows = [outcomes[i] for i in numbers]
+    others = {name for row in rows for name in row.figures} - set(plan.figures)
+    columns: Columns = {"run": np.array(numbers, dtype=np.int64)}
+    columns |= {
+        name: values[numbers] for name, values in varied_columns(plan.axes, plan.points).items()
+    }
     columns["status"] = _texts([row.status for row in rows])
     columns["error"] = _texts([row.error for row in rows])
-    if design:
-        columns[DESIGN] = _texts(design)
-    for name in names:
+    if plan.design is not None:
+        columns[DESIGN] = _texts([plan.design.parts[i] for i in numbers])
+    for name in (*plan.figures, *sorted(others)):
         columns[name] = np.array([row.figures.get(name, np.nan) for row in rows], dtype=np.float64)
-    columns["settings"] = _texts(digests)
-    return columns
+    columns["settings"] = _texts([plan.digests[i] for i in numbers])
+    frame: pd.DataFrame = need("pandas").DataFrame(columns)
+    frame.attrs["units"] = {name: one for name, one in plan.units.items() if name in columns}
+    frame.attrs[HEAD] = dict(plan.head)
+    return frame
 
 
 def varied_columns(axes: Sequence[Axis], points: Sequence[tuple[Value, ...]]) -> Columns:
@@ -99,6 +96,12 @@ def varied_keys(table: pd.DataFrame) -> list[str]:
     return names[1 : names.index("status")]
 
 
+def figures_of(table: pd.DataFrame) -> list[str]:
+    """Return the figures of a table."""
+    names = [str(name) for name in table.columns]
+    return [name for name in names[names.index("error") + 1 :] if name not in (DESIGN, "settings")]
+
+
 def main_figures(figures: Iterable[str]) -> list[str]:
     """Return those of `figures` that are shown first: the scenario's own, then the peak forces."""
     names = [str(name) for name in figures]
@@ -106,77 +109,56 @@ def main_figures(figures: Iterable[str]) -> list[str]:
     return own + [name for name in names if name.endswith(".peak_force")]
 
 
-def frame_of(columns: Columns, units: Mapping[str, str] | None = None) -> pd.DataFrame:
-    """Return the table as a pandas.DataFrame; the `units` of columns are its attrs["units"]."""
-    frame: pd.DataFrame = need("pandas").DataFrame(columns)
-    if units:
-        frame.attrs["units"] = {name: unit for name, unit in units.items() if name in columns}
-    return frame
-
-
-def write_table(
-    path: Path,
-    columns: Columns,
-    description: Mapping[str, object],
-    units: Mapping[str, str] | None = None,
-) -> None:
-    """Write the table to `path`, Parquet or HDF5 by its suffix, in place of an earlier one.
-
-    pandas reads the `units` of a Parquet file as attrs["units"].
-
-    The same columns and description give the same bytes.
+def write_table(path: Path, table: pd.DataFrame) -> None:
+    """Write the table to `path` in place of an earlier one; the same table gives the same bytes.
 
     Raises
     ------
     ResultError
         It cannot be written; an earlier table stays as it was.
     """
-    text = json.dumps(description, sort_keys=True)
-    known = {name: unit for name, unit in sorted((units or {}).items()) if name in columns}
+    columns = {str(name): table[name].to_numpy() for name in table.columns}
     try:
         with atomic_file(path) as file:
-            if path.suffix.lower() in PARQUET:
-                about = {_ATTRS: json.dumps({"units": known})} if known else {}
-                write_parquet(file, columns, {DATASET: text} | about)
-            else:
-                _write_hdf5(file, columns, text, known)
+            write_parquet(file, columns, {_ATTRS: json.dumps(table.attrs, sort_keys=True)})
     except OSError as fault:
         raise ResultError(path, f"cannot be written: {fault.strerror or fault}") from None
 
 
-def _is_table(path: Path) -> bool:
-    """Whether the file has the description that write_table leaves."""
+def read_outcomes(path: Path, head: Mapping[str, object]) -> dict[str, Outcome]:
+    """Return what the table at `path` holds, by the digests of the runs' settings.
+
+    Raises
+    ------
+    ResultError
+        It is no table of a sweep, or it is damaged.
+    SweepError
+        It is the table of a sweep that differs from `head`.
+    """
+    if not path.exists() or not path.stat().st_size:
+        return {}
     try:
-        if path.suffix.lower() in PARQUET:
-            return DATASET.encode() in (need("pyarrow.parquet").read_schema(path).metadata or {})
-        with need("h5py").File(path) as file:
-            return DATASET in file and "description" in file[DATASET].attrs
-    except (OSError, ValueError):  # pyarrow's faults are ValueErrors
-        return False
-
-
-def _write_hdf5(
-    file: IO[bytes], columns: Columns, description: str, units: Mapping[str, str]
-) -> None:
-    h5py = need("h5py")
-    # One array of records: a column's name may hold the slash that would make it a folder.
-    encoded: list[NDArray[np.generic]] = []
-    kinds = []
-    for values in columns.values():
-        if values.dtype == object:
-            # Texts have a fixed length: texts elsewhere in the file would leave gaps of unknown
-            # bytes.
-            encoded.append(np.array([one.encode() for one in values], dtype=np.bytes_))
-            kinds.append(h5py.string_dtype("utf-8", max(encoded[-1].dtype.itemsize, 1)))
-        else:
-            encoded.append(values)
-            kinds.append(values.dtype)
-    records = np.rec.fromarrays(encoded, dtype=list(zip(columns, kinds, strict=True)))
-    with h5py.File(file, "w") as table:
-        dataset = table.create_dataset(DATASET, data=records, track_times=False)
-        dataset.attrs["description"] = description
-        if units:
-            dataset.attrs["units"] = json.dumps(units)
+        table = need("pandas").read_parquet(path, page_checksum_verification=True)
+        pairs = [(table.attrs[HEAD][name], head[name]) for name in _MUST_AGREE]
+        names = figures_of(table)
+        figures = table[names].to_numpy(float)
+        rows = table[["run", "status", "error", "settings"]].itertuples(index=False)
+        found = {
+            settings: Outcome(number, status, error, dict(zip(names, own, strict=True)))
+            for (number, status, error, settings), own in zip(rows, figures.tolist(), strict=True)
+        }
+    except (OSError, ValueError, KeyError, TypeError):  # pyarrow's faults are ValueErrors
+        why = "is a file that no sweep wrote, or a damaged one: give another --out, or delete it"
+        raise ResultError(path, why) from None
+    for words, (old, new) in zip(_MUST_AGREE.values(), pairs, strict=True):
+        # A file that only one of the two names does not matter to the runs of both.
+        both = isinstance(old, dict) and isinstance(new, dict)
+        if (old | new != new | old) if both else old != new:
+            raise SweepError(
+                f"{path} is the table of a sweep with {words}: delete it to start again, or give "
+                "another --out"
+            )
+    return found
 
 
 def _varied(values: Sequence[Value]) -> NDArray[np.generic]:

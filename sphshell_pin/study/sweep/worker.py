@@ -1,9 +1,9 @@
 """What happens in a worker: the scenario is built once, then changed and run again and again."""
 
 import os
-import socket
+import platform
+import signal
 import threading
-import time
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -59,16 +59,9 @@ def changed(scenario: Scenario, run: Run, path: Path) -> Scenario:
     return found
 
 
-def prepare(job: Job) -> None:
-    """Make this process ready for the runs of `job`.
-
-    Raises
-    ------
-    SweepError
-        It cannot run them: other versions, other files, a scenario that cannot be built here.
-    """
-    with _turn:
-        _prepare(job)
+def dask_setup(_: object) -> None:
+    """Let a worker that this sweep starts, by Dask's name for such a hook, not end by Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def run_one(job: Job, run: Run) -> Outcome:
@@ -81,26 +74,29 @@ def run_one(job: Job, run: Run) -> Outcome:
     """
     with _turn:
         if job.token not in _built:
-            _prepare(job)
-        start = time.perf_counter()
-        outcome = _try_run(job, run)
-        return replace(outcome, wall_time=time.perf_counter() - start, worker=_here())
+            prepare(job)
+        return _try_run(job, run)
 
 
-def _prepare(job: Job) -> None:
-    here = versions()
+def prepare(job: Job) -> None:
+    """Make this process ready for the runs of `job`.
+
+    Raises
+    ------
+    SweepError
+        It cannot run them: other versions, other files, a scenario that cannot be built here.
+    """
+    here, this = versions(), f"worker {platform.node()}:{os.getpid()}"
     other = [f"{name} {here[name]}" for name in here if here[name] != job.versions[name]]
     if other:
         wanted = ", ".join(f"{name} {version}" for name, version in job.versions.items())
-        raise SweepError(
-            f"worker {_here()} has {', '.join(other)}; the sweep was started with {wanted}"
-        )
+        raise SweepError(f"{this} has {', '.join(other)}; the sweep was started with {wanted}")
     try:
         path = job.path
         for name, digest in digest_files(path.parent, job.files).items():
             if digest != job.files[name]:
                 have = "no" if digest == "absent" else "another"
-                raise SweepError(f"worker {_here()} has {have} file {path.parent / name}")
+                raise SweepError(f"{this} has {have} file {path.parent / name}")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             built = build_scenario(changed(job.scenario, job.sample, path), path)
@@ -108,9 +104,7 @@ def _prepare(job: Job) -> None:
         raise
     except Exception as fault:
         # Most faults cannot be sent from one process to another; their sentence can.
-        raise SweepError(
-            f"worker {_here()} cannot build the scenario: {_sentence(fault)}"
-        ) from None
+        raise SweepError(f"{this} cannot build the scenario: {_sentence(fault)}") from None
     _built.clear()
     _built[job.token] = built
 
@@ -135,10 +129,7 @@ def _try_run(job: Job, run: Run) -> Outcome:
     if stopped is not None:
         return Outcome(run.number, FAILED, _sentence(stopped, path), {})
     status, error, figures = _measure(job, built, result)
-    curves = b""
-    if job.curves is not None and run.recorded and status == DONE:
-        curves = job.curves.of(built, result)
-    return Outcome(run.number, status, error, figures, curves=curves)
+    return Outcome(run.number, status, error, figures)
 
 
 def _measure(job: Job, built: Built, result: Result) -> tuple[str, str, dict[str, float]]:
@@ -167,7 +158,3 @@ def _sentence(fault: BaseException, path: Path | None = None) -> str:
     if not isinstance(fault, SphshellError):
         text = f"{type(fault).__name__}: {text}"
     return ", ".join([" ".join(text.split()), *getattr(fault, "__notes__", ())])
-
-
-def _here() -> str:
-    return f"{socket.gethostname()}:{os.getpid()}"

@@ -50,6 +50,7 @@ def greeting(player: Player, picture: str | None, offer: Json) -> Json:
         ],
         "start": player.start,
         "duration": player.duration,
+        "planned": player.planned,
         "speeds": [SLOWEST, FASTEST],
         "window": STRIP_SECONDS,
         "picture": picture,

@@ -76,6 +76,10 @@ class Player(Protocol):
         """Length of a replay [s]; None where it has no end."""
 
     @property
+    def planned(self) -> float | None:
+        """Length of the motion that the scenario states [s]; None of a replay."""
+
+    @property
     def ended(self) -> str | None:
         """Why it cannot go on, in one sentence; None while it can."""
 

@@ -17,6 +17,9 @@ constexpr double kOnAxis = 1e-12;
 constexpr int kMostRepeats = 20;
 // Faces that cross at less than this (sine) overlap as if it were this.
 constexpr double kLeastSlope = 1e-4;
+// A crossing of faces that are tangent at its end is followed from this share of the size beside
+// it: nearer, rounding decides where it goes.
+constexpr double kBesideEnd = 1e-7;
 
 }  // namespace
 
@@ -237,13 +240,13 @@ bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, S
     out.tangent = turn * joint.tangent_on_ruling(faces.shapes, out.point);
     return probe.pull(out.point).dot(out.tangent);
   };
-  // From an end, but where both faces are tangent: so near to that there is a direction.
+  // From an end, but where both faces are tangent: from so near to that there is a direction.
+  const double beside = std::clamp(kBesideEnd * shell.size() / (q - p).norm(), 1e-6, 0.1);
   const auto from_end = [&](const Vec3& x) {
-    return joint.ends_tangent && !(joint.at(faces.shapes, x).sine > kLeastAngle) ? 1e-6 : 0;
+    return joint.ends_tangent && !(joint.at(faces.shapes, x).sine > kLeastAngle) ? beside : 0;
   };
   const double least = from_end(p), most = 1 - from_end(q);
-  // Regions of features overlap by this: no center is between two of them.
-  const double gap = surface.gap(), t = std::clamp(out.t, least, most), middle = pull(t);
+  const double t = std::clamp(out.t, least, most), middle = pull(t);
   const bool ahead = middle > 0;
   const double end = ahead ? most : least;
   // The first rest that way: in steps that double, as there may be several.
@@ -254,9 +257,18 @@ bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, S
     next = pull(to);
   }
   if (next != 0 && (next > 0) == ahead) {
-    // Within it the point is still the side's own.
-    out.t = std::clamp(out.t, 1e-6, 1 - 1e-6);
-    if (std::abs(next) >= gap) out.t = ahead ? 1 : 0, out.point = ahead ? q : p;
+    // From there to the vertex the curve is straight. Regions of features overlap by the gap: no
+    // center is between two of them.
+    const Vec3 &x = ahead ? q : p, d = out.point - x;
+    const double back = end == 0 || end == 1 ? 0.0 : probe.pull(x).dot(d) / d.norm();
+    if (std::abs(next) < surface.gap()) {
+      out.t = std::clamp(out.t, 1e-6, 1 - 1e-6);
+    } else if (back > 0) {
+      out.point = x + std::min(back / d.norm(), 1.0) * d;
+      out.tangent = ahead ? Vec3(-d) : d;
+    } else {
+      out.t = ahead ? 1 : 0, out.point = x;
+    }
   } else if (ahead && next < 0) {
     find_rest(pull, from, to, last, next);
   } else if (next > 0) {

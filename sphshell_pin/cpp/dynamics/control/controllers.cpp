@@ -33,18 +33,20 @@ class JointPd : public Controller {
         q_ref_(fields.vector("q_ref")),
         actuated_(fields.vector("actuated")),
         error_(VectorX::Zero(kd_.size())),
-        gravity_(fields.number("gravity") != 0) {}
+        gravity_(fields.number("gravity") != 0),
+        friction_(fields.number("friction_compensation") != 0) {}
 
   void torque(SceneData& scene, double, const VectorX& q, const VectorX& v, VectorX& tau) override {
     scene.body().difference(q, q_ref_, error_);
     tau = kp_.cwiseProduct(error_) - kd_.cwiseProduct(v);
     if (gravity_) tau += scene.body().gravity(q);
     tau.array() *= actuated_.array();
+    if (friction_) scene.joints().compensate(v, actuated_, tau);
   }
 
  private:
   VectorX kp_, kd_, q_ref_, actuated_, error_;
-  bool gravity_;
+  bool gravity_, friction_;
 };
 
 // Parameters of CartesianImpedance; units as in dynamics/control/impedance.py.
@@ -64,7 +66,8 @@ struct ImpedanceSettings {
         joint_damping(f.vector("joint_damping")),
         q_ref(f.vector("q_ref")),
         actuated(f.vector("actuated")),
-        decoupled(f.number("decoupled") != 0) {}
+        decoupled(f.number("decoupled") != 0),
+        friction_compensation(f.number("friction_compensation") != 0) {}
 
   int joint, path_joint;                            // that carry the controlled frame, and the path
   SE3 frame, path_placement;                        // in those joints
@@ -73,7 +76,8 @@ struct ImpedanceSettings {
   double force_rise;                                // time in which that comes on [s]
   double rotational_stiffness, rotational_damping;  // [N m], [N m s]
   VectorX posture_stiffness, joint_damping, q_ref, actuated;
-  bool decoupled;  // the inertia of the robot does not disturb the frame
+  bool decoupled;              // the inertia of the robot does not disturb the frame
+  bool friction_compensation;  // motors make up for damping and dry friction of the joints
 };
 
 // In the path's frame.
@@ -179,6 +183,7 @@ void CartesianImpedance::torque(SceneData& scene, double t, const VectorX& q, co
   opposed.angular() =
       -(joint.rotation().transpose() * moment) - s_.frame.translation().cross(local);
   tau = (body.bias(q, v, opposed_) + aside_).cwiseProduct(s_.actuated);
+  if (s_.friction_compensation) scene.joints().compensate(v, s_.actuated, tau);
 }
 
 // In the frame: Lambda (a_d - Jdot v - J M^-1 tau), with tau what acts aside of F. Of a carrier

@@ -37,7 +37,7 @@ void ImplicitStepper::begin(Chart& chart) {
 void ImplicitStepper::linearize_torques(Chart& chart) {
   const State& from = chart.origin();
   Multibody& body = chart.scene().body();
-  torque_by_state_.resize(nv_, 2 * nv_);
+  torque_by_state_.setZero(nv_, 2 * nv_ + nz_);
   u_.setZero(nv_);
   q_.resize(from.q.size());
   for (int k = 0; k < nv_; ++k) {
@@ -56,7 +56,16 @@ void ImplicitStepper::linearize_torques(Chart& chart) {
     v_[k] = from.v[k];
   }
   body.kinematics(from.q, from.v);
-  rates_.topLeftCorner(nv_, 2 * nv_).noalias() += linearization_.inverse_mass() * torque_by_state_;
+  // Compensated friction of joints follows the stretches of its springs.
+  JointForces& joints = chart.scene().joints();
+  for (int i = 0; i < joints.size(); ++i) {
+    const double stretch = joints.stretch(i), change = 1e-3 * kDifference;
+    joints.stretch(i) += change;
+    torque_by_state_.col(2 * nv_ + chart.scene().joint_bristles() + i) =
+        (chart.torques().torque(from.t, from.q, from.v) - torque_) / change;
+    joints.stretch(i) = stretch;
+  }
+  rates_.topRows(nv_).noalias() += linearization_.inverse_mass() * torque_by_state_;
 }
 
 void ImplicitStepper::add_time(Chart& chart) {

@@ -14,12 +14,14 @@ JointForces::JointForces(Effects effects, int nv)
   if (!act_) return;
   torque_.setZero(nv);
   rates_.setZero(static_cast<Eigen::Index>(effects_->friction.size()));
+  stretches_ = rates_;
   stops_.resize(effects_->stops.size());
 }
 
 void JointForces::evaluate(const VectorX& q, const VectorX& v, const VectorRef& z,
                            double relaxation) {
   powers_ = Powers();
+  stretches_ = z;
   torque_.setZero();
   if (effects_->damping.size() > 0) {
     // Viscous damping, -d v, and the power v d v that it takes.
@@ -46,11 +48,21 @@ void JointForces::evaluate(const VectorX& q, const VectorX& v, const VectorRef& 
     const DryFriction& dry = effects_->friction[i];
     // As BristleFriction::add() in one dimension, with the projection on [-limit, limit].
     const double speed = v[dry.v], x = z[i], held = dry.clamped(dry.stiffness * x);
-    const double force = -dry.clamped(dry.stiffness * x + dry.damping * speed);
+    const double force = -dry.held(x, speed);
     torque_[dry.v] += force;
     rates_[i] = speed - (x - held / dry.stiffness) / std::max(dry.relaxation, relaxation);
     powers_.friction -= force * speed;
     powers_.bristles += 0.5 * held * held / dry.stiffness;
+  }
+}
+
+void JointForces::compensate(const VectorX& v, const VectorX& driven, VectorX& tau) const {
+  if (!act_) return;
+  if (effects_->damping.size() > 0)
+    tau.array() += (driven.array() * effects_->damping.array()) * v.array();
+  for (Eigen::Index i = 0; i < stretches_.size(); ++i) {
+    const DryFriction& dry = effects_->friction[i];
+    tau[dry.v] += driven[dry.v] * dry.held(stretches_[i], v[dry.v]);
   }
 }
 

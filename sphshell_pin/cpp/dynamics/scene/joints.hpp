@@ -36,6 +36,8 @@ struct DryFriction {
   double relaxation;                 // time in which the spring gives way beyond its limit [s]
 
   double clamped(double x) const { return std::clamp(x, -limit, limit); }
+  // What the spring holds at a stretch x and a speed; friction is its opposite.
+  double held(double x, double speed) const { return clamped(stiffness * x + damping * speed); }
 };
 
 // The constant description, shared by all states of a scene: what acts in the joints, and the
@@ -79,6 +81,10 @@ class JointForces {
   const Powers& powers() const { return powers_; }
   const VectorX& rates() const { return rates_; }
   const std::vector<TouchState>& stops() const { return stops_; }
+  // Adds to tau what makes up for damping and dry friction at velocities v of `driven` joints (1,
+  // else 0), with the stretches of the last evaluate(), or of stretch().
+  void compensate(const VectorX& v, const VectorX& driven, VectorX& tau) const;
+  double& stretch(int i) { return stretches_[i]; }
   // tau with the torques of the last evaluate().
   const VectorX& added(const VectorX& tau);
 
@@ -93,7 +99,7 @@ class JointForces {
  private:
   Effects effects_;
   bool act_;
-  VectorX torque_, rates_, sum_;
+  VectorX torque_, rates_, sum_, stretches_;
   Powers powers_;
   std::vector<TouchState> stops_;
 };

@@ -156,6 +156,7 @@ class SceneData {
   const std::vector<Pair>& pairs() const { return pairs_; }
   const std::vector<Cluster>& clusters() const { return clusters_; }
   const JointForces& joints() const { return joints_; }
+  JointForces& joints() { return joints_; }
   Multibody& body() { return body_; }
   const Multibody& body() const { return body_; }
 

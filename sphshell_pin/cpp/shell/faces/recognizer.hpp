@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <vector>
 
 #include "shell/faces/recognition.hpp"
@@ -93,7 +94,12 @@ class Recognizer {
   void absorb(int face);
 
   // steps.cpp
-  double widest_step(const Growth& growth);
+  // The widest regular step of a face [rad], and by the region beyond that of oblique ends.
+  struct Steps {
+    double equal;
+    std::map<int, double> before;
+  };
+  Steps widest_steps(const Growth& growth);
   double slack(const Growth& growth, double step) const;
   void leave_wide_bands_out(Growth& growth);
 

@@ -1,6 +1,6 @@
 #include "shell/faces/snapping.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 
@@ -11,30 +11,55 @@ namespace sphshell {
 namespace {
 
 constexpr int kMostSnaps = 8;
+// Faces are tangent that come as near as this to each other, over the size.
+constexpr double kTouch = 1e-14;
+// Vertices stay that are nearer to their faces than what those may be off, or than this share of
+// the tolerance.
+constexpr double kLeastSnap = 1e-3;
 // Curves are settled on faces in so many rounds, by at most this share of their chord.
 constexpr int kMostSettlings = 3;
 constexpr double kMostSettled = 0.02;
 // A triangle may turn by 25 degrees (cosine): beyond that, its height is of the rounding.
 constexpr double kLeastAlike = 0.9;
 
-// Moves x onto all shapes by Newton's method, each along what earlier ones leave free: those that
-// are tangent to earlier ones are left out. False if it goes farther than `tolerance`.
-bool onto_all(const std::vector<Primitive>& shapes, const std::vector<int>& faces, double tolerance,
-              Vec3& x) {
+// Moves x onto all shapes by Newton's method, each along what earlier ones leave free. False if it
+// goes farther than `tolerance`. A shape that is tangent to an earlier one, to rounding at `size`,
+// leaves open where on it x is: where both have one normal.
+bool onto_all(const std::vector<Primitive>& shapes, const std::vector<int>& faces, double size,
+              double tolerance, Vec3& x) {
   const Vec3 before = x;
   for (int i = 0; i < kMostSnaps; ++i) {
     // Gram-Schmidt on the normals: at most three faces determine a point.
     Vec3 step = Vec3::Zero(), free[3];
     int count = 0;
-    for (const int f : faces) {
-      Vec3 n;
-      const double off = shapes[f].distance(x, n) + n.dot(step);
+    const auto move_along = [&](const Vec3& n, double off) {
       Vec3 along = n;
       for (int k = 0; k < count; ++k) along -= along.dot(free[k]) * free[k];
       const double sine = along.norm();
-      if (count == 3 || !(sine > kLeastAngle)) continue;
-      free[count] = along / sine;
-      step -= off / sine * free[count++];
+      if (count == 3 || !(sine > kLeastAngle)) return false;
+      step -= (off + n.dot(step)) / sine * (free[count++] = along / sine);
+      return true;
+    };
+    for (const int f : faces) {
+      Vec3 n, m;
+      const double off = shapes[f].distance(x, n);
+      if (move_along(n, off)) continue;
+      for (const int g : faces) {
+        if (g == f) break;
+        const double other = shapes[g].distance(x, m);
+        if (!(n.cross(m).norm() < kLeastAngle)) continue;
+        const double sign = n.dot(m) < 0 ? -1 : 1;
+        // Across their border both turn apart most.
+        const Eigen::SelfAdjointEigenSolver<Mat3> turn(
+            Mat3(shapes[f].hessian(x) - sign * shapes[g].hessian(x)));
+        const int most = -turn.eigenvalues()[0] > turn.eigenvalues()[2] ? 0 : 2;
+        const double bend = turn.eigenvalues()[most];
+        const Vec3 across = turn.eigenvectors().col(most);
+        const double aside = across.dot(n - sign * m) / bend;
+        if (std::abs(off - sign * other - bend / 2 * aside * aside) <= kTouch * size)
+          move_along(across, aside);
+        break;
+      }
     }
     x += step;
     if (!((x - before).norm() <= tolerance)) return false;
@@ -105,12 +130,12 @@ std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, doubl
     // Planes first: they are exact, and the other faces give way.
     std::stable_partition(around[v].begin(), around[v].end(),
                           [&](int f) { return flat(faces.shapes[f]); });
-    if (onto_all(faces.shapes, around[v], tolerance, out[v])) continue;
+    if (onto_all(faces.shapes, around[v], shell.size(), tolerance, out[v])) continue;
     around[v].erase(std::find_if_not(around[v].begin(), around[v].end(),
                                      [&](int f) { return flat(faces.shapes[f]); }),
                     around[v].end());
     out[v] = before[v];
-    if (!onto_all(faces.shapes, around[v], tolerance, out[v])) out[v] = before[v];
+    if (!onto_all(faces.shapes, around[v], shell.size(), tolerance, out[v])) out[v] = before[v];
   }
   for (std::size_t v = 0; v < out.size(); ++v)
     any = any || (out[v] - before[v]).norm() > kMostGap * shell.size();

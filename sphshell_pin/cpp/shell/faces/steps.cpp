@@ -44,7 +44,7 @@ Place place_on(const Primitive& s, const Vec3& x) {
 double angle_from(double a, double b) { return std::abs(std::remainder(a - b, 2 * M_PI)); }
 
 // The step from one vertex to another along a parallel circle of a cylinder or cone, a circle of a
-// torus' tube, a great circle of a sphere [rad]; zero on a ruling, negative elsewhere.
+// torus' tube, a great circle of a sphere [rad]; zero on a ruling, negative where it is oblique.
 double step_between(const Primitive& s, const Vec3& x, const Vec3& y, double tolerance) {
   if (s.kind == FaceKind::Sphere)
     return 2 * std::asin(std::min((x - y).norm() / (2 * s.radius), 1.0));
@@ -53,7 +53,7 @@ double step_between(const Primitive& s, const Vec3& x, const Vec3& y, double tol
   if (s.kind == FaceKind::Torus)
     return around * a.off < tolerance ? angle_from(a.across, b.across) : 0;
   if (std::abs(a.across - b.across) < tolerance) return around;
-  return around * a.off < tolerance ? 0 : -1;
+  return around * a.off < tolerance ? 0 : -around;
 }
 
 // The angle between the two rulings that a region lies between, on a torus between two circles
@@ -80,15 +80,17 @@ double width_between(const Primitive& s, const std::vector<Vec3>& points) {
 
 // A round face is sampled in equal steps: the last one can be shorter, never longer. Steps are
 // those that another of the same width follows. The result is infinite where few do.
-double Recognizer::widest_step(const Growth& growth) {
+// An oblique cut is sampled in unequal ones: n of them leave open whether n - 1 would have done,
+// and the widest may differ as much again from the wide ones as those from the others.
+Recognizer::Steps Recognizer::widest_steps(const Growth& growth) {
   struct Chord {
     int ends[2];
     double step;
     bool regular;
   };
   std::vector<Chord> chords;
-  std::vector<std::pair<int, int>> at;  // vertex, chord
-  std::size_t oblique = 0;
+  std::vector<std::pair<int, int>> at;          // vertex, chord
+  std::vector<std::pair<int, double>> oblique;  // region beyond, step
   for (const int t : growth.triangles)
     for (int k = 0; k < 3; ++k) {
       const int h = shell_.topology().other_half_edge(3 * t + k);
@@ -96,7 +98,8 @@ double Recognizer::widest_step(const Growth& growth) {
       if (u >= 0 && (regions_.of(u) == regions_.of(t) || (is_marked(u) && u < t))) continue;
       const int v = corners(t)[k], w = corners(t)[next_corner(k)];
       const double step = step_between(growth.shape, point(v), point(w), 2 * growth.window);
-      oblique += step < 0 && (u < 0 || !is_marked(u));
+      if (step < 0 && (u < 0 || !is_marked(u)))
+        oblique.push_back({u < 0 ? -1 : regions_.of(u), -step});
       if (step <= 0) continue;
       at.push_back({v, static_cast<int>(chords.size())});
       at.push_back({w, static_cast<int>(chords.size())});
@@ -117,13 +120,25 @@ double Recognizer::widest_step(const Growth& growth) {
           a.regular = b.regular = true;
       }
   }
+  Steps out{std::numeric_limits<double>::infinity(), {}};
   std::vector<double> steps;
   for (const Chord& chord : chords)
     if (chord.regular) steps.push_back(chord.step);
-  if (steps.empty() || double(steps.size()) < kLeastRegular * double(chords.size() + oblique))
-    return std::numeric_limits<double>::infinity();
-  const bool straight = growth.shape.kind <= FaceKind::Cone;
-  return quantile(std::move(steps), straight ? kMostRegular : 1);
+  const double all = double(chords.size() + oblique.size());
+  if (!steps.empty() && double(steps.size()) >= kLeastRegular * all) {
+    const bool straight = growth.shape.kind <= FaceKind::Cone;
+    out.equal = quantile(std::move(steps), straight ? kMostRegular : 1);
+    out.equal += slack(growth, out.equal);
+  }
+  std::sort(oblique.begin(), oblique.end());
+  for (std::size_t i = 0, end; i < oblique.size(); i = end) {
+    steps.clear();
+    for (end = i; end < oblique.size() && oblique[end].first == oblique[i].first; ++end)
+      steps.push_back(oblique[end].second);
+    const double n = double(steps.size()), wide = quantile(steps, kMostRegular);
+    if (n > 1) out.before[oblique[i].first] = wide * n / (n - 1) + wide - median(steps);
+  }
+  return out;
 }
 
 // How far two angles [rad] may be apart that are meant to be equal.
@@ -135,27 +150,45 @@ double Recognizer::slack(const Growth& growth, double step) const {
 
 // Flats are inscribed in a shaft or a ring as well, and belts in a ball: they are wider than the
 // steps of the face around them. Where the face ends with a band, in what is tangent to it there,
-// the band is part of the face.
+// the band is part of the face. So it is where the face goes on at an end of the band: a plane
+// meets a cylinder in rulings, as it meets a cone through its tip, or a torus in circles about the
+// axis.
 void Recognizer::leave_wide_bands_out(Growth& growth) {
   std::vector<int>& all = growth.triangles;
   mark(all);
   const Primitive& s = growth.shape;
-  const double step = widest_step(growth), most = step + slack(growth, step);
-  if (!(most < M_PI)) return;
+  const Steps steps = widest_steps(growth);
+  const double most = steps.equal;
+  if (!(most < M_PI) && steps.before.empty()) return;
   std::vector<int> some = all;
   some.insert(some.end(), growth.left_out.begin(), growth.left_out.end());
   std::sort(some.begin(), some.end(), [&](int a, int b) {
     return std::pair(regions_.of(a), a) < std::pair(regions_.of(b), b);
   });
-  const auto goes_on = [&](int t) {
-    for (int k = 0; k < 3; ++k) {
-      const int u = beside_[3 * t + k];
-      if (u < 0 || is_marked(u) || regions_.of(u) == regions_.of(t)) continue;
-      Vec3 n;
-      s.distance((point(corners(t)[k]) + point(corners(t)[next_corner(k)])) / 2, n);
-      if (std::abs(n.dot(facet_normal(u))) > kGoesOn) return true;
-    }
-    return false;
+  // By the ends of a band, from one of its rulings to the other; a whole ring has none.
+  const auto is_wide = [&](const std::vector<int>& members, double width) {
+    bool wide = false, ends = false;
+    for (const int t : members)
+      for (int k = 0; k < 3; ++k) {
+        const int h = shell_.topology().other_half_edge(3 * t + k), u = h < 0 ? -1 : triangle_of(h);
+        const int beyond = u < 0 ? -1 : regions_.of(u);
+        if (beyond == regions_.of(t)) continue;
+        const Vec3 &x = point(corners(t)[k]), &y = point(corners(t)[next_corner(k)]);
+        const double step = step_between(s, x, y, 2 * growth.window);
+        if (u >= 0 && is_marked(u)) {
+          if (step != 0) return false;
+          continue;
+        }
+        if (beside_[3 * t + k] >= 0) {
+          Vec3 n;
+          s.distance((x + y) / 2, n);
+          if (std::abs(n.dot(facet_normal(u))) > kGoesOn) return false;
+        }
+        ends = ends || step != 0;
+        const auto before = step < 0 ? steps.before.find(beyond) : steps.before.end();
+        wide = wide || step > most || (before != steps.before.end() && -step > before->second);
+      }
+    return wide || (!ends && width > most);
   };
   struct Band {
     int region;
@@ -174,9 +207,8 @@ void Recognizer::leave_wide_bands_out(Growth& growth) {
     for (const int v : vertices_of(members)) points.push_back(point(v));
     // One row of a torus may be wider than the others: only a ring that is plane is none of it.
     const std::size_t least = s.kind == FaceKind::Torus ? 5 : 4;
-    wide[region] =
-        s.kind == FaceKind::Sphere || (points.size() >= least && width_between(s, points) > most &&
-                                       std::none_of(members.begin(), members.end(), goes_on));
+    const double width = points.size() < least ? 0 : width_between(s, points);
+    wide[region] = s.kind == FaceKind::Sphere || (width > 0 && is_wide(members, width));
   }
   // In a ball a belt goes on beyond its rulings, which are its wide sides.
   const auto is_in_belt = [&](const Band& band) {

@@ -5,11 +5,15 @@ import { on, send } from "./connection.js";
 import { element, number, Slider } from "./controls.js";
 import { add_key } from "./keys.js";
 
-let running = null, scrubbed = -Infinity, speed = null;
+let running = null, scrubbed = -Infinity, speed = null, over = false;
 
 const toggle = () => running !== null && send({ type: "run", on: !running });
 const step = () => send({ type: "step", seconds: Number(element("step-size").value) });
-const reset = () => send({ type: "reset" });
+// Once what the scenario states is over, the same button shows it again.
+const reset = () => {
+  send({ type: "reset" });
+  if (over && !running) toggle();
+};
 
 element("run").onclick = toggle;
 element("step").onclick = step;
@@ -24,6 +28,10 @@ on("hello", (data) => {
     low: data.speeds[0], high: data.speeds[1], log: true, value: 1, output: element("speed-value"),
     tell: (value) => `${number(value, 3)} \u00d7`,
   }, (value) => send({ type: "speed", value: Math.abs(value - 1) < 0.03 ? 1 : value }));
+  on("state", ({ t }) => {
+    over = data.planned !== null && t - data.start >= data.planned;
+    element("reset").textContent = over ? "Repeat" : "Reset";
+  });
   if (data.duration === null) return;
   element("scrub").hidden = false;
   const scrubber = element("scrubber");

@@ -1,0 +1,335 @@
+"""Uncertain inputs: points, Sobol indices and tornados against closed forms, and their pictures."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from sphshell_pin import robots
+from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError
+from sphshell_pin.plot.uncertainty import plot_uncertainty
+from sphshell_pin.study.sweep import (
+    LogNormal,
+    Normal,
+    Uniform,
+    plan_sweep,
+    quantiles,
+    sobol_indices,
+    sweep,
+    tornado,
+)
+from sphshell_pin.study.sweep.distributions import distributions_of
+from sphshell_pin.study.sweep.grid import MOST_RUNS
+from sphshell_pin.study.sweep.sampling import design_of
+from tests.command import call
+from tests.study.resting import GRAVITY
+
+pd = pytest.importorskip("pandas")
+pytest.importorskip("pyarrow")
+pytest.importorskip("matplotlib")
+
+STIFFNESS, DAMPING = "contact.law.stiffness", "contact.law.damping"
+DIST = {STIFFNESS: "lognormal(1e5,1.5)", DAMPING: "uniform(1,5)"}
+
+# Ishigami's function: T. Ishigami and T. Homma, ISUMA 1990; variances V1, V2 and V13, all others
+# are zero.
+A, B = 7.0, 0.1
+ANGLES = dict.fromkeys(("x", "y", "z"), f"uniform({-np.pi!r},{np.pi!r})")
+V1 = 0.5 * (1 + B * np.pi**4 / 5) ** 2
+V2 = A**2 / 8
+V13 = B**2 * np.pi**8 * (1 / 18 - 1 / 50)
+FIRST = np.array([V1, V2, 0.0]) / (V1 + V2 + V13)
+TOTAL = np.array([V1 + V13, V2, V13]) / (V1 + V2 + V13)
+
+
+def ishigami(x, y, z):
+    return np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x)
+
+
+def table_of(design, values):
+    """Return the table of a design, as a sweep makes it, whose figure f has `values`."""
+    columns = {"run": range(len(values)), **{axis.key: axis.values for axis in design.axes}}
+    more = {"status": "done", "error": "", "design": design.parts, "f": values, "settings": ""}
+    return pd.DataFrame(columns | more)
+
+
+def ishigami_table(n, **design):
+    """Return the table of a sweep of n (d + 2) runs, with the function in place of a scenario."""
+    made = design_of(ANGLES, "sobol", n, indices=True, **design)
+    return table_of(made, ishigami(*made.values.T))
+
+
+def covers(found, kind, exact):
+    return (found[f"{kind}_low"] <= exact) & (exact <= found[f"{kind}_high"])
+
+
+def test_texts_are_distributions():
+    found = distributions_of(["a = normal(1e5, 2e3)", "b=Uniform(-1,2)", "c=lognormal(3,1.5)"])
+    assert found == {"a": Normal(1e5, 2e3), "b": Uniform(-1, 2), "c": LogNormal(3, 1.5)}
+    assert [*map(str, found.values())] == [
+        "normal(100000,2000)",
+        "uniform(-1,2)",
+        "lognormal(3,1.5)",
+    ]
+    assert distributions_of({"a": Normal(0, 1)}) == {"a": Normal(0, 1)}
+
+
+def test_quantiles_are_those_of_the_textbook():
+    # 0.8413... of a normal distribution lies below one deviation over the mean.
+    below = 0.5 * (1 + math.erf(math.sqrt(0.5)))
+    shares = np.array([1 - below, 0.5, below])
+    np.testing.assert_allclose(Normal(10, 2).quantile(shares), [8, 10, 12], rtol=1e-12)
+    np.testing.assert_allclose(Uniform(10, 12).quantile(shares), 10 + 2 * shares, rtol=1e-12)
+    np.testing.assert_allclose(LogNormal(6, 1.5).quantile(shares), [4, 6, 9], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("dist", "words"),
+    [
+        ({}, "must say what is uncertain"),
+        (["a"], "must be KEY=DISTRIBUTION, one of normal"),
+        (["a=normal"], r"must be one of normal\(mean,deviation\), uniform"),
+        (["a=gauss(1,2)"], "must be one of normal"),
+        (["a=normal(1;2)"], "must be one of normal"),
+        (["a=normal(1,-2)"], "deviation = -2.0 must be positive"),
+        (["a=uniform(2,1)"], "high = 1.0 must be more than low = 2"),
+        (["a=lognormal(12.2,0.4)"], "factor = 0.4 must be "),
+        (["a=normal(1,2)", "a=normal(1,3)"], "a' is given twice"),
+        (["a=uniform(-1e308,1e308)"], "not finite"),
+        ({"a": [1, 2]}, "must be one of normal"),
+        (3, "must map keys to distributions"),
+    ],
+)
+def test_wrong_distributions_are_told(dist, words):
+    with pytest.raises(InvalidParameter, match=words):
+        design_of(dist, "lhs", 8)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({}, "vary must say what varies, as .* or dist what is uncertain"),
+        ({"vary": ["a=1,2"], "sample": "lhs"}, "sample = 'lhs' is for uncertain inputs"),
+        ({"vary": ["a=1,2"], "dist": DIST}, "vary = .* is for values in a grid"),
+        ({"dist": DIST, "together": True}, "together = True is for values in a grid"),
+        ({"dist": DIST}, "sample must be given with dist"),
+        ({"dist": DIST, "n": 8, "tornado": True}, "sample must be given with dist"),
+        ({"dist": DIST, "sample": "soboll", "n": 8}, "must be sobol or lhs"),
+        ({"dist": DIST, "sample": "sobol"}, "n = None must be a whole number"),
+        ({"dist": DIST, "sample": "sobol", "n": 100}, "power of 2 .* such as 64 or 128"),
+        ({"dist": DIST, "sample": "lhs", "n": 8, "seed": -1}, "whole number, 0 or more"),
+        ({"dist": DIST, "sample": "lhs", "n": 8, "indices": True}, "indices need .* = sobol"),
+        ({"dist": DIST, "sample": "sobol", "n": 2**19, "indices": True}, f"{MOST_RUNS} at most"),
+        # Beyond the bounds: not cut off, not made a failed run, but told before anything runs.
+        (
+            {"dist": {STIFFNESS: "normal(1e5,6e4)"}, "sample": "lhs", "n": 64},
+            r"3 points of 64 have a value that is not allowed; the first: .*stiffness: should be "
+            r"greater than 0 \(given: -.*lognormal\(median,factor\) is positive",
+        ),
+        ({"dist": DIST | {"contact.ball-plate.law.stiffness": "uniform(1,2)"}, "tornado": True},
+         "dist = .* is given twice: leave one of the two out"),
+    ],
+)  # fmt: skip
+def test_arguments_that_do_not_go_together_are_told(scenario, arguments, words):
+    with pytest.raises(InvalidParameter, match=words):
+        plan_sweep(scenario, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("contact.law.stifness", "did you mean 'stiffness'"),
+        ("run.integrator", "run.integrator: should be a valid"),
+        ("contact.lw.k", "no item 'lw.k'"),
+    ],
+)
+def test_a_key_without_a_number_is_told(scenario, key, words):
+    with pytest.raises(ScenarioError, match=words):
+        plan_sweep(scenario, dist={key: "normal(1,2)"}, sample="lhs", n=64)
+
+
+@pytest.mark.parametrize("sample", ["sobol", "lhs"])
+def test_each_interval_of_equal_probability_has_one_point(sample):
+    dist = {"a": Normal(3, 2), "b": LogNormal(2, 3), "c": Uniform(-1, 1)}
+    found = design_of(dist, sample, 64).values.T
+    exact = [stats.norm(3, 2), stats.lognorm(math.log(3), scale=2), stats.uniform(-1, 2)]
+    for values, one in zip(found, exact, strict=True):
+        assert sorted((64 * one.cdf(values)).astype(int)) == list(range(64))
+    again, other = (design_of(dist, sample, 64, seed=seed).values.T for seed in (0, 1))
+    assert np.array_equal(again, found)
+    assert not np.any(other == found)
+
+
+def test_the_design_is_saltellis_and_the_tornado_moves_one_input_at_a_time():
+    design = design_of({"x": "uniform(0,1)", "y": "uniform(2,3)"}, "sobol", 16, indices=True)
+    assert design.parts == ("A", "B", "AB x", "AB y") * 16
+    a, b, x, y = (design.values[i::4] for i in range(4))
+    np.testing.assert_array_equal(x, np.column_stack([b[:, 0], a[:, 1]]))
+    np.testing.assert_array_equal(y, np.column_stack([a[:, 0], b[:, 1]]))
+    both = np.column_stack([a, b]) - [0, 2, 0, 2]
+    assert all(sorted((16 * one).astype(int)) == list(range(16)) for one in both.T)
+    design = design_of({"x": "uniform(0,1)", "y": "normal(2,1)"}, tornado=True)
+    assert design.parts == ("median", "5 % x", "95 % x", "5 % y", "95 % y")
+    z = 1.6448536269514722
+    expected = [[0.5, 2], [0.05, 2], [0.95, 2], [0.5, 2 - z], [0.5, 2 + z]]
+    np.testing.assert_allclose(design.values, expected, rtol=1e-12)
+
+
+def test_the_indices_of_ishigamis_function():
+    table = ishigami_table(8192)
+    found = sobol_indices(table, "f")
+    assert found.index.tolist() == ["x", "y", "z"]
+    for kind, exact in (("first", FIRST), ("total", TOTAL)):
+        np.testing.assert_allclose(found[kind], exact, rtol=0, atol=0.01)
+        assert covers(found, kind, exact).all()
+        assert (found[f"{kind}_high"] - found[f"{kind}_low"] < 0.1).all()
+    few = ishigami_table(64)
+    found = sobol_indices(few, "f")
+    assert sobol_indices(few.sample(frac=1, random_state=1), "f").equals(found)
+    narrow = sobol_indices(few, "f", confidence=0.5)
+    assert (narrow["total_low"] > found["total_low"]).all()
+    assert (narrow["total_high"] < found["total_high"]).all()
+
+
+@pytest.mark.study
+def test_intervals_cover_95_percent_where_the_points_are_random():
+    """The bootstrap takes the points for independent: with such points it must be right."""
+    rng, n, tables, hits = np.random.default_rng(5), 512, 300, []
+    design = design_of(ANGLES, "sobol", n, indices=True)
+    for _ in range(tables):
+        a, b = rng.uniform(-np.pi, np.pi, (2, n, 3))
+        swaps = [np.where(np.arange(3) == i, b, a) for i in range(3)]
+        values = ishigami(*np.stack([a, b, *swaps], axis=1).reshape(-1, 3).T)
+        found = sobol_indices(table_of(design, values), "f")
+        hits.append([covers(found, "first", FIRST), covers(found, "total", TOTAL)])
+    # As if the six intervals of a table all hit or missed together: 2.4 standard deviations.
+    assert abs(np.mean(hits) - 0.95) < 2.4 * np.sqrt(0.95 * 0.05 / tables)
+
+
+def test_a_step_function_of_one_input_and_the_order_of_a_tornado():
+    design = design_of({"x": "uniform(0,1)", "y": "uniform(0,1)"}, "sobol", 1024, indices=True)
+    found = sobol_indices(table_of(design, np.floor(4 * design.values[:, 0]).astype(int)), "f")
+    np.testing.assert_allclose(found[["first", "total"]].loc["x"], [1, 1], atol=0.02)
+    assert found.loc["y", ["first", "total", "first_low", "total_high"]].tolist() == [0, 0, 0, 0]
+    design = design_of(dict.fromkeys("ab", "uniform(0,1)") | {"c": "uniform(-1,1)"}, tornado=True)
+    a, b, c = design.values.T
+    found = tornado(table_of(design, a + 3 * b + 10 * c**2), "f")
+    assert found.index.tolist() == ["c", "b", "a"]
+    # Both ends of c lie on one side of its median.
+    np.testing.assert_allclose(found.loc["c"], [-0.9, 0.9, 2 + 8.1, 2, 2 + 8.1], rtol=1e-12)
+    np.testing.assert_allclose(found.loc["b"], [0.05, 0.95, 0.65, 2, 3.35], rtol=1e-12)
+
+
+def test_tables_that_have_no_such_answer_are_told():
+    table = ishigami_table(8)
+    alone = design_of(ANGLES, tornado=True)
+    moved = table_of(alone, ishigami(*alone.values.T))
+    constant = table.assign(f=0.3 * (1 + 1e-16 * np.arange(len(table))))  # but for rounding
+    holes, broken = table.copy(), moved.copy()
+    holes.loc[7, "f"] = np.inf
+    broken.loc[2, ["f", "error"]] = np.nan, "it broke"
+    for compute, words in (
+        (lambda: sobol_indices(table.iloc[1:], "f"), "table lacks rows"),
+        (lambda: tornado(table, "f"), "no runs for a tornado"),
+        (lambda: sobol_indices(table.drop(columns="design"), "f"), "no column 'design'"),
+        (lambda: sobol_indices(table, "f", confidence=95), "between 0 and 1"),
+        (lambda: sobol_indices(moved, "f"), "no runs for Sobol indices"),
+        (lambda: quantiles(moved), "no sample, only a tornado"),
+        (lambda: sobol_indices(constant, "f"), "'f' is 0.3 in all runs: without a variance"),
+        (lambda: sobol_indices(holes, "f"), r"1 of 40 runs \(AB x, run 7: it is inf\)"),
+        (lambda: tornado(broken, "f"), r"run 2: it broke\): a tornado of the others would be wr"),
+    ):
+        with pytest.raises(InvalidParameter, match=words):
+            compute()
+    with pytest.raises(NameNotFound, match="no figure 'g'; the table has: f"):
+        sobol_indices(table, "g")
+
+
+def depth_of(stiffness):
+    mass = robots.load("ball").model.inertias[1].mass
+    return (mass * GRAVITY / stiffness) ** (1 / 1.5)
+
+
+def test_a_sample_has_the_closed_form_of_rest_is_told_and_drawn(scenario):
+    # The depth falls with the stiffness, which alone decides it.
+    out = scenario.parent / "told.parquet"
+    options = [f"--dist={key}={one}" for key, one in DIST.items()]
+    options += ["--sample", "sobol", "--n", 32, "--indices", "--tornado", "--verdicts"]
+    told = call("sweep", scenario, *options, "--workers", 0, "--out", out)
+    assert told.exit_code == 0, told.output
+    table, words = pd.read_parquet(out), " ".join(told.output.split())
+    assert table.columns[:6].tolist() == ["run", STIFFNESS, DAMPING, "status", "error", "design"]
+    assert table["design"].value_counts().to_dict() == {
+        **dict.fromkeys(["A", "B", f"AB {STIFFNESS}", f"AB {DAMPING}"], 32),
+        **dict.fromkeys(["median", *(f"{i} % {key}" for key in DIST for i in (5, 95))], 1),
+    }
+    found = quantiles(table).loc["figures.depth"]
+    assert found["runs"] == 64
+    share = np.array([0.95, 0.75, 0.5, 0.25, 0.05])
+    expected = depth_of(LogNormal(1e5, 1.5).quantile(share))
+    np.testing.assert_allclose(found[[5, 25, 50, 75, 95]].to_numpy(float), expected, rtol=0.03)
+    moved = tornado(table, "figures.depth")
+    assert moved.index.tolist() == [STIFFNESS, DAMPING]
+    ends = depth_of(LogNormal(1e5, 1.5).quantile(np.array([0.05, 0.5, 0.95])))
+    np.testing.assert_allclose(moved.loc[STIFFNESS, ["low", "median", "high"]].tolist(), ends, 1e-8)
+    np.testing.assert_allclose(moved.loc[DAMPING, ["low", "high"]].tolist(), [ends[1]] * 2, 1e-4)
+    indices = sobol_indices(table, "figures.depth")
+    assert abs(indices.loc[DAMPING, ["first", "total"]]).max() < 1e-3
+    row = indices.loc[STIFFNESS]
+    assert row["first_low"] < 1 < row["first_high"]
+    for part in (
+        "resting: 133 runs, 133 done, 0 failed",
+        f"{STIFFNESS} lognormal(100000,1.5) 51328.2 100000 194825 N/m^1.5",
+        "figures.depth 0 % of the runs",
+        f"{STIFFNESS} {row['first']:.4f} {row['first_low']:.4f} to {row['first_high']:.4f}",
+        f"figures.depth is {moved['median'].iloc[0]:.6g} with all inputs at their medians",
+    ):
+        assert part in words
+    assert (scenario.parent / "told.figures.depth.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_failed_runs_are_left_out_of_quantiles_and_refused_by_indices(scenario):
+    # A radius above 24 mm starts deeper than its half.
+    dist = {"contact.sphere.radius": "normal(0.018,0.005)", STIFFNESS: "uniform(1e5,2e5)"}
+    table = sweep(scenario, dist=dist, sample="sobol", n=8, indices=True, workers=0)
+    failed = int((table[table["design"].isin(["A", "B"])]["status"] == "failed").sum())
+    assert 0 < failed < 8
+    assert quantiles(table).loc["figures.depth", "runs"] == 16 - failed
+    with pytest.raises(InvalidParameter, match=r"no finite value in .* of 32 runs \(.*starts at"):
+        sobol_indices(table, "figures.depth")
+
+
+@pytest.mark.parametrize(
+    "values", [[np.nan], [3.5, 3.5, np.nan], [1e300, -1e300, 0], list(range(10_000)), [1, 1, 2, 4]]
+)
+def test_the_histogram_counts_every_run_that_has_the_figure(values):
+    values = np.array(values, dtype=float)
+    (axis,) = plot_uncertainty("pairs.a-b.peak_force", values).axes
+    known = values[~np.isnan(values)]
+    assert sum(bar.get_height() for bar in axis.patches) == len(known)
+    assert len(axis.patches) <= 60
+    assert axis.get_xlabel() == "peak force [N]"
+    told = [one.get_text() for one in axis.texts]
+    assert told == ([] if len(known) else ["No run has this figure."])
+    drawn = [line.get_xdata()[0] for line in axis.lines]
+    assert drawn == ([*np.percentile(known, [5, 50, 95])] if len(known) else [])
+
+
+def test_bars_of_inputs_have_their_ends_and_intervals():
+    """Of many inputs the largest are drawn, from the top; a bar begins at the median, or at 0."""
+    keys = [f"key {i}" for i in range(30)]
+    ends = {"low_value": -1.0, "high_value": 1.0, "low": np.linspace(-2, 0.5, 30)}
+    moved = pd.DataFrame({**ends, "median": 1.0, "high": 3.0}, index=keys)
+    found = sobol_indices(ishigami_table(64), "f").sort_values("total", ascending=False)
+    left, right = plot_uncertainty("f", None, moved, found).axes
+    assert [label.get_text() for label in left.get_yticklabels()] == keys[:20]
+    assert np.all(np.diff(left.get_yticks()) < 0)
+    assert "(20 of 30)" in left.get_title()
+    assert {bar.get_x() for bar in left.patches} == {1.0}
+    drawn = [bar.get_x() + bar.get_width() for bar in left.patches]
+    assert drawn == pytest.approx([*moved["low"][:20], *moved["high"][:20]])
+    assert [bar.get_width() for bar in right.patches] == [*found["first"], *found["total"]]
+    for kind, lines in zip(("first", "total"), right.collections, strict=True):
+        drawn = [segment[:, 0].tolist() for segment in lines.get_segments()]
+        np.testing.assert_allclose(drawn, found[[f"{kind}_low", f"{kind}_high"]], rtol=1e-12)
