@@ -114,16 +114,23 @@ void SagittaWitness::add(const Shell& shell, const Edge& edge) {
   sides_.push_back({s, static_cast<float>((p[edge.last_vertex] - p[edge.first_vertex]).norm())});
 }
 
-// The weighted quantile by the lengths of the sides.
+// The weighted quantile by the lengths of the sides: the last one before which no more of them
+// lies.
 void SagittaWitness::find_usual() {
-  std::sort(sides_.begin(), sides_.end());
   double length = 0, below = 0;
   for (const auto& side : sides_) length += side.second;
-  for (const auto& [sagitta, own] : sides_) {
-    if (below > kMost * length) break;
-    below += own;
-    usual_ = sagitta;
+  auto first = sides_.begin(), last = sides_.end();
+  while (last - first > 1) {
+    const auto middle = first + (last - first) / 2;
+    std::nth_element(first, middle, last);
+    double more = below;
+    for (auto side = first; side != middle; ++side) more += side->second;
+    if (more > kMost * length)
+      last = middle;
+    else
+      first = middle, below = more;
   }
+  if (first != last) usual_ = first->first;
   std::vector<std::pair<float, float>>().swap(sides_);
 }
 
