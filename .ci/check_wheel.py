@@ -59,7 +59,6 @@ TESTS = (
     "tests/contact/test_contact_wrench.py",
     "tests/contact/test_invariance.py",
     "tests/dynamics/test_external_forces.py",
-    "tests/dynamics/test_momentum.py",
     "tests/test_pickling.py",
 )
 TEST_NEEDS = ("pytest>=8", "hypothesis>=6", "scipy>=1.15")
