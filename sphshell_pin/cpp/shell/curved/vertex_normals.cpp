@@ -19,7 +19,7 @@ constexpr double kMostUneven = 0.1;
 // Smallest pivot of the scaled normal equations: below, the points do not tell the terms apart.
 constexpr double kLeastPivot = 1e-6;
 // The frame turns with the normal: a few rounds settle both. A tilt that settles it [rad].
-constexpr int kMostRounds = 3;
+constexpr int kNormalFits = 3;
 constexpr double kSettledTilt = 1e-7;
 // Normals agree within this angle [rad] and share of the spread of the normals around.
 constexpr double kSmallTurn = 0.005, kLikely = 0.25;
@@ -73,7 +73,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
   // Distances of about one, so that one pivot threshold serves all sizes.
   const double scale = std::sqrt(double(points.size()) / size2);
   Vec3 n = normal;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kNormalFits; ++round) {
     const Vec3 east = n.unitOrthogonal(), north = n.cross(east);
     Square square = Square::Zero();
     Row along = Row::Zero();
@@ -109,7 +109,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
     // The gradient of the height at the origin tilts the normal.
     n = (n - fit[0] * east - fit[1] * north).normalized();
     // What a further round would turn it by is smaller than this by as much as it is small.
-    if (round + 1 < kMostRounds &&
+    if (round + 1 < kNormalFits &&
         (round == 0 || fit.template head<2>().squaredNorm() >= kSettledTilt * kSettledTilt))
       continue;
     // The variances of the first two coefficients: what is left, over the degrees of freedom, times

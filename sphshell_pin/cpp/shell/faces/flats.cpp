@@ -10,7 +10,7 @@
 namespace sphshell {
 namespace {
 
-constexpr double kBeyond = 1e-8;  // as a share of the size: no corner stands out by more
+constexpr double kFlatBeyond = 1e-8;  // as a share of the size: no corner stands out by more
 
 // The border of one planar face.
 struct Outline {
@@ -75,7 +75,7 @@ class Search {
     }
     const CurvedFacet& facet = surface_.facets()[f];
     const bool bends = facet.control_offset(k, 0).norm() + facet.control_offset(k, 1).norm() >
-                       kBeyond * shell_.size();
+                       kFlatBeyond * shell_.size();
     return bends ? -2 : -1;
   }
 
@@ -132,7 +132,8 @@ class Search {
     for (std::size_t i = 0; i < out.sides.size(); ++i) {
       const int h = out.sides[i], curve = curve_of(h);
       const Vec3 turn = along(h).cross(along(out.sides[(i + 1) % out.sides.size()]));
-      out.convex = out.convex && turn.dot(out.normal) > -kBeyond * shell_.size() * along(h).norm();
+      out.convex =
+          out.convex && turn.dot(out.normal) > -kFlatBeyond * shell_.size() * along(h).norm();
       out.straight = out.straight && curve == -1;
       out.circle = i == 0 || out.circle == curve ? curve : -2;
     }
@@ -144,8 +145,8 @@ class Search {
     const std::vector<int>& begin = topology_.neighbor_begin;
     for (int i = begin[vertex]; i < begin[vertex + 1]; ++i) {
       const double out = normal.dot(place(topology_.neighbors[i]) - place(vertex));
-      above = above || out > kBeyond * shell_.size();
-      below = below || out < -kBeyond * shell_.size();
+      above = above || out > kFlatBeyond * shell_.size();
+      below = below || out < -kFlatBeyond * shell_.size();
     }
     return !(above && below);
   }
@@ -184,7 +185,7 @@ class Search {
     std::vector<int> corners;
     for (std::size_t i = 0; i < sides.size(); ++i) {
       const Vec3 before = along(sides[i]), after = along(sides[(i + 1) % sides.size()]);
-      if (before.cross(after).norm() > kBeyond * before.norm() * after.norm())
+      if (before.cross(after).norm() > kFlatBeyond * before.norm() * after.norm())
         corners.push_back(end(sides[i]));
     }
     const int number = static_cast<int>(out.polygons.size());
@@ -205,8 +206,9 @@ class Search {
       // Only a part of its circumference, or one that goes on.
       if (joint.kind == FaceJoint::Kind::Line || joint.tangent) return;
       const Vec3 from = joint.point - shape.point;
-      if (joint.kind == FaceJoint::Kind::Circle && joint.axis.cross(shape.axis).norm() < kBeyond &&
-          from.cross(shape.axis).norm() < kBeyond * shell_.size())
+      if (joint.kind == FaceJoint::Kind::Circle &&
+          joint.axis.cross(shape.axis).norm() < kFlatBeyond &&
+          from.cross(shape.axis).norm() < kFlatBeyond * shell_.size())
         ends.push_back({from.dot(shape.axis), joint.radius});
     }
     for (std::size_t t = 0; t < faces.of.size(); ++t) {
@@ -214,15 +216,15 @@ class Search {
       for (const int v : shell_.triangles()[t]) {
         const Vec3& x = place(v);
         const Vec3 from = x - shape.point;
-        if (from.cross(shape.axis).norm() < kBeyond * shell_.size())
+        if (from.cross(shape.axis).norm() < kFlatBeyond * shell_.size())
           ends.push_back({from.dot(shape.axis), 0});  // the tip of a cone
         for (int i = topology_.neighbor_begin[v]; i < topology_.neighbor_begin[v + 1]; ++i)
-          if (shape.distance(place(topology_.neighbors[i])) > kBeyond * shell_.size()) return;
+          if (shape.distance(place(topology_.neighbors[i])) > kFlatBeyond * shell_.size()) return;
       }
     }
     if (ends.empty()) return;
     const auto [low, high] = std::minmax_element(ends.begin(), ends.end());
-    if (!(high->first - low->first > kBeyond * shell_.size())) return;
+    if (!(high->first - low->first > kFlatBeyond * shell_.size())) return;
     out.ruled.push_back(
         {{shape.point + low->first * shape.axis, shape.point + high->first * shape.axis},
          shape.axis,
