@@ -13,7 +13,8 @@ from sphshell_pin import testing
 from sphshell_pin.errors import SetupWarning
 from tests.contact.test_planes import pose, scene_of
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
-from tests.dynamics.test_foundation_on_plane import FRICTIONS, INERTIA, box, thrown
+from tests.dynamics.test_foundation_on_plane import FRICTIONS, box, thrown
+from tests.dynamics.test_planes import INERTIA
 from tests.meshes import cube, grid_plate
 from tests.models import add_body, empty, linear_law
 

@@ -1,5 +1,7 @@
 """Charts of the live page in a real browser: what is chosen is drawn, read, and compared."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -52,7 +54,9 @@ class ChartTab(Tab):
 
 @pytest.fixture(scope="module")
 def tab(browser, tmp_path_factory):
-    path = write(tmp_path_factory.mktemp("finger"), FINGER + KNOB)
+    # Its motion as stated is never over: Reset does not become Repeat, which would set it going.
+    text = re.sub(r"duration = .*", "duration = 100.0", FINGER) + KNOB
+    path = write(tmp_path_factory.mktemp("finger"), text)
     with Live(LiveRun(build(path)), running=False) as live:
         opened = ChartTab(browser, live)
         yield opened
