@@ -64,7 +64,10 @@ def collada_root(content: bytes) -> ET.Element:
     if not content.startswith((b"\xff\xfe", b"\xfe\xff")):  # UTF-16
         content = content.strip(b"\0 \t\r\n")  # which assimp does not mind
     check_size(content)
-    root = ET.fromstring(content)
+    try:
+        root = ET.fromstring(content)
+    except ET.ParseError as error:  # of namespaces, which `check_size` does not look at
+        raise ValueError(f"it is not well-formed XML: {error}") from None
     if fault := _collada_fault(root):
         raise ValueError(fault)
     return root

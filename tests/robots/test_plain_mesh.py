@@ -148,6 +148,7 @@ WRONG = {
     "entity": (".dae", collada(p="0 1 &#46;"), "<p> holds what is no index"),
     "comment": (".dae", collada(p="0 1 <!-- 2 -->."), "<p> holds what is no index"),
     "utf-16": (".dae", collada(p="0 1 x").decode().encode("utf-16"), "<p> holds what is no index"),
+    "namespace": (".dae", collada().replace(b'xmlns="', b'xmlns="}'), "not well-formed XML"),
     "itself": (".dae", collada(node='<instance_node url="#n"/>'), "holds itself"),
     "scene": (".dae", collada(node='<instance_node url="#w"/>'), "holds itself"),
     "deep": (".dae", collada(node="<node>" * 300 + "</node>" * 300), "deep"),
