@@ -22,8 +22,13 @@ MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
 """Formats of the meshes that a robot may name: those that have been tried."""
 
 MOST_NODES = 100_000
+"""Most nodes of a mesh, those that stand for others counted as often as they are copied."""
+
 MOST_TRIANGLES = 20_000_000
+"""Most triangles of a mesh, counted in the same way."""
+
 DEEPEST_NODE = 200
+"""Most nodes inside each other: the reader calls itself for each."""
 
 _ODD, _CONTINUED = re.compile(rb"[\0\f\v]|\\\r(?!\n)"), re.compile(rb"\\\r?\n")
 _MATERIALS = re.compile(rb"mtllib([^\r\n]*)")
