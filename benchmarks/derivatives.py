@@ -19,7 +19,7 @@ from sphshell_pin.study.report.machine import machine
 from sphshell_pin.study.report.steps import panda, start_of, with_sheet
 from sphshell_pin.study.report.surfaces import wavy_sheet
 from sphshell_pin.study.report.timing import one_core, take_turns
-from sphshell_pin.testing.numbers import names_of
+from sphshell_pin.testing.differences import names_of
 
 CALLS, ROUNDS = 2000, 50
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import sphshell_pin
 from sphshell_pin.base.atomic import write_whole
-from sphshell_pin.base.json_text import json_text
+from sphshell_pin.base.texts import json_text
 from sphshell_pin.study.report.contents import Table
 
 FOLDER = Path(sphshell_pin.__file__).parent.parent / "docs" / "measured"

@@ -15,52 +15,23 @@ from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.mimic import Mimic, shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
-from sphshell_pin.robots.description import Description, check_poses, check_size, parsed
-from sphshell_pin.robots.files import (
-    RobotError,
-    build_geometry,
-    build_model,
-    is_path,
-    keep_geometry_of,
-    keep_spheres,
-    read,
-)
-from sphshell_pin.robots.inertia import few, mass_fault, with_density
-from sphshell_pin.robots.library_names import is_library_name, library_source
-from sphshell_pin.robots.mesh_spheres import MeshSpheres, spheres_of_link, spheres_of_mesh
-
-__all__ = [
-    "OWN",
-    "TIPS",
-    "URDF_FOLDER",
-    "WORKING",
-    "Description",
-    "LoadedRobot",
-    "MeshSpheres",
-    "RobotError",
-    "build_geometry",
-    "build_model",
-    "collision_spheres",
-    "end_spheres",
-    "exactly",
-    "fingertips",
-    "floats",
-    "is_library_name",
-    "is_path",
-    "keep_geometry_of",
-    "keep_spheres",
-    "library_source",
-    "load",
-    "load_file",
-    "mass_fault",
-    "mimics_of_library",
-    "names",
-    "read",
-    "spheres_of_link",
-    "spheres_of_mesh",
-    "with_density",
-]
-
+from sphshell_pin.robots.description import Description as Description
+from sphshell_pin.robots.description import check_poses, check_size, parsed
+from sphshell_pin.robots.files import RobotError as RobotError
+from sphshell_pin.robots.files import build_geometry as build_geometry
+from sphshell_pin.robots.files import build_model as build_model
+from sphshell_pin.robots.files import is_path as is_path
+from sphshell_pin.robots.files import keep_geometry_of as keep_geometry_of
+from sphshell_pin.robots.files import keep_spheres as keep_spheres
+from sphshell_pin.robots.files import read as read
+from sphshell_pin.robots.finding import is_library_name as is_library_name
+from sphshell_pin.robots.finding import library_source as library_source
+from sphshell_pin.robots.inertia import few
+from sphshell_pin.robots.inertia import mass_fault as mass_fault
+from sphshell_pin.robots.inertia import with_density as with_density
+from sphshell_pin.robots.mesh_spheres import MeshSpheres as MeshSpheres
+from sphshell_pin.robots.mesh_spheres import spheres_of_link as spheres_of_link
+from sphshell_pin.robots.mesh_spheres import spheres_of_mesh as spheres_of_mesh
 
 _AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # of a root that floats
 

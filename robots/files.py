@@ -19,11 +19,19 @@ from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots.description import Description, check_memory, check_size, parsed
+from sphshell_pin.robots.description import (
+    INCLUDED,
+    Description,
+    add_limits,
+    check_memory,
+    check_size,
+    check_tree,
+    mimics_of,
+    parsed,
+)
 from sphshell_pin.robots.mesh_faults import mesh_fault
 from sphshell_pin.robots.packages import Folders, including
 from sphshell_pin.robots.plain_mesh import collada_unit
-from sphshell_pin.robots.urdf_tree import INCLUDED, add_limits, check_tree, mimics_of
 
 if TYPE_CHECKING:
     from sphshell_pin.robots.mjcf import MjcfRobot

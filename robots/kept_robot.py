@@ -14,15 +14,8 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.errors import RobotWarning
-from sphshell_pin.robots import LoadedRobot, exactly
+from sphshell_pin.robots import LoadedRobot, exactly, files
 from sphshell_pin.robots.description import Description
-from sphshell_pin.robots.files import (
-    RobotError,
-    build_geometry,
-    build_model,
-    described,
-    keep_spheres,
-)
 from sphshell_pin.robots.packages import Folders
 
 
@@ -56,16 +49,18 @@ def load_kept(
     No file is read but `meshes`, by their names. Warns with RobotWarning of those that are missing.
     Raises RobotError as `robots.load_file` does.
     """
-    description = described(text.encode(), Folders(Path(file), kept=meshes), free_flyer=free_flyer)
-    model = build_model(description, free_flyer=free_flyer, mimic=mimic)
-    visual, missing = build_geometry(description, model, pin.GeometryType.VISUAL)
-    keep_spheres(description)
-    spheres, _ = build_geometry(description, model, pin.GeometryType.COLLISION)
+    description = files.described(
+        text.encode(), Folders(Path(file), kept=meshes), free_flyer=free_flyer
+    )
+    model = files.build_model(description, free_flyer=free_flyer, mimic=mimic)
+    visual, missing = files.build_geometry(description, model, pin.GeometryType.VISUAL)
+    files.keep_spheres(description)
+    spheres, _ = files.build_geometry(description, model, pin.GeometryType.COLLISION)
     robot = LoadedRobot(name, model, spheres, visual, description.q0(model))
     robot = exactly(robot, description, mimic=mimic, warn=False)
     q = np.array(q0)
     if q.shape != (robot.model.nq,) or not np.isfinite(q).all():
-        raise RobotError(f"{file}: its posture {q0} is not one of {robot.model.nq} numbers")
+        raise files.RobotError(f"{file}: its posture {q0} is not one of {robot.model.nq} numbers")
     if missing:
         warnings.warn(
             f"{file}: without these visual meshes, which the results do not hold: "

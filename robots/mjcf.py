@@ -6,7 +6,7 @@ equalities, and makes one nameless joint of several.
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,20 +16,61 @@ import pinocchio as pin
 
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.errors import import_extra
+from sphshell_pin.robots import mjcf_compile
 from sphshell_pin.robots.description import Description
-from sphshell_pin.robots.mjcf_compile import (
-    BALL,
-    FREE,
-    HINGE,
-    LEFT_OUT,
-    MESH,
-    SLIDE,
-    Compiled,
-)
-from sphshell_pin.robots.mjcf_couplings import couplings
-from sphshell_pin.robots.mjcf_includes import include
 from sphshell_pin.robots.packages import Folders
+
+_KINDS = ("connect", "weld", "joint", "tendon")
+_SITE = 6  # of mjtObj
+
+
+def couplings(m: Any, joints: Sequence[str]) -> tuple[tuple[Mimic, ...], tuple[str, ...]]:
+    """Return the equalities that are mimic joints, and a sentence on each of the others.
+
+    m : MuJoCo's model; joints : their names
+    """
+    mimics, loops = [], []
+    for e in range(m.neq):
+        if not m.eq_active0[e]:
+            continue
+        kind, one, two = int(m.eq_type[e]), int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
+        tag = _KINDS[kind] if kind < len(_KINDS) else "flex"
+        label = f"<{tag}>" + (f" '{m.eq(e).name}'" if m.eq(e).name else "")
+        terms = m.eq_data[e, :5].tolist()
+        if tag == "joint" and two < 0:
+            loops.append(f"{label} holds joint '{joints[one]}' at {terms[0]:g} (lock it instead)")
+        elif tag == "joint" and any(terms[2:]):
+            of = f"'{joints[one]}' follow '{joints[two]}'"
+            loops.append(f"{label} makes joint {of} by a polynomial")
+        elif tag == "joint":
+            # It is of the distances from ref.
+            ref, of_ref = (float(m.qpos0[m.jnt_qposadr[j]]) for j in (one, two))
+            offset = terms[0] + ref - terms[1] * of_ref
+            mimics.append(Mimic(joints[one], joints[two], terms[1], offset))
+        elif tag in ("connect", "weld"):
+            ends = [one, two]
+            if m.eq_objtype[e] == _SITE:
+                ends = [int(m.site_bodyid[site]) for site in ends]
+            bodies = " and ".join(f"'{m.body(end).name}'" for end in ends)
+            names = ", ".join(repr(joints[j]) for j in _between(m, *ends))
+            of = f", of the joints {names}" if names else ""
+            loops.append(f"the kinematic loop that {label} closes between {bodies}{of}")
+        else:
+            loops.append(f"{label} of <equality>")
+    return tuple(mimics), tuple(loops)
+
+
+def _between(m: Any, one: int, other: int) -> list[int]:
+    """Return the joints on the way from one body to another."""
+    ways = [[one], [other]]
+    for way in ways:
+        while way[0]:
+            way.insert(0, int(m.body_parentid[way[0]]))
+    apart = [body for body in ways[0] + ways[1] if (body in ways[0]) != (body in ways[1])]
+    return [m.body_jntadr[body] + k for body in apart for k in range(m.body_jntnum[body])]
+
 
 _SHAPES: dict[int, tuple[str, Callable[..., Any]]] = {
     2: ("sphere", lambda r, *_: coal.Sphere(r)),
@@ -40,7 +81,7 @@ _SHAPES: dict[int, tuple[str, Callable[..., Any]]] = {
 }
 """Names and shapes by MuJoCo's mjtGeom."""
 
-_OTHERS = {0: "plane", MESH: "mesh"}
+_OTHERS = {0: "plane", mjcf_compile.MESH: "mesh"}
 _GRAY = (0.5, 0.5, 0.5, 1.0)
 _SHOWN_GROUPS = 3
 _NUMBERS: tuple[str, ...] = (
@@ -64,10 +105,10 @@ def read_mjcf(root: ET.Element, folders: Folders, *, floats: bool | None = None)
     with interrupts_delayed():
         mujoco = import_extra("mujoco", "mujoco", "an MJCF file")
     if folders.kept is None:
-        include(root, [folders.file.resolve()])
+        mjcf_compile.include(root, [folders.file.resolve()])
     elif root.find(".//include") is not None:
         raise ValueError("it includes other files")
-    made = Compiled(mujoco, root, folders, floats)
+    made = mjcf_compile.Compiled(mujoco, root, folders, floats)
     robot = MjcfRobot(made, root.get("model") or "robot")
     mimics, loops = couplings(robot.m, robot.joints)
     notes = tuple(
@@ -80,7 +121,7 @@ def read_mjcf(root: ET.Element, folders: Folders, *, floats: bool | None = None)
 class MjcfRobot:
     """What MuJoCo compiled, as Pinocchio's models."""
 
-    def __init__(self, made: Compiled, name: str) -> None:
+    def __init__(self, made: mjcf_compile.Compiled, name: str) -> None:
         m = self.m = made.model
         for part in _NUMBERS:
             if not np.isfinite(getattr(m, part)).all():
@@ -100,7 +141,7 @@ class MjcfRobot:
             if self.mesh(g) is not None or m.geom_type[g] in _SHAPES:
                 self.geoms.append(g)
             else:
-                made.notes[LEFT_OUT].append(_kind(m.geom_type[g]))
+                made.notes[mjcf_compile.LEFT_OUT].append(_kind(m.geom_type[g]))
         self._note(made)
 
     def model(self) -> pin.Model:
@@ -115,7 +156,7 @@ class MjcfRobot:
             first, count = m.body_jntadr[i], m.body_jntnum[i]
             for j in range(first, first + count):
                 anchor, drawn = pin.SE3(np.eye(3), m.jnt_pos[j]), self._drawn(j)
-                if m.jnt_type[j] == FREE:  # its coordinates are the pose in the world
+                if m.jnt_type[j] == mjcf_compile.FREE:  # its coordinates are the pose in the world
                     place = anchor = pin.SE3.Identity()
                 there = place * anchor * drawn.inverse()
                 made = model.addJoint(joint, self._joint(j), there, self.joints[j])
@@ -150,7 +191,7 @@ class MjcfRobot:
 
     def mesh(self, g: int) -> tuple[Path, Array] | None:
         """Return the file and the scale of the mesh of a geom that has one."""
-        is_mesh = self.m.geom_type[g] == MESH
+        is_mesh = self.m.geom_type[g] == mjcf_compile.MESH
         return self.files.get(self.m.mesh(self.m.geom_dataid[g]).name) if is_mesh else None
 
     def touches(self, g: int) -> bool:
@@ -199,8 +240,8 @@ class MjcfRobot:
         found = {}
         for j, name in enumerate(self.joints):
             at, kind = self.m.jnt_qposadr[j], self.m.jnt_type[j]
-            values = drawn[at : at + (7 if kind == FREE else 1)]
-            if kind == FREE or (kind != BALL and values.any()):
+            values = drawn[at : at + (7 if kind == mjcf_compile.FREE else 1)]
+            if kind == mjcf_compile.FREE or (kind != mjcf_compile.BALL and values.any()):
                 found[name] = values
         return found
 
@@ -208,8 +249,8 @@ class MjcfRobot:
         """Return q (nq,) of Pinocchio, whose quaternions have w last."""
         q = qpos.copy()
         for at, kind in zip(self.m.jnt_qposadr, self.m.jnt_type, strict=True):
-            if kind in (FREE, BALL):
-                begin = at + (3 if kind == FREE else 0)
+            if kind in (mjcf_compile.FREE, mjcf_compile.BALL):
+                begin = at + (3 if kind == mjcf_compile.FREE else 0)
                 turn = np.roll(qpos[begin : begin + 4], -1)
                 q[begin : begin + 4] = turn / np.linalg.norm(turn)
         return q
@@ -218,20 +259,26 @@ class MjcfRobot:
         """Return the motion of a joint from zero to where the file draws it."""
         m = self.m
         moved = m.qpos0[m.jnt_qposadr[j]] * m.jnt_axis[j]
-        if m.jnt_type[j] == SLIDE:
+        if m.jnt_type[j] == mjcf_compile.SLIDE:
             return pin.SE3(np.eye(3), moved)
-        return pin.SE3(pin.exp3(moved) if m.jnt_type[j] == HINGE else np.eye(3), np.zeros(3))
+        return pin.SE3(
+            pin.exp3(moved) if m.jnt_type[j] == mjcf_compile.HINGE else np.eye(3), np.zeros(3)
+        )
 
     def _joint(self, j: int) -> Any:
         kind, axis = int(self.m.jnt_type[j]), self.m.jnt_axis[j]
-        if kind in (FREE, BALL):
-            return pin.JointModelFreeFlyer() if kind == FREE else pin.JointModelSpherical()
-        names = ("PX", "PY", "PZ") if kind == SLIDE else ("RX", "RY", "RZ")
+        if kind in (mjcf_compile.FREE, mjcf_compile.BALL):
+            return (
+                pin.JointModelFreeFlyer()
+                if kind == mjcf_compile.FREE
+                else pin.JointModelSpherical()
+            )
+        names = ("PX", "PY", "PZ") if kind == mjcf_compile.SLIDE else ("RX", "RY", "RZ")
         for name, along in zip(names, np.eye(3), strict=True):
             if (axis == along).all():
                 return getattr(pin, f"JointModel{name}")()
         kinds = pin.JointModelPrismaticUnaligned, pin.JointModelRevoluteUnaligned
-        return kinds[kind - SLIDE](axis)
+        return kinds[kind - mjcf_compile.SLIDE](axis)
 
     def _limit(self, model: pin.Model) -> None:
         """Put ranges, damping, dry friction, armature and limits of forces into `model`."""
@@ -259,13 +306,13 @@ class MjcfRobot:
         model.upperVelocityLimit = np.full(model.nv, np.inf)
         model.lowerVelocityLimit = -model.upperVelocityLimit
 
-    def _note(self, made: Compiled) -> None:
+    def _note(self, made: mjcf_compile.Compiled) -> None:
         """Note what the file states that is not modeled."""
         m, notes = self.m, made.notes
         for j, name in enumerate(self.joints):
             if np.any(m.jnt_stiffness[j]):
                 notes["springs of joints (stiffness, springdamper) are not modeled"].append(name)
-            if m.jnt_limited[j] and m.jnt_type[j] == BALL:
+            if m.jnt_limited[j] and m.jnt_type[j] == mjcf_compile.BALL:
                 notes["ranges of ball joints are not modeled"].append(name)
         for i in np.flatnonzero(m.body_gravcomp).tolist():
             notes["gravity acts on bodies with gravcomp too"].append(self.bodies[i])

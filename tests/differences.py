@@ -16,9 +16,9 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.named_numbers import AXES, TWIST
 from sphshell_pin.testing.differences import _AHEAD as AHEAD
 from sphshell_pin.testing.differences import _PLACES as PLACES
+from sphshell_pin.testing.differences import changed, is_place, names_of, scale_of
 from sphshell_pin.testing.differences import differentiated as derivative
 from sphshell_pin.testing.forces import accelerations
-from sphshell_pin.testing.numbers import changed, is_place, names_of, scale_of
 
 __all__ = ["AHEAD", "PLACES", "changed", "columns_of", "is_place", "names_of", "scale_of"]
 

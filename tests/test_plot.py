@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from sphshell_pin import plot
+from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.plot.figure import NO_CONTACT
+from sphshell_pin.plot.over_time import MOST_PAIRS, MOST_POINTS
 from tests.view.stand_ins import (
     a_result,
     a_scene,
@@ -72,7 +75,7 @@ def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
         {"row": 1, "normal_force": 3.0, "friction_force_world": [-1.0, 0, 0], "depth": 2e-3},
         {"row": 2, "pair": 1, "normal_force": 9.0},
     ]
-    series = plot.PairSeries.of(a_result([0, 1, 2], np.zeros((3, 8)), rows, ("one", "two")), 0)
+    series = PairSeries.of(a_result([0, 1, 2], np.zeros((3, 8)), rows, ("one", "two")), 0)
     np.testing.assert_array_equal(series.normal, [0, 5, 0])
     np.testing.assert_array_equal(series.friction, [0, 0, 0])
     np.testing.assert_array_equal(series.depth, [0, 2e-3, 0])
@@ -86,7 +89,7 @@ def test_a_run_without_contact_is_told_in_words(tmp_path):
         plot.plot_contact_path(result),
         plot.plot_result(result),
     ):
-        assert plot.NO_CONTACT in texts(figure)
+        assert NO_CONTACT in texts(figure)
     assert len(plot.save_figures(result, tmp_path)) == 3
 
 
@@ -122,7 +125,7 @@ def test_every_shell_has_its_own_picture_and_every_pair_its_name():
 
 
 def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
-    count = plot.MOST_PAIRS + 3
+    count = MOST_PAIRS + 3
     rows = [
         {"row": 1, "pair": k, "normal_force": 1.0 + k, "point_world": [0.1 * k, 0, 0]}
         for k in range(count)
@@ -143,7 +146,7 @@ def test_a_long_run_keeps_its_one_row_peak():
         [0], [[0]], [{"row": 123_457, "normal_force": 77.0, "depth": 1e-3}]
     ).contacts
     line = plot.plot_force_and_depth(result).axes[0].lines[0]
-    assert len(line.get_xdata()) <= plot.MOST_POINTS + 2
+    assert len(line.get_xdata()) <= MOST_POINTS + 2
     assert line.get_ydata().max() == 77.0
 
 

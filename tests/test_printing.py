@@ -14,7 +14,7 @@ import pytest
 import typer
 
 from sphshell_pin.cli import app, main
-from sphshell_pin.cli.app import echo
+from sphshell_pin.cli.common import echo
 from sphshell_pin.scenario import run_scenario
 from sphshell_pin.study import report
 from sphshell_pin.study.report.contents import Finding, Section
@@ -101,7 +101,7 @@ def test_no_command_needs_somebody_who_takes_what_it_prints(name, home, monkeypa
         echo(url)
         signal.setitimer(signal.ITIMER_REAL, 0.2)
 
-    monkeypatch.setattr(importlib.import_module("sphshell_pin.cli.view"), "echo", ended_by_ctrl_c)
+    monkeypatch.setattr(importlib.import_module("sphshell_pin.cli.common"), "echo", ended_by_ctrl_c)
     ends = {}
     for redirect in (heard, closed, full_in_ascii):
         place = home.with_name("é")

@@ -2,11 +2,11 @@
 
 # Imported for their commands, in the order of the help.
 # isort: off
-from sphshell_pin.cli import new, running, view, render, export, compare, taxels  # noqa: F401
+from sphshell_pin.cli import new, running, view, export, compare  # noqa: F401
 from sphshell_pin.cli import files, sweep, fit, report  # noqa: F401
-from sphshell_pin.cli import check_robot, listing  # noqa: F401
+from sphshell_pin.cli import check_robot  # noqa: F401
 
 # isort: on
-from sphshell_pin.cli.app import app, main
+from sphshell_pin.cli.common import app, main
 
 __all__ = ["app", "main"]

@@ -11,27 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import (
-    ERROR,
-    INTERRUPTED,
-    MISSED,
-    DensityOption,
-    MimicOption,
-    PackageDirOption,
-    RadiusOption,
-    XacroArgOption,
-    colored,
-    command,
-    echo,
-    length_of,
-    make_table,
-    option,
-    plain,
-    progress_bar,
-    say,
-    terminal,
-    xacro_args_of,
-)
+from sphshell_pin.cli import common
+from sphshell_pin.cli.common import command
 from sphshell_pin.errors import FrameNotFound, SphshellError
 
 if TYPE_CHECKING:
@@ -47,15 +28,15 @@ def check_robot_(
     *,
     every: bool = False,
     frame: str | None = None,
-    radius: RadiusOption = None,
+    radius: common.RadiusOption = None,
     free_flyer: bool = False,
-    package_dir: PackageDirOption = None,
-    xacro_arg: XacroArgOption = None,
-    density: DensityOption = None,
-    no_mimic: MimicOption = False,
+    package_dir: common.PackageDirOption = None,
+    xacro_arg: common.XacroArgOption = None,
+    density: common.DensityOption = None,
+    no_mimic: common.MimicOption = False,
     mend: Path | None = None,
     quick: bool = False,
-    seed: Annotated[int, option("Seed of the random postures.", min=0)] = 0,
+    seed: Annotated[int, common.option("Seed of the random postures.", min=0)] = 0,
     json: Path | None = None,
 ) -> None:
     """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.
@@ -96,21 +77,21 @@ def check_robot_(
     if mend is not None:
         from sphshell_pin.robots.mending import mended
 
-        args = xacro_args_of(xacro_arg)
+        args = common.xacro_args_of(xacro_arg)
         text, changes = mended(names[0], package_dir or (), args, density)
         write_whole(mend, text.encode())
-        say(f"Written: {mend}")
+        common.say(f"Written: {mend}")
         for change in changes:
-            say(f"  {change}")
+            common.say(f"  {change}")
         names, package_dir, xacro_arg, density = [str(mend)], None, None, None
     sizes = study.QUICK if quick else study.Sizes()
     check = partial(
         study.check_robot,
         frame=frame,
-        radius=length_of("--radius", radius),
+        radius=common.length_of("--radius", radius),
         free_flyer=free_flyer,
         package_dirs=package_dir or (),
-        xacro_args=xacro_args_of(xacro_arg),
+        xacro_args=common.xacro_args_of(xacro_arg),
         density=density,
         mimic=not no_mimic,
         seed=seed,
@@ -120,8 +101,8 @@ def check_robot_(
     _print(reports)
     if stopped:
         left = len(names) - len(reports)
-        echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
-        raise typer.Exit(INTERRUPTED)
+        common.echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
+        raise typer.Exit(common.INTERRUPTED)
     command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
     if json is not None:
         text = report.as_json(reports, f"{command} --json {json}", seed, sizes)
@@ -130,7 +111,7 @@ def check_robot_(
     # A robot that was asked for by name and cannot be checked is wrong input, and so is what
     # no robot there is can be checked with.
     unread = report.NOT_CHECKED in verdicts and (not every or len(set(verdicts)) == 1)
-    raise typer.Exit(MISSED if report.FAILED in verdicts else ERROR if unread else 0)
+    raise typer.Exit(common.MISSED if report.FAILED in verdicts else common.ERROR if unread else 0)
 
 
 def _check_writable(path: Path) -> None:
@@ -150,7 +131,7 @@ def _check(
     from sphshell_pin.study.robot_check import RobotReport
 
     reports: list[RobotReport] = []
-    with progress_bar("", "MofNCompleteColumn", total=len(names)) as update:
+    with common.progress_bar("", "MofNCompleteColumn", total=len(names)) as update:
         try:
             for name in names:
 
@@ -175,26 +156,26 @@ def _print(reports: Sequence[RobotReport]) -> None:
     from sphshell_pin.study.robot_check.checks import CHECKS
     from sphshell_pin.study.robot_check.report import PASS, as_table, remarks
 
-    console = terminal()
+    console = common.terminal()
     if not sys.stdout.isatty():
         console.width = _PIPE_WIDTH
     # On a narrow terminal without the frame and the size, and with short titles: a figure that is
     # folded cannot be read.
     narrow = console.width < _WIDE
     titles = [key[: 6 if narrow else None] for key in CHECKS]
-    table = make_table("robot", *([] if narrow else ["frame", "nq/nv"]), *titles, "verdict")
+    table = common.make_table("robot", *([] if narrow else ["frame", "nq/nv"]), *titles, "verdict")
     for column in table.columns[1 if narrow else 2 :]:
         column.no_wrap = True
     for one, (name, frame, size, *figures, verdict) in zip(reports, as_table(reports), strict=True):
         shown = [
-            colored(text, "red" if text and not one.met(key) else "")
+            common.colored(text, "red" if text and not one.met(key) else "")
             for key, text in zip(CHECKS, figures, strict=True)
         ]
         color = "green" if verdict == PASS else "red"
-        where = [] if narrow else [plain(frame), size]
-        table.add_row(plain(name), *where, *shown, colored(verdict, color))
+        where = [] if narrow else [common.plain(frame), size]
+        table.add_row(common.plain(name), *where, *shown, common.colored(verdict, color))
     console.print(table)
     for sentence in remarks(reports):
-        say(sentence)
+        common.say(sentence)
     passed = sum(one.verdict == PASS for one in reports)
-    say(f"{passed} of {len(reports)} robots pass")
+    common.say(f"{passed} of {len(reports)} robots pass")

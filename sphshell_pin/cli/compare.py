@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.base.tables import column
-from sphshell_pin.cli.app import command, if_installed, print_table, say
+from sphshell_pin.cli import common
 from sphshell_pin.cli.export import file_of, with_scene
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 MOST_ROWS = 24
 
 
-@command()
+@common.command()
 def compare(runs: list[Path], *, out: Path = Path("results/compare"), picture: bool = True) -> None:
     """Lay finished runs over each other: figures and curves, with their differences from the first.
 
@@ -47,12 +47,12 @@ def compare(runs: list[Path], *, out: Path = Path("results/compare"), picture: b
         f"{name}.csv": csv_text(table).encode() for name, table in tables_of(comparison).items()
     }
     if picture:
-        with if_installed():
+        with common.if_installed():
             files["compare.png"] = png(plot_compare(comparison))
     written = write_folder(out, files, ("figures.csv", "curves.csv", "compare.png"))
     for other in comparison.others:
         _print(comparison.runs[0].label, other)
-    say(f"files in {out}: {', '.join(path.name for path in written)}")
+    common.say(f"files in {out}: {', '.join(path.name for path in written)}")
 
 
 def labels_of(runs: list[Path]) -> list[str]:
@@ -67,9 +67,9 @@ def labels_of(runs: list[Path]) -> list[str]:
 
 def _print(first: str, other: Difference) -> None:
     """Print what of `other` is not as in the run `first`."""
-    say(f" beside {first}", bold=other.label)
+    common.say(f" beside {first}", bold=other.label)
     settings = [(key, _shown(mine), _shown(yours)) for key, mine, yours in other.settings]
-    print_table(("setting", first, other.label), settings[:MOST_ROWS])
+    common.print_table(("setting", first, other.label), settings[:MOST_ROWS])
     figures = [
         (
             column(one.name, one.unit),
@@ -82,7 +82,7 @@ def _print(first: str, other: Difference) -> None:
         if not one.same
     ]
     titles = ("figure", first, other.label, "difference", "relative")
-    print_table(titles, figures[:MOST_ROWS])
+    common.print_table(titles, figures[:MOST_ROWS])
     curves = [
         (
             one.name,
@@ -95,18 +95,18 @@ def _print(first: str, other: Difference) -> None:
         if one.values.any()
     ]
     titles = ("curve", "largest difference", "at", "rms", "of its range")
-    print_table(titles, curves[:MOST_ROWS])
+    common.print_table(titles, curves[:MOST_ROWS])
     for title, rows in (("settings", settings), ("figures", figures), ("curves", curves)):
         if len(rows) > MOST_ROWS:
             see = "" if title == "settings" else ": see the tables"
-            say(f"{len(rows) - MOST_ROWS} more {title} differ{see}")
+            common.say(f"{len(rows) - MOST_ROWS} more {title} differ{see}")
     same = len(other.figures) - len(figures), len(other.curves) - len(curves)
-    say(f"equal to the last bit: {same[0]} figures, {same[1]} curves")
+    common.say(f"equal to the last bit: {same[0]} figures, {same[1]} curves")
     if other.span is None:
-        say("no curves are compared: the runs have no time in common")
+        common.say("no curves are compared: the runs have no time in common")
     for label, parts in ((first, other.only_first), (other.label, other.only_other)):
         if parts:
-            say(f"in {label} alone: {', '.join(parts)}")
+            common.say(f"in {label} alone: {', '.join(parts)}")
 
 
 def _shown(value: object) -> str:

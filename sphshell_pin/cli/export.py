@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sphshell_pin.cli.app import OfOption, RunArgument, command, echo, progress_bar
+from sphshell_pin.cli import common
+from sphshell_pin.cli.common import command
 from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
@@ -15,17 +17,18 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import Scene
     from sphshell_pin.scenario.running.replay import Replay
 
+
 FORMATS = ("mcap", "csv", "parquet")
 
 
 @command()
 def export(
     *,
-    run: RunArgument,
+    run: common.RunArgument,
     to: str | None = None,
     out: Path | None = None,
     start: str = "0",
-    of: OfOption = None,
+    of: common.OfOption = None,
 ) -> None:
     """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.
 
@@ -68,7 +71,7 @@ def export(
         place = out or beside(run, f"_{to}")
         files = write_tables(place, result, scene, format=to, command=command)  # type: ignore[arg-type]
     for file in files:
-        echo(file)
+        common.echo(file)
 
 
 def file_of(run: Path) -> Path:
@@ -117,14 +120,14 @@ def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | 
         if scenario is not None:
             raise
         result = Result.load(file_of(run))
-        echo(f"warning: joints have numbers instead of names: {fault}", err=True)
+        common.echo(f"warning: joints have numbers instead of names: {fault}", err=True)
         return result, None
 
 
 def _write_mcap(place: Path, replay: Replay, start: int, command: str) -> Path:
     from sphshell_pin.export.mcap import write_mcap
 
-    with progress_bar(place.name, total=1.0) as update:
+    with common.progress_bar(place.name, total=1.0) as update:
         return write_mcap(
             place,
             replay.result,
@@ -133,3 +136,48 @@ def _write_mcap(place: Path, replay: Replay, start: int, command: str) -> Path:
             command=command,
             progress=lambda share: update(completed=share),
         )
+
+
+@command()
+def taxels(
+    run: common.RunArgument,
+    *,
+    contact: str,
+    shape: tuple[int, int] = (16, 16),
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    up: tuple[float, float, float] | None = None,
+    extent_deg: tuple[float, float] = (90.0, 90.0),
+    speed: float = 1.0,
+    out: Path | None = None,
+) -> None:
+    """Write what a grid of tactile sensors on a sphere felt: taxels.npz, and a film of it.
+
+    The run must have recorded patches (record in its table run).
+
+    Example: sphshell-pin taxels results/polished_valve --contact tool --axis 0 0 1
+
+    Options
+    -------
+    contact : Contact whose sphere has the taxels.
+    shape : Numbers of taxels: rows and columns.
+    axis : From the sphere's center to the middle of the grid, in its frame.
+    up : Direction of the columns, in the same frame; by default any.
+    extent_deg : Angles over which rows and columns reach.
+    speed : Simulated seconds in a second of the film.
+    out : Folder to write into; by default that of the run.
+    """
+    from sphshell_pin.patches import TaxelGrid
+    from sphshell_pin.scenario.running.replay import Replay
+
+    height, width = map(math.radians, extent_deg)
+    grid = TaxelGrid(contact, shape, axis=axis, up=up, extent=(height, width))
+    file = file_of(run)
+    replay = Replay(file)
+    images = grid.images(replay.result, replay.scene)
+    folder = file.parent if out is None else out
+    folder.mkdir(parents=True, exist_ok=True)
+    common.echo(images.save(folder / "taxels.npz"))
+    with common.if_installed():
+        common.echo(images.save_film(folder / "taxels.gif", speed=speed))
+    felt, missed = float(images.forces.max()), float(abs(images.outside).max())
+    common.echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")

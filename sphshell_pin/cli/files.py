@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import (
-    MISSED,
-    command,
-    length_of,
-    option,
-    print_table,
-    say,
-)
+from sphshell_pin.cli import common
 from sphshell_pin.errors import SphshellError, UnitMissing
 
 if TYPE_CHECKING:
@@ -24,27 +17,30 @@ if TYPE_CHECKING:
 MOST_ROWS = 16  # of the printed table
 
 ChordErrorOption = Annotated[
-    float | None, option("Of CAD: largest distance of the elements from the exact surface \\[m].")
+    float | None,
+    common.option("Of CAD: largest distance of the elements from the exact surface \\[m]."),
 ]
 BodyOption = Annotated[
-    list[str] | None, option("Of CAD: take this body; may be given several times.", metavar="NAME")
+    list[str] | None,
+    common.option("Of CAD: take this body; may be given several times.", metavar="NAME"),
 ]
 FaceOption = Annotated[
     list[str] | None,
-    option(
+    common.option(
         "Of CAD: take this face, by name or number; may be given several times.", metavar="NAME"
     ),
 ]
 
 TimeLimitOption = Annotated[
-    float | None, option("Of CAD: end OpenCASCADE after this time \\[s], 600 unless given.")
+    float | None, common.option("Of CAD: end OpenCASCADE after this time \\[s], 600 unless given.")
 ]
 MemoryLimitOption = Annotated[
-    float | None, option("Of CAD: let OpenCASCADE take so much memory \\[bytes], 8e9 unless given.")
+    float | None,
+    common.option("Of CAD: let OpenCASCADE take so much memory \\[bytes], 8e9 unless given."),
 ]
 
 
-@command()
+@common.command()
 def check(
     file: Path,
     *,
@@ -107,12 +103,12 @@ def check(
     shell = load(file, unit, "--unit")
     if against is None:
         shell.curvature_report()
-        say(str(shell.health))
+        common.say(str(shell.health))
         return
     from sphshell_pin.study.against import compare_shells
 
     other = load(against, against_unit, "--against-unit", False)
-    found = compare_shells(shell, other, length_of("--radius", radius), tolerance)
+    found = compare_shells(shell, other, common.length_of("--radius", radius), tolerance)
     _print_against(found, (file.name, against.name))
     if json is not None:
         from sphshell_pin.base.atomic import write_whole
@@ -120,7 +116,7 @@ def check(
         text = dumps({"files": [str(file), str(against)], **found.to_dict()}, indent=1)
         write_whole(json, text.encode())
     if map_ is not None:
-        from sphshell_pin.plot.differences import plot_differences
+        from sphshell_pin.plot.contact_map import plot_differences
         from sphshell_pin.plot.figure import write_figure
         from sphshell_pin.study.against import differences_on
 
@@ -129,8 +125,8 @@ def check(
             for of, (path, one) in enumerate(((file, shell), (against, other)))
         ]
         title = f"{len(found.off)} of {len(found.faces)} faces differ"
-        say(f"wrote {write_figure(map_, plot_differences(title, parts))}")
-    raise typer.Exit(0 if found.same else MISSED)
+        common.say(f"wrote {write_figure(map_, plot_differences(title, parts))}")
+    raise typer.Exit(0 if found.same else common.MISSED)
 
 
 def _print_against(found: Against, names: tuple[str, str]) -> None:
@@ -152,17 +148,19 @@ def _print_against(found: Against, names: tuple[str, str]) -> None:
     ]
     if rows:
         columns = ("face", "kind", "[m^2]", "places", "worst [m]", "of r", "median", "of size")
-        print_table((*columns, "force", "lost+extra"), rows)
+        common.print_table((*columns, "force", "lost+extra"), rows)
     if len(found.off) > len(rows):
-        say(f"{len(found.off) - len(rows)} more faces differ")
+        common.say(f"{len(found.off) - len(rows)} more faces differ")
     if found.unreached:
-        say(f"{found.unreached} faces are not compared: no sphere of this radius touches one alone")
+        common.say(
+            f"{found.unreached} faces are not compared: no sphere of this radius touches one alone"
+        )
     spheres = f"spheres of radius {found.radius:.3g} m, {found.depth:.3g} m deep"
-    say(f"A {names[0]}, B {names[1]}; {spheres}")
-    say(found.verdict())
+    common.say(f"A {names[0]}, B {names[1]}; {spheres}")
+    common.say(found.verdict())
 
 
-@command()
+@common.command()
 def convert(
     source: Path,
     target: Path,
@@ -209,13 +207,13 @@ def convert(
     for held in (done.source, done.target):
         size, area = f"{held.size:.6g} m", f"{held.area:.6g} m^2"
         rows.append((str(held.path), held.unit, f"{held.count} {held.kind}", size, area))
-    print_table(("file", "unit", "holds", "size", "area"), rows)
-    say(
+    common.print_table(("file", "unit", "holds", "size", "area"), rows)
+    common.say(
         f"deviation measured at {len(done.forth) + len(done.back)} points: "
         f"largest {done.largest:.3g} m, root mean square {done.rms:.3g} m"
     )
     for note in done.notes:
-        say(f"note: {note}")
+        common.say(f"note: {note}")
 
 
 def faces_of(names: list[str] | None) -> list[str | int] | None:

@@ -10,40 +10,27 @@ from typing import TYPE_CHECKING
 import typer
 
 from sphshell_pin.base.checks import stated_pairs
-from sphshell_pin.cli.app import (
-    MISSED,
-    CompiledOption,
-    PackageDirOption,
-    ScenarioArgument,
-    SetOption,
-    changes_of,
-    command,
-    echo,
-    if_installed,
-    print_table,
-    progress_bar,
-    say,
-)
+from sphshell_pin.cli import common
 from sphshell_pin.errors import InvalidParameter, ScenarioError
 
 if TYPE_CHECKING:
     from sphshell_pin.study.fit import Experiment, Fit
 
 
-@command()
+@common.command()
 def fit(
     data: list[Path] | None = None,
     *,
-    scenario: ScenarioArgument,
+    scenario: common.ScenarioArgument,
     param: list[str],
     experiment: list[str] | None = None,
     column: list[str] | None = None,
     sigma: list[str] | None = None,
     out: Path | None = None,
     picture: bool = True,
-    compiled: CompiledOption = False,
-    set_: SetOption = None,
-    package_dir: PackageDirOption = None,
+    compiled: common.CompiledOption = False,
+    set_: common.SetOption = None,
+    package_dir: common.PackageDirOption = None,
 ) -> None:
     """Fit values of a scenario to measured data, and write the scenario with the fitted values.
 
@@ -70,7 +57,7 @@ def fit(
     from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
     from sphshell_pin.study.fit.writing import scenario_text
 
-    changes = changes_of(set_, compiled=compiled)
+    changes = common.changes_of(set_, compiled=compiled)
     wanted = parse_wanted(param)
     given = [Experiment(path) for path in data or []]
     given += [_experiment(text) for text in experiment or []]
@@ -81,7 +68,7 @@ def fit(
     scenario_text(path, {**changes, **starts}, path.parent)
     status = "{task.completed} runs, misfit {task.fields[misfit]}"
     columns = "SpinnerColumn", status, "TimeElapsedColumn"
-    with progress_bar("fit", *columns, total=None, misfit="-") as update:
+    with common.progress_bar("fit", *columns, total=None, misfit="-") as update:
 
         def progress(runs: int, misfit: float) -> None:
             shown = "-" if math.isnan(misfit) else f"{misfit:.4g} sigma"
@@ -99,7 +86,7 @@ def fit(
     files = _write(found, path, out or Path("results") / path.stem, changes, picture=picture)
     _print_report(found, files)
     if not found.determined:
-        raise typer.Exit(MISSED)
+        raise typer.Exit(common.MISSED)
 
 
 def _experiment(text: str) -> Experiment:
@@ -112,7 +99,7 @@ def _experiment(text: str) -> Experiment:
         file, changes = "", []
     if not file or not all("=" in one for one in changes):
         raise InvalidParameter("--experiment", text, "must be 'DATA.csv KEY=VALUE ...'")
-    return Experiment(file, changes_of(changes), " ".join([Path(file).stem, *changes]))
+    return Experiment(file, common.changes_of(changes), " ".join([Path(file).stem, *changes]))
 
 
 def _deviations(stated: list[str] | None) -> dict[str, float]:
@@ -138,7 +125,7 @@ def _write(
     if picture:
         from sphshell_pin.plot.figure import png
 
-        with if_installed():
+        with common.if_installed():
             made["fit.png"] = png(found.plot())
     name = f"{path.stem}.fitted.toml"
     made = {name: found.scenario_text(folder, changes).encode(), **made}
@@ -148,7 +135,7 @@ def _write(
     try:
         check_knobs(read_scenario(fitted), fitted, ranges=True)
     except ScenarioError as fault:
-        echo(f"note: the fitted scenario needs a change before it runs: {fault}", err=True)
+        common.echo(f"note: the fitted scenario needs a change before it runs: {fault}", err=True)
     return files
 
 
@@ -158,8 +145,8 @@ def _print_report(found: Fit, files: list[Path]) -> None:
     count = sum(len(one.t) for one in found.series)
     experiments = len({one.experiment for one in found.series})
     text = f": {count} values of {experiments} experiments, {found.runs} runs"
-    say(text, bold=found.scenario)
-    print_table(
+    common.say(text, bold=found.scenario)
+    common.print_table(
         ("parameter", "start", "value", f"{found.level:.0%} interval", "unit"),
         (
             (one.key, f"{one.start:.6g}", f"{one.value:.6g}", interval_text(one), one.unit)
@@ -171,13 +158,13 @@ def _print_report(found: Fit, files: list[Path]) -> None:
         for k, (one, row) in enumerate(zip(found.parameters, found.correlation, strict=True), 1):
             cells = ["-" if math.isnan(r) else f"{r:+.3f}" for r in row[:k].tolist()]
             rows.append((f"{k} {one.key}", *cells))
-        print_table(("correlation", *(str(k + 1) for k in range(len(rows)))), rows)
+        common.print_table(("correlation", *(str(k + 1) for k in range(len(rows)))), rows)
     rows = []
     for series in found.series:
         sigma = f"{math.sqrt(float((series.sigma**2).mean())):.4g}{' given' * series.given}"
         called = f"{series.name} of {series.experiment}"
         rows.append((called, f"{len(series.t)}", f"{series.rms:.4g}", sigma, series.unit))
-    print_table(("data", "values", "rms residual", "sigma", "unit"), rows)
+    common.print_table(("data", "values", "rms residual", "sigma", "unit"), rows)
     for remark in found.remarks:
-        echo(f"note: {remark}", err=True)
-    say(f"files: {', '.join(map(str, files))}")
+        common.echo(f"note: {remark}", err=True)
+    common.say(f"files: {', '.join(map(str, files))}")

@@ -6,19 +6,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NoReturn
 
-from sphshell_pin.cli.app import (
-    DensityOption,
-    MimicOption,
-    PackageDirOption,
-    RadiusOption,
-    XacroArgOption,
-    command,
-    echo,
-    length_of,
-    progress_bar,
-    say,
-    xacro_args_of,
-)
+from sphshell_pin.cli import common
 from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
 from sphshell_pin.errors import SphshellError, UnitMissing
 
@@ -29,13 +17,13 @@ if TYPE_CHECKING:
 _FRAMES = 8  # of a robot in a list
 
 
-@command()
+@common.command()
 def new(
     *,
     robot: str,
     surface: str = "plane",
     frame: str | None = None,
-    radius: RadiusOption = None,
+    radius: common.RadiusOption = None,
     offset: tuple[float, float, float] | None = None,
     unit: str | None = None,
     body: BodyOption = None,
@@ -50,10 +38,10 @@ def new(
     tips: Literal["one", "all"] = "one",
     base: Literal["fixed", "floating"] | None = None,
     free_flyer: bool = False,
-    package_dir: PackageDirOption = None,
-    xacro_arg: XacroArgOption = None,
-    density: DensityOption = None,
-    no_mimic: MimicOption = False,
+    package_dir: common.PackageDirOption = None,
+    xacro_arg: common.XacroArgOption = None,
+    density: common.DensityOption = None,
+    no_mimic: common.MimicOption = False,
     out: Path | None = None,
     force: bool = False,
 ) -> None:
@@ -93,12 +81,12 @@ def new(
 
     title = f"{robot} and {surface}: searching posture, place and values"
     try:
-        with progress_bar(title, "TimeElapsedColumn", total=None):
+        with common.progress_bar(title, "TimeElapsedColumn", total=None):
             made = new_scenario(
                 robot,
                 surface,
                 frame=frame,
-                radius=length_of("--radius", radius),
+                radius=common.length_of("--radius", radius),
                 offset=offset,
                 unit=unit,
                 bodies=body,
@@ -109,17 +97,17 @@ def new(
                 place=place,
                 at=at,
                 path=path,
-                length=length_of("--length", length),
+                length=common.length_of("--length", length),
                 tips=tips,
                 base="floating" if free_flyer else base,
                 package_dirs=package_dir or (),
-                xacro_args=xacro_args_of(xacro_arg),
+                xacro_args=common.xacro_args_of(xacro_arg),
                 density=density,
                 mimic=not no_mimic,
                 out=out,
                 force=force,
                 # What was tried goes to the error stream, the answer to the other.
-                tell=lambda what: echo(what, err=True),
+                tell=lambda what: common.echo(what, err=True),
             )
     except UnitMissing as error:
         raise SphshellError(f"the unit {error.must('--unit {}')}") from error
@@ -128,17 +116,17 @@ def new(
 
 def _list_robots(folder: str) -> NoReturn:
     """Print the robots in a folder, each as it is found, and end: one has to be named."""
-    from sphshell_pin.robots.workspace import find_robots
+    from sphshell_pin.robots.finding import find_robots
 
     count = 0
     for one in find_robots(folder):
         count += 1
-        say(f"{one.file}: {one.joints} joints" if one.joints else f"{one.file}")
+        common.say(f"{one.file}: {one.joints} joints" if one.joints else f"{one.file}")
         if one.frames:
             shown = ", ".join(one.frames[:_FRAMES]) + (", ..." if one.frames[_FRAMES:] else "")
-            say(f"  frames at its ends: {shown}")
+            common.say(f"  frames at its ends: {shown}")
         if one.missing:
-            say(f"  missing: {one.missing}")
+            common.say(f"  missing: {one.missing}")
     which = f"say which of these {count} robots: --robot FILE" if count else "holds no robot's file"
     raise SphshellError(f"{folder}: {which}")
 
@@ -146,12 +134,12 @@ def _list_robots(folder: str) -> NoReturn:
 def _show(made: NewScenario) -> None:
     for section in made.built.scenario.shell:
         if section.file is not None:
-            say(f"{made.built.shells[section.name].health}\n")
-    say(f"{made.explanation}\n")
-    say("Chosen:")
+            common.say(f"{made.built.shells[section.name].health}\n")
+    common.say(f"{made.explanation}\n")
+    common.say("Chosen:")
     for one in made.why:
-        say(f"  {one}")
-    say(f"\nWritten: {made.path}")
-    say("Next:")
+        common.say(f"  {one}")
+    common.say(f"\nWritten: {made.path}")
+    common.say("Next:")
     for way in ("run", "view"):
-        say(f"  sphshell-pin {way} {shlex.quote(str(made.path))}")
+        common.say(f"  sphshell-pin {way} {shlex.quote(str(made.path))}")

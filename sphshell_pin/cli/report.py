@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from sphshell_pin.cli.app import (
-    MISSED,
-    PERCENT,
-    colored,
-    command,
-    echo,
-    print_table,
-    progress_bar,
-    say,
-)
+from sphshell_pin.cli import common
+from sphshell_pin.cli.common import command
 
 if TYPE_CHECKING:
     from sphshell_pin.study.report import Report
@@ -41,7 +33,7 @@ def report(*, quick: bool = False, out: Path = Path("results/report")) -> None:
 
     # Without --out: the folder is no part of what was measured.
     command = f"sphshell-pin report{' --quick' * quick}"
-    with progress_bar("report", PERCENT, "TimeElapsedColumn", total=1.0) as update:
+    with common.progress_bar("report", common.PERCENT, "TimeElapsedColumn", total=1.0) as update:
         made = make_report(
             out,
             quick=quick,
@@ -49,8 +41,8 @@ def report(*, quick: bool = False, out: Path = Path("results/report")) -> None:
             tell=lambda title, share: update(description=title, completed=share),
         )
     _print(made)
-    say(f"page: {out / PAGE}")
-    raise typer.Exit(MISSED if made.failed else 0)
+    common.say(f"page: {out / PAGE}")
+    raise typer.Exit(common.MISSED if made.failed else 0)
 
 
 def _print(made: Report) -> None:
@@ -58,12 +50,12 @@ def _print(made: Report) -> None:
     for one in [one for section in made.sections for one in section.findings]:
         word = {True: "met", False: "missed", None: ""}[one.met]
         word = "not measured" if one.unmeasured else word
-        cell = colored(word, "green" if word == "met" else "red")
+        cell = common.colored(word, "green" if word == "met" else "red")
         rows.append((one.what, one.text, one.spread_text, one.aim_text, cell))
-    print_table(("figure", "median", "quartiles", "aim", "verdict"), rows)
+    common.print_table(("figure", "median", "quartiles", "aim", "verdict"), rows)
     for line in [line for section in made.sections for line in section.unmeasured]:
-        echo(f"not measured: {line}", err=True)
+        common.echo(f"not measured: {line}", err=True)
     if made.caution:
-        echo(f"caution: {made.caution}", err=True)
+        common.echo(f"caution: {made.caution}", err=True)
     for section in made.failed:
-        echo(f"not measured: {section.title}: {section.error}", err=True)
+        common.echo(f"not measured: {section.title}: {section.error}", err=True)

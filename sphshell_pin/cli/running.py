@@ -8,29 +8,31 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from sphshell_pin.cli.app import (
-    ERROR,
-    INTERRUPTED,
-    MISSED,
-    PERCENT,
-    CompiledOption,
-    DtOption,
-    DurationOption,
-    PackageDirOption,
-    ScenarioArgument,
-    SetOption,
-    changes_of,
-    colored,
-    command,
-    echo,
-    print_table,
-    progress_bar,
-    say,
-)
+from sphshell_pin.cli import common
 from sphshell_pin.errors import Interrupted, SimulationDiverged
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario import RunReport
+
+
+@common.command("list")
+def list_(context: typer.Context) -> None:
+    """List the shipped scenarios, and the robots that scenarios can name.
+
+    Example: sphshell-pin list
+    """
+    from sphshell_pin.robots import OWN, names
+    from sphshell_pin.scenario import read_scenario, shipped_scenarios
+
+    table = common.make_table("scenario")
+    table.add_column("what it shows")
+    for name, path in shipped_scenarios().items():
+        table.add_row(name, common.plain(read_scenario(path).title))
+    common.terminal().print(table)
+    common.say(f": {', '.join(names())}", bold="robots")
+    if len(names()) == len(OWN):
+        common.say("More robots: pip install 'sphshell-pin[robots]'")
+
 
 # A share of the exchanged energy that no sound run loses or gains.
 SUSPICIOUS_RESIDUAL = 0.05
@@ -38,19 +40,19 @@ SUSPICIOUS_RESIDUAL = 0.05
 MOST_PAIRS = 16
 
 
-@command()
+@common.command()
 def run(
     *,
-    scenario: ScenarioArgument,
+    scenario: common.ScenarioArgument,
     out: Path | None = None,
-    dt: DtOption = None,
-    duration: DurationOption = None,
+    dt: common.DtOption = None,
+    duration: common.DurationOption = None,
     recording: bool = True,
     figures: bool = True,
     audit_cad: bool = False,
-    compiled: CompiledOption = False,
-    set_: SetOption = None,
-    package_dir: PackageDirOption = None,
+    compiled: common.CompiledOption = False,
+    set_: common.SetOption = None,
+    package_dir: common.PackageDirOption = None,
 ) -> None:
     """Run a scenario and write its results folder.
 
@@ -65,11 +67,13 @@ def run(
     """
     from sphshell_pin.scenario import build, explain_built, run_built
 
-    changes = changes_of(set_, dt, duration, compiled)
+    changes = common.changes_of(set_, dt, duration, compiled)
     built = build(scenario, changes)
     for warning in explain_built(built).warnings:
-        echo(f"warning: {warning}", err=True)
-    with progress_bar(built.name, PERCENT, "TimeRemainingColumn", total=1.0) as update:
+        common.echo(f"warning: {warning}", err=True)
+    with common.progress_bar(
+        built.name, common.PERCENT, "TimeRemainingColumn", total=1.0
+    ) as update:
         report = run_built(
             built,
             out,
@@ -83,12 +87,12 @@ def run(
     raise typer.Exit(code)
 
 
-@command()
+@common.command()
 def explain(
-    scenario: ScenarioArgument,
-    dt: DtOption = None,
-    set_: SetOption = None,
-    package_dir: PackageDirOption = None,
+    scenario: common.ScenarioArgument,
+    dt: common.DtOption = None,
+    set_: common.SetOption = None,
+    package_dir: common.PackageDirOption = None,
 ) -> None:
     """Say what a scenario models: time scales, expected depths, a fitting dt, warnings.
 
@@ -96,9 +100,9 @@ def explain(
     """
     from sphshell_pin.scenario import build, explain_built
 
-    built = build(scenario, changes_of(set_, dt))
-    say(f": {built.scenario.title}", bold=built.name)
-    say(str(explain_built(built)))
+    built = build(scenario, common.changes_of(set_, dt))
+    common.say(f": {built.scenario.title}", bold=built.name)
+    common.say(str(explain_built(built)))
 
 
 def _exit_code(report: RunReport, *, changed: bool) -> int:
@@ -106,14 +110,14 @@ def _exit_code(report: RunReport, *, changed: bool) -> int:
         hint = ""
         if isinstance(report.stopped, SimulationDiverged):
             hint = "; sphshell-pin explain, with the same --set, names a fitting dt"
-        echo(f"{report.stopped}{hint}\npartial results are in {report.folder}", err=True)
-        return INTERRUPTED if isinstance(report.stopped, Interrupted) else ERROR
+        common.echo(f"{report.stopped}{hint}\npartial results are in {report.folder}", err=True)
+        return common.INTERRUPTED if isinstance(report.stopped, Interrupted) else common.ERROR
     if all(verdict.met for verdict in report.verdicts):
         return 0
     if changed:
-        echo("the scenario was changed: missed expectations are not counted", err=True)
+        common.echo("the scenario was changed: missed expectations are not counted", err=True)
         return 0
-    return MISSED
+    return common.MISSED
 
 
 def _joint_rows(report: RunReport) -> Iterator[tuple[str, ...]]:
@@ -132,7 +136,7 @@ def _print_report(report: RunReport) -> None:
     from sphshell_pin.scenario.running.figures import measure_energy
 
     stats = report.result.stats
-    say(f": {report.built.scenario.title}", bold=report.built.name)
+    common.say(f": {report.built.scenario.title}", bold=report.built.name)
     shown = sorted(stats.pairs, key=lambda name: -stats.pairs[name].peak_force)[:MOST_PAIRS]
     rows = [
         (
@@ -147,26 +151,28 @@ def _print_report(report: RunReport) -> None:
         if name in shown
     ]
     titles = ("contact", "duration", "touches", "peak force", "mean force", "largest depth")
-    print_table(titles, rows)
+    common.print_table(titles, rows)
     others = [pair for name, pair in stats.pairs.items() if name not in shown]
     if others:
         touched = sum(1 for pair in others if pair.touches)
-        say(
+        common.say(
             f"{len(others)} more contacts with smaller peak forces, of which {touched} touched: "
             "all are in summary.json"
         )
-    print_table(("joint", "stops", "stop time", "torque cut", "peak speed"), _joint_rows(report))
+    common.print_table(
+        ("joint", "stops", "stop time", "torque cut", "peak speed"), _joint_rows(report)
+    )
     energy = measure_energy(report.result)
-    say(
+    common.say(
         f"energy residual   {energy['residual']:.3g} J, {energy['relative_residual']:.2g} of the "
         f"{energy['exchanged']:.3g} J exchanged\n"
         f"real-time factor  {stats.real_time_factor:.3g} ({stats.duration:.4g} s simulated "
         f"in {stats.wall_time:.3g} s, {stats.steps} steps of {stats.dt:g} s)"
     )
     if energy["relative_residual"] > SUSPICIOUS_RESIDUAL:
-        echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
+        common.echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
     for warning in report.warnings:
-        echo(f"warning: {warning}", err=True)
+        common.echo(f"warning: {warning}", err=True)
     if report.audit is not None:
         audited = [
             (one.name, f"{one.contacts}", f"{one.unmatched}")
@@ -174,12 +180,12 @@ def _print_report(report: RunReport) -> None:
             + tuple(f"{off:.3g} rad" for off in one.normal)
             for one in report.audit.pairs
         ]
-        say("contacts beside those on the exact CAD faces, largest and rms difference")
+        common.say("contacts beside those on the exact CAD faces, largest and rms difference")
         heads = ("contact", "recorded", "on no face", "depth off", "rms", "normal off", "rms")
-        print_table(heads, audited)
-    marks = {True: colored("as expected", "green"), False: colored("missed", "red")}
+        common.print_table(heads, audited)
+    marks = {True: common.colored("as expected", "green"), False: common.colored("missed", "red")}
     judged = [(v.figure, v.expected, f"{v.measured:.6g}", marks[v.met]) for v in report.verdicts]
-    print_table(("figure", "expected", "measured", "verdict"), judged)
-    say(f"files in {report.folder}: {', '.join(file.name for file in report.files)}")
+    common.print_table(("figure", "expected", "measured", "verdict"), judged)
+    common.say(f"files in {report.folder}: {', '.join(file.name for file in report.files)}")
     for note in report.notes:
-        echo(note, err=True)
+        common.echo(note, err=True)

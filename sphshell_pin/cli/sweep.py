@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import typer
 
-from sphshell_pin.cli.app import (
+from sphshell_pin.cli.common import (
     ERROR,
     CompiledOption,
     DtOption,

@@ -1,28 +1,25 @@
 """The command view: a scenario that runs, or a finished run, in a page to play with."""
 
-from sphshell_pin.cli.app import (
-    OfOption,
-    PackageDirOption,
-    SetOption,
-    changes_of,
-    command,
-    echo,
-)
+import re
+from pathlib import Path
+
+from sphshell_pin.cli import common
+from sphshell_pin.errors import InvalidParameter, SphshellError
 
 
-@command()
+@common.command()
 def view(
     scenario: str,
     *,
-    set_: SetOption = None,
-    package_dir: PackageDirOption = None,
+    set_: common.SetOption = None,
+    package_dir: common.PackageDirOption = None,
     speed: float = 1.0,
     paused: bool = False,
     host: str = "127.0.0.1",
     port: int = 0,
     open_: bool = True,
     color: str = "surface",
-    of: OfOption = None,
+    of: common.OfOption = None,
 ) -> None:
     """Run a scenario in a page: pause, push, change parameters; or play a finished run.
 
@@ -44,7 +41,7 @@ def view(
 
     preview(
         scenario,
-        changes=changes_of(set_),
+        changes=common.changes_of(set_),
         scenario=of,
         speed=speed,
         paused=paused,
@@ -52,5 +49,74 @@ def view(
         port=port,
         open=open_,
         color=color,  # type: ignore[arg-type]
-        told=lambda url: echo(f"{url}  (Ctrl-C ends the run)"),
+        told=lambda url: common.echo(f"{url}  (Ctrl-C ends the run)"),
     )
+
+
+@common.command()
+def render(
+    run: common.RunArgument,
+    *,
+    out: Path,
+    time: float | None = None,
+    from_: float | None = None,
+    to: float | None = None,
+    size: str = "1280x720",
+    fps: float | None = None,
+    speed: float | None = None,
+    camera: str = "fit",
+    chart: bool = True,
+    dark: bool = False,
+    of: common.OfOption = None,
+) -> None:
+    """Draw a finished run: one picture, a film, or a folder of pictures for slides.
+
+    It needs the extra video, and Chromium.
+
+    Example: sphshell-pin render results/fingertip_on_blade --out blade.mp4 --camera follow
+
+    Options
+    -------
+    out : A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures.
+    time : Of a picture: time of the run [s]; by default its end.
+    from_ : Of a film: time at which it begins [s].
+    to : Of a film: time at which it ends [s].
+    size : Width and height in pixels.
+    fps : Pictures per second; by default 30, of a .gif 20.
+    speed : Simulated seconds per second; by default as the scenario has it.
+    camera : From where: fit, front, side, top, follow, contact.
+    chart : Forces and depth under the scene.
+    dark : Dark background.
+    """
+    from sphshell_pin.scenario.running.replay import Replay
+    from sphshell_pin.view.film import render_film
+    from sphshell_pin.view.live.opening import result_file
+
+    pixels = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
+    if pixels is None:
+        raise InvalidParameter("--size", size, "must be WIDTHxHEIGHT, for instance 1280x720")
+    file = result_file(run)
+    if file is None:
+        raise SphshellError(
+            f"{run} is no finished run: give its results folder or run.npz, which "
+            "sphshell-pin run writes"
+        )
+    replay = Replay(file, of)
+    with common.progress_bar(str(out), total=None) as update:
+        drawn = render_film(
+            out,
+            replay.result,
+            replay.scene,
+            replay.visual_model,
+            time=time,
+            span=(from_, to),
+            size=(int(pixels[1]), int(pixels[2])),
+            fps=fps,
+            speed=speed if speed is not None or out.suffix == ".png" else replay.speed,
+            camera=camera,  # type: ignore[arg-type]
+            chart=chart,
+            dark=dark,
+            title=replay.title,
+            told=lambda done, count: update(completed=done, total=count),
+        )
+    common.echo(drawn)

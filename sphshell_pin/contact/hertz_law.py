@@ -9,19 +9,14 @@ from pathlib import Path
 
 from sphshell_pin import _core
 from sphshell_pin.base.parameters import parameter
+from sphshell_pin.contact import materials
 from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw, dissipation_for
-from sphshell_pin.contact.materials import (
-    TwoMaterials,
-    elastic_numbers,
-    find_material,
-    restitution_between,
-)
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 
 
 @dataclass(frozen=True)
-class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
+class HertzLaw(materials.TwoMaterials, NormalLaw, kind="hertz"):
     """Hertz's law from materials: the force follows from the curvatures of sphere and shell.
 
     force = E* scale depth^1.5 with 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2; `young` [Pa] and
@@ -76,10 +71,10 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
 
         Where these state no damping, the restitution is that of the materials at 1 m/s.
         """
-        stated = elastic_numbers(sphere, shell)
+        stated = materials.elastic_numbers(sphere, shell)
         if not more.keys() & {"restitution", "speed", "loss_tangent", "frequency"}:
-            pair = find_material(sphere), find_material(shell)
-            stated |= {"restitution": restitution_between(*pair), "speed": 1.0}
+            pair = materials.find_material(sphere), materials.find_material(shell)
+            stated |= {"restitution": materials.restitution_between(*pair), "speed": 1.0}
         return cls(**stated | more)
 
     @cached_property

@@ -7,14 +7,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import (
-    check_finite,
-    check_not_negative,
-    check_positive,
-    check_type,
-    check_vector,
-)
 from sphshell_pin.contact.friction import Friction, check_friction
 from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
@@ -32,8 +26,8 @@ class BristleState:
     """
 
     def __init__(self, radius: float = 0.0, relaxation: float = 2e-5) -> None:
-        self.radius = check_not_negative("radius", radius, "m")
-        self.relaxation = check_positive("relaxation", relaxation, "s")
+        self.radius = checks.check_not_negative("radius", radius, "m")
+        self.relaxation = checks.check_positive("relaxation", relaxation, "s")
         self.stretch_world: Array = np.zeros(3)
         """Stretch of the bristle (3,) [m]; zero without contact.
 
@@ -59,7 +53,7 @@ class BristleState:
         the normal, and is stretched by the new velocity, as in SemiImplicitEuler (order 1). Where
         `depth` is not positive, it forgets; at a new touch it begins unstretched.
         """
-        dt = check_not_negative("dt", dt, "s")
+        dt = checks.check_not_negative("dt", dt, "s")
         contact = _Contact(point, normal, depth, motion_i, motion_j, law, friction)
         if contact.depth <= 0 or self._normal is None:
             self.stretch_world = np.zeros(3)
@@ -91,15 +85,15 @@ class _Contact:
         law: NormalLaw,
         friction: Friction | None,
     ) -> None:
-        self.point = check_vector("point", point, 3)
-        self.normal = check_vector("normal", normal, 3)
+        self.point = checks.check_vector("point", point, 3)
+        self.normal = checks.check_vector("normal", normal, 3)
         if abs(np.linalg.norm(self.normal) - 1) > 1e-6:
             raise InvalidParameter("normal", self.normal.tolist(), "must be a unit vector")
         for name, motion in (("motion_i", motion_i), ("motion_j", motion_j)):
-            check_type(name, motion, pin.Motion, "must be a pinocchio.Motion")
+            checks.check_type(name, motion, pin.Motion, "must be a pinocchio.Motion")
         check_law(law, "at a lone contact point")
         check_friction(friction)
-        self.depth = check_finite("depth", depth)
+        self.depth = checks.check_finite("depth", depth)
         self.motion = motion_i - motion_j
         self.law, self.friction = law, friction
 

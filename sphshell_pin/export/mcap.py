@@ -17,8 +17,8 @@ from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_type
 from sphshell_pin.base.tables import quantity_of
-from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts

@@ -17,9 +17,8 @@ from sphshell_pin.dynamics.result.result_scene import scene_of
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
-from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
-from sphshell_pin.patches.placed import PlacedPatches, patches_on
+from sphshell_pin.patches.placed import PlacedPatches, load_in_polygons, patches_on
 
 # Parallels are no straight lines in a patch: they are cut so that a chord leaves them by this
 # share of the larger half axis of the smallest of the larger patches.

@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.base.checks import check_name
-from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result_scene import find_scene
 from sphshell_pin.errors import NameNotFound
-from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
-from sphshell_pin.plot.contact_path import plot_contact_path
-from sphshell_pin.plot.figure import NO_CONTACT, write_figure
-from sphshell_pin.plot.over_time import MOST_PAIRS, plot_energy, plot_force_and_depth, plot_overview
-from sphshell_pin.plot.sensors import plot_sensors
-from sphshell_pin.plot.series import MOST_POINTS
+from sphshell_pin.plot.contact_map import plot_contact_map as plot_contact_map
+from sphshell_pin.plot.figure import write_figure
+from sphshell_pin.plot.on_shell import plot_contact_path as plot_contact_path
+from sphshell_pin.plot.over_time import plot_energy as plot_energy
+from sphshell_pin.plot.over_time import plot_force_and_depth as plot_force_and_depth
+from sphshell_pin.plot.over_time import plot_overview as plot_overview
+from sphshell_pin.plot.over_time import plot_sensors as plot_sensors
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -28,22 +28,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
 
-__all__ = [
-    "KINDS",
-    "MOST_PAIRS",
-    "MOST_POINTS",
-    "NO_CONTACT",
-    "QUANTITIES",
-    "PairSeries",
-    "plot_contact_map",
-    "plot_contact_path",
-    "plot_energy",
-    "plot_force_and_depth",
-    "plot_overview",
-    "plot_result",
-    "plot_sensors",
-    "save_figures",
-]
 
 KINDS: dict[str, Callable[..., Figure]] = {
     "overview": plot_overview,

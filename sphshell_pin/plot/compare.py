@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.plot.figure import count, finish_axis, label_axis, new_figure, say
-from sphshell_pin.plot.series import thinned
+from sphshell_pin.plot.over_time import thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,25 +11,96 @@ import numpy as np
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result_scene import scene_of
 from sphshell_pin.errors import NameNotFound
+from sphshell_pin.plot import on_shell
 from sphshell_pin.plot.figure import INK, NO_CONTACT, only_say, reading_unit
-from sphshell_pin.plot.on_shell import (
-    PathGroup,
-    Picture,
-    color_scale,
-    element_corners,
-    group_paths,
-    shell_figure,
-)
-from sphshell_pin.plot.patches import COLORS as PATCH_COLORS
-from sphshell_pin.plot.patches import draw_patches, patches_of, peak_pressure
 
 if TYPE_CHECKING:
+    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
     from sphshell_pin.patches.placed import PlacedPatches
     from sphshell_pin.shell.shell import Shell
+
+EYE = np.array([0.6, -0.7, 0.5])
+
+
+def plot_differences(title: str, parts: Sequence[tuple[str, Shell, Array]]) -> Figure:
+    """Return a Figure of shells, each seen from two opposite sides.
+
+    parts : name, shell, and by how much each of its elements differs in depth (m,) [m]; elements
+        of 0 are gray
+
+    Raises MissingExtra without matplotlib.
+    """
+    largest = max(float(values.max(initial=0.0)) for _, _, values in parts)
+    factor, unit = reading_unit(largest, "m")
+    scale = on_shell.color_scale(largest * factor, "viridis_r")
+    figure, axes = on_shell.shell_figure(title, 2 * len(parts))
+    for k, axis in enumerate(axes):
+        name, shell, values = parts[k // 2]
+        picture = on_shell.Picture.of(axis, shell, EYE * (1 - 2 * (k % 2)), np.asarray(shell.box))
+        picture.draw_shell(shell, values, scale.to_rgba(values * factor))
+        axis.set_title(f"{name}, from {('one side', 'the other')[k % 2]}", fontsize=10)
+    figure.colorbar(scale, ax=axes, label=f"largest difference of depth on a face [{unit}]")
+    return figure
+
+
+PATCH_COLORS = "viridis"
+MOST = 40  # ellipses in one picture
+_CIRCLE = np.linspace(0.0, 2.0 * np.pi, 33)
+
+
+def patches_of(result: Result, scene: Scene, group: on_shell.PathGroup) -> PlacedPatches | None:
+    """Return the patches on the shell of `group` in its frame, those that press."""
+    from sphshell_pin.patches.placed import patches_on
+
+    if result.patch_rows is None:
+        return None
+    pairs = [path.pair for path in group.paths]
+    pair = scene.pairs[pairs[0]]
+    patches = patches_on(result, scene, pairs, pair.joint_j, pair.placement_j)
+    return patches.select(patches.force > 0.0)
+
+
+def peak_pressure(patches: PlacedPatches) -> Array:
+    """Return the peak of Hertz's pressure of each patch (k,) [Pa]."""
+    return np.asarray(1.5 * patches.force / (np.pi * patches.half_axes.prod(axis=1)))
+
+
+def draw_patches(
+    picture: on_shell.Picture, patches: PlacedPatches, normal: Array, scale: ScalarMappable
+) -> None:
+    """Draw some ellipses on the side that `normal` (3,) shows, apart from each other, true to size.
+
+    `scale` has the colors of the peak pressures [MPa].
+    """
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    seen = np.flatnonzero(patches.normals @ normal > 0.0)
+    if not len(seen):
+        return
+    peak = peak_pressure(patches)
+    kept: list[int] = []
+    extent = float(np.ptp(patches.points[seen], axis=0).max())
+    for k in seen.tolist():
+        near = patches.points[kept] - patches.points[k]
+        apart = max(1.5 * float(patches.half_axes[k, 0]), extent / MOST)
+        if not kept or float((near**2).sum(axis=1).min()) > apart**2:
+            kept.append(k)
+    kept = [kept[k] for k in np.unique(np.linspace(0, len(kept) - 1, MOST).astype(int))]
+    ellipses = []
+    for k in kept:
+        axis = patches.axes[k]
+        across = np.cross(patches.normals[k], axis)
+        a, b = patches.half_axes[k]
+        ring = a * np.cos(_CIRCLE)[:, None] * axis + b * np.sin(_CIRCLE)[:, None] * across
+        ellipses.append((patches.points[k] + ring) * picture.factor)
+    colors = scale.to_rgba(peak[kept] * 1e-6)
+    shown = Poly3DCollection(ellipses, facecolors=colors, edgecolors=INK, linewidths=0.6, zorder=5)
+    picture.axis.add_collection3d(shown, autolim=False)
+
 
 QUANTITIES = {
     "impulse": ("normal impulse on each element", "N", " s"),
@@ -76,7 +148,7 @@ def plot_contact_map(
     if quantity not in QUANTITIES:
         raise NameNotFound("quantity", quantity, "a contact map", QUANTITIES)
     scene = scene_of(result, scene)
-    groups = [group for group in group_paths(result, scene) if group.shell is not None]
+    groups = [group for group in on_shell.group_paths(result, scene) if group.shell is not None]
     views = [
         view
         for group in groups
@@ -86,19 +158,19 @@ def plot_contact_map(
         reason = "No shell was touched." if len(result.contacts.t) else NO_CONTACT
         return only_say("Contact map", reason)
     title = f"Contact map{_caution(result, groups, quantity)}"
-    figure, axes = shell_figure(title, len(views))
+    figure, axes = on_shell.shell_figure(title, len(views))
     label, base, after = QUANTITIES[quantity]
     largest = max(float(view.values.max()) for view in views)
     factor, unit = reading_unit(largest, base)
-    scale = color_scale(largest * factor, COLORS)
+    scale = on_shell.color_scale(largest * factor, COLORS)
     peaks = [
         peak_pressure(view.patches).max(initial=0.0) for view in views if view.patches is not None
     ]
-    pressure = color_scale(max(peaks, default=0.0) * 1e-6, PATCH_COLORS)
+    pressure = on_shell.color_scale(max(peaks, default=0.0) * 1e-6, PATCH_COLORS)
     for axis, view in zip(axes, views, strict=True):
-        touched = element_corners(view.shell)[view.values > 0.0].reshape(-1, 3)
+        touched = on_shell.element_corners(view.shell)[view.values > 0.0].reshape(-1, 3)
         near = np.vstack((touched, *view.paths))
-        picture = Picture.of(axis, view.shell, view.normal, near)
+        picture = on_shell.Picture.of(axis, view.shell, view.normal, near)
         fine = picture.draw_shell(view.shell, view.values, scale.to_rgba(view.values * factor))
         # Where elements are as fine as a line, their colors are the path.
         for path in [] if fine else view.paths:
@@ -138,7 +210,7 @@ def element_values(result: Result, pairs: list[int], elements: int, quantity: st
     return values
 
 
-def _caution(result: Result, groups: list[PathGroup], quantity: str) -> str:
+def _caution(result: Result, groups: list[on_shell.PathGroup], quantity: str) -> str:
     """Say so where the recorded rows missed much of what the contacts did, else nothing."""
     figures = result.stats.pairs
     seen, done = 0.0, 0.0
@@ -161,7 +233,7 @@ def _caution(result: Result, groups: list[PathGroup], quantity: str) -> str:
 
 
 def _views(
-    result: Result, group: PathGroup, quantity: str, patches: PlacedPatches | None
+    result: Result, group: on_shell.PathGroup, quantity: str, patches: PlacedPatches | None
 ) -> list[_View]:
     """Return the pictures of one shell: one, or two if it is touched from opposite sides."""
     shell = group.shell
@@ -174,7 +246,7 @@ def _views(
     first = np.average(normals, axis=0, weights=np.maximum(force, 0.0) + 1e-12)
     if np.linalg.norm(first) < 0.2:
         first = normals[np.argmax(force)]
-    corners = element_corners(shell)
+    corners = on_shell.element_corners(shell)
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
     facing = outward @ (first / np.linalg.norm(first))

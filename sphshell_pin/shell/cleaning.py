@@ -14,10 +14,9 @@ import numpy as np
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array, Ints, Mask
 from sphshell_pin.errors import InvalidShell
+from sphshell_pin.shell import orientation
 from sphshell_pin.shell.cleaned import CleanedSurface
-from sphshell_pin.shell.corner_normals import Found, settle_normals, unit_normals
 from sphshell_pin.shell.health import ShellHealth
-from sphshell_pin.shell.orientation import Oriented, as_triangles, find_borders, orient
 from sphshell_pin.shell.polygons import Polygons, examine_quads, without_area
 from sphshell_pin.shell.raw import RawSurface, raw_surface
 from sphshell_pin.shell.tangent_joints import settle_joints
@@ -49,7 +48,7 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
         If no element with an area is left.
     """
     found = _given(raw)
-    table = unit_normals(raw, found)
+    table = orientation.unit_normals(raw, found)
     polygons, vertices = _without_unused(Polygons.from_raw(raw), raw.vertices)
     size = box_diagonal(vertices)
     if size == 0.0:
@@ -73,7 +72,7 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
         polygons = polygons.with_corners(representative[polygons.corners])
     polygons, table = _mend(polygons, vertices, table, tolerance, size, found)
     solid = None if raw.solids is None else raw.solids[polygons.source]
-    oriented = orient(polygons, vertices, solid)
+    oriented = orientation.orient(polygons, vertices, solid)
     polygons = oriented.polygons
     if solid is not None:
         polygons = _joined(polygons, place)
@@ -119,16 +118,16 @@ def take_surface(raw: RawSurface) -> CleanedSurface:
             f"element {int(flat[0])} has no area ({flat.size} such elements): leave clean=True to "
             "have it dropped"
         )
-    as_given = orient(polygons, raw.vertices, keep_winding=True)
+    as_given = orientation.orient(polygons, raw.vertices, keep_winding=True)
     found = _given(raw)
     found["cleaned"] = False
-    table = unit_normals(raw, found)
+    table = orientation.unit_normals(raw, found)
     return _with_origin(_assemble(as_given, raw.vertices, table, found, turn_normals=False), raw)
 
 
-def _given(raw: RawSurface) -> Found:
+def _given(raw: RawSurface) -> orientation.Found:
     """Begin the record of the cleaning: ShellHealth's fields by name, 0 unless they are set."""
-    found: Found = defaultdict(int)
+    found: orientation.Found = defaultdict(int)
     found["input_vertices"], found["input_elements"] = len(raw.vertices), raw.num_polygons
     found["notes"] = raw.notes
     return found
@@ -161,7 +160,7 @@ def _mend(
     table: Array | None,
     tolerance: float,
     size: float,
-    found: Found,
+    found: orientation.Found,
 ) -> tuple[Polygons, Array | None]:
     """Polygons of three or four corners, each with area and none twice, edge to edge."""
     counts = polygons.counts
@@ -183,7 +182,9 @@ def _mend(
     return _drop_flat(polygons, vertices, given, found), table
 
 
-def _drop_flat(polygons: Polygons, vertices: Array, given: Mask, found: Found) -> Polygons:
+def _drop_flat(
+    polygons: Polygons, vertices: Array, given: Mask, found: orientation.Found
+) -> Polygons:
     """Without repeated corners and without elements that have no area."""
     while (repeated := _core.mend_repeats(polygons.offsets, polygons.corners)).size:
         polygons = polygons.drop_slots(repeated.view(np.bool_))
@@ -205,7 +206,7 @@ def _drop_flat(polygons: Polygons, vertices: Array, given: Mask, found: Found) -
     return polygons
 
 
-def _drop_duplicates(polygons: Polygons, given: Mask, found: Found) -> Polygons:
+def _drop_duplicates(polygons: Polygons, given: Mask, found: orientation.Found) -> Polygons:
     edges = polygons.edges
     first, opposite = _core.mend_duplicates(
         polygons.offsets, polygons.corners, edges.slot_edge, edges.users
@@ -263,7 +264,7 @@ def _split_t_junctions(
 
 
 def _triangulate(
-    polygons: Polygons, vertices: Array, tolerance: float, size: float, found: Found
+    polygons: Polygons, vertices: Array, tolerance: float, size: float, found: orientation.Found
 ) -> Polygons:
     """With everything but triangles and planar, convex quads cut into triangles."""
     cut = polygons.counts > 4
@@ -302,17 +303,17 @@ def _largest_warp(polygons: Polygons, vertices: Array, size: float) -> float:
 
 
 def _assemble(
-    oriented: Oriented,
+    oriented: orientation.Oriented,
     vertices: Array,
     table: Array | None,
-    found: Found,
+    found: orientation.Found,
     turn_normals: bool = True,
 ) -> CleanedSurface:
     polygons = oriented.polygons
-    triangles, triangle_element = as_triangles(polygons, vertices)
+    triangles, triangle_element = orientation.as_triangles(polygons, vertices)
     normals = None
     if table is not None and polygons.normal_row is not None:
-        normals = settle_normals(table, polygons, vertices, found, turn_normals)
+        normals = orientation.settle_normals(table, polygons, vertices, found, turn_normals)
     elements = np.full((len(polygons), 4), -1, np.int32)
     if polygons.only_triangles:
         elements[:, :3] = triangles
@@ -320,7 +321,7 @@ def _assemble(
         place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
         elements[polygons.polygon_of_slot, place] = polygons.corners
     in_use = _in_use(triangles, len(vertices))
-    borders = find_borders(oriented, vertices)
+    borders = orientation.find_borders(oriented, vertices)
     starts = np.arange(0, triangles.size + 1, 3)
     health = ShellHealth(
         **found,

@@ -177,7 +177,7 @@ def _surface(path: Path, unit: str | None, options: CadOptions) -> _Mesh | _Face
 def _content(path: Path, unit: str, source: _Mesh | _Faces, options: CadOptions) -> bytes:
     if path.suffix.lower() not in CAD_SUFFIXES:
         return encoded(path, source.shell(), unit)
-    from sphshell_pin.shell.cad.units import MILLIMETER
+    from sphshell_pin.shell.cad.model import MILLIMETER
     from sphshell_pin.shell.cad.writing import cad_content, faceted, parts_of
 
     if isinstance(source, _Faces):

@@ -6,15 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array, Ints
-from sphshell_pin.base.checks import (
-    check_each_positive,
-    check_flag,
-    check_points,
-    check_positive,
-    check_vector,
-    read_only,
-)
 from sphshell_pin.base.summary import Summarized
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.base import ShellBase
@@ -90,9 +83,9 @@ class Queries(ShellBase):
         """
         number = Method.from_name(method)
         if not _is_sphere(center, radius):
-            center = check_vector("center", center, 3, " [m]")
-            radius = check_positive("radius", radius, "m")
-        gradient = check_flag("gradient", gradient)
+            center = checks.check_vector("center", center, 3, " [m]")
+            radius = checks.check_positive("radius", radius, "m")
+        gradient = checks.check_flag("gradient", gradient)
         if gradient and number is Method.ELEMENTS:
             raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
         core = self.core_for(method)
@@ -125,8 +118,8 @@ class Queries(ShellBase):
         InvalidParameter, NameNotFound
             If centers or radii are out of range, or the method unknown.
         """
-        places = check_points("centers", centers)
-        sizes = check_each_positive("radii", radii, len(places), "m")
+        places = checks.check_points("centers", centers)
+        sizes = checks.check_each_positive("radii", radii, len(places), "m")
         workers, number = thread_count(threads), Method.from_name(method)
         depth, count = self.core_for(method).contacts_batch(places, sizes, int(number), workers)
         return depth, count
@@ -140,9 +133,9 @@ class Queries(ShellBase):
         the points are out of range, NameNotFound if the method is unknown.
         """
         smooth = Method.from_name(method) is Method.SMOOTH
-        places = check_points("points", points)
+        places = checks.check_points("points", points)
         core = self.core_for(method)
         found = core.closest_points(places, smooth, thread_count(threads))
         for column in found:
-            read_only(column)
+            checks.read_only(column)
         return ClosestPoints(*found)

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import Table, column, quantity_of
-from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import state_titles
+from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError

@@ -9,9 +9,9 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import quantity_of
-from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import coordinates
+from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.format.build import Built
 

@@ -1,16 +1,64 @@
 """Analytic derivatives against central differences on the tangent space."""
 
+import functools
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from sphshell_pin.base import named_numbers
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.testing.finding import Finding, Optional, worst
 from sphshell_pin.testing.forces import accelerations, joint_jacobian, joint_names
-from sphshell_pin.testing.numbers import changed, is_place, names_of, scale_of
+
+
+def names_of(scene: Scene) -> list[str]:
+    """Return the names of all numbers of all pairs, as "PAIR.law.stiffness"."""
+    known = named_numbers.names_of_pairs(scene.pairs)
+    return [name for name, number in known.items() if number.ends is not None]
+
+
+def is_place(column: str) -> bool:
+    """Whether a column is a coordinate of an offset or of a placement."""
+    return column.rpartition(".")[2] in (*named_numbers.AXES, *named_numbers.TWIST)
+
+
+def scale_of(scene: Scene, column: str, depth: float) -> tuple[float, bool]:
+    """Return on what a scene changes with a number, and whether that is at its lower bound, 0.
+
+    It is the number itself, of places and lengths the `depth` [m].
+    """
+    number, _, value = _found(scene, column)
+    if number.path[0] not in ("law", "friction"):
+        return depth, False
+    return abs(value) or 1.0, value == 0.0
+
+
+def changed(scene: Scene, column: str, by: float) -> Scene:
+    """Return the scene with one number changed `by` so much.
+
+    A placement is multiplied by pinocchio.exp6 of a twist, from the right.
+    """
+    number, place, value = _found(scene, column)
+    if isinstance(value, pin.SE3):
+        value = value * pin.exp6(pin.Motion(by * np.eye(6)[place]))
+    elif number.shape:
+        value = tuple((np.asarray(value) + by * np.eye(3)[place]).tolist())
+    else:
+        value += by
+    pairs = list(scene.pairs)
+    pairs[number.at] = named_numbers.with_value(pairs[number.at], number.path, value)
+    return scene.with_pairs(tuple(pairs))
+
+
+def _found(scene: Scene, column: str) -> tuple[named_numbers.NamedNumber, int, Any]:
+    """Return the number that a column is of, its place in it, and the whole value."""
+    number, place = named_numbers.every_column(named_numbers.names_of_pairs(scene.pairs))[column]
+    return number, place, functools.reduce(getattr, number.path, scene.pairs[number.at])
+
 
 # Central differences of order 4: places, in steps, and weights.
 _PLACES = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0))

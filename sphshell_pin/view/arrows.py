@@ -9,20 +9,8 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.view.nodes import (
-    HIDDEN_SCALE,
-    IntArray,
-    Move,
-    mover,
-    on_top,
-    pose,
-    rod,
-    rod_along,
-    rotation_to,
-    set_object,
-    show,
-    sphere,
-)
+from sphshell_pin.view import nodes
+from sphshell_pin.view.nodes import show
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -129,7 +117,7 @@ def pushing(contacts: Contacts) -> Forces:
     return Forces(contacts.point_world[~saddle], normal[~saddle], friction[~saddle])
 
 
-def strongest(force: Array, size: int) -> IntArray:
+def strongest(force: Array, size: int) -> nodes.IntArray:
     """Return the indices of the `size` largest of `force` (k,) at most, in their order."""
     return np.sort(np.argsort(-force, kind="stable")[:size])
 
@@ -150,19 +138,19 @@ class ArrowPool:
         if kind == "total":
             colors = {"total": TOTAL_COLOR}
         self._parts = len(colors)
-        self._arrows: list[tuple[Move, Move]] = []
-        self._points: list[Move] = []
+        self._arrows: list[tuple[nodes.Move, nodes.Move]] = []
+        self._points: list[nodes.Move] = []
         self._nodes: dict[str, list[Visualizer]] = {"arrows": [], "points": []}
         for index in range(size):
             for name, color in colors.items():
                 node = visualizer[f"{name}_{index}"]
-                set_object(node["shaft"], rod(1.0, 1.0), on_top(color), order=10)
-                set_object(node["head"], rod(2.6, 0.0), on_top(color), order=10)
-                self._arrows.append((mover(node["shaft"]), mover(node["head"])))
+                nodes.set_object(node["shaft"], nodes.rod(1.0, 1.0), nodes.on_top(color), order=10)
+                nodes.set_object(node["head"], nodes.rod(2.6, 0.0), nodes.on_top(color), order=10)
+                self._arrows.append((nodes.mover(node["shaft"]), nodes.mover(node["head"])))
                 self._nodes["arrows"].append(node)
             point = visualizer[f"point_{index}"]
-            set_object(point, sphere(1.0, 20), on_top(POINT_COLOR), order=11)
-            self._points.append(mover(point))
+            nodes.set_object(point, nodes.sphere(1.0, 20), nodes.on_top(POINT_COLOR), order=11)
+            self._points.append(nodes.mover(point))
             self._nodes["points"].append(point)
         self._where = np.zeros((size, 3))
         # Where a hidden arrow waits: most of a pool does, in most frames.
@@ -183,11 +171,11 @@ class ArrowPool:
                 most = strongest(np.linalg.norm(total[:, 0], axis=1), self.size)
             rows = self._slots(forces.point, most)
         for slot, place_point in enumerate(self._points):
-            arrows, size = np.zeros((self._parts, 3)), HIDDEN_SCALE
+            arrows, size = np.zeros((self._parts, 3)), nodes.HIDDEN_SCALE
             if forces is not None and slot in rows:
                 self._where[slot] = forces.point[rows[slot]]
                 arrows, size = drawn[rows[slot]], 1.3 * self._width
-            place_point(pose(np.eye(3), self._where[slot], size))
+            place_point(nodes.pose(np.eye(3), self._where[slot], size))
             for part, force in enumerate(arrows):
                 self._place_arrow(self._parts * slot + part, slot, force, scale)
         self._shown = set(rows)
@@ -197,7 +185,7 @@ class ArrowPool:
         for node in self._nodes[part]:
             show(node, on)
 
-    def _slots(self, points: Array, rows: IntArray) -> dict[int, int]:
+    def _slots(self, points: Array, rows: nodes.IntArray) -> dict[int, int]:
         """Return which of `rows` each slot shows: a contact keeps its slot while it moves little.
 
         Else an arrow would sweep across the picture whenever another contact comes or goes.
@@ -227,7 +215,9 @@ class ArrowPool:
             # A hidden arrow keeps its last direction, so that it does not swing as it grows back.
             hidden = self._waiting[arrow]
             if hidden is None or not np.array_equal(hidden[:3, 3], start):
-                hidden = pose(rotation_to(self._directions[arrow]), start, HIDDEN_SCALE)
+                hidden = nodes.pose(
+                    nodes.rotation_to(self._directions[arrow]), start, nodes.HIDDEN_SCALE
+                )
                 self._waiting[arrow] = hidden
             place_shaft(hidden)
             place_head(hidden)
@@ -238,5 +228,5 @@ class ArrowPool:
         head = min(HEAD_LENGTH * self._width, 0.6 * length)
         width = head / HEAD_LENGTH
         shaft = (length - head) * direction
-        place_shaft(rod_along(start, shaft, width))
-        place_head(rod_along(start + shaft, head * direction, width))
+        place_shaft(nodes.rod_along(start, shaft, width))
+        place_head(nodes.rod_along(start + shaft, head * direction, width))

@@ -8,21 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.view.distance import draw_distance
-from sphshell_pin.view.nodes import (
-    OnJoint,
-    lattice,
-    line_segments,
-    material,
-    mover,
-    node_name,
-    on_top,
-    set_object,
-    show,
-    sphere,
-    triangle_mesh,
-)
-from sphshell_pin.view.surface import draw_faces, draw_patches, draw_shell, great_circles
+from sphshell_pin.view import nodes, surface
+from sphshell_pin.view.nodes import sphere
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -53,18 +40,18 @@ def plane_key(pair: ContactPair) -> Hashable:
     return pair.joint_i, pair.placement_i.homogeneous.tobytes()
 
 
-class DrawnShell(OnJoint):
+class DrawnShell(nodes.OnJoint):
     """The shell of `side`, drawn below `visualizer`; `index` numbers the shells of the scene."""
 
     def __init__(self, visualizer: Visualizer, side: ShellSide, index: int) -> None:
         shell = side.shell
-        node = visualizer[f"{index}_{node_name(shell.name)}"]
+        node = visualizer[f"{index}_{nodes.node_name(shell.name)}"]
         super().__init__(node, side.joint, side.in_joint)
         self.shell = shell
         self._curved = side.is_smooth
         self._index = index
         self._colorings: dict[str, bool] = {}
-        draw_shell(node, shell, index, curved=self._curved)
+        surface.draw_shell(node, shell, index, curved=self._curved)
 
     @property
     def largest_distance(self) -> float:
@@ -74,8 +61,8 @@ class DrawnShell(OnJoint):
     def show_curved(self, on: bool) -> None:
         """Draw the curved elements that contact uses, or the flat ones of the file."""
         if self._curved:
-            draw_shell(self.node, self.shell, self._index, curved=on)
-            show(self.node["surface"], not any(self._colorings.values()))
+            surface.draw_shell(self.node, self.shell, self._index, curved=on)
+            nodes.show(self.node["surface"], not any(self._colorings.values()))
 
     def show_coloring(self, part: str, on: bool, largest: float = 0.0) -> None:
         """Show or hide one of COLORINGS; each is drawn when it is first shown.
@@ -84,31 +71,31 @@ class DrawnShell(OnJoint):
         """
         if on and part not in self._colorings:
             if part == "patches":
-                draw_patches(self.node, self.shell, curved=self._curved)
+                surface.draw_patches(self.node, self.shell, curved=self._curved)
             elif part == "faces":
-                draw_faces(self.node, self.shell, curved=self._curved)
+                surface.draw_faces(self.node, self.shell, curved=self._curved)
             elif self._curved:
-                draw_distance(self.node, self.shell, largest)
+                surface.draw_distance(self.node, self.shell, largest)
             else:
                 return
         if on or part in self._colorings:
             self._colorings[part] = on
         seen = next((name for name in COLORINGS if self._colorings.get(name)), "surface")
         for name in ("surface", *self._colorings):
-            show(self.node[name], name == seen)
+            nodes.show(self.node[name], name == seen)
 
 
-class DrawnSphere(OnJoint):
+class DrawnSphere(nodes.OnJoint):
     """A sphere of the pair `name`, drawn below `visualizer`; `index` numbers those of the scene."""
 
     def __init__(self, visualizer: Visualizer, name: str, drawn: SphereSide, index: int) -> None:
-        radius, node = drawn.radius, visualizer[f"{index}_{node_name(name)}"]
+        radius, node = drawn.radius, visualizer[f"{index}_{nodes.node_name(name)}"]
         super().__init__(node, drawn.joint, drawn.in_joint)
-        set_object(
+        nodes.set_object(
             node["ball"],
             sphere(radius, 48),
             # Pulled forward a little: robots draw their own fingertip of the same radius.
-            material(
+            nodes.material(
                 "MeshPhong",
                 SPHERE_COLOR,
                 0.6,
@@ -122,12 +109,14 @@ class DrawnSphere(OnJoint):
             order=5,
         )
         # A faint disc through whatever hides the sphere: it often sits inside a hand.
-        set_object(node["ghost"], sphere(radius, 24), on_top(SPHERE_COLOR, 0.25), order=4)
+        nodes.set_object(
+            node["ghost"], sphere(radius, 24), nodes.on_top(SPHERE_COLOR, 0.25), order=4
+        )
         # Three great circles, so that one sees a ball spin.
-        set_object(
+        nodes.set_object(
             node["circles"],
-            line_segments(*great_circles(1.003 * radius)),
-            material("LineBasic", 0x0D2C66, 0.8),
+            nodes.line_segments(*surface.great_circles(1.003 * radius)),
+            nodes.material("LineBasic", 0x0D2C66, 0.8),
             "LineSegments",
             order=6,
         )
@@ -143,15 +132,17 @@ class DrawnPlane:
         self._shell = pair.joint_j, pair.placement_j
         self._center = 0.5 * (low + high)
         self._middle = np.full(3, np.inf)
-        node = visualizer[f"{index}_{node_name(pair.name)}"]
-        points, lines = lattice(np.arange(_CELLS + 1.0) - 0.5 * _CELLS)
+        node = visualizer[f"{index}_{nodes.node_name(pair.name)}"]
+        points, lines = nodes.lattice(np.arange(_CELLS + 1.0) - 0.5 * _CELLS)
         points, last = self._cell * points, len(points) - 1
         corners = np.array([0, _CELLS, last, 0, last, last - _CELLS], np.int32)
-        look = material("MeshBasic", PLANE_COLOR, 0.25, depthWrite=False)
-        set_object(node["square"], triangle_mesh(points, corners), look, order=1)
-        look = material("LineBasic", PLANE_COLOR, 0.5, depthWrite=False)
-        set_object(node["cells"], line_segments(points, lines), look, "LineSegments", order=2)
-        self._move = mover(node)
+        look = nodes.material("MeshBasic", PLANE_COLOR, 0.25, depthWrite=False)
+        nodes.set_object(node["square"], nodes.triangle_mesh(points, corners), look, order=1)
+        look = nodes.material("LineBasic", PLANE_COLOR, 0.5, depthWrite=False)
+        nodes.set_object(
+            node["cells"], nodes.line_segments(points, lines), look, "LineSegments", order=2
+        )
+        self._move = nodes.mover(node)
 
     def update(self, data: pin.Data) -> None:
         """Place it where forward kinematics left its joint in `data`, a cell on with the shell."""

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Longs, Mask
-from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_parts import ContactLog
+from sphshell_pin.dynamics.result.result_parts import ContactLog, Patches
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.patches.placed import poses_along
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.dynamics.result.contact_patches import Patches
+from sphshell_pin.dynamics.result.result_parts import Patches
 from sphshell_pin.dynamics.scene.sides import PlaneSide
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.view import nodes
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, Contacts, pushing
 from sphshell_pin.view.bodies import (
     COLORINGS,
@@ -22,19 +23,11 @@ from sphshell_pin.view.bodies import (
     sphere_key,
 )
 from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
-from sphshell_pin.view.distance import Painting, range_text
 from sphshell_pin.view.frames import FrameAxes, draw_grid, floor_height, grid_spacing
-from sphshell_pin.view.nodes import (
-    material,
-    new_visualizer,
-    node_name,
-    set_object,
-    show,
-    triangle_mesh,
-)
+from sphshell_pin.view.nodes import show
 from sphshell_pin.view.patches import PatchPool, PatchScale
 from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, frame_of_body
-from sphshell_pin.view.surface import FACE_COLORS, tube
+from sphshell_pin.view.surface import FACE_COLORS, Painting, range_text, tube
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -95,7 +88,7 @@ class Display:
         if arrows not in ("components", "total"):
             raise InvalidParameter("arrows", arrows, 'must be "components" or "total"')
         self.scene = scene
-        self.visualizer = new_visualizer() if visualizer is None else visualizer
+        self.visualizer = nodes.new_visualizer() if visualizer is None else visualizer
         self._model = scene.model
         self._data = self._model.createData()
         neutral = pin.neutral(self._model)
@@ -207,9 +200,11 @@ class Display:
         path = path[np.append(True, steps > 1e-3 * self.trail_width)]
         if len(path) < 2:
             return None
-        node = self.trail_node(pair)[node_name(name)]
+        node = self.trail_node(pair)[nodes.node_name(name)]
         vertices, triangles = tube(path, self.trail_width)
-        set_object(node, triangle_mesh(vertices, triangles), material("MeshBasic", TRAIL_COLOR))
+        nodes.set_object(
+            node, nodes.triangle_mesh(vertices, triangles), nodes.material("MeshBasic", TRAIL_COLOR)
+        )
         return node
 
     def trail_node(self, pair: int | None = None) -> Visualizer:

@@ -7,18 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.view import nodes
 from sphshell_pin.view.arrows import nice
-from sphshell_pin.view.nodes import (
-    Json,
-    OnJoint,
-    lattice,
-    line_segments,
-    material,
-    on_top,
-    rod,
-    rod_along,
-    set_object,
-)
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -33,12 +23,12 @@ FEW = 20  # more axes are shorter
 LINES = 20  # of the grid, on each side of its middle
 
 
-def draw_axes(node: Visualizer, width: float, length: float, looks: list[Json]) -> None:
+def draw_axes(node: Visualizer, width: float, length: float, looks: list[nodes.Json]) -> None:
     """Draw x, y and z of `length` [m] and half `width` [m] below `node`, with a look for each."""
     for axis, look in enumerate(looks):
         arm = node["xyz"[axis]]
-        set_object(arm, rod(0.45, 0.45), look, order=9)
-        arm.set_transform(rod_along(np.zeros(3), length * np.eye(3)[axis], width))
+        nodes.set_object(arm, nodes.rod(0.45, 0.45), look, order=9)
+        arm.set_transform(nodes.rod_along(np.zeros(3), length * np.eye(3)[axis], width))
 
 
 class FrameAxes:
@@ -53,14 +43,14 @@ class FrameAxes:
         for pair in scene.pairs:
             places += [(one.joint, one.in_joint) for one in (*pair.spheres, *pair.shells)]
         length = (0.05 if len(places) <= FEW else 0.025) * size
-        looks = [on_top(color) for color in AXIS_COLORS]
-        self._drawn: dict[tuple[int, bytes], OnJoint] = {}
+        looks = [nodes.on_top(color) for color in AXIS_COLORS]
+        self._drawn: dict[tuple[int, bytes], nodes.OnJoint] = {}
         for joint, placement in places:
             key = joint, placement.homogeneous.tobytes()
             if key not in self._drawn:
                 node = visualizer[f"frame_{len(self._drawn)}"]
                 draw_axes(node, 0.06 * length, length if self._drawn else 2.0 * length, looks)
-                self._drawn[key] = OnJoint(node, joint, placement)
+                self._drawn[key] = nodes.OnJoint(node, joint, placement)
 
     def update(self, data: pin.Data) -> None:
         """Place them where forward kinematics left the joints in `data`."""
@@ -92,8 +82,8 @@ def floor_height(scene: Scene, data: pin.Data) -> float:
 def draw_grid(node: Visualizer, view: View, height: float) -> None:
     """Draw a grid at a `height` [m] below `node`, around what `view` looks at."""
     step = grid_spacing(view)
-    points, segments = lattice(np.arange(-LINES, LINES + 1.0))
+    points, segments = nodes.lattice(np.arange(-LINES, LINES + 1.0))
     points = step * (points + np.round(np.array([*view.target[:2], 0.0]) / step))
     points[:, 2] = height
-    look = material("LineBasic", GRID_COLOR, 0.45, depthWrite=False)
-    set_object(node, line_segments(points, segments), look, "LineSegments")
+    look = nodes.material("LineBasic", GRID_COLOR, 0.45, depthWrite=False)
+    nodes.set_object(node, nodes.line_segments(points, segments), look, "LineSegments")

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics.result.contact_patches import Patches
+from sphshell_pin.dynamics.result.result_parts import Patches
+from sphshell_pin.view import nodes
 from sphshell_pin.view.arrows import Contacts, strongest
-from sphshell_pin.view.nodes import Move, hidden_at, mover, on_top, pose, set_object, triangle_mesh
 from sphshell_pin.view.surface import between_rings, ramp_colors
 
 if TYPE_CHECKING:
@@ -64,17 +64,17 @@ class PatchPool:
 
     def __init__(self, visualizer: Visualizer, size: int) -> None:
         self.size = size
-        self._moves: list[list[Move]] = []
+        self._moves: list[list[nodes.Move]] = []
         meshes = [_disc(level / LEVELS) for level in range(1, LEVELS + 1)]
         for index in range(size):
             moves = []
             for level, mesh in enumerate(meshes):
                 node = visualizer[f"patch_{index}_{level}"]
-                look = on_top(0xFFFFFF) | {"side": 2, "vertexColors": True}
-                set_object(node, mesh, look, order=9)
-                moves.append(mover(node))
+                look = nodes.on_top(0xFFFFFF) | {"side": 2, "vertexColors": True}
+                nodes.set_object(node, mesh, look, order=9)
+                moves.append(nodes.mover(node))
             self._moves.append(moves)
-        self._hidden = hidden_at(np.zeros(3))
+        self._hidden = nodes.hidden_at(np.zeros(3))
 
     def update(self, contacts: Contacts | None, patches: Patches, scale: PatchScale) -> None:
         """Show `patches` (k,) of `contacts` at `scale`: the largest forces, if there are many."""
@@ -102,7 +102,7 @@ class PatchPool:
             return -1, self._hidden
         turn = np.stack([axis, np.cross(normal, axis), normal], axis=1)
         level = min(LEVELS, max(1, int(np.ceil(share * LEVELS)))) - 1
-        return level, pose(turn, contacts.point_world[k], np.array([a, b, b]))
+        return level, nodes.pose(turn, contacts.point_world[k], np.array([a, b, b]))
 
 
 def _disc(level: float, rings: int = 10, sectors: int = 40) -> dict[str, Any]:
@@ -118,4 +118,4 @@ def _disc(level: float, rings: int = 10, sectors: int = 40) -> dict[str, Any]:
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros(sectors)], axis=1)
     vertices = (radius[:, None, None] * around).reshape(-1, 3)
     triangles = between_rings(len(radius), sectors)
-    return triangle_mesh(vertices, triangles, np.repeat(color, sectors, axis=0))
+    return nodes.triangle_mesh(vertices, triangles, np.repeat(color, sectors, axis=0))

@@ -18,28 +18,19 @@ from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.view.arrows import (
-    FRICTION_COLOR,
-    NORMAL_COLOR,
-    POINT_COLOR,
-    TOTAL_COLOR,
-    ArrowKind,
-    ArrowScale,
-    arrow_length,
-    largest_force,
-)
+from sphshell_pin.view import arrows as arrow
 from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.camera import DIRECTIONS, choose_view
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
+from sphshell_pin.view.curves import run_panel
 from sphshell_pin.view.display import TRAIL_COLOR, Display
-from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
 from sphshell_pin.view.frames import GRID_COLOR
 from sphshell_pin.view.nodes import css, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
 from sphshell_pin.view.robot import has_links
-from sphshell_pin.view.run_panel import run_panel
+from sphshell_pin.view.surface import RAMP, Coloring, check_coloring
 
 BARE = (
     "The robot is drawn by its joints, as the scene's model has no geometry: "
@@ -55,7 +46,7 @@ class RecordingOptions(TypedDict, total=False):
 
     fps: float
     speed: float
-    arrows: ArrowKind
+    arrows: arrow.ArrowKind
     color: Coloring
 
 
@@ -87,7 +78,7 @@ def render_recording(
     fps: float = 30,
     speed: float = 1.0,
     title: str = "A finished run",
-    arrows: ArrowKind = "components",
+    arrows: arrow.ArrowKind = "components",
     color: Coloring = "surface",
     span: tuple[float, float] | None = None,
     whole: bool = False,
@@ -134,8 +125,8 @@ def render_recording(
         for name, toward in DIRECTIONS.items()
     }
     view = views["fit"]
-    length = arrow_length(scene, view.distance)
-    scale = ArrowScale.from_forces(_forces(shown, arrows), length)
+    length = arrow.arrow_length(scene, view.distance)
+    scale = arrow.ArrowScale.from_forces(_forces(shown, arrows), length)
     most = int(np.bincount(shown.row).max(initial=0)) if len(shown.row) else 0
 
     window = FilmWindow()
@@ -296,7 +287,7 @@ def choose_rows(
     if not len(contacts.row) or count == 1:
         return rows, times
     force = np.zeros(len(t))
-    np.maximum.at(force, contacts.row, largest_force(contacts))
+    np.maximum.at(force, contacts.row, arrow.largest_force(contacts))
     # A touch shorter than a frame would otherwise be lost between two frames.
     middles = np.searchsorted(t, 0.5 * (wanted[1:] + wanted[:-1]))
     first, last = np.searchsorted(t, start), np.searchsorted(t, end, side="right")
@@ -309,10 +300,10 @@ def choose_rows(
     return rows, times
 
 
-def _forces(contacts: ContactRows, arrows: ArrowKind) -> Array:
+def _forces(contacts: ContactRows, arrows: arrow.ArrowKind) -> Array:
     """Magnitudes of all arrows that `contacts` bring into the picture [N]."""
     if arrows == "total":
-        return largest_force(contacts)
+        return arrow.largest_force(contacts)
     # Friction is a fraction of the normal force: it shares its scale.
     return contacts.normal_force
 
@@ -347,7 +338,11 @@ def _draw_trails(
 
 
 def _legend(
-    scene: Scene, scale: ArrowScale, arrows: ArrowKind, shown: ContactRows, trailed: bool
+    scene: Scene,
+    scale: arrow.ArrowScale,
+    arrows: arrow.ArrowKind,
+    shown: ContactRows,
+    trailed: bool,
 ) -> list[tuple[str, str]]:
     legend = []
     radii = sorted({one.radius for pair in scene.pairs for one in pair.spheres})
@@ -361,15 +356,15 @@ def _legend(
     if not len(shown.row):
         return [*legend, ("transparent", "no contact in this run")]
     if arrows == "total":
-        legend.append((css(TOTAL_COLOR), f"force {on_what}, {scale}"))
+        legend.append((css(arrow.TOTAL_COLOR), f"force {on_what}, {scale}"))
     else:
-        legend.append((css(NORMAL_COLOR), f"normal force {on_what}, {scale}"))
-        legend.append((css(FRICTION_COLOR), "friction force, same scale"))
+        legend.append((css(arrow.NORMAL_COLOR), f"normal force {on_what}, {scale}"))
+        legend.append((css(arrow.FRICTION_COLOR), "friction force, same scale"))
     if scale.cuts(_forces(shown, arrows)):
         cut = f"arrows longer than {scale.longest * 1e3:.0f} mm are cut"
         legend.append(("transparent", cut))
     if shown.patches is None:
-        legend.append((css(POINT_COLOR), "contact point"))
+        legend.append((css(arrow.POINT_COLOR), "contact point"))
     if trailed:
         legend.append((css(TRAIL_COLOR), "path on the shell"))
     return legend

@@ -14,20 +14,9 @@ from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.view import nodes
 from sphshell_pin.view.frames import PALE_AXIS_COLORS, draw_axes
 from sphshell_pin.view.meshes import lit_facets
-from sphshell_pin.view.nodes import (
-    Move,
-    OnJoint,
-    hidden_at,
-    material,
-    mover,
-    node_name,
-    rod,
-    rod_along,
-    set_object,
-    sphere,
-)
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -92,12 +81,12 @@ class GeometryRobot:
         self._model = model
         self._geometry = geometry_model
         self._placed = geometry_model.createData()
-        self._parts: list[tuple[Move, pin.SE3, Array]] = []
+        self._parts: list[tuple[nodes.Move, pin.SE3, Array]] = []
         self._paths: list[str] = []
         for index, body in enumerate(geometry_model.geometryObjects):
             node = visualizer[viewer.getViewerNodeName(body, pin.GeometryType.VISUAL)]
             # A reference: it follows the update of all placements.
-            self._parts.append((mover(node), self._placed.oMg[index], _in_body(body)))
+            self._parts.append((nodes.mover(node), self._placed.oMg[index], _in_body(body)))
             self._paths.append(node.path)
 
     def held(self) -> list[tuple[str, str | None]]:
@@ -153,8 +142,8 @@ class SkeletonRobot:
         self._model = model
         self._held: list[tuple[str, int]] = []
         self._width = 0.012 * size
-        self._links: list[tuple[Move, int, int, Array]] = []
-        self._axes: list[OnJoint] = []
+        self._links: list[tuple[nodes.Move, int, int, Array]] = []
+        self._axes: list[nodes.OnJoint] = []
         root = visualizer["robot"]
         ends = [
             (model.parents[joint], joint, np.zeros(3), model.names[joint])
@@ -162,20 +151,22 @@ class SkeletonRobot:
         ]
         ends += [(joint, joint, at, f"tip_{k}") for k, (joint, at) in enumerate(tips) if joint]
         for start, end, offset, name in ends:
-            node = root["links"][node_name(name)]
-            set_object(node, rod(1.0, 1.0), material("MeshPhong", LINK_COLOR))
-            self._links.append((mover(node), start, end, offset))
+            node = root["links"][nodes.node_name(name)]
+            nodes.set_object(node, nodes.rod(1.0, 1.0), nodes.material("MeshPhong", LINK_COLOR))
+            self._links.append((nodes.mover(node), start, end, offset))
             self._held.append((node.path, start))
         for joint in range(1, model.njoints):
             if joint in drawn or model.inertias[joint].mass == 0.0:
                 continue
-            node = root["joints"][node_name(model.names[joint])]
-            set_object(
-                node["ball"], sphere(1.6 * self._width, 20), material("MeshPhong", JOINT_COLOR)
+            node = root["joints"][nodes.node_name(model.names[joint])]
+            nodes.set_object(
+                node["ball"],
+                nodes.sphere(1.6 * self._width, 20),
+                nodes.material("MeshPhong", JOINT_COLOR),
             )
-            looks = [material("MeshBasic", color) for color in PALE_AXIS_COLORS]
+            looks = [nodes.material("MeshBasic", color) for color in PALE_AXIS_COLORS]
             draw_axes(node, self._width, 5.0 * self._width, looks)
-            self._axes.append(OnJoint(node, joint))
+            self._axes.append(nodes.OnJoint(node, joint))
             self._held.append((node.path, joint))
 
     def held(self) -> list[tuple[str, str | None]]:
@@ -188,6 +179,6 @@ class SkeletonRobot:
             first = data.oMi[start].translation
             step = data.oMi[end].act(offset) - first
             short = np.linalg.norm(step) < self._width
-            move(hidden_at(first) if short else rod_along(first, step, self._width))
+            move(nodes.hidden_at(first) if short else nodes.rod_along(first, step, self._width))
         for one in self._axes:
             one.update(data)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.shell.curved import curved_mesh
+from sphshell_pin.shell.curvature import curved_mesh
 from tests.hard_cases.aims import STOPPED_AT, ImpactTest, draw
 from tests.hard_cases.targets import all_targets, crossings, sweep, winding
 from tests.hard_cases.verdict import Verdict, Verdicts, at_most, case

@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell.cad.model import box_size
-from sphshell_pin.shell.curved import curved_mesh, points_at
+from sphshell_pin.shell.curvature import curved_mesh, points_at
 from sphshell_pin.shell.raw import area_vectors, random_places
 from tests.parts.occ import faces, parts
 

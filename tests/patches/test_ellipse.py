@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sphshell_pin.patches.ellipse import load_in_polygons, pressure
+from sphshell_pin.patches.placed import load_in_polygons, pressure
 
 
 def summed(polygon, n=1500):

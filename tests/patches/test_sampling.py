@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.patches.sampling import divide
+from sphshell_pin.patches.foundation import divide
 from tests.patches.scenes import plate
 
 

@@ -7,17 +7,22 @@ import numpy as np
 import pytest
 
 from sphshell_pin import robots, scenarios
-from sphshell_pin.robots import gear_mesh
 from tests.models import pose_of
+
+
+def loaded(file):
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+gear_mesh = loaded(Path(__file__).parents[2] / "docs" / "site" / "gear_mesh.py")
 
 
 @pytest.fixture(scope="module")
 def gears():
-    file = Path(scenarios.__file__).parent / "gear_contact.py"
-    spec = importlib.util.spec_from_file_location("gear_contact", file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return loaded(Path(scenarios.__file__).parent / "gear_contact.py")
 
 
 def poses(model, angle_1, angle_2):

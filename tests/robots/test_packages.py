@@ -9,8 +9,8 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.errors import RobotWarning
+from sphshell_pin.robots.finding import find_robots
 from sphshell_pin.robots.packages import Folders
-from sphshell_pin.robots.workspace import find_robots
 from tests.command import call
 
 XACRO = """<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro">

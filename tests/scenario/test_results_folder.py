@@ -12,7 +12,7 @@ import time
 import pytest
 
 from sphshell_pin.base.atomic import AtomicFolder, FolderInUse, atomic_file
-from sphshell_pin.base.atomic.exchange import exchange
+from sphshell_pin.base.atomic.files import exchange
 from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running import run
@@ -118,7 +118,7 @@ def test_a_file_written_by_others_meanwhile_is_kept(tmp_path, monkeypatch):
         os.replace(out / "aside", out / "notes.txt")
         exchange(one, other)
 
-    monkeypatch.setattr("sphshell_pin.base.atomic.folder.exchange", late)
+    monkeypatch.setattr("sphshell_pin.base.atomic.files.exchange", late)
     put(out, "new")
     assert (out / "late.txt").read_text() == "late"
     assert (out / "notes.txt").read_text() == "second"
@@ -126,7 +126,7 @@ def test_a_file_written_by_others_meanwhile_is_kept(tmp_path, monkeypatch):
 
 def never_exchanged(monkeypatch):
     monkeypatch.setattr(
-        "sphshell_pin.base.atomic.folder.exchange", lambda *_: pytest.fail("it was exchanged")
+        "sphshell_pin.base.atomic.files.exchange", lambda *_: pytest.fail("it was exchanged")
     )
 
 

@@ -178,7 +178,7 @@ def test_where_names_cannot_be_exchanged_no_summary_stands_beside_mixed_files(
     def missing(*_):
         raise OSError(errno.ENOSYS, "Function not implemented")
 
-    monkeypatch.setattr("sphshell_pin.base.atomic.folder.exchange", missing)
+    monkeypatch.setattr("sphshell_pin.base.atomic.files.exchange", missing)
     keep, before, after = two_runs
     out = place / "out"
     for n in ends(place, keep, lambda: results("new"), act, once=False):

@@ -8,8 +8,8 @@ from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.scenario.running.replay import Replay
+from sphshell_pin.scenario.running.rows import motion_series
 from sphshell_pin.scenario.running.run import run_built
-from sphshell_pin.scenario.running.series import motion_series
 from tests.scenario.files import FINGER, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")

@@ -10,7 +10,7 @@ pytest.importorskip("OCP")
 
 from sphshell_pin import Shell
 from sphshell_pin.shell.cad import require_kernel, tessellation
-from sphshell_pin.shell.curved import curved_mesh
+from sphshell_pin.shell.curvature import curved_mesh
 from tests.oracle.cad import ExactShape, curved_places, deviation
 from tests.parts.occ import faces as occ_faces
 from tests.shell import cad_shapes as shapes

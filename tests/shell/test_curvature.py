@@ -8,8 +8,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.shell.curvature import curvature_report
-from sphshell_pin.shell.curved import curved_mesh
+from sphshell_pin.shell.curvature import curvature_report, curved_mesh
 from tests import meshes, models
 
 from .surfaces import CUBE, CUBE_QUADS, plate

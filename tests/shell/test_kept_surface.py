@@ -10,7 +10,7 @@ import pytest
 
 from sphshell_pin.base.cache import CACHE, cache_folder, keep_newest
 from sphshell_pin.errors import UnitWarning
-from sphshell_pin.shell import loading
+from sphshell_pin.shell import shell as loading
 from sphshell_pin.shell.cad import CadOptions
 from sphshell_pin.shell.cleaned import CleanedSurface
 

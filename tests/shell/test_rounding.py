@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.shell.rounding import SCALES, rounding
+from sphshell_pin.shell.raw import SCALES, rounding
 from tests import meshes
 
 from .surfaces import CUBE, CUBE_QUADS

@@ -9,7 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, WeakLawWarning
-from sphshell_pin.testing.triangles import crossed, distances, pieces
+from sphshell_pin.testing.found import crossed, distances, pieces
 from tests import meshes
 from tests.contact.smooth.surfaces import shell_of
 from tests.models import (

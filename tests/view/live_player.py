@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, SceneContacts
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.scenario.running.player import Rows
+from sphshell_pin.scenario.running.rows import Rows
 from tests.view.stand_ins import contact_pair, plate
 
 RADIUS, MASS, GRAVITY = 0.05, 1.0, 9.81

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin.errors import NameNotFound
-from sphshell_pin.scenario.running.player import Rows
-from sphshell_pin.scenario.running.series import Series
+from sphshell_pin.scenario.running.rows import Rows, Series
 from sphshell_pin.view.live.charts import MOST_KEPT, MOST_POINTS, Charts, History, Thinner
 
 

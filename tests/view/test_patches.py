@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sphshell_pin.dynamics.result.contact_patches import PATCH
+from sphshell_pin.dynamics.result.result_parts import PATCH
 from sphshell_pin.view.patches import LEVELS, PatchPool, PatchScale
 from tests.view.drawn import Film
 from tests.view.stand_ins import contact_log

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin.dynamics.result.contact_patches import PATCH
+from sphshell_pin.dynamics.result.result_parts import PATCH
 from sphshell_pin.view import write_recording
 from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.bodies import SPHERE_COLOR

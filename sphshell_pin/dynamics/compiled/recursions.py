@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.dynamics.compiled.c_text import Block, Storage
 from sphshell_pin.dynamics.compiled.joint_motion import (
+    Block,
     Expression,
     JointMotion,
     Pose,
+    Storage,
     casadi,
     constant_pose,
     cross_force,

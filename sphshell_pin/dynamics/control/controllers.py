@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,15 +14,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import (
-    check_configuration,
-    check_names,
-    check_not_negative,
-    check_vector,
-)
 from sphshell_pin.base.parameters import Component, flat_fields, parameter
-from sphshell_pin.dynamics.control.callables import check_callable
 from sphshell_pin.dynamics.scene.models import find_joint, set_joint
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import Readings
@@ -32,6 +27,39 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
 
 __all__ = ["GravityCompensation", "JointPD"]
+
+TAKES = ("t", "q", "v", "contacts")
+"""Arguments of a callable that is a controller."""
+
+
+def check_callable(callback: Callable[..., object]) -> None:
+    """Raise InvalidParameter unless `callback` can be called as tau(t, q, v, contacts).
+
+    One with an argument `sensors` gets that too. A callable whose signature Python cannot know, as
+    of some compiled ones, passes.
+    """
+    try:
+        signature = inspect.signature(callback)
+    except (TypeError, ValueError):
+        return
+    try:
+        signature.bind(*TAKES, **({"sensors": None} if reads_sensors(callback) else {}))
+    except TypeError as error:
+        name = getattr(callback, "__name__", type(callback).__name__)
+        raise InvalidParameter(
+            "controller",
+            callback,
+            f"must take tau({', '.join(TAKES)}): {error}",
+            f"'{name}{signature}'",
+        ) from None
+
+
+def reads_sensors(callback: Callable[..., object]) -> bool:
+    """Whether a controller takes an argument called `sensors`."""
+    try:
+        return "sensors" in inspect.signature(callback).parameters
+    except (TypeError, ValueError):
+        return False
 
 
 # One number for all driven joints, one each (nv,), or by joint, 0 for the others.
@@ -58,7 +86,7 @@ class Controller(Component):
         """Raise InvalidParameter unless `joints` is None or a list of names."""
         super().__post_init__()
         if self.joints is not None:
-            object.__setattr__(self, "joints", check_names("joints", self.joints))
+            object.__setattr__(self, "joints", checks.check_names("joints", self.joints))
 
     def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller for `scene`, started at q0 (nq,)."""
@@ -86,14 +114,14 @@ class Controller(Component):
         if isinstance(given, Mapping):
             gains = np.zeros(model.nv)
             for joint_name, value in given.items():
-                number = check_not_negative(f"{name}.{joint_name}", value)
+                number = checks.check_not_negative(f"{name}.{joint_name}", value)
                 with _joint_of(name, joint_name):
                     joint = find_joint(model, joint_name)
                 gains[joint.idx_v : joint.idx_v + joint.nv] = number
             return gains
         if np.ndim(given) == 0:
-            return np.full(model.nv, check_not_negative(name, given))
-        gains = check_vector(name, given, model.nv, f": nv = {model.nv}")
+            return np.full(model.nv, checks.check_not_negative(name, given))
+        gains = checks.check_vector(name, given, model.nv, f": nv = {model.nv}")
         if (gains < 0).any():
             k = int(np.argmin(gains))
             raise InvalidParameter(f"{name}[{k}]", float(gains[k]), "must not be negative")
@@ -106,11 +134,11 @@ class Controller(Component):
         if given is None:
             return q
         if not isinstance(given, Mapping):
-            return check_configuration("q_ref", model, given, f": nq = {model.nq}")
+            return checks.check_configuration("q_ref", model, given, f": nq = {model.nq}")
         for name, value in given.items():
             with _joint_of("q_ref", name):
                 set_joint(model, q, name, value)
-        return check_configuration("q_ref", model, q)
+        return checks.check_configuration("q_ref", model, q)
 
     def in_scenario(self, find_shell: Callable[[str], ShellPlace]) -> Controller:
         """Return this controller with the shells that it names."""
@@ -217,7 +245,7 @@ def wrap_callable(
         except Exception as error:
             add_origin(error, f"the controller at t = {t:.6g} s")
             raise
-        return check_vector("controller's tau", tau, model.nv)
+        return checks.check_vector("controller's tau", tau, model.nv)
 
     return _core.PythonController(torque)
 

@@ -11,14 +11,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import (
-    check_name,
-    check_placement,
-    check_points,
-    check_type,
-    check_vector,
-)
 from sphshell_pin.base.parameters import parameter
 from sphshell_pin.dynamics.control.controllers import Controller, Gain, Posture, ShellPlace
 from sphshell_pin.dynamics.control.target_path import Curve, Timing, path_fields
@@ -134,16 +128,16 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     def __post_init__(self) -> None:
         """Raise InvalidParameter for wrong types, and for a shell's place without a shell."""
         super().__post_init__()
-        check_name("frame", self.frame)
+        checks.check_name("frame", self.frame)
         if self.shell is not None:
-            check_type("shell", self.shell, (Shell, str), "must be a Shell or None")
+            checks.check_type("shell", self.shell, (Shell, str), "must be a Shell or None")
         for name, value in (("shell_frame", self.shell_frame), ("placement", self.placement)):
             if value is not None and self.shell is None:
                 raise InvalidParameter(name, value, "says where the shell is: give the shell too")
         if self.shell_frame is not None:
-            check_name("shell_frame", self.shell_frame)
-        check_placement("placement", self.placement)
-        check_vector("offset", self.offset, 3, " [m]")
+            checks.check_name("shell_frame", self.shell_frame)
+        checks.check_placement("placement", self.placement)
+        checks.check_vector("offset", self.offset, 3, " [m]")
 
     def in_scenario(self, find_shell: Callable[[str], ShellPlace]) -> CartesianImpedance:
         """Return this controller with the shell that it names."""
@@ -189,7 +183,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
 
     def _shell_place(self, scene: Scene) -> tuple[str, pin.SE3]:
         """Return the frame that carries the path, and where the path's own frame is in it."""
-        placement = check_placement("placement", self.placement)
+        placement = checks.check_placement("placement", self.placement)
         if self.shell_frame is not None or self.placement is not None:
             return self.shell_frame or "universe", placement
         places: list[tuple[str, pin.SE3]] = []
@@ -208,7 +202,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
 
     def _motion(self) -> tuple[Curve, Timing]:
         """Return the target's curve, in the path's own frame, and its motion along it."""
-        points = check_points("path", self.path)
+        points = checks.check_points("path", self.path)
         if len(points) == 0:
             raise InvalidParameter("path", [], "must have at least one point")
         shell = self.shell if isinstance(self.shell, Shell) else None
@@ -220,7 +214,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         said: list[str] = []
         curve = self._motion()[0]
         if isinstance(self.shell, Shell):
-            corners = check_points("path", self.path)
+            corners = checks.check_points("path", self.path)
             off = np.abs(self.shell.closest_points(corners).distances)
             k, size = int(np.argmax(off)), self.shell.size
             if off[k] > OFF_PATH * size:

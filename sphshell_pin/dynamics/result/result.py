@@ -14,10 +14,7 @@ from numpy.typing import ArrayLike
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_finite, read_only
 from sphshell_pin.base.summary import Detail, Fact, Summarized
-from sphshell_pin.dynamics.result import result_columns
-from sphshell_pin.dynamics.result.contact_patches import PATCH, Patches
-from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event, Origin
-from sphshell_pin.dynamics.result.run_state import RunState, split_states
+from sphshell_pin.dynamics.result import result_columns, result_parts
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene.joint_components import moving_joints
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -57,19 +54,19 @@ class Result(Summarized):
     q: Array
     v: Array
     pairs: tuple[str, ...]
-    contacts: ContactLog
-    events: tuple[Event, ...]
-    energy: EnergyAudit
+    contacts: result_parts.ContactLog
+    events: tuple[result_parts.Event, ...]
+    energy: result_parts.EnergyAudit
     stats: RunStats
     scene: Scene | None = None
-    origin: Origin | None = None
+    origin: result_parts.Origin | None = None
     sensors: Mapping[str, SensorLog] = field(default_factory=dict)
-    patch_rows: Patches | None = None
+    patch_rows: result_parts.Patches | None = None
     sensitivity_rows: Sensitivities | None = None
     torque: Array | None = None
     states: tuple[Array, ...] | None = None
 
-    def at(self, t: float) -> RunState:
+    def at(self, t: float) -> result_parts.RunState:
         """Return the state of the last step that was accepted by the last row at or before t [s].
 
         `Simulation.run(result.at(t))` makes the rest of the run again, to the same bits, with the
@@ -84,7 +81,7 @@ class Result(Summarized):
         row = int(np.searchsorted(self.t, check_finite("t", t), side="right")) - 1
         if row < 0:
             raise InvalidParameter("t", t, f"must not be before the first row: {self.t[0]} s")
-        return RunState.from_values(self.states[row], self.q.shape[1], self.v.shape[1])
+        return result_parts.RunState.from_values(self.states[row], self.q.shape[1], self.v.shape[1])
 
     def _facts(self) -> list[Fact]:
         pairs = self.stats.pairs.values()
@@ -132,7 +129,7 @@ class Result(Summarized):
         energies = read_only(whole["energy"]).T
         owners, patches = _owners(pairs, scene), whole.get("patches")
         events = tuple(
-            Event(float(t), owners[EVENT_KINDS[kind]][number], EVENT_KINDS[kind])
+            result_parts.Event(float(t), owners[EVENT_KINDS[kind]][number], EVENT_KINDS[kind])
             for t, number, kind in zip(
                 whole["event_t"], whole["event_pair"], whole["event_kind"], strict=True
             )
@@ -142,19 +139,21 @@ class Result(Summarized):
             q=read_only(whole["q"]),
             v=read_only(whole["v"]),
             pairs=pairs,
-            contacts=ContactLog(**log),
+            contacts=result_parts.ContactLog(**log),
             events=events,
-            energy=EnergyAudit(*energies),
+            energy=result_parts.EnergyAudit(*energies),
             stats=stats,
             scene=scene,
             sensors=sensors.logs(whole),
-            patch_rows=None if patches is None else read_only(np.frombuffer(patches, PATCH)),
+            patch_rows=None
+            if patches is None
+            else read_only(np.frombuffer(patches, result_parts.PATCH)),
             torque=read_only(whole["torques"]) if "torques" in whole else None,
-            states=split_states(whole.get("states"), whole.get("state_sizes")),
+            states=result_parts.split_states(whole.get("states"), whole.get("state_sizes")),
         )
 
     @property
-    def patches(self) -> Patches:
+    def patches(self) -> result_parts.Patches:
         """The patch of each contact of `contacts`, in the same order: a structured array (m,).
 
         Its fields: `half_axes` (2,) a >= b [m], `axis_world` (3,) direction of a, `peak_pressure`

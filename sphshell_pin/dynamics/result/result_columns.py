@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import column
-from sphshell_pin.dynamics.result.contact_patches import patch_columns
-from sphshell_pin.dynamics.result.pair_series import PairSeries
+from sphshell_pin.dynamics.result.result_parts import PairSeries, patch_columns
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
 
 if TYPE_CHECKING:

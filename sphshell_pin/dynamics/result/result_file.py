@@ -26,9 +26,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.regular_file import open_regular
-from sphshell_pin.dynamics.result.contact_patches import PATCH
-from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event, Kept, Origin
-from sphshell_pin.dynamics.result.run_state import split_states
+from sphshell_pin.dynamics.result import result_parts
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.run.sensitivities import Sensitivities
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, Columns
@@ -59,7 +57,7 @@ ARRAYS: dict[str, Kind] = {
     **_of_type("contacts", ROW),
     "contacts.t": (FLOAT, ("m",)),
     "contacts.row": (LONG, ("m",)),
-    **{f"energy.{one.name}": (FLOAT, ("n",)) for one in fields(EnergyAudit)},
+    **{f"energy.{one.name}": (FLOAT, ("n",)) for one in fields(result_parts.EnergyAudit)},
 }
 """By name: the numbers of an array and its shape; a size of the same name is the same in all."""
 
@@ -70,7 +68,7 @@ OPTIONAL: dict[str, dict[str, Kind]] = {
         "sensors.sampled": (FLOAT, ("s",)),
         "sensors.values": (FLOAT, ("w",)),
     },
-    "patches": _of_type("patches", PATCH),
+    "patches": _of_type("patches", result_parts.PATCH),
     "sensitivities": {
         "sensitivities.q": (FLOAT, ("n", "nv", "p")),
         "sensitivities.v": (FLOAT, ("n", "nv", "p")),
@@ -152,7 +150,9 @@ def save_result(result: Result, path: Path, home: str | PathLike[str] | None) ->
         header["sensors"] = {name: log.columns for name, log in result.sensors.items()}
         arrays |= dict(zip(OPTIONAL["sensors"], joined_logs(result.sensors), strict=True))
     if result.patch_rows is not None:
-        arrays |= {f"patches.{name}": result.patch_rows[name] for name in PATCH.names or ()}
+        arrays |= {
+            f"patches.{name}": result.patch_rows[name] for name in result_parts.PATCH.names or ()
+        }
     if result.torque is not None:
         arrays["torque"] = result.torque
     if result.states is not None:
@@ -167,7 +167,7 @@ def save_result(result: Result, path: Path, home: str | PathLike[str] | None) ->
     return path
 
 
-def _origin_in_file(origin: Origin, home: Path) -> dict[str, object]:
+def _origin_in_file(origin: result_parts.Origin, home: Path) -> dict[str, object]:
     """Return what a file in the folder `home` holds of the scenario that ran."""
     scenario, settings = origin.scenario, origin.settings
     if Path(scenario).suffix != ".toml":
@@ -211,7 +211,7 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
 
     patches = None
     if columns := part("patches."):
-        patches = np.empty(len(arrays["contacts.row"]), PATCH)
+        patches = np.empty(len(arrays["contacts.row"]), result_parts.PATCH)
         for name, column in columns.items():
             patches[name] = column
         read_only(patches)
@@ -222,17 +222,17 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
     if header.origin is not None:
         keep = None
         if header.origin.kept is not None:
-            keep = partial(Kept, header.origin.kept, part(KEPT))
+            keep = partial(result_parts.Kept, header.origin.kept, part(KEPT))
         scenario = header.origin.found_from(Path(path).parent)
-        origin = Origin(scenario, header.origin.settings, keep)
+        origin = result_parts.Origin(scenario, header.origin.settings, keep)
     return kind(
         t=arrays["t"],
         q=arrays["q"],
         v=arrays["v"],
         pairs=tuple(header.pairs),
-        contacts=ContactLog(**part("contacts.")),
-        events=tuple(Event(*e) for e in header.events),
-        energy=EnergyAudit(**part("energy.")),
+        contacts=result_parts.ContactLog(**part("contacts.")),
+        events=tuple(result_parts.Event(*e) for e in header.events),
+        energy=result_parts.EnergyAudit(**part("energy.")),
         stats=header.stats,
         origin=origin,
         sensors=split_logs(
@@ -244,7 +244,7 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
         patch_rows=patches,
         sensitivity_rows=sensitivities,
         torque=arrays.get("torque"),
-        states=split_states(arrays.get("states.values"), arrays.get("states.sizes")),
+        states=result_parts.split_states(arrays.get("states.values"), arrays.get("states.sizes")),
     )
 
 

@@ -13,19 +13,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin import _core
+from sphshell_pin import _core, errors
+from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import (
-    check_finite,
-    check_moved_mass,
-    check_not_negative,
-    check_positive,
-)
-from sphshell_pin.dynamics.control.callables import reads_sensors
-from sphshell_pin.dynamics.control.controllers import Callback, Controller, wrap_callable
-from sphshell_pin.dynamics.result.contact_patches import check_record
+from sphshell_pin.dynamics.control import controllers
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.run_state import RunState
+from sphshell_pin.dynamics.result.result_parts import RunState, check_record
 from sphshell_pin.dynamics.result.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.scene import explain
@@ -34,15 +27,8 @@ from sphshell_pin.dynamics.scene.joint_components import moving_joints
 from sphshell_pin.dynamics.scene.models import find_joint
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
-from sphshell_pin.errors import (
-    DeepStart,
-    InvalidParameter,
-    SetupWarning,
-    SphshellError,
-    WeakLawWarning,
-)
 
-AnyController = Controller | Callback | None
+AnyController = controllers.Controller | controllers.Callback | None
 # A compiled run, or what a rollout keeps of one.
 Ended: TypeAlias = "_core.Simulation | _core.Outcome"
 
@@ -81,18 +67,20 @@ def start_run(
     resumed = None
     if isinstance(q0, RunState):
         if v0 is not None:
-            raise InvalidParameter("v0", v0, "must not be given: the state of a run has its own")
+            raise errors.InvalidParameter(
+                "v0", v0, "must not be given: the state of a run has its own"
+            )
         resumed, t0 = q0, q0.t
         q0, v0 = resumed.q, resumed.v
     q, v = scene.check_state(q0, v0)
-    duration = check_not_negative("duration", duration, "s")
+    duration = checks.check_not_negative("duration", duration, "s")
     core_controller, hold = bind_controller(scene, integrator, controller, control_dt, q, sensors)
-    if warn and isinstance(controller, Controller):
+    if warn and isinstance(controller, controllers.Controller):
         for text in controller._setup_warnings(scene, q):
-            warnings.warn(text, SetupWarning, stacklevel=3)
+            warnings.warn(text, errors.SetupWarning, stacklevel=3)
     rows = many_rows(integrator, duration, record_dt) if warn else None
     if rows is not None:
-        warnings.warn(rows, SetupWarning, stacklevel=3)
+        warnings.warn(rows, errors.SetupWarning, stacklevel=3)
     settings = run_settings(
         scene, integrator, duration, hold, record_dt=record_dt, record=record, t0=t0
     )
@@ -105,7 +93,7 @@ def start_run(
         prepare(core)
     if resumed is not None and not core.resume(resumed.values):
         must = "must be the state of a run of a scene with the same pairs and joints"
-        raise InvalidParameter("q0", resumed, must)
+        raise errors.InvalidParameter("q0", resumed, must)
     deep = core.deep_start()
     if deep is not None:
         raise deep_start(scene, *deep)
@@ -117,7 +105,7 @@ def many_rows(integrator: Integrator, duration: float, record_dt: object) -> str
 
     How many those of a variable step without `record_dt` [s] are is not known before.
     """
-    stated = 0.0 if record_dt is None else check_positive("record_dt", record_dt, "s")
+    stated = 0.0 if record_dt is None else checks.check_positive("record_dt", record_dt, "s")
     between = max(stated, step_of(integrator))
     if between == 0 or duration / between <= _MANY_ROWS:
         return None
@@ -139,18 +127,18 @@ def run_settings(
 ) -> _core.RunSettings:
     """Check and collect the settings of a compiled run; torques are held for `hold` [s]."""
     dt = step_of(integrator)
-    t0 = check_finite("t0", t0)
+    t0 = checks.check_finite("t0", t0)
     if np.spacing(abs(t0) + duration) > 1e-3 * (dt or 1e-6):
-        raise InvalidParameter(
+        raise errors.InvalidParameter(
             "t0, duration",
             (t0, duration),
             f"must be small enough to count steps of {dt or 1e-6!r} s",
         )
-    check_moved_mass(scene.model)
+    checks.check_moved_mass(scene.model)
     recorded = check_record(record)
     every = 0.0
     if record_dt is not None:
-        every = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
+        every = min(checks.check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
     return _core.RunSettings(
         integrator=integrator.kind,
         dt=dt,
@@ -181,28 +169,30 @@ def bind_controller(
 ) -> tuple[_core.Controller | None, float]:
     """Return the C++ controller, started at q0 (nq,), and how long its torques are held [s]."""
     dt = step_of(integrator)
-    if control_dt is not None and check_positive("control_dt", control_dt, "s") < dt:
-        raise InvalidParameter("control_dt", control_dt, f"must not be below dt = {dt!r} s")
+    if control_dt is not None and checks.check_positive("control_dt", control_dt, "s") < dt:
+        raise errors.InvalidParameter("control_dt", control_dt, f"must not be below dt = {dt!r} s")
     if controller is None:
         return None, 0.0
     if isinstance(controller, type):
-        raise InvalidParameter(
+        raise errors.InvalidParameter(
             "controller", controller, "is a class, not a controller: did you forget ()?"
         )
-    if isinstance(controller, Controller):
+    if isinstance(controller, controllers.Controller):
         return controller._bind(scene, q0), control_dt or 0.0
     if callable(controller):
-        if not reads_sensors(controller):
-            return wrap_callable(controller, scene.model), control_dt or dt
+        if not controllers.reads_sensors(controller):
+            return controllers.wrap_callable(controller, scene.model), control_dt or dt
         if control_dt is None and dt == 0:
-            raise InvalidParameter(
+            raise errors.InvalidParameter(
                 "control_dt",
                 None,
                 "must be given for a controller that reads sensors with an integrator of variable "
                 "step: how long its torques are held [s]",
             )
-        return wrap_callable(controller, scene.model, sensors.readings), control_dt or dt
-    raise InvalidParameter(
+        return controllers.wrap_callable(
+            controller, scene.model, sensors.readings
+        ), control_dt or dt
+    raise errors.InvalidParameter(
         "controller", controller, "must be None, a controller or tau(t, q, v, contacts)"
     )
 
@@ -219,16 +209,16 @@ def core_pairs(
         weak = weakness(pair, figure)
         # A sphere at rest in touch has no speed to judge by.
         if weak is not None and figure.approach_speed != DEFAULT_SPEED:
-            warnings.warn(weak, WeakLawWarning, stacklevel=4)
+            warnings.warn(weak, errors.WeakLawWarning, stacklevel=4)
     coarse = coarseness(scene, figures, limited_dt) if warn else None
     if coarse is not None:
-        warnings.warn(coarse, SetupWarning, stacklevel=4)
+        warnings.warn(coarse, errors.SetupWarning, stacklevel=4)
     return cores
 
 
-def deep_start(scene: Scene, pair: int, depth: float) -> DeepStart:
+def deep_start(scene: Scene, pair: int, depth: float) -> errors.DeepStart:
     """Return the error of a sphere that starts too deep [m] in the shell of its pair."""
-    return DeepStart(scene.pairs[pair].name, depth, scene.pairs[pair].least_radius)
+    return errors.DeepStart(scene.pairs[pair].name, depth, scene.pairs[pair].least_radius)
 
 
 def advance(
@@ -262,7 +252,9 @@ def result_of(
     names = tuple(pair.name for pair in scene.pairs)
     summaries = core.summaries
     if len(summaries) != len(names) + len(scene.joints.stopped_joints(scene.model)):
-        raise SphshellError("the scene's contacts were changed during the run: it has no result")
+        raise errors.SphshellError(
+            "the scene's contacts were changed during the run: it has no result"
+        )
     counts, wall_time = core.counts, core.wall_time
     simulated = core.time - float(record["t"][0] if len(record["t"]) else core.time)
     figures = map(PairFigures.from_core, summaries[: len(names)])

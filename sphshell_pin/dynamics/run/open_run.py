@@ -14,14 +14,8 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_not_negative, check_vector
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.run_stats import RunStats
-from sphshell_pin.dynamics.run.advance import (
-    AnyController,
-    advance,
-    bind_controller,
-    core_pairs,
-    start_run,
-    why_ended,
-)
+from sphshell_pin.dynamics.run import advance as advancing
+from sphshell_pin.dynamics.run.advance import advance
 from sphshell_pin.dynamics.run.simulation import Simulation
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.dynamics.scene.one_user import one_at_a_time
@@ -54,7 +48,7 @@ class OpenRun:
         simulation: Simulation,
         q0: ArrayLike,
         v0: ArrayLike | None = None,
-        controller: AnyController = None,
+        controller: advancing.AnyController = None,
         control_dt: float | None = None,
         *,
         record_dt: float,
@@ -66,7 +60,7 @@ class OpenRun:
         self._user = _core.OneUser("OpenRun")
         self._sensors = SensorSet(simulation.sensors, simulation.scene)
         # Scene.explain reports a weak law.
-        self._core = start_run(
+        self._core = advancing.start_run(
             simulation.scene,
             simulation.integrator,
             q0,
@@ -114,7 +108,7 @@ class OpenRun:
         left = wall if wall == math.inf else check_not_negative("wall", wall, "s")
         if self.ended is None:
             status = advance(self._core, until, left)
-            self.ended = why_ended(status, self._core, self.scene)
+            self.ended = advancing.why_ended(status, self._core, self.scene)
         rows = self._result(self._core.take(), first=self._rows)
         self._rows += len(rows.t)
         return rows
@@ -139,7 +133,7 @@ class OpenRun:
         return float(now.total[0] - start.total[0])
 
     @one_at_a_time
-    def change(self, scene: Scene, controller: AnyController = None) -> bool:
+    def change(self, scene: Scene, controller: advancing.AnyController = None) -> bool:
         """Go on with the laws, friction and radii of `scene`, and with `controller` unless None.
 
         The scene must have the same model and the same pairs otherwise; what this adds to the
@@ -154,10 +148,10 @@ class OpenRun:
         if controller is not None and controller is not self._controller:
             # What it leaves to the start of the run, such as its posture, is as at the start.
             start = self._start.q[0]
-            core_controller, _ = bind_controller(
+            core_controller, _ = advancing.bind_controller(
                 scene, simulation.integrator, controller, self._control_dt, start, self._sensors
             )
-        pairs = core_pairs(scene, q, v, warn=False)
+        pairs = advancing.core_pairs(scene, q, v, warn=False)
         self._core.change(pairs, scene.bind_joints(), core_controller)
         if core_controller is not None:
             self._controller = controller

@@ -19,7 +19,7 @@ from sphshell_pin.base.named_numbers import (
     names_of_start,
 )
 from sphshell_pin.base.summary import Fact, Summarized, names
-from sphshell_pin.dynamics.control.callables import reads_sensors
+from sphshell_pin.dynamics.control.controllers import reads_sensors
 from sphshell_pin.dynamics.scene.derivatives import core_parameters
 from sphshell_pin.errors import InvalidParameter, ResultError
 

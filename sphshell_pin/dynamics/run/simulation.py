@@ -6,45 +6,20 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
-from sphshell_pin import _core
+from sphshell_pin import _core, errors
 from sphshell_pin.base.checks import check_not_negative
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.run_state import RunState
-from sphshell_pin.dynamics.run.advance import (
-    AnyController,
-    CtrlC,
-    advance,
-    bind_controller,
-    core_pairs,
-    result_of,
-    run_settings,
-    start_run,
-    step_of,
-    why_ended,
-)
+from sphshell_pin.dynamics.result.result_parts import RunState
+from sphshell_pin.dynamics.run import advance as advancing
+from sphshell_pin.dynamics.run import rollout as rollouts
 from sphshell_pin.dynamics.run.integrators import Adaptive, Integrator
-from sphshell_pin.dynamics.run.many_runs import (
-    Tasks,
-    check_controllers,
-    not_begun,
-    one_each,
-    states_of,
-    worker_count,
-)
-from sphshell_pin.dynamics.run.rollout import Plan, Rollout
 from sphshell_pin.dynamics.run.sensitivities import Asked
 from sphshell_pin.dynamics.scene.derivatives import StepDerivatives
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_state import SceneState
 from sphshell_pin.dynamics.scene.variations import Variations, check_names_of
 from sphshell_pin.dynamics.sensing.sensors import Sensor, SensorSet, check_sensors
-from sphshell_pin.errors import (
-    Interrupted,
-    InvalidParameter,
-    RolloutInterrupted,
-    SimulationDiverged,
-)
 
 
 class Simulation(Summarized):
@@ -60,10 +35,12 @@ class Simulation(Summarized):
         sensors: Iterable[Sensor] = (),
     ) -> None:
         if not isinstance(scene, Scene):
-            raise InvalidParameter("scene", type(scene).__name__, "must be a sphshell_pin.Scene")
+            raise errors.InvalidParameter(
+                "scene", type(scene).__name__, "must be a sphshell_pin.Scene"
+            )
         integrator = Adaptive() if integrator is None else integrator
         if not isinstance(integrator, Integrator):
-            raise InvalidParameter(
+            raise errors.InvalidParameter(
                 "integrator",
                 integrator,
                 "must be Adaptive(rtol), Implicit(rtol), SemiImplicitEuler(dt), RungeKutta4(dt) or "
@@ -85,7 +62,7 @@ class Simulation(Summarized):
         q0: ArrayLike | RunState,
         v0: ArrayLike | None = None,
         duration: float = 1.0,
-        controller: AnyController = None,
+        controller: advancing.AnyController = None,
         control_dt: float | None = None,
         *,
         record_dt: float | None = None,
@@ -127,7 +104,7 @@ class Simulation(Summarized):
         asked = None
         if not isinstance(sensitivities, tuple) or sensitivities:
             asked = Asked(self.scene, sensitivities, controller)
-        core = start_run(
+        core = advancing.start_run(
             self.scene,
             self.integrator,
             q0,
@@ -141,7 +118,7 @@ class Simulation(Summarized):
             sensors=sensors,
             prepare=None if asked is None else asked.begin,
         )
-        ctrl_c = CtrlC()
+        ctrl_c = advancing.CtrlC()
 
         def glance() -> None:
             if progress is not None:
@@ -152,18 +129,18 @@ class Simulation(Summarized):
                 raise KeyboardInterrupt
 
         def so_far() -> Result:
-            result = result_of(self.scene, self.integrator, core, core.take(), sensors)
+            result = advancing.result_of(self.scene, self.integrator, core, core.take(), sensors)
             return replace(result, sensitivity_rows=asked.rows(core)) if asked else result
 
         try:
             with ctrl_c:
-                status = advance(core, glance=glance)
+                status = advancing.advance(core, glance=glance)
         except KeyboardInterrupt:
-            raise Interrupted(core.time, so_far()) from None
+            raise errors.Interrupted(core.time, so_far()) from None
         result = so_far()
-        reason = why_ended(status, core, self.scene)
+        reason = advancing.why_ended(status, core, self.scene)
         if reason is not None:
-            raise SimulationDiverged(core.time, reason, result)
+            raise errors.SimulationDiverged(core.time, reason, result)
         return result
 
     def step_derivatives(
@@ -183,9 +160,9 @@ class Simulation(Summarized):
 
         Raises InvalidParameter for an integrator whose steps have no fixed length.
         """
-        dt = step_of(self.integrator)
+        dt = advancing.step_of(self.integrator)
         if dt == 0:
-            raise InvalidParameter(
+            raise errors.InvalidParameter(
                 "integrator",
                 self.integrator,
                 "has no fixed step to differentiate: take SemiImplicitEuler(dt), RungeKutta4(dt) "
@@ -203,14 +180,14 @@ class Simulation(Summarized):
         duration: float = 1.0,
         threads: int | None = None,
         *,
-        controller: AnyController | Sequence[AnyController] = None,
+        controller: advancing.AnyController | Sequence[advancing.AnyController] = None,
         control_dt: float | None = None,
         vary: Mapping[str, object] | None = None,
         record_dt: float | None = None,
         record: Collection[str] = (),
         progress: Callable[[float], object] | None = None,
         t0: float = 0.0,
-    ) -> Rollout:
+    ) -> rollouts.Rollout:
         """Make many runs at once, over threads; each has the bits that `run` gives it.
 
         Parameters
@@ -246,54 +223,54 @@ class Simulation(Summarized):
         scene, integrator = self.scene, self.integrator
         sensors = SensorSet(self.sensors, scene)
         began = time.perf_counter()
-        workers = worker_count(threads)
+        workers = rollouts.worker_count(threads)
         duration = check_not_negative("duration", duration, "s")
         vary = check_names_of(vary)
-        starts = states_of(scene, q0s, v0s, vary, controller)
+        starts = rollouts.states_of(scene, q0s, v0s, vary, controller)
         # Start and end are rows whatever the time between rows.
         rows = record_dt if record_dt is not None else (duration or None)
 
         def settings_of(scene: Scene, hold: float) -> _core.RunSettings:
-            return run_settings(
+            return advancing.run_settings(
                 scene, integrator, duration, hold, record_dt=rows, record=record, t0=t0
             )
 
         settings = {0.0: settings_of(scene, 0.0)}
-        controllers = one_each(controller, len(starts))
-        check_controllers(scene, integrator, controllers, control_dt, starts, sensors)
+        controllers = rollouts.one_each(controller, len(starts))
+        rollouts.check_controllers(scene, integrator, controllers, control_dt, starts, sensors)
         variations = Variations(scene, vary, len(starts), sensors.sensors)
-        plan = Plan(starts, [None] * len(starts), variations, {}, t0)
+        plan = rollouts.Plan(starts, [None] * len(starts), variations, {}, t0)
 
         def add(run: int) -> None:
             q0, v0 = starts[run]
             varied = variations.scene(run)
-            bound, hold = bind_controller(
+            bound, hold = advancing.bind_controller(
                 varied, integrator, controllers[run], control_dt, q0, sensors
             )
             if hold not in settings:
                 settings[hold] = settings_of(varied, hold)
             # The rollout warns of a weak law when a sphere has gone through.
-            pairs = core_pairs(varied, q0, v0, warn=False)
+            pairs = advancing.core_pairs(varied, q0, v0, warn=False)
             measuring = variations.sensors(run)
             read = sensors if measuring is sensors.sensors else SensorSet(measuring, scene)
             core.add(pairs, joints, bound, q0, v0, settings[hold], read.core)
 
-        def rollout() -> Rollout:
+        def rollout() -> rollouts.Rollout:
             wall_time = time.perf_counter() - began
-            return Rollout(scene, integrator, core, plan, workers, wall_time, sensors)
+            return rollouts.Rollout(scene, integrator, core, plan, workers, wall_time, sensors)
 
         workers = max(min(workers, len(starts)), 1)
         joints = scene.bind_joints()
         core = _core.Rollout(scene.model, workers)
-        tasks = Tasks(core, workers, progress, len(starts), plan.failures)
+        tasks = rollouts.Tasks(core, workers, progress, len(starts), plan.failures)
         try:
-            with CtrlC() as ctrl_c:
+            with advancing.CtrlC() as ctrl_c:
                 for run in range(len(starts)):
                     try:
                         add(run)
                     except Exception as fault:
                         # A contact source is asked about the start, and may raise.
-                        plan.failures[run] = not_begun(fault)
+                        plan.failures[run] = rollouts.not_begun(fault)
                         continue
                     plan.numbers[run] = tasks.added
                     tasks.make_room(ctrl_c)
@@ -301,7 +278,7 @@ class Simulation(Summarized):
         except KeyboardInterrupt:
             core.stop()
             plan.leave_out(core)
-            raise RolloutInterrupted(tasks.done, rollout()) from None
+            raise errors.RolloutInterrupted(tasks.done, rollout()) from None
         finally:
             core.stop()
         return rollout()

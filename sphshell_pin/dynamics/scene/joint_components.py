@@ -11,14 +11,8 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
+from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import (
-    as_floats,
-    check_not_negative,
-    check_positive,
-    check_type,
-    check_vector,
-)
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.dynamics.scene.models import find_joint, mass_matrix
@@ -63,7 +57,7 @@ class JointLimits:
         """Raise InvalidParameter for a law that is none, and for an empty range."""
         check_law(self.law, "at a joint's stop")
         try:
-            right = bool(np.all(as_floats(self.lower) < as_floats(self.upper)))
+            right = bool(np.all(checks.as_floats(self.lower) < checks.as_floats(self.upper)))
         except (TypeError, ValueError, OverflowError):
             right = False
         if not right:
@@ -90,12 +84,12 @@ class JointFriction:
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter unless the numbers are positive; damping may be zero."""
-        check_positive("torque", self.torque, "N m or N")
+        checks.check_positive("torque", self.torque, "N m or N")
         if self.stiffness is not None:
-            check_positive("stiffness", self.stiffness, "N m/rad or N/m")
+            checks.check_positive("stiffness", self.stiffness, "N m/rad or N/m")
         if self.damping is not None:
-            check_not_negative("damping", self.damping, "N m s/rad or N s/m")
-        check_positive("relaxation", self.relaxation, "s")
+            checks.check_not_negative("damping", self.damping, "N m s/rad or N s/m")
+        checks.check_positive("relaxation", self.relaxation, "s")
 
 
 @dataclass(frozen=True)
@@ -119,12 +113,16 @@ class JointComponents:
     def __post_init__(self) -> None:
         """Raise InvalidParameter for what is no mapping from names, or has a wrong type."""
         for one in fields(self):
-            values = check_type(one.name, getattr(self, one.name), Mapping, "must map joint names")
+            values = checks.check_type(
+                one.name, getattr(self, one.name), Mapping, "must map joint names"
+            )
             object.__setattr__(self, one.name, dict(values))
         for name, limits in self.limits.items():
-            check_type(f"limits.{name}", limits, JointLimits, "must be JointLimits")
+            checks.check_type(f"limits.{name}", limits, JointLimits, "must be JointLimits")
         for name, friction in self.friction.items():
-            check_type(f"friction.{name}", friction, JointFriction, "must be a JointFriction")
+            checks.check_type(
+                f"friction.{name}", friction, JointFriction, "must be a JointFriction"
+            )
 
     @classmethod
     def from_model(
@@ -310,7 +308,7 @@ class JointComponents:
             joint = find_joint(model, name)
             numbers = _per_velocity(f"{kind}.{name}", value, joint.nv)
             for number in numbers:
-                check_not_negative(f"{kind}.{name}", number)
+                checks.check_not_negative(f"{kind}.{name}", number)
             each[joint.idx_v : joint.idx_v + joint.nv] = numbers
         return each
 
@@ -322,9 +320,9 @@ class JointComponents:
             joint = find_joint(model, name)
             at = slice(joint.idx_v, joint.idx_v + joint.nv)
             if isinstance(value, Sequence):
-                low, high = check_vector(f"effort.{name}", value, 2, ": lower and upper")
+                low, high = checks.check_vector(f"effort.{name}", value, 2, ": lower and upper")
             else:
-                high = check_not_negative(f"effort.{name}", value, "N m or N")
+                high = checks.check_not_negative(f"effort.{name}", value, "N m or N")
                 low = -high
             if not low <= 0 <= high:
                 raise InvalidParameter(
@@ -357,7 +355,7 @@ def check_joints(joints: object, model: pin.Model, lock: Iterable[str]) -> Joint
     """
     if joints is None:
         return JointComponents()
-    given = check_type(
+    given = checks.check_type(
         "joints",
         joints,
         JointComponents,

@@ -7,27 +7,11 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin import _core
+from sphshell_pin import _core, contact
 from sphshell_pin.base.summary import Fact, Summarized
-from sphshell_pin.contact import (
-    BristleFriction,
-    FoundationLaw,
-    Friction,
-    FunctionFriction,
-    Method,
-    MindlinFriction,
-    NormalLaw,
-)
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
-from sphshell_pin.dynamics.scene.sides import (
-    PlaneSide,
-    ShellSide,
-    Side,
-    SourceSide,
-    SphereSide,
-)
-from sphshell_pin.dynamics.scene.sources import checked_source
+from sphshell_pin.dynamics.scene import sides as ends
 from sphshell_pin.errors import InvalidParameter
 
 
@@ -40,10 +24,10 @@ class ContactPair(Summarized):
     """
 
     name: str
-    side_i: Side
-    side_j: Side
-    law: NormalLaw
-    friction: Friction | None
+    side_i: ends.Side
+    side_j: ends.Side
+    law: contact.NormalLaw
+    friction: contact.Friction | None
     group: str = ""
 
     def __post_init__(self) -> None:
@@ -51,15 +35,17 @@ class ContactPair(Summarized):
 
         Raises InvalidParameter.
         """
-        is_source = isinstance(self.side_i, SourceSide)
+        is_source = isinstance(self.side_i, ends.SourceSide)
         check_law(self.law, "at the points of a contact source" if is_source else "")
         check_friction(self.friction)
-        if isinstance(self.side_i, PlaneSide):
+        if isinstance(self.side_i, ends.PlaneSide):
             self._check_plane()
-        if isinstance(self.friction, FunctionFriction) and isinstance(self.law, FoundationLaw):
+        if isinstance(self.friction, contact.FunctionFriction) and isinstance(
+            self.law, contact.FoundationLaw
+        ):
             must = "is for contacts at a point: beside a FoundationLaw take a CoulombFriction"
             raise InvalidParameter("friction", self.friction.kind, must)
-        if is_source and isinstance(self.friction, MindlinFriction):
+        if is_source and isinstance(self.friction, contact.MindlinFriction):
             must = "needs a sphere, and a contact source has none: take a BristleFriction"
             raise InvalidParameter("friction", self.friction.kind, must)
 
@@ -105,17 +91,17 @@ class ContactPair(Summarized):
         return self.side_j.in_joint
 
     @cached_property
-    def spheres(self) -> tuple[SphereSide, ...]:
+    def spheres(self) -> tuple[ends.SphereSide, ...]:
         """The spheres of this pair: one, two, or none."""
-        return tuple(one for one in (self.side_i, self.side_j) if isinstance(one, SphereSide))
+        return tuple(one for one in (self.side_i, self.side_j) if isinstance(one, ends.SphereSide))
 
     @cached_property
-    def shells(self) -> tuple[ShellSide, ...]:
+    def shells(self) -> tuple[ends.ShellSide, ...]:
         """The shells of this pair: one or none."""
-        return (self.side_j,) if isinstance(self.side_j, ShellSide) else ()
+        return (self.side_j,) if isinstance(self.side_j, ends.ShellSide) else ()
 
     @property
-    def sphere_on_shell(self) -> tuple[tuple[SphereSide, ShellSide], ...]:
+    def sphere_on_shell(self) -> tuple[tuple[ends.SphereSide, ends.ShellSide], ...]:
         """Both sides of a pair of a sphere and a shell; nothing of another."""
         return tuple(zip(self.spheres, self.shells, strict=False))
 
@@ -124,21 +110,21 @@ class ContactPair(Summarized):
         """The fields that lead to what can be changed, by the names of files and derivatives."""
         found: dict[str, tuple[str, ...]] = {"law": ("law",), "friction": ("friction",)}
         for name, end in (("sphere", "side_i"), ("other_sphere", "side_j")):
-            if isinstance(getattr(self, end), SphereSide):
+            if isinstance(getattr(self, end), ends.SphereSide):
                 found[name] = end, "sphere"
         if self.shells:
             found["placement"] = "side_j", "placement"
         return found
 
     @cached_property
-    def plane_law(self) -> NormalLaw:
+    def plane_law(self) -> contact.NormalLaw:
         """The law, and of one that follows the curvature of the shell that of a plane shell.
 
         Of a foundation beside a Plane it is that of a face as large as the shell's box: stiffest.
         """
         if not self.law.needs_shape:
             return self.law
-        if isinstance(self.side_i, PlaneSide) and isinstance(self.law, FoundationLaw):
+        if isinstance(self.side_i, ends.PlaneSide) and isinstance(self.law, contact.FoundationLaw):
             (on_shell,) = self.shells
             sides = np.sort(np.ptp(on_shell.shell.vertices, axis=0))
             return self.law.on_face(float(sides[1] * sides[2]))
@@ -156,17 +142,17 @@ class ContactPair(Summarized):
         end.
         """
         why = "beside a Plane: it follows from the radius of a Sphere"
-        if self.law.needs_shape and not isinstance(self.law, FoundationLaw):
+        if self.law.needs_shape and not isinstance(self.law, contact.FoundationLaw):
             must = "take law.on_plane(radius), or a FoundationLaw, which needs no radius"
             raise InvalidParameter("law", self.law, f"must be one of the depth alone {why}; {must}")
         friction = self.friction
-        lies = isinstance(self.law, FoundationLaw) or any(
+        lies = isinstance(self.law, contact.FoundationLaw) or any(
             one.shell.core_for(one.method).has_flats for one in self.shells if one.is_smooth
         )
-        if isinstance(friction, BristleFriction) and lies:
+        if isinstance(friction, contact.BristleFriction) and lies:
             object.__setattr__(self, "friction", replace(friction, torsional=True))
         elif friction is not None and (
-            isinstance(friction, MindlinFriction) or friction._binding.torsional
+            isinstance(friction, contact.MindlinFriction) or friction._binding.torsional
         ):
             raise InvalidParameter("friction", friction, f"must have no disc of contact {why}")
         for one in self.shells:
@@ -175,13 +161,13 @@ class ContactPair(Summarized):
                 raise InvalidParameter("method", one.method, must)
 
     @property
-    def core_sides(self) -> tuple[Side, Side]:
+    def core_sides(self) -> tuple[ends.Side, ends.Side]:
         """The core's body i, and j.
 
         Against a plane the core's body i is the one with the shell: in the frame of the plane, its
         body j, the normal is constant.
         """
-        if isinstance(self.side_i, PlaneSide):
+        if isinstance(self.side_i, ends.PlaneSide):
             return self.side_j, self.side_i
         return self.side_i, self.side_j
 
@@ -196,7 +182,7 @@ class ContactPair(Summarized):
         """What is modeled of this pair, in sentences."""
         first, second = self.side_i.sentence, self.side_j.sentence
         bodies = f"{first} against {second}"
-        if isinstance(self.side_i, SourceSide):
+        if isinstance(self.side_i, ends.SourceSide):
             bodies = (
                 "contact points of the user's own routine between frames "
                 f"'{self.frame_i}' and '{self.frame_j}'"
@@ -215,9 +201,9 @@ class ContactPair(Summarized):
     def _bind(self) -> _core.Pair:
         """Build the C++ binding of this pair."""
         source = None
-        if isinstance(self.side_i, SourceSide):
+        if isinstance(self.side_i, ends.SourceSide):
             has_state = self.friction is not None and self.friction.has_state
-            source = checked_source(self.side_i.find, self.name, has_state)
+            source = ends.checked_source(self.side_i.find, self.name, has_state)
         method = self.shells[0].method if self.shells else "facets"
         side_i, side_j = self.core_sides
         core = _core.Pair(
@@ -230,10 +216,10 @@ class ContactPair(Summarized):
             ball=self.spheres[1].radius if len(self.spheres) > 1 else 0.0,
             shell=self.shells[0].shell.core_for(method) if self.shells else None,
             source=source,
-            method=int(Method.from_name(method)),
+            method=int(contact.Method.from_name(method)),
             law=self.law._binding,
             friction=None if self.friction is None else self.friction._binding,
-            plane=isinstance(self.side_i, PlaneSide),
+            plane=isinstance(self.side_i, ends.PlaneSide),
         )
         core.group = self.group
         return core

@@ -12,18 +12,13 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_positive, check_type
 from sphshell_pin.base.named_numbers import columns_of, names_of_pairs
 from sphshell_pin.contact import Friction, NormalLaw
-from sphshell_pin.dynamics.scene.constraints import ContactConstraints, constraints_of
-from sphshell_pin.dynamics.scene.derivatives import (
-    ContactForceDerivatives,
-    DynamicsDerivatives,
-    core_parameters,
-)
+from sphshell_pin.dynamics.scene import derivatives
 from sphshell_pin.dynamics.scene.explain import Explanation, explain_scene
-from sphshell_pin.dynamics.scene.from_geometry import add_pairs
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.scene.scene_parts import SceneParts
 from sphshell_pin.dynamics.scene.scene_state import SceneState
+from sphshell_pin.dynamics.scene.sphere_arguments import add_pairs
 
 __all__ = ["ContactPair", "Scene", "SceneContacts", "SceneState"]
 
@@ -110,7 +105,7 @@ class Scene(SceneParts):
         *,
         parameters: Collection[str] = (),
         state: SceneState | None = None,
-    ) -> ContactForceDerivatives:
+    ) -> derivatives.ContactForceDerivatives:
         """Return the contacts at q (nq,), v (nv,), and how their forces and depths change.
 
         `parameters` and `state` as in `dynamics_derivatives`; what is approximate is said in
@@ -118,7 +113,7 @@ class Scene(SceneParts):
         """
         columns, core = self._bind_parameters(parameters, state)
         found = self._at(state).contact_force_derivatives(q, v, core)
-        return ContactForceDerivatives.from_core(*found, self._model.nv, columns)
+        return derivatives.ContactForceDerivatives.from_core(*found, self._model.nv, columns)
 
     def dynamics_derivatives(
         self,
@@ -128,7 +123,7 @@ class Scene(SceneParts):
         *,
         parameters: Collection[str] = (),
         state: SceneState | None = None,
-    ) -> DynamicsDerivatives:
+    ) -> derivatives.DynamicsDerivatives:
         """Return the acceleration at q (nq,), v (nv,) under the torques tau (nv,), and derivatives.
 
         v and tau are zero unless given. By q, v and tau they are pinocchio's
@@ -148,7 +143,7 @@ class Scene(SceneParts):
         """
         columns, core = self._bind_parameters(parameters, state)
         found = self._at(state).dynamics_derivatives(q, v, tau, core)
-        return DynamicsDerivatives(*found, columns)
+        return derivatives.DynamicsDerivatives(*found, columns)
 
     def _bind_parameters(
         self, parameters: Collection[str], state: SceneState | None = None
@@ -157,7 +152,9 @@ class Scene(SceneParts):
         if isinstance(parameters, tuple) and not parameters:
             return (), []
         columns = columns_of(parameters, names_of_pairs(self.pairs))
-        return columns, core_parameters(self, columns, None if state is None else state.start)
+        return columns, derivatives.core_parameters(
+            self, columns, None if state is None else state.start
+        )
 
     def contacts(
         self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
@@ -170,14 +167,16 @@ class Scene(SceneParts):
 
     def constraints(
         self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
-    ) -> ContactConstraints:
+    ) -> derivatives.ContactConstraints:
         """Return all contacts at q (nq,), v (nv,) for Pinocchio's own solvers of constraints.
 
         Their laws are not in them but for the stiffness: ADMM and PGS compute forces that hold the
         bodies apart, with Coulomb's cones. `state` as in `contacts`.
         """
         contacts = self.contacts(q, v, state)
-        return constraints_of(self.model, self.pairs, self.check_state(q, v)[0], contacts)
+        return derivatives.constraints_of(
+            self.model, self.pairs, self.check_state(q, v)[0], contacts
+        )
 
     def _at(self, state: SceneState | None) -> _core.Scene | _core.SceneState:
         if state is None:

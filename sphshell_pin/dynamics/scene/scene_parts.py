@@ -25,15 +25,10 @@ from sphshell_pin.base.checks import (
 from sphshell_pin.base.summary import Detail, Fact, Summarized, names
 from sphshell_pin.contact import Friction, FunctionFriction, ImpactLaw, NormalLaw, Plane, Sphere
 from sphshell_pin.dynamics.compiled.robot import load_compiled
+from sphshell_pin.dynamics.scene import models
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
-from sphshell_pin.dynamics.scene.models import (
-    check_model,
-    find_frame,
-    reduced_model,
-)
 from sphshell_pin.dynamics.scene.pairs import ContactPair
-from sphshell_pin.dynamics.scene.sides import ShellSide, Side, SourceSide
-from sphshell_pin.dynamics.scene.sources import Find
+from sphshell_pin.dynamics.scene.sides import Find, ShellSide, Side, SourceSide
 from sphshell_pin.dynamics.scene.sphere_arguments import (
     default_group,
     named,
@@ -65,7 +60,7 @@ class SceneParts(Summarized):
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
-        check_model(model)
+        models.check_model(model)
         self.lock = check_names("lock", lock)
         if q_lock is None:
             q = pin.neutral(model)
@@ -75,7 +70,7 @@ class SceneParts(Summarized):
             raise InvalidParameter(
                 "q_lock", q_lock, "must come with lock, the joints to hold there"
             )
-        self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
+        self._model = models.reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
         # What a locked joint holds, its frames do not say any more.
         self._whole = (pin.Model(model), q) if self.lock else (self._model, q)
         # Nothing is left to model of joints that are held.
@@ -345,7 +340,7 @@ class SceneParts(Summarized):
 
     def frame_in_joint(self, name: str, called: str = "frame") -> tuple[int, pin.SE3]:
         """Return the joint of the frame `name`, and where the frame is in it."""
-        frame = self._model.frames[find_frame(self._model, name, called)]
+        frame = self._model.frames[models.find_frame(self._model, name, called)]
         return int(frame.parentJoint), pin.SE3(frame.placement)
 
 

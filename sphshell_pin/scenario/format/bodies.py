@@ -11,24 +11,13 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import off_unit_length
+from sphshell_pin.dynamics.scene import models
 from sphshell_pin.dynamics.scene.mimic import check_follows, count_of_all, mimics, shortened
-from sphshell_pin.dynamics.scene.models import (
-    find_frame,
-    find_joint,
-    reduced_geometry,
-    set_joint,
-)
 from sphshell_pin.errors import MissingExtra, ScenarioError, SphshellError
 from sphshell_pin.robots import LoadedRobot, load, load_file, mass_fault
+from sphshell_pin.scenario.format import schema
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.format.reading import item_key
-from sphshell_pin.scenario.format.schema import (
-    TIP_AT,
-    Placement,
-    RobotSection,
-    Scenario,
-    TipAt,
-)
 
 # A tip that is brought somewhere: starts of the search, and how near it comes [m], [rad].
 _SEEDS, _AT_TIP, _ALONG = 40, 1e-6, 1e-4
@@ -70,13 +59,15 @@ def blamed_on(path: Path, key: str) -> Iterator[None]:
         raise ScenarioError(path, key, why) from error
 
 
-def to_se3(placement: Placement) -> pin.SE3:
+def to_se3(placement: schema.Placement) -> pin.SE3:
     """Return the SE3 of a placement table."""
     return pin.SE3(pin.rpy.rpyToMatrix(*np.deg2rad(placement.rpy_deg)), np.array(placement.xyz))
 
 
 def assemble(
-    scenario: Scenario, path: Path, loaded: Mapping[tuple[object, ...], LoadedRobot] | None = None
+    scenario: schema.Scenario,
+    path: Path,
+    loaded: Mapping[tuple[object, ...], LoadedRobot] | None = None,
 ) -> Assembly:
     """Load all robots of `scenario` and append them into one model under its gravity.
 
@@ -119,7 +110,7 @@ def assemble(
             starts.append((name, q[in_q], v[in_v], np.array(model.armature[in_v])))
         stand = to_se3(section.placement)
         with blamed_on(path, f"{key}.frame"):
-            carrier = find_frame(base, section.frame)
+            carrier = models.find_frame(base, section.frame)
         if not several and stand.isIdentity():
             base, visual = model, geometry
         else:
@@ -136,7 +127,7 @@ def assemble(
     if armature.any():
         base.armature = armature  # which pinocchio.appendModel (4.1) drops
     for i, section in enumerate(scenario.robot):
-        key = f"{item_key('robot', scenario.robot, i)}.start.{TIP_AT}"
+        key = f"{item_key('robot', scenario.robot, i)}.start.{schema.TIP_AT}"
         if section.tip_start is not None:
             with blamed_on(path, key):
                 q0 = _with_tip(base, q0, section.tip_start, prefixes[i], section.lock, scenario)
@@ -146,10 +137,10 @@ def assemble(
 def _with_tip(
     model: pin.Model,
     q: Array,
-    tip: TipAt,
+    tip: schema.TipAt,
     prefix: str,
     lock: Sequence[str],
-    scenario: Scenario,
+    scenario: schema.Scenario,
 ) -> Array:
     """Return q (nq,) with the tip of the robot whose names begin with `prefix` where it shall be.
 
@@ -161,7 +152,7 @@ def _with_tip(
         name for name in names if not name.startswith(prefix) or name.removeprefix(prefix) in lock
     ]
     # A root that floats stays, as it would carry the tip anywhere.
-    held += [name for name in names if find_joint(model, name).nv == 6 and len(names) > 1]
+    held += [name for name in names if models.find_joint(model, name).nv == 6 and len(names) > 1]
     reach = Reach(model, frame, offset, held)
     place, rng = np.array(tip.xyz), np.random.default_rng(0)
     turn = None
@@ -196,7 +187,7 @@ def _with_tip(
 
 
 def _tip_frame(
-    model: pin.Model, tip: TipAt, prefix: str, scenario: Scenario
+    model: pin.Model, tip: schema.TipAt, prefix: str, scenario: schema.Scenario
 ) -> tuple[str, Sequence[float]]:
     """Return the frame of the tip and its offset, by default those of a contact's sphere."""
     if tip.frame is not None:
@@ -206,14 +197,14 @@ def _tip_frame(
         moves = (
             sphere is not None
             and sphere.frame.startswith(prefix)
-            and int(model.frames[find_frame(model, sphere.frame)].parentJoint) > 0
+            and int(model.frames[models.find_frame(model, sphere.frame)].parentJoint) > 0
         )
         if sphere is not None and moves:
             return sphere.frame, sphere.offset
     raise SphshellError("no contact has a sphere on this robot: name the frame of the tip")
 
 
-def origin(section: RobotSection) -> tuple[object, ...]:
+def origin(section: schema.RobotSection) -> tuple[object, ...]:
     """Return what tells robots of one scenario's folder apart before they start and are placed."""
     plain = ("name", "path", "density", "srdf", "pose", "floats", "mimic")
     lists = tuple(section.package_dirs), tuple(section.xacro_args.items())
@@ -233,7 +224,9 @@ def reduce_visual(assembly: Assembly) -> pin.GeometryModel:
     """Return the visual geometry for the model with `assembly.lock` locked."""
     if not assembly.lock:
         return assembly.visual_model
-    return reduced_geometry(assembly.model, assembly.visual_model, assembly.lock, assembly.q0)[1]
+    return models.reduced_geometry(
+        assembly.model, assembly.visual_model, assembly.lock, assembly.q0
+    )[1]
 
 
 def restrict(model: pin.Model, reduced: pin.Model, q: Array, v: Array) -> tuple[Array, Array]:
@@ -248,11 +241,11 @@ def restrict(model: pin.Model, reduced: pin.Model, q: Array, v: Array) -> tuple[
 
 def joint_spans(model: pin.Model, name: str) -> tuple[slice, slice]:
     """Return the places of a joint's numbers in q and in v; NameNotFound lists the joints."""
-    joint = find_joint(model, name)
+    joint = models.find_joint(model, name)
     return slice(joint.idx_q, joint.idx_q + joint.nq), slice(joint.idx_v, joint.idx_v + joint.nv)
 
 
-def _load(section: RobotSection, path: Path) -> LoadedRobot:
+def _load(section: schema.RobotSection, path: Path) -> LoadedRobot:
     if section.name is not None:
         return load(section.name, free_flyer=section.floats, mimic=section.mimic, pose=section.pose)
     folder, file = path.parent, section.path or ""
@@ -270,7 +263,7 @@ def _load(section: RobotSection, path: Path) -> LoadedRobot:
 
 
 def _start(
-    model: pin.Model, q_default: Array, section: RobotSection, path: Path, key: str
+    model: pin.Model, q_default: Array, section: schema.RobotSection, path: Path, key: str
 ) -> tuple[Array, Array]:
     q, v = np.array(q_default, dtype=float), np.zeros(model.nv)
     if section.q is not None:
@@ -287,11 +280,11 @@ def _start(
     rules = mimics(model)
     for name, value in section.joint_start.items():
         with blamed_on(path, f'{key}.start."{name}"'):
-            set_joint(model, q, name, value)
+            models.set_joint(model, q, name, value)
     for name in (one for one in section.joint_start if one in rules):
         # What it mimics may be stated too, or another joint that mimics the same.
         rule, value = rules[name], section.joint_start[name]
-        joint = find_joint(model, rule.of)
+        joint = models.find_joint(model, rule.of)
         if joint.nq == 1:
             with blamed_on(path, f'{key}.start."{name}"'):
                 stated = value[0] if isinstance(value, list) else value

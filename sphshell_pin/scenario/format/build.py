@@ -11,54 +11,23 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin import errors
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.parameters import Component, parameters_of
 from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.contact.friction import Friction
-from sphshell_pin.contact.function_friction import FunctionFrictionFile
-from sphshell_pin.contact.function_law import FunctionFile
+from sphshell_pin.contact.function_laws import FunctionFile, FunctionFrictionFile
 from sphshell_pin.contact.normal_law import NormalLaw
-from sphshell_pin.dynamics.control.callables import check_callable
-from sphshell_pin.dynamics.control.controllers import (
-    Callback,
-    Controller,
-    PythonFunction,
-    ShellPlace,
-)
+from sphshell_pin.dynamics.control import controllers
 from sphshell_pin.dynamics.run.advance import many_rows
 from sphshell_pin.dynamics.scene.explain import Explanation
 from sphshell_pin.dynamics.sensing.sensors import Sensor, check_sensors
-from sphshell_pin.errors import (
-    InvalidParameter,
-    NameNotFound,
-    ScenarioError,
-    SphshellError,
-    UnitWarning,
-)
 from sphshell_pin.robots import LoadedRobot
-from sphshell_pin.scenario.format import schema
-from sphshell_pin.scenario.format.bodies import (
-    Assembly,
-    assemble,
-    blamed_on,
-    check_masses,
-    origin,
-    reduce_visual,
-    restrict,
-    to_se3,
-)
+from sphshell_pin.scenario.format import bodies, reading, schema
+from sphshell_pin.scenario.format.components import joint_components, spheres_of, to_end, to_sphere
 from sphshell_pin.scenario.format.functions import Loader, Modules, load_function
-from sphshell_pin.scenario.format.joint_tables import joint_components
-from sphshell_pin.scenario.format.numbers import has_number, number_in, with_numbers
-from sphshell_pin.scenario.format.reading import (
-    change_scenario,
-    find_scenario,
-    item_key,
-    read_scenario,
-)
-from sphshell_pin.scenario.format.sliders import check_knobs
-from sphshell_pin.scenario.format.sphere_tables import spheres_of, to_end, to_sphere
+from sphshell_pin.scenario.format.sliders import check_knobs, has_number, number_in, with_numbers
 
 # A user's own; what it takes depends on where the scenario names it.
 Function = Callable[..., Any]
@@ -74,11 +43,11 @@ class Built(Summarized):
     scene: sp.Scene
     q0: Array
     v0: Array
-    controller: Controller | Callback | None
+    controller: controllers.Controller | controllers.Callback | None
     simulation: sp.Simulation
     visual_model: pin.GeometryModel
     """Geometry of the scene's model."""
-    assembly: Assembly
+    assembly: bodies.Assembly
     """The robots as one model; the same object as before where a rebuild could keep it."""
     shells: Mapping[str, sp.Shell]
     """The surfaces by name; the same objects as before where a rebuild could keep them."""
@@ -120,8 +89,8 @@ def build(
     MissingExtra
         The scenario needs an optional package that is not installed.
     """
-    path = find_scenario(name)
-    scenario = read_scenario(path, changes)
+    path = reading.find_scenario(name)
+    scenario = reading.read_scenario(path, changes)
     check_knobs(scenario, path, ranges=not changes)
     return build_scenario(
         scenario, path, reuse if reuse is not None and reuse.path == path else None
@@ -144,7 +113,7 @@ def rebuild(built: Built, changes: Mapping[str, str], *, anew: bool = False) -> 
         built = replace(built, functions={})
     elif (same := with_numbers(built, changes) or _with_controller(built, changes)) is not None:
         return same
-    scenario = change_scenario(built.scenario, changes, built.path)
+    scenario = reading.change_scenario(built.scenario, changes, built.path)
     check_knobs(scenario, built.path, ranges=False)
     return build_scenario(scenario, built.path, built)
 
@@ -159,11 +128,11 @@ def _with_controller(built: Built, changes: Mapping[str, str]) -> Built | None:
         values[name] = value
     try:
         new = stated.changed(**values)
-    except InvalidParameter:
+    except errors.InvalidParameter:
         return None
     scenario = built.scenario.model_copy(update={"controller": new})
     shells = {
-        one.name: (built.shells[one.name], one.frame, to_se3(one.placement))
+        one.name: (built.shells[one.name], one.frame, bodies.to_se3(one.placement))
         for one in scenario.shell
     }
     load = built.functions.__getitem__
@@ -198,10 +167,10 @@ def build_scenario(
             functions[where] = function(where, path, key, modules)
         return functions[where]
 
-    with blamed_on(path, "robot"):
+    with bodies.blamed_on(path, "robot"):
         q_lock = assembly.q0 if assembly.lock else None
         if scenario.contact:
-            check_masses(assembly, assembly.lock)
+            bodies.check_masses(assembly, assembly.lock)
         joints = joint_components(scenario, assembly, path)
         scene = sp.Scene(
             assembly.model,
@@ -211,30 +180,30 @@ def build_scenario(
             # What is only looked at starts no compiler.
             compiled=function is load_function and any(one.compiled for one in scenario.robot),
         )
-    shells: dict[str, ShellPlace] = {}
+    shells: dict[str, controllers.ShellPlace] = {}
     for i, section in enumerate(scenario.shell):
         shell = (
             (surfaces or {}).get(section.name)
             or _kept_shell(section, reuse)
-            or _build_shell(section, path, item_key("shell", scenario.shell, i))
+            or _build_shell(section, path, reading.item_key("shell", scenario.shell, i))
         )
-        shells[section.name] = shell, section.frame, to_se3(section.placement)
+        shells[section.name] = shell, section.frame, bodies.to_se3(section.placement)
     if len(shells) < len(scenario.shell):
-        raise ScenarioError(path, "shell", "two shells share a name")
+        raise errors.ScenarioError(path, "shell", "two shells share a name")
     for i, contact in enumerate(scenario.contact):
-        key = item_key("contact", scenario.contact, i)
+        key = reading.item_key("contact", scenario.contact, i)
         laws = _build_laws(contact, path, key, load)
         _add_contact(scene, contact, laws, shells, assembly, path, key)
     for i, source in enumerate(scenario.source):
-        key = item_key("source", scenario.source, i)
+        key = reading.item_key("source", scenario.source, i)
         find = load(source.find, f"{key}.find")
         laws = _build_laws(source, path, key, load)
-        with blamed_on(path, key):
+        with bodies.blamed_on(path, key):
             scene.add_contact_source(find, source.frame_i, source.frame_j, *laws, name=source.name)
-    q0, v0 = restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
+    q0, v0 = bodies.restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
     controller = _build_controller(scenario.controller, scene, q0, shells, path, load)
     sensors = _build_sensors(scenario.sensor, scene, path)
-    with blamed_on(path, "run"):
+    with bodies.blamed_on(path, "run"):
         simulation = sp.Simulation(scene, scenario.run.made(), sensors)
     figures = {
         figure: load(where, f"figures.{figure}") for figure, where in scenario.figures.items()
@@ -242,7 +211,7 @@ def build_scenario(
     if reuse is not None and assembly.visual_model is reuse.assembly.visual_model:
         visual = reuse.visual_model
     else:
-        visual = reduce_visual(assembly)
+        visual = bodies.reduce_visual(assembly)
     return Built(
         path.stem,
         path,
@@ -265,12 +234,12 @@ def _assemble(
     path: Path,
     reuse: Built | None,
     robots: Mapping[tuple[object, ...], LoadedRobot] | None,
-) -> Assembly:
+) -> bodies.Assembly:
     if reuse is None:
-        return assemble(scenario, path, robots)
+        return bodies.assemble(scenario, path, robots)
     if reuse.scenario.robot != scenario.robot:
-        loaded = zip(map(origin, reuse.scenario.robot), reuse.assembly.loaded, strict=True)
-        return assemble(scenario, path, dict(loaded))
+        loaded = zip(map(bodies.origin, reuse.scenario.robot), reuse.assembly.loaded, strict=True)
+        return bodies.assemble(scenario, path, dict(loaded))
     if reuse.scenario.gravity == scenario.gravity:
         return reuse.assembly
     model = reuse.assembly.model.copy()
@@ -297,7 +266,7 @@ def explain_built(built: Built) -> Explanation:
     rows = many_rows(built.simulation.integrator, run.duration, run.record_dt)
     told = said.warnings if rows is None else (*said.warnings, rows)
     said = replace(said, modelled=(*said.modelled, *assumed), warnings=told)
-    if not isinstance(built.controller, Controller):
+    if not isinstance(built.controller, controllers.Controller):
         return said
     setup = built.controller._setup_warnings(built.scene, built.q0)
     return replace(said, warnings=(*said.warnings, *setup))
@@ -308,13 +277,13 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
         name: getattr(section, name) for name in ("chord_error", "side", "name")
     }
     options["crease_angle"] = float(np.deg2rad(section.crease_angle_deg))
-    with blamed_on(path, key):
+    with bodies.blamed_on(path, key):
         if section.primitive is not None:
             shell = section.primitive.shell(segments=section.segments, **options)
         else:
             file = path.parent / str(section.file)
             if reason := why_no_file(file):
-                raise SphshellError(f"surface {file}: {reason}")
+                raise errors.SphshellError(f"surface {file}: {reason}")
             of_files = ("unit", "scale", "bodies", "faces", "time_limit", "memory_limit")
             options |= {name: getattr(section, name) for name in of_files}
             shell = sp.Shell.from_file(file, **options)
@@ -333,14 +302,16 @@ def _build_laws(
             return law.loaded(lambda where, field: load(where, f"{key}.{part}.{field}"))
         return law._build(path.parent)
 
-    with blamed_on(path, key):
+    with bodies.blamed_on(path, key):
         return built("law"), built("friction")
 
 
-def _find_shell(shells: Mapping[str, ShellPlace], name: str, path: Path, key: str) -> ShellPlace:
-    with blamed_on(path, f"{key}.shell"):
+def _find_shell(
+    shells: Mapping[str, controllers.ShellPlace], name: str, path: Path, key: str
+) -> controllers.ShellPlace:
+    with bodies.blamed_on(path, f"{key}.shell"):
         if name not in shells:
-            raise NameNotFound("shell", name, "the scenario", shells)
+            raise errors.NameNotFound("shell", name, "the scenario", shells)
     return shells[name]
 
 
@@ -348,8 +319,8 @@ def _add_contact(
     scene: sp.Scene,
     contact: schema.ContactSection,
     laws: tuple[NormalLaw, Friction | None],
-    shells: Mapping[str, ShellPlace],
-    assembly: Assembly,
+    shells: Mapping[str, controllers.ShellPlace],
+    assembly: bodies.Assembly,
     path: Path,
     key: str,
 ) -> None:
@@ -359,10 +330,12 @@ def _add_contact(
     else:
         touched = _find_shell(shells, contact.shell or "", path, key)
         carrier = touched[1]
-    with blamed_on(path, f"{key}.spheres"):
+    with bodies.blamed_on(path, f"{key}.spheres"):
         several = spheres_of(contact, assembly, carrier)
-    with blamed_on(path, key), warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
+    with bodies.blamed_on(path, key), warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", errors.UnitWarning
+        )  # Scene.explain reports it for every scenario
         law, friction = laws
         how: dict[str, Any] = {"law": law, "friction": friction, "name": contact.name}
         how["method"], one = contact.method, contact.sphere or contact.plane
@@ -374,11 +347,11 @@ def _add_contact(
 
 def _build_sensors(stated: Sequence[Component], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
     for i, one in enumerate(stated):
-        with blamed_on(path, item_key("sensor", stated, i)):
+        with bodies.blamed_on(path, reading.item_key("sensor", stated, i)):
             assert isinstance(one, Sensor)
             # A wrong frame or joint is reported now, not when the run starts.
             one._bind(scene)
-    with blamed_on(path, "sensor"):
+    with bodies.blamed_on(path, "sensor"):
         return check_sensors(stated)
 
 
@@ -386,16 +359,16 @@ def _build_controller(
     stated: Component,
     scene: sp.Scene,
     q0: Array,
-    shells: Mapping[str, ShellPlace],
+    shells: Mapping[str, controllers.ShellPlace],
     path: Path,
     load: Callable[[str, str], Function],
-) -> Controller | Function | None:
-    with blamed_on(path, "controller"):
-        if isinstance(stated, PythonFunction):
+) -> controllers.Controller | Function | None:
+    with bodies.blamed_on(path, "controller"):
+        if isinstance(stated, controllers.PythonFunction):
             function = load(stated.function, "controller.function")
-            check_callable(function)
+            controllers.check_callable(function)
             return function
-        controller: Controller | None = stated._build(path.parent)
+        controller: controllers.Controller | None = stated._build(path.parent)
         if controller is None:
             return None
         controller = controller.in_scenario(
@@ -404,10 +377,10 @@ def _build_controller(
         try:
             # A wrong frame, joint or size is reported now, not when the run starts.
             controller._bind(scene, q0)
-        except InvalidParameter as error:
+        except errors.InvalidParameter as error:
             name = error.name.partition(".")[0].partition("[")[0]
             known = name in parameters_of(stated)
-            raise ScenarioError(
+            raise errors.ScenarioError(
                 path, f"controller.{name}" if known else "controller", str(error)
             ) from None
         return controller

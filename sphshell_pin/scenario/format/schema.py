@@ -10,16 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias, cast
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    create_model,
-    model_validator,
-)
+import pydantic
 
 from sphshell_pin.base.parameters import Component, Parameter, parameters_of
 from sphshell_pin.contact import Friction as FrictionLaw
@@ -29,8 +20,7 @@ from sphshell_pin.dynamics.control import controllers
 from sphshell_pin.dynamics.control.controllers import NoController
 from sphshell_pin.dynamics.run.integrators import Adaptive, Integrator, SemiImplicitEuler
 from sphshell_pin.dynamics.sensing import sensors
-from sphshell_pin.scenario.format.shape_tables import Primitive
-from sphshell_pin.scenario.format.typed_tables import OneOf, Positive, Vector3, refuse_unknown_keys
+from sphshell_pin.scenario.format import shape_tables
 
 LISTS = ("robot", "joint", "shell", "contact", "source", "sensor", "knob")
 """Tables of which there may be several."""
@@ -38,38 +28,38 @@ LISTS = ("robot", "joint", "shell", "contact", "source", "sensor", "knob")
 TIP_AT = "tip_at"
 """Key of a robot's start that states where its tip is, beside those of its joints."""
 
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=3)]
+NotNegative = Annotated[float, pydantic.Field(ge=0, allow_inf_nan=False)]
+Count = Annotated[int, pydantic.Field(ge=3)]
 
 
-class Section(BaseModel):
+class Section(pydantic.BaseModel):
     """A table of the file: frozen; unknown keys are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    @model_validator(mode="before")
+    @pydantic.model_validator(mode="before")
     @classmethod
     def check_keys(cls, data: object) -> object:
         """Refuse an unknown key first: it often hides a missing one ("stifness")."""
         if isinstance(data, Mapping):
-            refuse_unknown_keys(data, list(cls.model_fields))
+            shape_tables.refuse_unknown_keys(data, list(cls.model_fields))
         return data
 
 
 class Placement(Section):
     """A placement in a reference frame: first rolled, pitched, yawed, then moved."""
 
-    xyz: Annotated[Vector3, Parameter("m")] = [0.0, 0.0, 0.0]
-    rpy_deg: Annotated[Vector3, Parameter("deg")] = [0.0, 0.0, 0.0]
+    xyz: Annotated[shape_tables.Vector3, Parameter("m")] = [0.0, 0.0, 0.0]
+    rpy_deg: Annotated[shape_tables.Vector3, Parameter("deg")] = [0.0, 0.0, 0.0]
 
 
 class TipAt(Section):
     """Where a robot's tip is at the start: a point of a frame, found by inverse kinematics."""
 
-    xyz: Vector3
+    xyz: shape_tables.Vector3
     frame: str | None = None
-    offset: Vector3 = [0.0, 0.0, 0.0]
-    along: Vector3 | None = None
+    offset: shape_tables.Vector3 = [0.0, 0.0, 0.0]
+    along: shape_tables.Vector3 | None = None
 
 
 def _start_kind(value: object) -> str:
@@ -77,8 +67,8 @@ def _start_kind(value: object) -> str:
 
 
 StartValue: TypeAlias = Annotated[
-    Annotated[float | list[float], Tag("joint")] | Annotated[TipAt, Tag("tip")],
-    Discriminator(_start_kind),
+    Annotated[float | list[float], pydantic.Tag("joint")] | Annotated[TipAt, pydantic.Tag("tip")],
+    pydantic.Discriminator(_start_kind),
 ]
 
 
@@ -90,7 +80,7 @@ class RobotSection(Section):
     urdf: str | None = None
     package_dirs: list[str] = []
     xacro_args: dict[str, bool | int | float | str] = {}
-    density: Positive | None = None
+    density: shape_tables.Positive | None = None
     srdf: str | None = None
     pose: str | None = None
     base: Literal["fixed", "floating"] | None = None
@@ -106,7 +96,7 @@ class RobotSection(Section):
     start: dict[str, StartValue] = {}
     speed: dict[str, float | list[float]] = {}
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def check_one_source(self) -> RobotSection:
         """Refuse a robot with no description, or with two."""
         if sum(one is not None for one in (self.name, self.file, self.urdf)) != 1:
@@ -170,21 +160,23 @@ class ShellSection(Section):
     name: str
     file: str | None = None
     unit: str | None = None
-    scale: Literal["apply", "ignore"] | Positive | None = None
-    primitive: Annotated[Primitive, OneOf(Primitive)] | None = None
-    chord_error: Positive | None = None
-    bodies: Annotated[list[str], Field(min_length=1)] | None = None
-    faces: Annotated[list[str | int], Field(min_length=1)] | bool | None = None
-    time_limit: Positive | None = None
-    memory_limit: Positive | None = None
+    scale: Literal["apply", "ignore"] | shape_tables.Positive | None = None
+    primitive: (
+        Annotated[shape_tables.Primitive, shape_tables.OneOf(shape_tables.Primitive)] | None
+    ) = None
+    chord_error: shape_tables.Positive | None = None
+    bodies: Annotated[list[str], pydantic.Field(min_length=1)] | None = None
+    faces: Annotated[list[str | int], pydantic.Field(min_length=1)] | bool | None = None
+    time_limit: shape_tables.Positive | None = None
+    memory_limit: shape_tables.Positive | None = None
     segments: Count | None = None
-    magnify: Positive = 1.0
+    magnify: shape_tables.Positive = 1.0
     side: Literal["both", "outside", "inside"] = "both"
-    crease_angle_deg: Annotated[float, Field(ge=0, le=180)] = 30.0
+    crease_angle_deg: Annotated[float, pydantic.Field(ge=0, le=180)] = 30.0
     frame: str = "universe"
     placement: Placement = Placement()
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def check_one_source(self) -> ShellSection:
         """Refuse a shell with no surface or two, and keys that its kind does not read."""
         if (self.file is None) == (self.primitive is None):
@@ -197,8 +189,8 @@ class ShellSection(Section):
         return self
 
 
-Law = Annotated[Component, OneOf(NormalLaw)]
-Friction = Annotated[Component, OneOf(FrictionLaw)]
+Law = Annotated[Component, shape_tables.OneOf(NormalLaw)]
+Friction = Annotated[Component, shape_tables.OneOf(FrictionLaw)]
 
 
 class JointSection(Section):
@@ -209,16 +201,16 @@ class JointSection(Section):
     upper: Annotated[float | None, Parameter("rad or m", "upper end")] = None
     stop: Law | None = None
     damping: Annotated[NotNegative | None, Parameter("N m s/rad", "joint damping")] = None
-    friction: Annotated[Positive | None, Parameter("N m", "dry friction")] = None
-    friction_stiffness: Annotated[Positive | None, Parameter("N m/rad", "sticking stiffness")] = (
-        None
-    )
+    friction: Annotated[shape_tables.Positive | None, Parameter("N m", "dry friction")] = None
+    friction_stiffness: Annotated[
+        shape_tables.Positive | None, Parameter("N m/rad", "sticking stiffness")
+    ] = None
     friction_damping: Annotated[NotNegative | None, Parameter("N m s/rad")] = None
     armature: Annotated[NotNegative | None, Parameter("kg m^2", "armature")] = None
     effort: Annotated[NotNegative | None, Parameter("N m", "effort limit")] = None
-    speed: Annotated[Positive | None, Parameter("rad/s", "speed limit")] = None
+    speed: Annotated[shape_tables.Positive | None, Parameter("rad/s", "speed limit")] = None
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def check_friction(self) -> JointSection:
         """Refuse a spring of dry friction without the friction."""
         alone = self.friction_stiffness is not None or self.friction_damping is not None
@@ -231,19 +223,19 @@ class SphereSection(Section):
     """The sphere of a contact: `radius` [m], center `offset` [m] in the robot's `frame`."""
 
     frame: str
-    radius: Annotated[Positive, Parameter("m", "sphere radius")]
-    offset: Annotated[Vector3, Parameter("m", "sphere offset")] = [0.0, 0.0, 0.0]
+    radius: Annotated[shape_tables.Positive, Parameter("m", "sphere radius")]
+    offset: Annotated[shape_tables.Vector3, Parameter("m", "sphere offset")] = [0.0, 0.0, 0.0]
 
 
 class PlaneSection(Section):
     """The plane of a contact, through `offset` [m] in `frame`; `normal` leads out of the solid."""
 
     frame: str
-    offset: Vector3 = [0.0, 0.0, 0.0]
-    normal: Vector3 = [0.0, 0.0, 1.0]
+    offset: shape_tables.Vector3 = [0.0, 0.0, 0.0]
+    normal: shape_tables.Vector3 = [0.0, 0.0, 1.0]
 
 
-Spheres = Annotated[list[SphereSection | str], Field(min_length=1)]
+Spheres = Annotated[list[SphereSection | str], pydantic.Field(min_length=1)]
 
 
 class ContactSection(Section):
@@ -261,7 +253,7 @@ class ContactSection(Section):
     law: Law
     friction: Friction = NoFriction()
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def check_ends(self) -> ContactSection:
         """Refuse a contact that lacks one of its two bodies, or has too many."""
         given = [one for one in (self.sphere, self.spheres, self.plane) if one is not None]
@@ -287,14 +279,14 @@ class SourceSection(Section):
     friction: Friction = NoFriction()
 
 
-Controller = Annotated[Component, OneOf(controllers.Controller)]
+Controller = Annotated[Component, shape_tables.OneOf(controllers.Controller)]
 
 
-Sensor = Annotated[Component, OneOf(sensors.Sensor)]
+Sensor = Annotated[Component, shape_tables.OneOf(sensors.Sensor)]
 
 
 def _bounds(about: Parameter) -> object:
-    return Field(gt=about.above, ge=about.at_least, le=about.at_most)
+    return pydantic.Field(gt=about.above, ge=about.at_least, le=about.at_most)
 
 
 # The parameters of all integrators, by name.
@@ -304,7 +296,7 @@ STEPPING = {
 _keys: dict[str, Any] = {
     name: (Annotated[float | None, _bounds(about), about], None) for name, about in STEPPING.items()
 }
-_Stepping: Any = create_model("_Stepping", __base__=Section, **_keys)
+_Stepping: Any = pydantic.create_model("_Stepping", __base__=Section, **_keys)
 
 
 def _check_integrator(kind: str) -> str:
@@ -322,14 +314,16 @@ class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integ
     The parameters of the integrator stand in this table; it is adaptive unless `dt` is given.
     """
 
-    duration: Annotated[Positive, Parameter("s")]
-    integrator: Annotated[str, AfterValidator(_check_integrator)] = ""
-    control_dt: Annotated[Positive | None, Parameter("s", "control period")] = None
-    record_dt: Annotated[Positive | None, Parameter("s", "time between rows")] = None
-    record: list[Literal["patch", "torque"]] = Field(default_factory=list)
-    recording_speed: Annotated[Positive, Parameter(label="speed of the recording")] = 1.0
+    duration: Annotated[shape_tables.Positive, Parameter("s")]
+    integrator: Annotated[str, pydantic.AfterValidator(_check_integrator)] = ""
+    control_dt: Annotated[shape_tables.Positive | None, Parameter("s", "control period")] = None
+    record_dt: Annotated[shape_tables.Positive | None, Parameter("s", "time between rows")] = None
+    record: list[Literal["patch", "torque"]] = pydantic.Field(default_factory=list)
+    recording_speed: Annotated[shape_tables.Positive, Parameter(label="speed of the recording")] = (
+        1.0
+    )
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def check_steps(self) -> RunSection:
         """Choose the integrator if none is given, and refuse what it does not take."""
         if not self.integrator:
@@ -375,7 +369,7 @@ class Expected(Section):
     min: float | None = None
     max: float | None = None
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def check_complete(self) -> Expected:
         """Refuse an expectation that nothing or everything fulfils."""
         ranged = self.min is not None or self.max is not None
@@ -408,8 +402,8 @@ class Scenario(Section):
 
     title: str
     description: str = ""
-    gravity: Annotated[Vector3, Parameter("m/s^2", "gravity")] = [0.0, 0.0, -9.81]
-    robot: Annotated[list[RobotSection], Field(min_length=1)]
+    gravity: Annotated[shape_tables.Vector3, Parameter("m/s^2", "gravity")] = [0.0, 0.0, -9.81]
+    robot: Annotated[list[RobotSection], pydantic.Field(min_length=1)]
     joint: list[JointSection] = []
     shell: list[ShellSection] = []
     contact: list[ContactSection] = []
@@ -421,7 +415,7 @@ class Scenario(Section):
     figures: dict[str, str] = {}
     expect: dict[str, Expected] = {}
 
-    @model_validator(mode="before")
+    @pydantic.model_validator(mode="before")
     @classmethod
     def take_single_tables(cls, data: object) -> object:
         """Read `[robot]` as the list of one that `[[robot]]` would have been."""

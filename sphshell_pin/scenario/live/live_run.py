@@ -11,8 +11,8 @@ import pinocchio as pin
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_finite, check_not_negative, check_positive, check_vector
-from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_parts import Patches
 from sphshell_pin.dynamics.run.advance import AnyController, step_of
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.dynamics.scene.one_user import one_at_a_time
@@ -21,10 +21,8 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.scenario.format.build import Built, rebuild
 from sphshell_pin.scenario.format.reading import look_up
 from sphshell_pin.scenario.format.sliders import LiveParameter, live_parameters
-from sphshell_pin.scenario.live.drag import Drag, Dragged, movable_bodies
-from sphshell_pin.scenario.live.joint_targets import Target, aimed, check_aim, targets_of
-from sphshell_pin.scenario.running.player import Rows
-from sphshell_pin.scenario.running.series import Series, held, series_of
+from sphshell_pin.scenario.live import acting
+from sphshell_pin.scenario.running.rows import Rows, Series, held, series_of
 
 # Between the rows for a chart [s].
 ROW_DT = 5e-3
@@ -53,7 +51,7 @@ class LiveRun:
         self._user = _core.OneUser("LiveRun")
         self._parameters = live_parameters(built)
         self._aims: dict[str, float] = {}
-        self._targets: tuple[Target, ...] | None = None
+        self._targets: tuple[acting.Target, ...] | None = None
         self._patches = "patch" in built.scenario.run.record
         self._torques = False
         self._begin(self._open(built))
@@ -63,7 +61,7 @@ class LiveRun:
         self._run = run
         self._fault: str | None = None
         self._push: tuple[str, Array, float] | None = None
-        self._drag: Drag | None = None
+        self._drag: acting.Drag | None = None
         self._readings: dict[str, Array] = {}
         if self._torques:
             run.record_torques()
@@ -129,18 +127,18 @@ class LiveRun:
     @property
     def bodies(self) -> tuple[str, ...]:
         """Frames that can be pushed, one of each moving body; those with a sphere first."""
-        return movable_bodies(self.scene)
+        return acting.movable_bodies(self.scene)
 
     @property
-    def targets(self) -> tuple[Target, ...]:
+    def targets(self) -> tuple[acting.Target, ...]:
         """The joints that the controller pulls to a posture, with their present targets."""
         if self._targets is None:
             model, start = self.built.scene.model, self.built.q0
-            self._targets = targets_of(self._controller(self.built), model, start)
+            self._targets = acting.targets_of(self._controller(self.built), model, start)
         return self._targets
 
     @property
-    def drag(self) -> Dragged | None:
+    def drag(self) -> acting.Dragged | None:
         """What pulls at a body now, and with which force; None if nothing does."""
         return None if self._drag is None else self._drag.at(self.scene.model, self.q, self.v)
 
@@ -292,14 +290,14 @@ class LiveRun:
 
         Its posture is that of the start, also where it begins in the middle of a run.
         """
-        return aimed(built.controller, built.scene.model, built.q0, self._aims)
+        return acting.aimed(built.controller, built.scene.model, built.q0, self._aims)
 
     def _drop_aims(self, before: Built, after: Built) -> None:
         """Forget the targets of joints whose posture another parameter changes."""
         if not self._aims:
             return
         then, now = (
-            {one.joint: one.value for one in targets_of(b.controller, b.scene.model, b.q0)}
+            {one.joint: one.value for one in acting.targets_of(b.controller, b.scene.model, b.q0)}
             for b in (before, after)
         )
         self._aims = {
@@ -336,7 +334,7 @@ class LiveRun:
             The value is beyond the limits of the joint; the run goes on as it was.
         """
         value = check_finite("value", value)
-        check_aim(self.targets, joint, value)
+        acting.check_aim(self.targets, joint, value)
         before = self._aims
         self._aims = {**before, joint: value}
         self._targets = None
@@ -379,7 +377,7 @@ class LiveRun:
         # The mass is that of the configuration in which the body was taken hold of.
         held = self._drag
         if held is None or not held.is_at(frame, at, rate):
-            held = Drag.hold(self.scene.model, self.q, frame, at, rate)
+            held = acting.Drag.hold(self.scene.model, self.q, frame, at, rate)
         drag = replace(held, target=target)
         drag.act_on(self._run)
         self._drag, self._push = drag, None

@@ -10,9 +10,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_parts import Origin
+from sphshell_pin.dynamics.result.result_parts import Origin, Patches
 from sphshell_pin.dynamics.result.result_scene import check_scene, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SlowLawWarning, SphshellError
@@ -22,8 +21,7 @@ from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, s
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import LiveParameter
 from sphshell_pin.scenario.running.kept_scenario import restore
-from sphshell_pin.scenario.running.player import Rows
-from sphshell_pin.scenario.running.series import Series, held, series_of
+from sphshell_pin.scenario.running.rows import Rows, Series, held, series_of
 
 # What moves the bodies, and what judges the outcome, is not needed to show them.
 UNSHOWN = ("controller", "sensor", "figures", "expect", "knob")

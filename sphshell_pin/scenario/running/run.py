@@ -12,22 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin import errors
 from sphshell_pin.base.atomic.files import held_folder
-from sphshell_pin.base.json_text import json_text, plain
 from sphshell_pin.base.regular_file import open_regular, read_text
 from sphshell_pin.base.tables import csv_text
+from sphshell_pin.base.texts import json_text, plain
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
-from sphshell_pin.errors import (
-    Interrupted,
-    MissingExtra,
-    ResultError,
-    SetupWarning,
-    SimulationDiverged,
-    SphshellError,
-    WeakLawWarning,
-)
 from sphshell_pin.scenario.format.build import Built, build
 from sphshell_pin.scenario.format.reading import shipped_scenarios
 from sphshell_pin.scenario.running.cad_audit import CadAudit, check_audit
@@ -67,7 +59,7 @@ class RunReport:
     notes: tuple[str, ...]
     """What could not be written, and why; one sentence each."""
     verdicts: tuple[Verdict, ...]
-    stopped: SphshellError | None
+    stopped: errors.SphshellError | None
     """Why the run ended early: Interrupted or SimulationDiverged."""
     audit: CadAudit | None = None
     """Differences of the contacts from those on the exact CAD faces, if that was asked for."""
@@ -182,12 +174,15 @@ def _judge(built: Built, result: Result) -> tuple[tuple[Verdict, ...], Exception
 
 def simulate(
     built: Built, progress: Callable[[float], object] | None = None
-) -> tuple[Result, SphshellError | None]:
+) -> tuple[Result, errors.SphshellError | None]:
     """Run without writing; return the result, and why it ended early (None: it did not)."""
     run = built.scenario.run
     try:
         with warnings.catch_warnings():
-            for kind in (WeakLawWarning, SetupWarning):  # explain_built and the report say them
+            for kind in (
+                errors.WeakLawWarning,
+                errors.SetupWarning,
+            ):  # explain_built and the report say them
                 warnings.simplefilter("ignore", kind)
             result = built.simulation.run(
                 built.q0,
@@ -199,7 +194,7 @@ def simulate(
                 record=run.record,
                 progress=progress,
             )
-    except (Interrupted, SimulationDiverged) as error:
+    except (errors.Interrupted, errors.SimulationDiverged) as error:
         error.result = replace(error.result, origin=origin_of(built))
         return error.result, error
     return replace(result, origin=origin_of(built)), None
@@ -218,9 +213,9 @@ def origin_of(built: Built) -> Origin:
     )
 
 
-def _not_written(folder: Path, error: OSError) -> ResultError:
+def _not_written(folder: Path, error: OSError) -> errors.ResultError:
     cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
-    return ResultError(folder, f"the results cannot be written: {cause.strerror or cause}")
+    return errors.ResultError(folder, f"the results cannot be written: {cause.strerror or cause}")
 
 
 def _holds_complete(folder: Path) -> bool:
@@ -263,12 +258,12 @@ def _draw(
             write()
         except KeyboardInterrupt:
             return True
-        except MissingExtra as error:
+        except errors.MissingExtra as error:
             notes.append(str(error))
         except Exception as error:
-            if isinstance(error, ResultError) and isinstance(error.__cause__, OSError):
+            if isinstance(error, errors.ResultError) and isinstance(error.__cause__, OSError):
                 raise
-            named = "" if isinstance(error, ResultError) else f"{type(error).__name__}: "
+            named = "" if isinstance(error, errors.ResultError) else f"{type(error).__name__}: "
             notes.append(f"{what} could not be made: {named}{error}".removesuffix(": "))
     return False
 
@@ -289,7 +284,7 @@ def _write_summary(
     built: Built,
     result: Result,
     verdicts: Iterable[Verdict],
-    stopped: SphshellError | None,
+    stopped: errors.SphshellError | None,
     audit: CadAudit | None,
 ) -> None:
     summary = {

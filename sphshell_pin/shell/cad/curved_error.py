@@ -17,7 +17,7 @@ from sphshell_pin.shell.cad.face_surface import stationary_parameters
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.surface import CadSurface
 from sphshell_pin.shell.cleaned import CleanedSurface
-from sphshell_pin.shell.curved import points_at
+from sphshell_pin.shell.curvature import points_at
 
 _ON_SIDES = [np.roll([1 - share, share, 0.0], side) for side in range(3) for share in ALONG]
 WEIGHTS = np.array([*_ON_SIDES, [1 / 3, 1 / 3, 1 / 3]])

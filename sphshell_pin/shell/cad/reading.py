@@ -22,10 +22,9 @@ from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from sphshell_pin.errors import ShellFileError
+from sphshell_pin.shell.cad import model as cad_model
 from sphshell_pin.shell.cad.framing import check_frame
-from sphshell_pin.shell.cad.model import CadFace, CadModel, Part, compound, subshapes
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.cad.units import NO_UNIT, iges_unit, step_unit
 from sphshell_pin.shell.readers.text import read_bytes
 
 IGES_FACES = (143, 144, 510)
@@ -41,7 +40,7 @@ _STEP_FACE = re.compile(rb"(?:FACE|FACE_SURFACE)\s*\(\s*'([^']+)'")
 Namer = Callable[[Occ], str]
 
 
-def read_model(path: Path) -> CadModel:
+def read_model(path: Path) -> cad_model.CadModel:
     """Read all faces of a CAD file.
 
     Raises
@@ -66,7 +65,7 @@ def read_model(path: Path) -> CadModel:
     return model
 
 
-def _read_step(path: Path, data: bytes) -> CadModel:
+def _read_step(path: Path, data: bytes) -> cad_model.CadModel:
     reader = STEPCAFControl_Reader()
     reader.SetNameMode(True)
     reader.SetColorMode(False)
@@ -75,10 +74,10 @@ def _read_step(path: Path, data: bytes) -> CadModel:
     XCAFApp_Application.GetApplication_s().InitDocument(document)
     if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
         raise ShellFileError(path, "is damaged, its STEP entities cannot be read")
-    unit = step_unit(reader.ChangeReader().StepModel())
+    unit = cad_model.step_unit(reader.ChangeReader().StepModel())
     labels = Sequence_TDF_Label()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(labels)
-    parts: list[Part] = []
+    parts: list[cad_model.Part] = []
     for label in labels:
         _walk(label, TopLoc_Location(), parts)
     transfer = reader.ChangeReader().WS().TransferReader()
@@ -94,10 +93,10 @@ def _read_step(path: Path, data: bytes) -> CadModel:
     )
     faces, bodies = _sort(parts, *namers)
     notes = _lost(len(re.findall(rb"=\s*(?:ADVANCED_|)FACE(?:_SURFACE|)\s*\(", data)), faces)
-    return CadModel(path, faces, bodies, unit, notes)
+    return cad_model.CadModel(path, faces, bodies, unit, notes)
 
 
-def _walk(label: Occ, location: Occ, parts: list[Part]) -> None:
+def _walk(label: Occ, location: Occ, parts: list[cad_model.Part]) -> None:
     """Collect the parts of an assembly, each in its place."""
     if XCAFDoc_ShapeTool.IsReference_s(label):
         location = location.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label))
@@ -120,13 +119,13 @@ def _walk(label: Occ, location: Occ, parts: list[Part]) -> None:
     parts.append((name, shape.Moved(location)))
 
 
-def _read_iges(path: Path, data: bytes) -> CadModel:
+def _read_iges(path: Path, data: bytes) -> cad_model.CadModel:
     reader = IGESControl_Reader()
     Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
     if reader.ReadFile(str(path)) != IFSelect_RetDone:
         raise ShellFileError(path, "is damaged, its IGES entities cannot be read")
     model = reader.IGESModel()
-    unit = iges_unit(path, model.GlobalSection())
+    unit = cad_model.iges_unit(path, model.GlobalSection())
     reader.TransferRoots()
     shape = reader.OneShape()
     transfer = reader.WS().TransferReader()
@@ -136,20 +135,20 @@ def _read_iges(path: Path, data: bytes) -> CadModel:
         text = entity.NameValue() if entity is not None and entity.HasName() else None
         return "" if text is None else _name(text.ToCString())
 
-    parts: list[Part] = [] if shape is None or shape.IsNull() else [("", shape)]
+    parts: list[cad_model.Part] = [] if shape is None or shape.IsNull() else [("", shape)]
     entities = range(1, model.NbEntities() + 1)
     named = any(model.Entity(k).HasName() for k in entities)
     faces, bodies = _sort(parts, *2 * [name_of if named else _no_name])
     held = (model.Entity(k).TypeNumber() for k in entities)
     notes = _lost(sum(kind in IGES_FACES for kind in held), faces)
-    return CadModel(path, faces, bodies, unit, notes)
+    return cad_model.CadModel(path, faces, bodies, unit, notes)
 
 
-def _read_brep(path: Path, data: bytes) -> CadModel:
+def _read_brep(path: Path, data: bytes) -> cad_model.CadModel:
     shape = TopoDS_Shape()
     if not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
         raise ShellFileError(path, "is damaged, its BREP shape cannot be read")
-    return CadModel(path, *_sort([("", shape)], _no_name, _no_name), NO_UNIT)
+    return cad_model.CadModel(path, *_sort([("", shape)], _no_name, _no_name), cad_model.NO_UNIT)
 
 
 def _no_name(_: Occ) -> str:
@@ -162,7 +161,7 @@ def _name(text: str) -> str:
     return "" if _NO_NAME.fullmatch(text) else text
 
 
-def _lost(held: int, faces: tuple[CadFace, ...]) -> tuple[str, ...]:
+def _lost(held: int, faces: tuple[cad_model.CadFace, ...]) -> tuple[str, ...]:
     """Say if fewer faces came out than the file has entities for."""
     lost = held - len(faces)
     if lost <= 0:
@@ -171,28 +170,28 @@ def _lost(held: int, faces: tuple[CadFace, ...]) -> tuple[str, ...]:
 
 
 def _sort(
-    parts: list[Part], name_of_body: Namer, name_of_face: Namer
-) -> tuple[tuple[CadFace, ...], tuple[Part, ...]]:
+    parts: list[cad_model.Part], name_of_body: Namer, name_of_face: Namer
+) -> tuple[tuple[cad_model.CadFace, ...], tuple[cad_model.Part, ...]]:
     """Sort faces into bodies: each solid, each shell outside of solids, all loose faces of a part.
 
     Returns faces and bodies. Names of bodies are made unique; those of faces are as the file has
     them, or "Face 12".
     """
-    faces: list[CadFace] = []
-    bodies: list[Part] = []
+    faces: list[cad_model.CadFace] = []
+    bodies: list[cad_model.Part] = []
     for part, shape in parts:
-        solids = list(subshapes(shape, TopAbs_SOLID))
-        shells = list(subshapes(shape, TopAbs_SHELL, TopAbs_SOLID))
-        loose = list(subshapes(shape, TopAbs_FACE, TopAbs_SHELL))
-        groups = [*solids, *shells, *([compound(loose)] if loose else [])]
+        solids = list(cad_model.subshapes(shape, TopAbs_SOLID))
+        shells = list(cad_model.subshapes(shape, TopAbs_SHELL, TopAbs_SOLID))
+        loose = list(cad_model.subshapes(shape, TopAbs_FACE, TopAbs_SHELL))
+        groups = [*solids, *shells, *([cad_model.compound(loose)] if loose else [])]
         for group in groups:
             own = part if len(groups) == 1 else name_of_body(group)
             name = own or (f"{part} {len(bodies) + 1}" if part else f"Body {len(bodies) + 1}")
             bodies.append((_unique(name, [taken for taken, _ in bodies]), group))
-            for face in subshapes(group, TopAbs_FACE):
+            for face in cad_model.subshapes(group, TopAbs_FACE):
                 number = len(faces) + 1
                 called = name_of_face(face) or f"Face {number}"
-                faces.append(CadFace(TopoDS.Face(face), called, number, len(bodies) - 1))
+                faces.append(cad_model.CadFace(TopoDS.Face(face), called, number, len(bodies) - 1))
     return tuple(faces), tuple(bodies)
 
 

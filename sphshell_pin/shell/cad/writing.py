@@ -5,15 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from OCP import BRepBuilderAPI
 from OCP.BRep import BRep_Builder
-from OCP.BRepBuilderAPI import (
-    BRepBuilderAPI_MakeEdge,
-    BRepBuilderAPI_MakeFace,
-    BRepBuilderAPI_MakeSolid,
-    BRepBuilderAPI_MakeVertex,
-    BRepBuilderAPI_MakeWire,
-    BRepBuilderAPI_Transform,
-)
 from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Dir, gp_Pln, gp_Pnt, gp_Trsf
 from OCP.IFSelect import IFSelect_RetDone
@@ -29,9 +22,8 @@ from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
 from sphshell_pin.errors import InvalidParameter, ShellFileError
-from sphshell_pin.shell.cad.model import CadModel, Part, compound
+from sphshell_pin.shell.cad.model import MILLIMETER, CadModel, Part, compound
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES, Occ
-from sphshell_pin.shell.cad.units import MILLIMETER
 from sphshell_pin.shell.shell import Shell
 from sphshell_pin.units import meters_per_unit
 
@@ -104,23 +96,25 @@ def faceted(shell: Shell) -> Occ:
     whole = TopoDS_Shell()
     builder.MakeShell(whole)
     points = [gp_Pnt(*point) for point in (shell.vertices / MILLIMETER).tolist()]
-    vertices = [BRepBuilderAPI_MakeVertex(point).Vertex() for point in points]
+    vertices = [BRepBuilderAPI.BRepBuilderAPI_MakeVertex(point).Vertex() for point in points]
     edges: dict[tuple[int, int], Occ] = {}
     first = np.searchsorted(shell.triangle_element, np.arange(shell.num_elements))
     normals = shell.triangle_normals[first]
     for row, normal in zip(shell.elements.tolist(), normals.tolist(), strict=True):
         loop = [k for k in row if k >= 0]
-        wire = BRepBuilderAPI_MakeWire()
+        wire = BRepBuilderAPI.BRepBuilderAPI_MakeWire()
         for a, b in zip(loop, loop[1:] + loop[:1], strict=True):
             key = (min(a, b), max(a, b))
             if key not in edges:
-                edges[key] = BRepBuilderAPI_MakeEdge(vertices[key[0]], vertices[key[1]]).Edge()
+                edges[key] = BRepBuilderAPI.BRepBuilderAPI_MakeEdge(
+                    vertices[key[0]], vertices[key[1]]
+                ).Edge()
             wire.Add(edges[key] if a < b else TopoDS.Edge(edges[key].Reversed()))
         plane = gp_Pln(points[loop[0]], gp_Dir(*normal))
-        builder.Add(whole, BRepBuilderAPI_MakeFace(plane, wire.Wire(), True).Face())
+        builder.Add(whole, BRepBuilderAPI.BRepBuilderAPI_MakeFace(plane, wire.Wire(), True).Face())
     whole.Closed(shell.is_closed)
     single = shell.is_closed and shell.health.components == 1
-    return BRepBuilderAPI_MakeSolid(whole).Solid() if single else whole
+    return BRepBuilderAPI.BRepBuilderAPI_MakeSolid(whole).Solid() if single else whole
 
 
 def _scaled(shape: Occ, factor: float) -> Occ:
@@ -128,7 +122,7 @@ def _scaled(shape: Occ, factor: float) -> Occ:
         return shape
     larger = gp_Trsf()
     larger.SetScale(gp_Pnt(0.0, 0.0, 0.0), factor)
-    return BRepBuilderAPI_Transform(shape, larger, True).Shape()
+    return BRepBuilderAPI.BRepBuilderAPI_Transform(shape, larger, True).Shape()
 
 
 def _write_step(stream: io.BytesIO, parts: Sequence[Part], unit: str) -> bool:

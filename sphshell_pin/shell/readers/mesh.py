@@ -16,15 +16,7 @@ import numpy.typing as npt
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import RawSurface
-from sphshell_pin.shell.readers.text import (
-    check_ascii,
-    finish,
-    indices,
-    pack_polygons,
-    read_bytes,
-    read_text,
-    real_numbers,
-)
+from sphshell_pin.shell.readers import text
 
 STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 """A triangle of a binary .stl file."""
@@ -35,9 +27,9 @@ _END_OF_FACET = re.compile(rb"(?i)\bendfacet\b")
 
 def read_stl(path: Path) -> RawSurface:
     """Read a binary or text .stl file: a soup of triangles."""
-    vertices, notes = stl_corners(path, read_bytes(path))
-    offsets, corners = pack_polygons(np.full(len(vertices) // 3, 3), np.arange(len(vertices)))
-    return finish(path, vertices.astype(np.float64), offsets, corners, notes=notes)
+    vertices, notes = stl_corners(path, text.read_bytes(path))
+    offsets, corners = text.pack_polygons(np.full(len(vertices) // 3, 3), np.arange(len(vertices)))
+    return text.finish(path, vertices.astype(np.float64), offsets, corners, notes=notes)
 
 
 def stl_corners(path: Path, data: bytes) -> tuple[npt.NDArray[np.floating], tuple[str, ...]]:
@@ -80,7 +72,7 @@ def read_obj(path: Path) -> RawSurface:
     corners: list[int] = []
     corner_normals: list[int] = []
     pending = ""
-    for number, row in enumerate(read_text(path).splitlines(), start=1):
+    for number, row in enumerate(text.read_text(path).splitlines(), start=1):
         if row.endswith("\\"):
             pending += row[:-1] + " "
             continue
@@ -108,10 +100,10 @@ def read_obj(path: Path) -> RawSurface:
                 )
             counts.append(len(named))
     vertices = _reals(path, points)
-    offsets, flat = pack_polygons(counts, corners)
+    offsets, flat = text.pack_polygons(counts, corners)
     # Forward references are legal: whether a vertex exists is known only now.
-    raw = finish(path, vertices, offsets, flat)
-    which = indices(corner_normals)
+    raw = text.finish(path, vertices, offsets, flat)
+    which = text.indices(corner_normals)
     if not (which >= 0).any():
         return raw
     # A last row of zeros stands for corners without a normal.
@@ -125,7 +117,7 @@ def read_obj(path: Path) -> RawSurface:
 
 def _obj_index(path: Path, line: int, word: str, latest: int, what: str) -> int:
     try:
-        check_ascii([word])
+        text.check_ascii([word])
         index = int(word)
     except ValueError:
         raise ShellFileError(path, f"'{word}' is not the index of a {what}", line) from None
@@ -140,14 +132,14 @@ def _check_reals(path: Path, line: int, words: list[str]) -> None:
     try:
         if len(words) < 4:
             raise ValueError("three numbers are needed")
-        real_numbers(words[1:4])
+        text.real_numbers(words[1:4])
     except ValueError as error:
         raise ShellFileError(path, f"'{' '.join(words)}': {error}", line) from None
 
 
 def _reals(path: Path, words: Sequence[object], width: int = 3) -> Array:
     try:
-        return real_numbers(words).reshape(-1, width)
+        return text.real_numbers(words).reshape(-1, width)
     except ValueError as error:
         raise ShellFileError(path, f"holds a coordinate that is not a number ({error})") from None
 
@@ -158,7 +150,7 @@ def read_off(path: Path) -> RawSurface:
     Line ends do not matter in the format, except that colors may follow the corners of a face up
     to the end of its line: they are tried where the plain reading does not come out even.
     """
-    lines = enumerate(read_text(path).splitlines(), start=1)
+    lines = enumerate(text.read_text(path).splitlines(), start=1)
     rows = [(number, row.split("#", 1)[0].split()) for number, row in lines]
     rows = [(number, row) for number, row in rows if row]
     if not rows or not rows[0][1][0].upper().endswith("OFF"):
@@ -174,7 +166,7 @@ def read_off(path: Path) -> RawSurface:
         header = data.pop(0)
     words = header + [word for row in data for word in row]
     try:
-        check_ascii(words)
+        text.check_ascii(words)
         num_vertices, num_faces = int(words[0]), int(words[1])
     except (ValueError, IndexError):
         raise ShellFileError(path, "must count vertices, faces and edges first", first) from None
@@ -201,8 +193,10 @@ def read_off(path: Path) -> RawSurface:
                 path, f"ends too early or holds a damaged face: {num_faces} faces were promised"
             )
         faces = [corners for one in found if one for corners in one]
-    offsets, corners = pack_polygons(list(map(len, faces)), [v for face in faces for v in face])
-    raw = finish(path, np.ascontiguousarray(table[:, :3]), offsets, corners)
+    offsets, corners = text.pack_polygons(
+        list(map(len, faces)), [v for face in faces for v in face]
+    )
+    raw = text.finish(path, np.ascontiguousarray(table[:, :3]), offsets, corners)
     if "N" not in kind.replace("OFF", ""):
         return raw
     return replace(raw, normals=table[corners, 3:6])

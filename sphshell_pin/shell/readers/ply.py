@@ -14,13 +14,7 @@ import numpy.typing as npt
 from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import LARGEST_COUNT, RawSurface
-from sphshell_pin.shell.readers.text import (
-    check_ascii,
-    finish,
-    pack_polygons,
-    read_bytes,
-    real_numbers,
-)
+from sphshell_pin.shell.readers import text
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -57,7 +51,7 @@ _Values = npt.NDArray[Any]  # of the types that the header names
 
 def read_ply(path: Path) -> RawSurface:
     """Read a .ply file, see `parse_ply`."""
-    return parse_ply(path, read_bytes(path))
+    return parse_ply(path, text.read_bytes(path))
 
 
 def parse_ply(path: Path, data: bytes) -> RawSurface:
@@ -74,7 +68,7 @@ def parse_ply(path: Path, data: bytes) -> RawSurface:
     try:
         body = data[start:]
         if form == "ascii":  # as if it were binary, all numbers 64-bit reals
-            body = real_numbers(body.decode("latin-1").split()).tobytes()
+            body = text.real_numbers(body.decode("latin-1").split()).tobytes()
         source = _Data(body)
         for element in elements:
             lists = [prop for prop in element.properties if prop.count_kind]
@@ -94,7 +88,7 @@ def parse_ply(path: Path, data: bytes) -> RawSurface:
     if polygons is None or any(axis not in table for axis in "xyz"):
         raise ShellFileError(path, "holds no vertices with x, y, z or no faces")
     vertices = np.stack([table[axis] for axis in "xyz"], axis=1)
-    raw = finish(path, vertices, *polygons)
+    raw = text.finish(path, vertices, *polygons)
     if any(axis not in table for axis in ("nx", "ny", "nz")):
         return raw
     normals = np.stack([table[axis] for axis in ("nx", "ny", "nz")], axis=1)
@@ -119,7 +113,7 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
         try:
             if not words or words[0] in ("ply", "comment", "obj_info"):
                 continue
-            check_ascii(words[2:3] if words[0] == "element" else [])
+            text.check_ascii(words[2:3] if words[0] == "element" else [])
             if words[0] == "format":
                 form = words[1]
             elif words[0] == "element":
@@ -160,7 +154,7 @@ class _Data:
             values = [self.values(prop) for prop in element.properties]
             found = zip(element.properties, values, strict=True)
             rows.append(np.concatenate([v for p, v in found if p.name in _CORNERS]))
-        return pack_polygons([len(row) for row in rows], _whole(np.concatenate(rows)))
+        return text.pack_polygons([len(row) for row in rows], _whole(np.concatenate(rows)))
 
     def values(self, prop: _Property) -> _Values:
         count = 1
@@ -188,7 +182,7 @@ class _Data:
                 return None
         name = next(prop.name for prop in element.properties if prop.name in _CORNERS)
         corners = rows[name]
-        return pack_polygons(np.full(len(rows), corners.shape[1]), _whole(corners.ravel()))
+        return text.pack_polygons(np.full(len(rows), corners.shape[1]), _whole(corners.ravel()))
 
     def _take(self, kind: np.dtype[Any], count: int) -> _Values:
         size = kind.itemsize * count

@@ -8,14 +8,7 @@ import numpy as np
 from sphshell_pin.base import regular_file
 from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import InvalidShell, ShellFileError
-from sphshell_pin.shell.raw import (
-    LARGEST_COUNT,
-    RawSurface,
-    check_indices,
-    check_vertices,
-    offsets_of,
-)
-from sphshell_pin.shell.rounding import rounding
+from sphshell_pin.shell import raw
 
 
 def read_text(path: Path) -> str:
@@ -49,7 +42,7 @@ def pack_polygons(
     counts: Sequence[int] | Longs, corners: Sequence[int] | Longs
 ) -> tuple[Longs, Ints]:
     """Offsets and corners from corner counts and indices from 0, see `indices`."""
-    return offsets_of(np.asarray(counts, np.int64)), indices(corners)
+    return raw.offsets_of(np.asarray(counts, np.int64)), indices(corners)
 
 
 def indices(values: Sequence[int] | Longs) -> Ints:
@@ -57,8 +50,8 @@ def indices(values: Sequence[int] | Longs) -> Ints:
     try:
         whole = np.asarray(values, np.int64)
     except OverflowError:  # Python's have no end
-        whole = np.array([min(max(i, -1), LARGEST_COUNT) for i in values], np.int64)
-    return np.clip(whole, -LARGEST_COUNT, LARGEST_COUNT).astype(np.int32)
+        whole = np.array([min(max(i, -1), raw.LARGEST_COUNT) for i in values], np.int64)
+    return np.clip(whole, -raw.LARGEST_COUNT, raw.LARGEST_COUNT).astype(np.int32)
 
 
 def finish(
@@ -68,20 +61,20 @@ def finish(
     corners: Ints,
     normals: Array | None = None,
     notes: tuple[str, ...] = (),
-) -> RawSurface:
+) -> raw.RawSurface:
     """Check what every file must fulfil: enough points, all finite, indices in range."""
     counts = np.diff(offsets)
     try:
         if len(counts) == 0:
             raise InvalidShell("holds no elements")
-        check_vertices(vertices, 1)
+        raw.check_vertices(vertices, 1)
         if counts.min() < 3:
             row = int(np.argmax(counts < 3))
             raise InvalidShell(
                 f"element {row + 1} has {int(counts[row])} corners; it needs at least three"
             )
-        check_indices(offsets, corners, len(vertices), 1)
+        raw.check_indices(offsets, corners, len(vertices), 1)
     except InvalidShell as error:
         raise ShellFileError(path, str(error)) from None
     points = np.ascontiguousarray(vertices, np.float64)
-    return RawSurface(points, offsets, corners, normals, notes, rounding=rounding(points))
+    return raw.RawSurface(points, offsets, corners, normals, notes, rounding=raw.rounding(points))

@@ -14,8 +14,8 @@ from scipy import stats
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.atomic import write_whole
-from sphshell_pin.base.json_text import json_text
 from sphshell_pin.base.summary import Detail, Fact, Summarized
+from sphshell_pin.base.texts import json_text
 from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.study.fit.parameters import TIE
 from sphshell_pin.study.fit.writing import scenario_text

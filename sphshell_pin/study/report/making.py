@@ -12,8 +12,8 @@ from pathlib import Path
 
 from sphshell_pin.base.atomic import AtomicFolder
 from sphshell_pin.base.atomic.files import held_folder
-from sphshell_pin.base.json_text import json_text
 from sphshell_pin.base.regular_file import read_text
+from sphshell_pin.base.texts import json_text
 from sphshell_pin.errors import ResultError, SetupWarning, SphshellError, WeakLawWarning
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report import convergence, integrators, queries, steps, timing

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from sphshell_pin.base.json_text import json_text
+from sphshell_pin.base.texts import json_text
 from sphshell_pin.study.robot_check.checks import CHECKS, Sizes
 from sphshell_pin.testing.finding import Finding
 

@@ -12,10 +12,9 @@ from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError, SweepError
 from sphshell_pin.scenario import Built, judge
 from sphshell_pin.scenario.format.build import build_scenario
-from sphshell_pin.scenario.format.numbers import with_numbers
 from sphshell_pin.scenario.format.reading import change_scenario
 from sphshell_pin.scenario.format.schema import Scenario
-from sphshell_pin.scenario.format.sliders import check_knobs
+from sphshell_pin.scenario.format.sliders import check_knobs, with_numbers
 from sphshell_pin.scenario.running.figures import (
     MORE_STATS,
     NOT_REPEATABLE,

@@ -13,8 +13,7 @@ from sphshell_pin.errors import NameNotFound
 from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:
-    from sphshell_pin.scenario.running.player import Rows
-    from sphshell_pin.scenario.running.series import Series
+    from sphshell_pin.scenario.running.rows import Rows, Series
     from sphshell_pin.view.live.player import Player
 
 Point = list[float]
@@ -116,7 +115,7 @@ class Charts:
     """
 
     def __init__(self, player: Player) -> None:
-        from sphshell_pin.scenario.running.series import force_series  # loads pydantic
+        from sphshell_pin.scenario.running.rows import force_series  # loads pydantic
 
         own: Sequence[Series] | None = getattr(player, "series", None)
         self.series = {

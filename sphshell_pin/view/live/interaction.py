@@ -17,8 +17,7 @@ from sphshell_pin.view.live.window import LiveWindow
 from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:
-    from sphshell_pin.scenario.live.drag import Dragged
-    from sphshell_pin.scenario.live.joint_targets import Target
+    from sphshell_pin.scenario.live.acting import Dragged, Target
     from sphshell_pin.view.live.player import Player
 
 G = 9.81

@@ -12,15 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.view.live import panel
 from sphshell_pin.view.live.charts import Charts, Point
 from sphshell_pin.view.live.events import BadMessage, Client, Event, newest
-from sphshell_pin.view.live.foreign import ForeignWindow, window_of
-from sphshell_pin.view.live.greeting import FASTEST, SLOWEST, STRIP_SECONDS, check_speed, greeting
 from sphshell_pin.view.live.interaction import Interaction
-from sphshell_pin.view.live.panel import Panel, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture
 from sphshell_pin.view.live.server import Server
-from sphshell_pin.view.live.window import LiveWindow
+from sphshell_pin.view.live.window import ForeignWindow, LiveWindow, window_of
 from sphshell_pin.view.nodes import Json, new_visualizer
 
 if TYPE_CHECKING:
@@ -61,7 +59,7 @@ class Live:
         wait: bool = False,
     ) -> None:
         self.player = player
-        self.speed = check_speed(speed)
+        self.speed = panel.check_speed(speed)
         self.running = running
         self.fault: Exception | None = None
         """What stopped the run, where that was no end of its own."""
@@ -70,7 +68,7 @@ class Live:
         self._foreign: ForeignWindow | None = None
         if visualizer is not None:
             self._foreign = ForeignWindow(window_of(visualizer))
-        self._panel = Panel()
+        self._panel = panel.Panel()
         self._charts = Charts(player)
         self._points: list[Point] = []
         self._clear_points = True
@@ -92,7 +90,7 @@ class Live:
             self.picture = Picture(player, canvas)
             own = self._window if self._foreign is None else None
             self._interaction = Interaction(player, self.picture, own)
-            hello = {"type": "hello", **greeting(player, framed, self._interaction.offer())}
+            hello = {"type": "hello", **panel.greeting(player, framed, self._interaction.offer())}
             self._panel.post("hello", hello | {"series": self._charts.descriptions()})
             self.draw()
         except BaseException:
@@ -107,7 +105,7 @@ class Live:
     @property
     def _spacing(self) -> float:
         """Simulated time between two points of the strip [s]."""
-        return self.speed * STRIP_SECONDS / STRIP_POINTS
+        return self.speed * panel.STRIP_SECONDS / STRIP_POINTS
 
     @property
     def real_time_factor(self) -> float:
@@ -251,7 +249,7 @@ class Live:
         self._changed = self._changed or duration > 0.0
         if not len(rows.t) and player.time > before:
             # In slow motion a frame is shorter than the time between two recorded rows.
-            rows = rows_now(player)
+            rows = panel.rows_now(player)
         self._points += self._charts.add(rows, self._spacing)
         self._points = self._points[-2 * STRIP_POINTS :]
         self._simulated += player.time - before
@@ -279,7 +277,7 @@ class Live:
             case "reset":
                 self._reset()
             case "speed":
-                self.speed = min(max(event["value"], SLOWEST), FASTEST)
+                self.speed = min(max(event["value"], panel.SLOWEST), panel.FASTEST)
                 self._pace.clear()
             case "parameter":
                 self._change(event["key"], event["value"])
@@ -359,7 +357,7 @@ class Live:
         back = t < self.player.time
         self._clear_charts()
         # Up to there from a little earlier, for the charts: nothing is computed again.
-        span = STRIP_SECONDS * self.speed
+        span = panel.STRIP_SECONDS * self.speed
         self.player.seek(t - span)
         rows = self.player.advance(max(0.0, t - self.player.time), BUDGET)
         self._points = self._charts.add(rows, self._spacing)
@@ -377,7 +375,7 @@ class Live:
         ask = getattr(self.player, "ask", None)
         if ask is not None:
             ask(self._charts.sources)
-        since = self.player.time - STRIP_SECONDS * self.speed
+        since = self.player.time - panel.STRIP_SECONDS * self.speed
         self._points, self._clear_points = self._charts.again(since, self._spacing), True
         for name in self._charts.earlier:
             self._post_earlier(name)
@@ -395,7 +393,7 @@ class Live:
 
     def _state(self) -> Json:
         player, contacts = self.player, self.player.contacts
-        listed = list_contacts(contacts, player.scene.pairs)
+        listed = panel.list_contacts(contacts, player.scene.pairs)
         exchanged = player.exchanged
         residual = player.residual
         return {

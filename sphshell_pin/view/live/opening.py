@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
-from sphshell_pin.view.distance import Coloring, check_coloring
-from sphshell_pin.view.live.greeting import check_speed
 from sphshell_pin.view.live.loop import Live
+from sphshell_pin.view.live.panel import check_speed
+from sphshell_pin.view.surface import Coloring, check_coloring
 
 if TYPE_CHECKING:
     from sphshell_pin.view.live.player import Player

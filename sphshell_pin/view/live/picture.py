@@ -9,24 +9,12 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics.result.contact_patches import Patches
+from sphshell_pin.dynamics.result.result_parts import Patches
+from sphshell_pin.view import nodes
 from sphshell_pin.view.arrows import ArrowPool, ArrowScale, Forces, arrow_length
 from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
 from sphshell_pin.view.display import HIDDEN_AT_FIRST, PARTS, Display
-from sphshell_pin.view.nodes import (
-    HIDDEN_SCALE,
-    Move,
-    hidden_at,
-    material,
-    mover,
-    on_top,
-    pose,
-    rod,
-    rod_along,
-    set_object,
-    show,
-    sphere,
-)
+from sphshell_pin.view.nodes import show
 from sphshell_pin.view.patches import PatchScale
 from sphshell_pin.view.surface import is_curved
 
@@ -34,7 +22,7 @@ if TYPE_CHECKING:
     from meshcat import Visualizer
 
     from sphshell_pin.dynamics.scene.scene import ContactPair, Scene, SceneContacts
-    from sphshell_pin.scenario.live.drag import Dragged
+    from sphshell_pin.scenario.live.acting import Dragged
     from sphshell_pin.view.live.player import Player
 
 POOL = 16
@@ -161,22 +149,26 @@ class DragLine:
 
     def __init__(self, visualizer: Visualizer, size: float) -> None:
         self._width = 0.0018 * size
-        look = on_top(DRAG_COLOR)
-        set_object(visualizer["line"], rod(1.0, 1.0), look, order=11)
-        self._line = mover(visualizer["line"])
-        self._ends: list[Move] = []
+        look = nodes.on_top(DRAG_COLOR)
+        nodes.set_object(visualizer["line"], nodes.rod(1.0, 1.0), look, order=11)
+        self._line = nodes.mover(visualizer["line"])
+        self._ends: list[nodes.Move] = []
         for name, radius in (("held", 2.6), ("cursor", 1.6)):
-            set_object(visualizer[name], sphere(radius * self._width, 16), look, order=11)
-            self._ends.append(mover(visualizer[name]))
+            nodes.set_object(
+                visualizer[name], nodes.sphere(radius * self._width, 16), look, order=11
+            )
+            self._ends.append(nodes.mover(visualizer[name]))
 
     def update(self, drag: Dragged | None) -> None:
         """Show `drag`, or nothing."""
         points = (np.zeros(3),) * 2 if drag is None else (drag.point_world, drag.target_world)
         span = points[1] - points[0]
         for move, point in zip(self._ends, points, strict=True):
-            move(hidden_at(point) if drag is None else pose(np.eye(3), point))
+            move(nodes.hidden_at(point) if drag is None else nodes.pose(np.eye(3), point))
         short = np.linalg.norm(span) <= self._width
-        self._line(hidden_at(points[0]) if short else rod_along(points[0], span, self._width))
+        self._line(
+            nodes.hidden_at(points[0]) if short else nodes.rod_along(points[0], span, self._width)
+        )
 
 
 class ConePool:
@@ -187,13 +179,13 @@ class ConePool:
     """
 
     def __init__(self, visualizer: Visualizer, size: int) -> None:
-        self._moves: list[Move] = []
+        self._moves: list[nodes.Move] = []
         for index in range(size):
             node = visualizer[f"cone_{index}"]
-            look = material("MeshBasic", CONE_COLOR, 0.22, depthTest=False, depthWrite=False)
-            set_object(node, rod(0.0, 1.0), look, order=8)
-            self._moves.append(mover(node))
-            self._moves[-1](hidden_at(np.zeros(3)))
+            look = nodes.material("MeshBasic", CONE_COLOR, 0.22, depthTest=False, depthWrite=False)
+            nodes.set_object(node, nodes.rod(0.0, 1.0), look, order=8)
+            self._moves.append(nodes.mover(node))
+            self._moves[-1](nodes.hidden_at(np.zeros(3)))
 
     def update(
         self, contacts: SceneContacts, pairs: tuple[ContactPair, ...], scale: ArrowScale
@@ -201,15 +193,15 @@ class ConePool:
         """Show the cones of `contacts`, the largest forces first; hide the others."""
         order = np.argsort(-contacts.normal_force, kind="stable")
         for slot, move in enumerate(self._moves):
-            matrix = hidden_at(np.zeros(3))
+            matrix = nodes.hidden_at(np.zeros(3))
             if slot < len(order):
                 k = int(order[slot])
                 law = pairs[int(contacts.pair[k])].friction
                 mu = 0.0 if law is None else law.largest_coefficient
                 height = min(contacts.normal_force[k] * scale.meters_per_newton, scale.longest)
-                if min(mu, 1.0) * height > HIDDEN_SCALE:
+                if min(mu, 1.0) * height > nodes.HIDDEN_SCALE:
                     along = height * contacts.normal_world[k]
-                    matrix = rod_along(contacts.point_world[k], along, mu * height)
+                    matrix = nodes.rod_along(contacts.point_world[k], along, mu * height)
             move(matrix)
 
 

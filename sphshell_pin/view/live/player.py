@@ -9,12 +9,11 @@ from sphshell_pin.base.arrays import Array
 if TYPE_CHECKING:
     import pinocchio as pin
 
-    from sphshell_pin.dynamics.result.contact_patches import Patches
+    from sphshell_pin.dynamics.result.result_parts import Patches
     from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
     from sphshell_pin.scenario.format.sliders import LiveParameter
-    from sphshell_pin.scenario.live.drag import Dragged
-    from sphshell_pin.scenario.live.joint_targets import Target
-    from sphshell_pin.scenario.running.player import Rows
+    from sphshell_pin.scenario.live.acting import Dragged, Target
+    from sphshell_pin.scenario.running.rows import Rows
 
 
 class Player(Protocol):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
-from sphshell_pin.shell.curved import curved_mesh
+from sphshell_pin.shell.curvature import curved_mesh
 from tests import meshes
 from tests.contact.helpers import directions, energy, force_sum, shell_of
 from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, push

@@ -1,4 +1,4 @@
-"""Draw the meshes of the robot gear_pair (python -m sphshell_pin.robots.gear_mesh)."""
+"""Draw the meshes of the robot gear_pair (python docs/site/gear_mesh.py)."""
 
 from pathlib import Path
 
@@ -58,7 +58,7 @@ def gear_triangles(teeth: int, bore: float = 0.012) -> Array:
 
 
 if __name__ == "__main__":
-    folder = Path(__file__).parent / "meshes"
+    folder = Path(__file__).parents[2] / "robots" / "meshes"
     for number in (20, 40):
         corners = gear_triangles(number).reshape(-1, 3)
         gear = Shell(corners, np.arange(len(corners)).reshape(-1, 3), clean=False)
