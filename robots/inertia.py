@@ -1,6 +1,7 @@
 """Masses of links whose URDF states none, from their geometry, and what to do without them."""
 
 import copy
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -8,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_positive
 from sphshell_pin.base.texts import number_of
@@ -113,34 +115,22 @@ def _inertia(
 
 
 def _of_solid(shell: Shell, density: float) -> pin.Inertia:
-    """Return the inertia of what a shell encloses, or of its convex hull where it is open.
+    """Return the inertia of what a shell encloses, or of its convex hull where it is open."""
+    with interrupts_delayed():
+        import trimesh
+    from scipy.spatial import QhullError
 
-    Summed over tetrahedra with one corner inside.
-    """
-    from scipy.spatial import ConvexHull, QhullError
-
-    points = np.asarray(shell.vertices)
-    inside = points.mean(axis=0)
+    # Counted from the middle: far from the origin the moments would be differences of near numbers.
+    middle = np.asarray(shell.vertices).mean(axis=0)
+    solid = trimesh.Trimesh(shell.vertices - middle, shell.triangles, process=False)
     try:
-        triangles = shell.triangles if shell.is_closed else ConvexHull(points).simplices
+        solid = solid if shell.is_closed else solid.convex_hull
     except (QhullError, ValueError):  # flat
         return pin.Inertia.Zero()
-    corners = points[triangles] - inside
-    volumes = np.linalg.det(corners) / 6.0
-    volumes = volumes if shell.is_closed else np.abs(volumes)
-    volume = float(volumes.sum())
-    if volume < 0.0:
-        volumes, volume = -volumes, -volume
-    if not volume > 0.0:
+    if not abs(solid.volume) > 0.0:
         return pin.Inertia.Zero()
-    sums = corners.sum(axis=1)
-    center = volumes @ sums / (4.0 * volume)
-    squares = np.einsum("i,ij,ik->jk", volumes, sums, sums)
-    squares += np.einsum("i,icj,ick->jk", volumes, corners, corners)
-    about = squares / 20.0 - volume * np.outer(center, center)
-    return pin.Inertia(
-        density * volume, inside + center, density * (np.trace(about) * np.eye(3) - about)
-    )
+    solid.density = math.copysign(density, solid.volume)
+    return pin.Inertia(float(solid.mass), middle + solid.center_mass, solid.moment_inertia)
 
 
 def _element(inertia: pin.Inertia) -> ET.Element:
