@@ -8,7 +8,7 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.errors import RobotWarning, ScenarioError
+from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.format.reading import read_scenario
 from tests.models import pose_of
@@ -155,18 +155,6 @@ def test_faults_name_the_key(fault, tmp_path):
     assert words in str(caught.value)
 
 
-def test_a_missing_mesh_names_the_searched_folders(tmp_path):
-    (tmp_path / "r.urdf").write_text(
-        '<robot name="r"><link name="a"><collision><geometry>'
-        '<mesh filename="package://arm/a.stl"/></geometry></collision></link></robot>'
-    )
-    text = 'title = "x"\nrobot.urdf = "r.urdf"\nrun.duration = 1\n'
-    with pytest.warns(RobotWarning, match=r"package://arm/a.stl.*--package-dir"):
-        assembled(tmp_path, text)
-    with pytest.raises(ScenarioError, match="does not exist"):
-        assembled(tmp_path, text + 'robot.package_dirs = ["meshes"]\n')
-
-
 DATA = Path(__file__).parents[1] / "data"
 GRIPPER = f"""title = "x"
 [robot]
@@ -228,12 +216,3 @@ def test_one_joint_of_a_group_locks_all(tmp_path):
         right = pose_of(scene.model, np.zeros(1), "right")
         assert np.allclose(right.translation, [-0.06, 0, -0.02])
         assert reduce_visual(found).ngeoms == found.visual_model.ngeoms
-
-
-def test_several_robots_keep_their_armature(tmp_path):
-    two = GRIPPER.replace("[robot]", "[[robot]]")
-    two = two.replace("KEYS", two.partition("\n")[2].partition("[run]")[0].replace("KEYS", ""))
-    two = two.replace("[[robot]]", '[[robot]]\nlabel = "a"', 1)
-    model = assembled(tmp_path, two).model
-    # 0.02 of each of two fingers.
-    assert np.allclose(model.armature, [0, 0.04, 0, 0.04])

@@ -1,8 +1,5 @@
 """What a first user meets: surfaces before the tip, parts of a file, names nearly right, Ctrl-C."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,7 +9,6 @@ from sphshell_pin.scenario.drafting.new import new_scenario
 from tests.command import call
 from tests.scenario.files import DROP, write
 from tests.scenario.test_new import arm_urdf
-from tests.test_import import EXTRAS
 
 
 def told(*arguments):
@@ -88,50 +84,3 @@ def test_another_integrator_leaves_the_old_ones_settings_behind(tmp_path):
     code, output = told("explain", made.path, "--dt", "1e-4")
     assert code == 2
     assert "set run.integrator to semi-implicit-euler" in output
-
-
-def test_a_doubtful_unit_is_told_once_and_plainly(tmp_path):
-    box = "\n".join(f"v {x} {y} {z}" for x in (0, 99) for y in (0, 99) for z in (0, 9))
-    (tmp_path / "b.obj").write_text(
-        box + "\nf 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n",
-        encoding="utf-8",
-    )
-    command = ["--robot", "ball", "--surface", tmp_path / "b.obj", "--unit", "m", "--radius", "3mm"]
-    code, output = told("new", *command, "--out", tmp_path / "a.toml")
-    assert code == 0, output
-    assert "UnitWarning" not in output
-    assert ".py" not in output
-
-
-def test_noise_is_no_stl(tmp_path):
-    path = tmp_path / "noise.stl"
-    path.write_bytes(np.random.default_rng(0).bytes(3000))
-    code, output = told("check", path, "--unit", "mm")
-    assert code == 2
-    assert "No module" not in output
-
-
-def test_a_new_scenario_needs_no_extra_package(tmp_path):
-    program = f"import sys; sys.modules |= dict.fromkeys({EXTRAS})\n"
-    program += "from sphshell_pin.scenario.drafting.new import new_scenario as new\n"
-    program += "new(sys.argv[1], radius=0.01, out=sys.argv[2])"
-    command = [sys.executable, "-c", program, arm_urdf(tmp_path), tmp_path / "a.toml"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.parametrize("cause", [KeyboardInterrupt, ValueError])
-def test_ctrl_c_while_a_library_loads_is_an_interruption(cause, monkeypatch):
-    def load(*_):
-        try:
-            raise cause
-        except cause as error:
-            ring = ImportError("initialization failed")
-            error.__context__ = None if cause is KeyboardInterrupt else ring
-            raise ring from error
-
-    monkeypatch.setattr("sphshell_pin.scenario.build", load)
-    code, output = told("explain", "sphere_on_shell")
-    assert (code, "interrupted" in output) == (
-        (130, True) if cause is KeyboardInterrupt else (2, False)
-    )

@@ -1,7 +1,5 @@
 """A hand about a part: forces in closed form, distances, and drafts that are run."""
 
-from itertools import product
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -15,7 +13,7 @@ from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.hand import GAP
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
-from sphshell_pin.scenario.drafting.part import Part, word_primitive
+from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.format.shape_tables import Box, Cylinder
 from tests.models import pose_of
 from tests.scenario.files import run_well
@@ -109,18 +107,6 @@ def hand_of(folder):
     loaded = robots.load_file(gripper(folder))
     tips = [Tip(s.frame, s.radius, np.array(s.offset), "") for s in robots.end_spheres(loaded)]
     return Hand(loaded.model, tips)
-
-
-def test_velocities_of_tips_are_those_of_differences(tmp_path):
-    hand, rng = hand_of(tmp_path), np.random.default_rng(3)
-    q, step = rng.uniform(-0.2, 0.4, hand.model.nq), 1e-6
-    found = hand.jacobians(q)
-    for k in range(hand.model.nv):
-        change = np.zeros(hand.model.nv)
-        change[k] = step
-        ahead = hand.centers(pin.integrate(hand.model, q, change))
-        behind = hand.centers(pin.integrate(hand.model, q, -change))
-        assert np.allclose(found[:, :, k], (ahead - behind) / (2 * step), atol=1e-8)
 
 
 def test_fingers_close_on_a_part(tmp_path):
@@ -226,28 +212,3 @@ def test_what_cannot_be_held_is_refused(options, why, tmp_path):
         new_scenario(robot, surface, tips="all", out=out(tmp_path), **options)
     assert not out(tmp_path).exists()
     assert not (tmp_path / "made_part.urdf").exists()
-
-
-@pytest.mark.parametrize(
-    ("side", "surface"),
-    mostly_studies(
-        product(("right", "left"), ("box", "cylinder", "sphere")),
-        {("right", "box")}.__contains__,
-    ),
-)
-def test_an_allegro_hand_holds(side, surface, tmp_path):
-    pytest.importorskip("example_robot_data")
-    robot = f"allegro_{side}_hand"
-    made = new_scenario(robot, surface, tips="all", against="plastic", out=out(tmp_path))
-    built = build(made.path)
-    result = run_well(built)
-    assert {name.rpartition("/")[2] for name in result.pairs} == {
-        f"link_{k}.0_tip" for k in (3, 7, 11, 15)
-    }
-
-
-@pytest.mark.parametrize("word", ["sphere", "cylinder", "box"])
-def test_a_part_of_one_word_is_five_radii_wide(word):
-    corners = word_primitive(word, 0.01).shell().vertices
-    height = 0.05 if word == "sphere" else 0.1
-    np.testing.assert_allclose(np.ptp(corners, axis=0), [0.05, 0.05, height], rtol=1e-2)

@@ -10,7 +10,6 @@ import sphshell_pin as sp
 from sphshell_pin.errors import ResultError, SphshellError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
-from sphshell_pin.view.live.opening import player_of
 from tests import models
 from tests.scenario.files import DROP, without_pictures, write
 
@@ -186,22 +185,6 @@ def with_code(tmp_path):
     run_built(build(write(tmp_path, SOURCE)), tmp_path / "out", recording=False)
     (tmp_path / "executed").unlink()
     return tmp_path
-
-
-def test_looking_at_results_executes_no_code(with_code):
-    """Somebody else's run.npz may name any file beside it."""
-    file = with_code / "out" / "run.npz"
-    result = sp.Result.load(file)
-    assert len(result.contacts)
-    for scenario in (None, with_code / "drop.toml"):
-        replay = Replay(file, scenario=scenario)
-        replay.seek(result.contacts.t[3])
-        assert len(replay.contacts)
-    player_of(file)
-    # The file alone, with settings of its own and no scenario beside it.
-    (with_code / "drop.toml").unlink()
-    Replay(file)
-    assert not (with_code / "executed").exists()
 
 
 def test_the_routine_is_loaded_where_it_is_trusted(with_code):

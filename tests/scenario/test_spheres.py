@@ -83,18 +83,6 @@ def test_collision_spheres_of_a_hand(tmp_path):
     assert {pair.group for pair in scene.pairs} == {"tips"}
 
 
-def test_collision_spheres_of_frames_and_others(tmp_path):
-    names = [one.frame for one in robots.collision_spheres(robots.load("allegro_right_hand"))]
-    own = '{ frame = "palm", radius = 0.03 }'
-    frame = robots.load("allegro_right_hand").model.frames[1].name
-    text = HAND.replace('"collision"', f'["{names[1]}", {own.replace("palm", frame)}]')
-    scene = build(write(tmp_path, text)).scene
-    assert [(pair.frame_i, pair.side_i.sphere.radius) for pair in scene.pairs] == [
-        (names[1], 0.012),
-        (frame, 0.03),
-    ]
-
-
 EGG = f"""
 title = "An egg on a table"
 [robot]

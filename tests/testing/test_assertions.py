@@ -9,7 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, WeakLawWarning
-from sphshell_pin.testing.triangles import crossed, distances, pieces
+from sphshell_pin.testing.triangles import crossed, distances
 from tests import meshes
 from tests.contact.smooth.surfaces import shell_of
 from tests.models import (
@@ -314,14 +314,6 @@ def test_distances_are_those_of_the_oracle() -> None:
         nearest = closest_on_triangles(point, corners.astype(np.longdouble))
         expected = np.linalg.norm((nearest - point).astype(float), axis=1)
         assert row == pytest.approx(expected, abs=1e-13)
-
-
-def test_pieces_hang_together_by_vertices() -> None:
-    triangles = np.array([[0, 1, 2], [2, 3, 4], [5, 6, 7], [7, 8, 9], [9, 0, 10]])
-    touched = np.array([True, True, True, True, False])
-    assert [one.tolist() for one in pieces(triangles, touched)] == [[0, 1], [2, 3]]
-    assert len(pieces(triangles, np.ones(5, bool))) == 1
-    assert pieces(triangles, np.zeros(5, bool)) == []
 
 
 def test_ways_through_triangles() -> None:

@@ -80,12 +80,6 @@ def test_a_contact_keeps_its_arrow_when_another_lets_go():
     np.testing.assert_array_equal(np.array(sizes) > 1e-4, [[1, 1, 0], [0, 1, 0], [1, 1, 0]])
 
 
-def test_what_is_cut_is_told():
-    scale = ArrowScale(0.1, 1.0, longest=0.25)
-    assert not scale.cuts(np.array([1.0, 2.4]))
-    assert scale.cuts(np.array([1.0, 2.6]))
-
-
 @pytest.mark.parametrize("size", [1000.0, 1e200, np.inf, np.nan])
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
 def test_forces_beyond_all_bounds_are_drawn_as_far_as_can_be(size):

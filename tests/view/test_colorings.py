@@ -9,7 +9,7 @@ import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.curved import curved_mesh
 from sphshell_pin.view.display import Display
-from sphshell_pin.view.distance import RAMP, check_coloring, draw_distance
+from sphshell_pin.view.distance import RAMP, draw_distance
 from sphshell_pin.view.recording import render_recording
 from sphshell_pin.view.surface import FACE_COLORS, hex_colors, ramp_colors
 from tests import models
@@ -127,8 +127,3 @@ def test_a_recording_states_range_and_kinds():
     assert FACE_COLORS["torus"] in page
     with pytest.raises(InvalidParameter, match="surface, patches, distance"):
         render_recording(result, scene, color="depth")
-
-
-def test_other_colours_are_refused():
-    with pytest.raises(InvalidParameter, match="must be one of"):
-        check_coloring("red")
