@@ -164,3 +164,20 @@ def test_what_passed_between_the_rows_is_reported(figures, said):
         assert ("record more often" in title) == bool(said)
         if quantity == "time":
             assert said in title
+
+
+def test_of_a_large_shell_the_part_that_was_touched_is_shown():
+    shell = grid(cells=40)
+    rows = [
+        {"row": k, "element": 820 + k, "point_world": [0.0125 + 0.025 * k, 0.0125, 0]}
+        for k in range(3)
+    ]
+    result, scene = on(shell, rows)
+    axis = plot_contact_map(result, scene).axes[0]
+    assert axis.get_xlabel() == "x of the shell [mm]"
+    middles, _ = painted(axis)
+    assert 3 <= len(middles) < 400
+    # What was touched is inside.
+    for (low, high), x in zip((axis.get_xlim(), axis.get_ylim()), (37.5, 12.5), strict=True):
+        assert low < x < high
+        assert high - low < 350.0

@@ -13,6 +13,7 @@ from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.mjcf_compile import silent
+from tests.texts import text_of
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -360,19 +361,7 @@ def test_meshes_of_mjcf(tmp_path):
         assert robots.load_file(path).model.nv == 2
 
 
-SHOWN = """<mujoco model="arm"><compiler angle="radian" meshdir="a" texturedir="/dev"><lengthrange/>
-</compiler><option timestep="0.002"/><size nconmax="1000000000" memory="99999M"/>
-<visual><global offwidth="640"/></visual><statistic meansize="0.1"/>
-<default><default class="link"><geom material="gray"/><joint damping="2"/></default></default>
-<asset><texture name="t" type="2d" file="zero"/><hfield name="h" size="1 1 1 1" file="zero"/>
-<material name="gray" texture="t" rgba="0.1 0.2 0.3 1"/><mesh name="w" file="nix.stl"/></asset>
-<worldbody><light pos="0 0 1"/><geom name="ground" type="hfield" hfield="h"/>
-<body name="b" childclass="link" gravcomp="1" user="1 2 3"><camera name="c"/><joint name="j"/>
-<inertial pos="0 0 0.1" mass="2" diaginertia="1 1 1"/><geom size="0.1"/>
-<geom type="mesh" mesh="w" contype="0" conaffinity="0"/></body></worldbody>
-<actuator><motor joint="j"/><plugin joint="j" plugin="p"/></actuator>
-<sensor><jointpos joint="j"/></sensor><extension><plugin plugin="p"/></extension>
-<keyframe><key name="home" qpos="0.5" qvel="0.1" ctrl="3"/></keyframe></mujoco>"""
+SHOWN = text_of("robots/shown.xml").rstrip()
 
 
 def test_what_only_shows_or_moves_the_robot_is_not_read(tmp_path):

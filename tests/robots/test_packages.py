@@ -203,3 +203,18 @@ def test_a_part_of_a_robot_names_the_robot_that_includes_it(tmp_path: Path, name
         whole.write_text(f'{head} name="arm"><xacro:include filename="macro.xacro"/></robot>')
     with pytest.raises(robots.RobotError, match=f"that includes this one: {re.escape(str(whole))}"):
         robots.load_file(part)
+
+
+def test_a_package_whose_meshes_were_put_into_more_folders_and_the_nearer_of_two(
+    tmp_path: Path,
+) -> None:
+    file = workspace(tmp_path, "src/vendor/arm_resources")
+    package(tmp_path / "src" / "another" / "arm_resources")
+    mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
+    for name in ("collision/large/one.obj", "visual/large/one.obj"):
+        (mesh.parent / name).parent.mkdir(parents=True)
+        (mesh.parent / name).write_bytes(mesh.read_bytes())
+    mesh.unlink()
+    file.write_text(file.read_text().replace("/one.obj", "/collision/one.obj"))
+    (geometry,) = robots.load_file(file).collision_model.geometryObjects
+    assert geometry.meshPath.endswith("vendor/arm_resources/meshes/collision/large/one.obj")

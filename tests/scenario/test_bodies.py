@@ -13,26 +13,9 @@ from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restric
 from sphshell_pin.scenario.format.reading import read_scenario
 from tests.models import pose_of
 from tests.scenario.files import write
+from tests.texts import text_of
 
-TWO = """
-title = "a finger and a ball"
-gravity = [0, 1, -2]
-
-[[robot]]
-name = "three_link_finger"
-placement = { xyz = [0.1, 0.2, 0.3], rpy_deg = [0, 0, 90] }
-lock = ["middle_joint"]
-start = { knuckle = 0.3, middle_joint = 0.4 }
-speed = { knuckle = 1.5 }
-
-[[robot]]
-name = "ball"
-start = { root_joint = [1, 2, 3, 0, 0, 0.6, 0.8] }
-speed = { root_joint = [1, 2, 3, 4, 5, 6] }
-
-[run]
-duration = 1
-"""
+TWO = text_of("scenarios/finger_and_ball.toml")
 
 
 def assembled(folder, text=TWO):
@@ -55,26 +38,7 @@ def test_names_carry_the_robot_and_the_values_their_joint(tmp_path):
     np.testing.assert_allclose(assembly.v0, [1.5, 0, 0, 1, 2, 3, 4, 5, 6])
 
 
-MOUNTED = """
-title = "a finger on a turntable, and a ball"
-
-[[robot]]
-name = "turntable"
-start = { axle = 0.7 }
-
-[[robot]]
-name = "ball"
-start = { root_joint = [1, 2, 3, 0, 0, 0.6, 0.8] }
-
-[[robot]]
-name = "three_link_finger"
-frame = "turntable/disc"
-placement = { xyz = [0.1, 0.2, 0.3], rpy_deg = [0, 0, 90] }
-start = { knuckle = 0.3, middle_joint = 0.4, distal_joint = 0.5 }
-
-[run]
-duration = 1
-"""
+MOUNTED = text_of("scenarios/mounted.toml")
 
 
 def test_a_robot_may_be_mounted_on_another(tmp_path):

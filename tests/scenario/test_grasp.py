@@ -18,7 +18,10 @@ from sphshell_pin.scenario.format.shape_tables import Box, Cylinder
 from tests.models import pose_of
 from tests.scenario.files import run_well
 from tests.studies import mostly_studies
+from tests.texts import DATA
 
+# Three fingers, two against one, each with two hinges about y.
+GRIPPER = DATA / "robots" / "three_fingers.urdf"
 NO_WEIGHT = np.zeros(6)
 
 
@@ -61,36 +64,7 @@ def test_a_part_weighs_what_its_material_weighs():
 
 def test_an_open_surface_has_no_weight(tmp_path):
     with pytest.raises(SphshellError, match="is open, so it has no weight"):
-        new_scenario(gripper(tmp_path), sheet(tmp_path), tips="all", unit="m", out=out(tmp_path))
-
-
-def gripper(folder):
-    """Write a hand of three fingers, two against one, each with two hinges about y."""
-    parts = ['<robot name="gripper"><link name="palm"/>']
-    for name, side, y in (("thumb", 1, 0.0), ("left", -1, 0.03), ("right", -1, -0.03)):
-        above = "palm"
-        for k, (link, length) in enumerate((("upper", 0.06), ("lower", 0.05))):
-            at = f"{side * 0.035} {y} 0" if k == 0 else "0 0 -0.06"
-            low, high = ((-0.9, 0.4), (-0.2, 1.3))[k]
-            parts.append(
-                f'<joint name="{name}_{link}_hinge" type="revolute"><parent link="{above}"/>'
-                f'<child link="{name}_{link}"/><origin xyz="{at}"/><axis xyz="0 {side} 0"/>'
-                f'<limit lower="{low}" upper="{high}" effort="5" velocity="5"/></joint>'
-                f'<link name="{name}_{link}"><inertial><origin xyz="0 0 {-0.5 * length}"/>'
-                '<mass value="0.05"/><inertia ixx="2e-5" iyy="2e-5" izz="5e-6" ixy="0" ixz="0" '
-                f'iyz="0"/></inertial><collision><origin xyz="0 0 {-0.5 * length}"/><geometry>'
-                f'<box size="0.01 0.01 {0.8 * length}"/></geometry></collision>'
-            )
-            if link == "lower":
-                parts.append(
-                    f'<collision><origin xyz="0 0 {-length}"/><geometry><sphere radius="0.01"/>'
-                    "</geometry></collision>"
-                )
-            parts.append("</link>")
-            above = f"{name}_{link}"
-    file = folder / "gripper.urdf"
-    file.write_text("".join(parts) + "</robot>", encoding="utf-8")
-    return file
+        new_scenario(GRIPPER, sheet(tmp_path), tips="all", unit="m", out=out(tmp_path))
 
 
 def sheet(folder):
@@ -103,15 +77,15 @@ def out(folder):
     return folder / "made.toml"
 
 
-def hand_of(folder):
-    loaded = robots.load_file(gripper(folder))
+def hand_of():
+    loaded = robots.load_file(GRIPPER)
     tips = [Tip(s.frame, s.radius, np.array(s.offset), "") for s in robots.end_spheres(loaded)]
     return Hand(loaded.model, tips)
 
 
 def test_fingers_close_on_a_part(tmp_path):
     """All centers stand a radius and the gap away from a cylinder: a distance to its axis."""
-    hand, shell = hand_of(tmp_path), shell_of(Cylinder(radius=0.02, length=0.2))
+    hand, shell = hand_of(), shell_of(Cylinder(radius=0.02, length=0.2))
     along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
     q, points, normals = hand.close_on(
         np.tile([-0.3, 0.6], 3), shell, along_y, np.array([1e-4, 2e-4, -1e-4])
@@ -125,7 +99,7 @@ def test_fingers_close_on_a_part(tmp_path):
 
 def test_torques_do_the_work_of_the_forces(tmp_path):
     """Virtual work: of forces on points that move with the tips."""
-    hand, shell = hand_of(tmp_path), shell_of(Cylinder(radius=0.02, length=0.2))
+    hand, shell = hand_of(), shell_of(Cylinder(radius=0.02, length=0.2))
     along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
     q, points, normals = hand.close_on(np.tile([-0.3, 0.6], 3), shell, along_y, 0.0)
     forces = np.random.default_rng(0).normal(size=(3, 3))
@@ -148,7 +122,7 @@ def test_torques_do_the_work_of_the_forces(tmp_path):
 
 
 def test_what_is_out_of_reach_is_not_touched(tmp_path):
-    hand, shell = hand_of(tmp_path), shell_of(Box([0.02, 0.02, 0.02]))
+    hand, shell = hand_of(), shell_of(Box([0.02, 0.02, 0.02]))
     far = pin.SE3(np.eye(3), np.array([0, 0, -0.5]))
     assert hand.close_on(np.zeros(6), shell, far, GAP) is None
 
@@ -157,9 +131,7 @@ def test_what_is_out_of_reach_is_not_touched(tmp_path):
     "surface", mostly_studies(["box", "cylinder", "sphere"], lambda one: one != "cylinder")
 )
 def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
-    made = new_scenario(
-        gripper(tmp_path), surface, tips="all", against="plastic", out=out(tmp_path)
-    )
+    made = new_scenario(GRIPPER, surface, tips="all", against="plastic", out=out(tmp_path))
     assert (tmp_path / "made_part.urdf").is_file()
     built = build(made.path)  # what stands in the files, read again
     gaps = [pair.gap for pair in built.scene.explain(built.q0, built.v0).pairs]
@@ -174,8 +146,7 @@ def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
 
 def test_fingers_that_mimic_others_hold_too(tmp_path):
     """Two fingers move as one; motors make up for friction that would keep them from pressing."""
-    file = gripper(tmp_path)
-    text = file.read_text(encoding="utf-8")
+    file, text = tmp_path / "gripper.urdf", GRIPPER.read_text("utf-8")
     for link in ("upper", "lower"):
         at = text.index("</joint>", text.index(f'<joint name="right_{link}_hinge"'))
         text = f'{text[:at]}<mimic joint="left_{link}_hinge"/>{text[at:]}'
@@ -201,7 +172,7 @@ def test_fingers_that_mimic_others_hold_too(tmp_path):
     ],
 )
 def test_what_cannot_be_held_is_refused(options, why, tmp_path):
-    options = {"robot": gripper(tmp_path), "surface": "box", **options}
+    options = {"robot": GRIPPER, "surface": "box", **options}
     if options["surface"] == "large":
         import trimesh
 

@@ -44,6 +44,9 @@ def test_the_cursor_moves_and_the_same_spring_follows(ball) -> None:
         ball.pull("ball", [0.0, 0.0, 0.0], [0.1 * share, 0.0, 0.1], 100.0)
         ball.advance(0.02)
         assert ball._drag.stiffness == stiffness
+        damping = 2.0 * np.sqrt(stiffness * body_mass(ball))  # critical
+        force = stiffness * ([0.1 * share, 0.0, 0.1] - ball.q[:3]) - damping * ball.v[:3]
+        np.testing.assert_allclose(ball.drag.force_world, force, atol=1e-9)
     settle(ball)
     np.testing.assert_allclose(ball.q[:3], [0.1, 0.0, 0.1], atol=1e-6)
 

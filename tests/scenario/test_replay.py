@@ -12,6 +12,7 @@ from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
 from tests import models
 from tests.scenario.files import DROP, without_pictures, write
+from tests.texts import text_of
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
@@ -152,30 +153,7 @@ def figure(result, scene):
     return 1.0
 """
 
-SOURCE = """
-title = "a ball falls on points of one's own"
-
-[robot]
-name = "ball"
-start = { root_joint = [0, 0, 0.0125, 0, 0, 0, 1] }
-
-[source]
-name = "ball-plate"
-find = "routine.py:find"
-frame_i = "ball"
-law = { type = "impact", stiffness = 1e6 }
-
-[controller]
-type = "python"
-function = "routine.py:torque"
-
-[run]
-duration = 0.02
-dt = 1e-4
-
-[figures]
-own = "routine.py:figure"
-"""
+SOURCE = text_of("scenarios/source.toml")
 
 
 @pytest.fixture

@@ -108,3 +108,6 @@ def test_saddles_are_no_arrows_that_pull_and_the_sum_of_forces_stays(least):
     assert (np.sum(drawn.normal * normals[[0, 1, 2, 5]], axis=1) > 0.0).all()
     np.testing.assert_allclose(drawn.normal.sum(axis=0), normal @ normals, atol=1e-12)
     np.testing.assert_array_equal(drawn.normal[-1], [0.0, 0.0, 5.0])
+    # Of each saddle its two neighbors bear half.
+    ends = normal[[0, 2], None] * normals[[0, 2]] + 0.5 * normal[[3, 4], None] * normals[[3, 4]]
+    np.testing.assert_allclose(drawn.normal[[0, 2]], ends, atol=1e-12)

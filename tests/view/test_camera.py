@@ -65,6 +65,6 @@ def test_the_whole_robot_is_in_the_picture_of_a_short_run():
     near = choose_view(*seen)
     assert near.distance < 0.8 * whole.distance
     # A floor that reaches far beyond the robot does not make it small.
-    floor = sp.Shell([[-5, -5, -1], [5, -5, -1], [5, 5, -1], [-5, 5, -1]], [[0, 1, 2, 3]])
+    floor = sp.Shell([[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 0]], [[0, 1, 2, 3]])
     scene.add_contact(sp.Sphere(0.02, "panda_link0"), floor, law=sp.ImpactLaw(1e5, 1.5, 0, 1e-4))
     assert choose_view(*seen, whole=True).distance < 1.5 * whole.distance

@@ -11,6 +11,7 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.live import Live
 from tests.scenario.files import DROP, write
+from tests.texts import text_of
 from tests.view.test_live_in_browser import Tab
 
 pytestmark = pytest.mark.browser
@@ -24,38 +25,10 @@ KNOB = '\n[[knob]]\nkey = "contact.ball-plate.law.stiffness"\n'
 SCENARIO = DROP.replace("damping = 20.0 }", FRICTION) + KNOB
 
 # Everything that one can press or drag, and is seen, with its box in the page.
-TARGETS = """() => [...document.querySelectorAll(
-    "button, select, input:not([type=checkbox]), summary, label:has(input[type=checkbox])")]
-  .filter((one) => one.checkVisibility({visibilityProperty: true}) && !one.closest("dialog"))
-  .map((one) => {
-    const box = one.getBoundingClientRect();
-    return {name: one.id || one.textContent.trim(), left: box.left, right: box.right,
-            top: box.top + scrollY, bottom: box.bottom + scrollY,
-            floats: one.closest("#stage") !== null};
-  })"""
+TARGETS = text_of("page/targets.js").rstrip()
 
 # Of each piece of text that is seen: its color, and the colors behind it from the nearest on.
-TEXTS = """() => {
-  const found = [];
-  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-  while (walk.nextNode()) {
-    const text = walk.currentNode.textContent.trim(), one = walk.currentNode.parentElement;
-    if (!text || !one.checkVisibility({visibilityProperty: true})) continue;
-    if (one.closest("script, style, option, select, :disabled")) continue;
-    const behind = [];
-    for (let node = one; node; node = node.parentElement)
-      behind.push(getComputedStyle(node).backgroundColor);
-    found.push([text, getComputedStyle(one).color, behind]);
-  }
-  for (const one of document.querySelectorAll("select, input[type=text]")) {
-    if (!one.checkVisibility() || one.disabled) continue;
-    const behind = [];
-    for (let node = one; node; node = node.parentElement)
-      behind.push(getComputedStyle(node).backgroundColor);
-    found.push([one.id || one.type, getComputedStyle(one).color, behind]);
-  }
-  return found;
-}"""
+TEXTS = text_of("page/texts.js").rstrip()
 
 VARIABLES = """(names) => {
   const style = getComputedStyle(document.documentElement);

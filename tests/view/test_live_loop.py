@@ -286,3 +286,12 @@ def test_a_value_that_cannot_be_is_answered_in_the_words_of_its_slider(
     assert client is TAB
     assert answer.startswith(told.format(key=key))
     assert str(tmp_path) not in answer
+
+
+def test_nothing_is_drawn_for_nobody(make):
+    live = make()
+    drawn = live._window.frame
+    state = live._panel.news(0)[0]
+    frames(live, 20)
+    assert live.player.time > 0.3
+    assert (live._window.frame, live._panel.news(0)[0]) == (drawn, state)

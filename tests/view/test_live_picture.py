@@ -180,3 +180,15 @@ def test_what_is_moved_down_below_the_figures_stays_in_the_picture(seed):
     before, after = (in_picture(one, around) for one in (view, lowered(view)))
     assert np.abs(after).max() < 1.0
     assert after[:, 1].max() < before[:, 1].max() - 0.1
+
+
+def test_a_contact_that_jumps_starts_another_piece():
+    player = BallPlayer()
+    easel = Easel(player)
+    for start in (-0.4, 0.3):
+        for x in np.linspace(start, start + 0.05, 30):
+            player.q = np.array([x, 0.0, 0.049])
+            easel.draw()
+    for path, drawn in easel.browser.objects.items():
+        if "/trail/" in path:
+            assert np.ptp(attribute(drawn)[:, 0]) < 0.1

@@ -4,7 +4,7 @@ import threading
 import numpy as np
 import pytest
 
-from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.view import write_recording
 from sphshell_pin.view.contact_path import ContactRows
 from sphshell_pin.view.recording import choose_rows
@@ -100,3 +100,10 @@ def test_without_meshcat_one_sentence_says_how_to_get_it(tmp_path, monkeypatch):
     with pytest.raises(MissingExtra, match=r"sphshell-pin\[view\]"):
         write_recording(tmp_path / "run.html", result, scene)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("name", "value"), [("fps", 0.0), ("fps", np.nan), ("speed", -1.0)])
+def test_a_pace_that_is_not_positive_is_refused(tmp_path, name, value):
+    scene, result = ball_on_plate()
+    with pytest.raises(InvalidParameter, match=name):
+        write_recording(tmp_path / "run.html", result, scene, **{name: value})
