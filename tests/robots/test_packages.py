@@ -59,6 +59,16 @@ def test_packages_of_the_workspace_are_found_from_any_folder(
     assert robots.load_file(relative).model.inertias[1].lever[0] == pytest.approx(0.3)
 
 
+def test_a_relative_package_folder_is_that_of_the_working_folder_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = workspace(tmp_path, "elsewhere/arm_resources")
+    monkeypatch.chdir(tmp_path)
+    folders = Folders.of(file, ["elsewhere"])
+    monkeypatch.chdir(file.parent)
+    assert folders.package("arm_resources") == tmp_path / "elsewhere" / "arm_resources"
+
+
 def test_the_search_ends_at_the_workspace(tmp_path: Path) -> None:
     file = workspace(tmp_path / "one", "../other/arm_resources")
     folders = Folders.of(file)

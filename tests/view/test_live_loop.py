@@ -250,17 +250,18 @@ def test_the_legend_says_where_arrows_are_cut(make):
 
 
 def test_a_queue_of_steps_gives_way_to_others(make, monkeypatch):
-    live = make()
+    live, taken = make(), []
     advance = live.player.advance
     monkeypatch.setattr(loop, "BUDGET", 1e-3)
-    monkeypatch.setattr(live.player, "advance", lambda *a: (time.sleep(0.005), advance(*a))[1])
+    monkeypatch.setattr(
+        live.player, "advance", lambda *a: (time.sleep(0.005), taken.append(1), advance(*a))[2]
+    )
     for _ in range(100):
         say(live, "step", seconds=1e-3)
         say(live, "look")  # between steps of one tab, which count once
     say(live, "speed", value=0.25)
-    begin = time.perf_counter()
     live.frame(0.0)
-    assert time.perf_counter() - begin < 0.4
+    assert 0 < len(taken) < 50
     assert live.speed == 0.25
     assert [text for _, text in live.told] == ["steps came faster than they run: some are left out"]
 
