@@ -34,32 +34,6 @@ def test_no_joint_stands_behind_the_surface(axes, tmp_path):
     assert heights[1:].min() > 0.009
 
 
-def test_a_new_scenario_takes_one_body_of_a_cad_file(tmp_path):
-    pytest.importorskip("OCP")
-    from OCP.BRep import BRep_Builder
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-    from OCP.BRepTools import BRepTools
-    from OCP.gp import gp_Pnt
-    from OCP.TopoDS import TopoDS_Compound
-
-    builder, pair = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(pair)
-    builder.Add(pair, BRepPrimAPI_MakeBox(100.0, 100.0, 20.0).Shape())
-    builder.Add(pair, BRepPrimAPI_MakeBox(gp_Pnt(300, 0, 0), 40.0, 40.0, 40.0).Shape())
-    BRepTools.Write_s(pair, str(tmp_path / "two.brep"))
-    command = ["new", "--robot", "ball", "--surface", tmp_path / "two.brep", "--unit", "mm"]
-    command += ["--radius", "5mm", "--out", tmp_path / "a.toml"]
-    code, output = told(*command, "--face", "3")
-    assert code == 0, output
-    assert build(tmp_path / "a.toml").scenario.shell[0].faces == [3]
-    made = new_scenario(
-        "ball", tmp_path / "two.brep", unit="mm", faces=[7, 8, 9, 10, 11, 12], radius=0.005,
-        out=tmp_path / "b.toml",
-    )  # fmt: skip
-    (shell,) = build(made.path).shells.values()
-    np.testing.assert_allclose(np.ptp(shell.box, axis=0), 0.04, atol=1e-9)
-
-
 def test_a_scenario_is_found_by_its_whole_name(tmp_path):
     path = write(tmp_path, DROP)
     code, output = told("explain", path.with_suffix(""))

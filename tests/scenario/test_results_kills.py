@@ -30,7 +30,7 @@ from sphshell_pin.study.sweep.table import write_table
 from sphshell_pin.view.film import render_film
 from tests import meshes
 from tests.scenario.files import DROP, write
-from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
+from tests.scenario.operations import contents, counted, fill, killed_at, visible
 from tests.studies import mostly_studies
 
 MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
@@ -157,17 +157,6 @@ def test_a_full_disk_leaves_the_old_results_and_nothing_else(two_runs, results, 
     keep, before, after = two_runs
     for n in ends(place, keep, lambda: results("new"), fill, once=False):
         assert contents(place) in (before, after), n
-        assert os.listdir(place) == ["out"], n
-
-
-def test_ctrl_c_at_any_operation_leaves_old_or_new_results(two_runs, results, place):
-    keep, before, after = two_runs
-    for n in ends(place, keep, lambda: results("new"), interrupt):
-        if visible(place) != before:
-            check_whole(place / "out")  # pictures that were not drawn are not listed
-            assert set(visible(place)) <= set(after)
-        results("new")
-        assert contents(place) == after, n
         assert os.listdir(place) == ["out"], n
 
 

@@ -94,36 +94,3 @@ def test_quantities_and_their_curves_can_be_chosen(tab):
     assert tab.live._charts.keys == ("q.knuckle", "q.distal_joint")
     tab.page.locator("h1").click()
     assert not tab.page.locator("#curve-list").is_visible()
-
-
-def test_the_last_run_stays_as_a_ghost_and_a_kept_one_too(tab):
-    tab.choose("Joint velocity [deg/s]")
-    tab.step()
-    t, first = tab.points("v.knuckle")
-    tab.reset()
-    ghost_t, ghost = tab.points("v.knuckle", "ghost")
-    assert set(np.round(t, 6)) <= set(np.round(ghost_t, 6))
-    np.testing.assert_allclose(np.interp(t, ghost_t, ghost), first, rtol=1e-6, atol=1e-9)
-    assert "last run" in tab.page.locator("#curve-legend").inner_text()
-    # Another stiffness: at the same simulated time another curve.
-    tab.live.player.change("controller.kp", 0.1)
-    tab.step()
-    t, second = tab.points("v.knuckle")
-    assert np.abs(np.interp(t, ghost_t, ghost) - second).max() > 1.0
-    assert tab.page.evaluate("chart.lines(0, 1).filter((one) => one.ghost).length") == 3
-    tab.page.evaluate("globalThis.last = chart.ghost")
-    tab.page.keyboard.press("k")
-    tab.wait("chart.ghost !== last && document.getElementById('compare').value === 'kept'")
-    np.testing.assert_allclose(tab.points("v.knuckle", "ghost")[1][: len(second)], second)
-    tab.reset()
-    tab.reset()
-    assert tab.page.evaluate("document.getElementById('compare').value") == "kept"
-    assert len(tab.points("v.knuckle", "ghost")[0]) >= len(second)
-    tab.page.select_option("#compare", "")
-    assert tab.page.evaluate("chart.ghost") is None
-    assert "run" not in tab.page.locator("#curve-legend").inner_text()
-    # A parameter that restarts is the beginning of another run, too.
-    tab.page.select_option("#compare", "last")
-    tab.step()
-    tab.slide('[data-parameter="robot.three_link_finger.start.knuckle"]', 0.6)
-    tab.wait("state.t === 0 && chart.ghost?.rows.length > 3")
