@@ -37,20 +37,11 @@ ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests" / "data" / "corpus"
 FILES = ROOT / "tests" / "data"
 
-SHIPPED: tuple[str, ...] = (
-    "panda",
-    "ur3",
-    "ur5",
-    "ur10",
-    "xarm7",
-    "z1",
-    "kinova",
-    "so100",
-    "so101",
-    "talos_arm",
+SHIPPED = (
+    *("panda", "ur3", "ur5", "ur10", "xarm7", "z1", "kinova", "so100", "so101", "talos_arm"),
+    *("finger_edu", "three_link_finger", "allegro_right_hand", "asr_twodof", "ball", "a1", "go2"),
+    "solo12",
 )
-SHIPPED += ("finger_edu", "three_link_finger", "allegro_right_hand", "asr_twodof")
-SHIPPED += ("ball", "a1", "go2", "solo12")
 ROBOTS: dict[str, tuple[str, dict[str, object]]] = {
     **{name: (name, {}) for name in SHIPPED},
     "arm_with_probe": (str(FILES / "robots" / "arm_with_probe.urdf"), {}),

@@ -78,18 +78,6 @@ def test_the_touched_elements_are_colored_where_they_are():
     assert figure.axes[-1].get_ylabel() == "normal impulse on each element [N s]"
 
 
-@pytest.mark.parametrize(
-    ("quantity", "label"),
-    [
-        ("time", "time in contact of each element [s]"),
-        ("peak", "peak normal force on each element [N]"),
-    ],
-)
-def test_other_quantities_carry_their_unit(quantity, label):
-    result, scene = on(grid(), ROWS, ("tip", "toe"))
-    assert plot_contact_map(result, scene, quantity).axes[-1].get_ylabel() == label
-
-
 def test_the_eye_is_before_the_surface_a_little_aside():
     random = np.random.default_rng(0)
     for direction in [*random.normal(size=(50, 3)), [0, 0, 1.0], [0, 0, -1.0], [1.0, 0, 0]]:
@@ -128,23 +116,6 @@ def test_a_solid_held_from_both_sides_has_two_pictures():
         names = {text.get_text().strip() for text in axis.texts}
         assert own in names
         assert other not in names
-
-
-def test_of_a_large_shell_the_part_that_was_touched_is_shown():
-    shell = grid(cells=40)
-    rows = [
-        {"row": k, "element": 820 + k, "point_world": [0.0125 + 0.025 * k, 0.0125, 0]}
-        for k in range(3)
-    ]
-    result, scene = on(shell, rows)
-    axis = plot_contact_map(result, scene).axes[0]
-    assert axis.get_xlabel() == "x of the shell [mm]"
-    middles, _ = painted(axis)
-    assert 3 <= len(middles) < 400
-    # What was touched is inside.
-    for (low, high), x in zip((axis.get_xlim(), axis.get_ylim()), (37.5, 12.5), strict=True):
-        assert low < x < high
-        assert high - low < 350.0
 
 
 def test_a_fine_mesh_is_colored_as_wide_as_a_line(monkeypatch):
@@ -193,3 +164,20 @@ def test_what_passed_between_the_rows_is_reported(figures, said):
         assert ("record more often" in title) == bool(said)
         if quantity == "time":
             assert said in title
+
+
+def test_of_a_large_shell_the_part_that_was_touched_is_shown():
+    shell = grid(cells=40)
+    rows = [
+        {"row": k, "element": 820 + k, "point_world": [0.0125 + 0.025 * k, 0.0125, 0]}
+        for k in range(3)
+    ]
+    result, scene = on(shell, rows)
+    axis = plot_contact_map(result, scene).axes[0]
+    assert axis.get_xlabel() == "x of the shell [mm]"
+    middles, _ = painted(axis)
+    assert 3 <= len(middles) < 400
+    # What was touched is inside.
+    for (low, high), x in zip((axis.get_xlim(), axis.get_ylim()), (37.5, 12.5), strict=True):
+        assert low < x < high
+        assert high - low < 350.0

@@ -57,21 +57,6 @@ def notebooks():
     return module
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_notebook_has_the_cells_of_its_script(notebooks, name):
-    script = EXAMPLES / f"{name}.py"
-    cells = notebooks.notebook_of(script).cells
-    code = "".join(cell.source for cell in cells if cell.cell_type == "code")
-    words = "".join(cell.source for cell in cells if cell.cell_type == "markdown")
-    assert cells[0].source.startswith("# ")
-    assert '"""' not in words
-    # No line is lost: those of the script are those of the cells.
-    lines = [line for line in script.read_text().splitlines() if not line.startswith("# %%")]
-    for line in lines:
-        bare = line.strip().strip('"').removeprefix("# ").strip()
-        assert bare in code or bare in words, line
-
-
 @pytest.mark.parametrize("name", mostly_studies(NAMES, lambda name: name not in LONG))
 def test_an_example_comes_to_what_it_should(notebooks, name, tmp_path):
     pytest.importorskip(NEEDS.get(name, "numpy"))

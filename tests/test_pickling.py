@@ -108,11 +108,6 @@ def test_an_open_run_says_why_not(trip: Trip) -> None:
         trip(OpenRun(sp.Simulation(bumpy_scene()), START, record_dt=1e-3))
 
 
-def test_a_compiled_core_says_why_not(trip: Trip) -> None:
-    with pytest.raises(NotPicklable, match="send its Shell"):
-        trip(bumpy_scene().pairs[0].side_j.shell._binding)
-
-
 def test_a_copy_of_a_scene_is_independent(trip: Trip) -> None:
     scene = bumpy_scene()
     other = trip(scene)

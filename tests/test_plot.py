@@ -5,7 +5,7 @@ import pytest
 
 from sphshell_pin import plot
 from sphshell_pin.dynamics.result.result_parts import PairSeries
-from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.errors import MissingExtra
 from sphshell_pin.plot.figure import NO_CONTACT
 from sphshell_pin.plot.over_time import MOST_PAIRS, MOST_POINTS
 from tests.view.stand_ins import (
@@ -148,21 +148,6 @@ def test_a_long_run_keeps_its_one_row_peak():
     line = plot.plot_force_and_depth(result).axes[0].lines[0]
     assert len(line.get_xdata()) <= MOST_POINTS + 2
     assert line.get_ydata().max() == 77.0
-
-
-def test_potential_energy_is_shown_from_where_it_started():
-    result = without_contact()
-    result.energy.potential = np.linspace(1000.0, 1001.0, 5)
-    line = next(
-        line for line in plot.plot_energy(result).axes[0].lines if "potential" in line.get_label()
-    )
-    assert line.get_ydata()[0] == 0.0
-
-
-def test_a_folder_that_cannot_be_written_is_named(tmp_path):
-    (tmp_path / "file").write_text("in the way")
-    with pytest.raises(ResultError, match=r"force_and_depth\.png"):
-        plot.save_figures(without_contact(), tmp_path / "file")
 
 
 def test_without_matplotlib_one_sentence_says_how_to_get_it(monkeypatch):

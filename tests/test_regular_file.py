@@ -4,7 +4,6 @@ import os
 import re
 import socket
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ import pytest
 from sphshell_pin.base.atomic.file import write_whole
 from sphshell_pin.base.regular_file import open_regular, read_bytes, read_text
 from sphshell_pin.errors import ResultError
-from tests.programs import python
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -96,40 +94,3 @@ def test_nothing_else_in_the_package_opens_files_for_reading():
                     if READS.search(line.replace("open_regular(", "")) and not OWN.search(line)
                 ]
     assert found == []
-
-
-COMMANDS = {
-    "scenario": ("run", "a.toml"),
-    "explain": ("explain", "a.toml"),
-    "urdf": ("check-robot", "a.urdf"),
-    "xacro": ("check-robot", "a.xacro"),
-    "surface": ("check", "a.stl", "--unit", "m"),
-    "step": ("check", "a.step"),
-    "results": ("export", "a.npz", "--to", "csv"),
-    "table": ("fit", "--help"),
-}
-
-
-@pytest.mark.parametrize("kind", ["pipe", "zeros"])
-def test_commands_say_what_a_special_file_is(kind, tmp_path):
-    program = (
-        "import sys, json\n"
-        "from sphshell_pin.cli import main\n"
-        "for words in json.loads(sys.argv[1]):\n"
-        "    sys.argv = ['sphshell-pin', *words]\n"
-        "    try:\n        main()\n"
-        "    except SystemExit as end:\n        print(words[1], end.code, flush=True)\n"
-    )
-    import json
-
-    for words in COMMANDS.values():
-        place = tmp_path / words[1]
-        if not place.exists() and words[1][0] == "a":
-            os.mkfifo(place) if kind == "pipe" else place.symlink_to("/dev/zero")
-    start = time.monotonic()
-    done = python(program, json.dumps([*COMMANDS.values()][:-1]), cwd=tmp_path)
-    assert time.monotonic() - start < 100.0
-    assert "Traceback" not in done.stderr
-    ends = [line.split() for line in done.stdout.splitlines() if line[:2] == "a."]
-    assert [end for _, end in ends] == ["2"] * (len(COMMANDS) - 1), done.stderr
-    assert done.stderr.count("is a pipe, a socket or a device") == len(COMMANDS) - 1, done.stderr

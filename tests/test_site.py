@@ -16,7 +16,6 @@ import pytest
 
 import sphshell_pin
 from sphshell_pin import errors
-from tests.programs import python
 
 for package in ("mkdocs", "material", "mkdocstrings"):
     pytest.importorskip(package, reason="needs the extra docs: mkdocs-material, mkdocstrings")
@@ -87,22 +86,6 @@ def test_it_builds_without_a_warning(built):
     assert "WARNING" not in said
 
 
-def test_data_and_parameters_are_shown(built):
-    site, _ = built
-    texts = {one.name: one.read_text(encoding="utf-8") for one in site.glob("*.html")}
-    for name, words in (
-        ("hard_cases", ("symmetric top", "Bowl touched along a ring")),
-        ("speed", ("coal::collide", "Ball bounces five times")),
-        ("robots", ("three_link_finger", "valve_body_step")),
-        ("laws", ("parameter of <code>MindlinFriction</code>", "full_damping_depth")),
-        ("scenarios", ("half-space", "cartesian-impedance", "release")),
-        ("commands", ("--chord-error", "check-robot")),
-        ("gallery", ("mean force", "scenarios/peg_in_bore.toml")),
-    ):
-        for word in words:
-            assert word in texts[f"{name}.html"], (name, word)
-
-
 def test_every_page_is_there_and_in_the_menu(built, pages):
     site, _ = built
     written = {page.relative_to(ROOT / "docs") for page in (ROOT / "docs").rglob("*.md")}
@@ -124,20 +107,6 @@ def test_it_asks_nobody_for_anything(built, pages):
     for style in site.rglob("*.css"):
         text = style.read_text(encoding="utf-8")
         assert not re.search(r"(url\(|@import)\s*[\"']?(https?:)?//", text), style.name
-
-
-def test_the_links_of_the_site_lead_somewhere(pages):
-    for file, page in pages.items():
-        if file.name == "404.html":  # its links are those of a site at the root of a host
-            continue
-        for link in page.links:
-            parts = urlsplit(link)
-            if parts.scheme or parts.netloc:
-                continue
-            target = (file.parent / unquote(parts.path)).resolve() if parts.path else file
-            assert target.exists(), f"{file.name}: {link}"
-            if parts.fragment and target in pages:
-                assert unquote(parts.fragment) in pages[target].anchors, f"{file.name}: {link}"
 
 
 def test_every_public_name_is_in_the_api(built, pages):
@@ -165,21 +134,6 @@ def test_meanings_of_parameters_do_not_pass_for_types(built, pages):
     site, _ = built
     text = " ".join("".join(pages[site / "api" / "shell.html"].text).split())
     assert re.search(r"crease_angle \(float, default: CREASE_ANGLE ?\) \S edges that turn", text)
-
-
-def test_docstrings_are_spelled_out(tmp_path):
-    program = (
-        "from sections import spell_out\n"
-        "text = 'Do it.\\n\\nParameters\\n----------\\na : first [m],\\n    or none\\n'\n"
-        "text += 'b : (n,); c : (m,) last\\nd (n, 3), e (n,) : both\\n'\n"
-        "text += '\\nRaises\\n------\\nError : kept\\n'\n"
-        "print(spell_out(text), end='')"
-    )
-    assert python(program, cwd=ROOT / "docs" / "api", check=True).stdout == (
-        "Do it.\n\nParameters\n----------\na\n    first [m],\n    or none\n"
-        "b\n    (n,)\nc\n    (m,) last\nd, e\n    (n, 3), (n,) both\n\n"
-        "Raises\n------\nError : kept\n"
-    )
 
 
 @pytest.fixture
@@ -224,22 +178,3 @@ def test_it_fits_a_telephone_and_its_search_finds(built, browser, address, pages
     page.locator(".md-search-result__item a").first.wait_for()
     assert not complaints
     context.close()
-
-
-@pytest.mark.browser
-def test_its_search_finds_in_a_page_that_is_opened_as_a_file(built, browser):
-    site, _ = built
-    page = browser.new_page()
-    complaints: list[str] = []
-    page.on("pageerror", lambda fault: complaints.append(str(fault)))
-    page.goto((site / "index.html").as_uri())
-    page.locator("input[name=query]").click()
-    page.keyboard.type("Mindlin")
-    found = page.locator(".md-search-result__meta")
-    page.wait_for_function(
-        "document.querySelector('.md-search-result__meta').textContent.includes('matching')"
-    )
-    assert int(found.text_content().split()[0]) > 0
-    assert page.locator(".md-search-result__link").first.get_attribute("href").startswith("file:")
-    page.close()
-    assert complaints == []

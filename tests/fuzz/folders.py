@@ -20,37 +20,16 @@ from tests.fuzz.meshes import SHAPES, WRITERS, Mesh, damaged_mesh
 from tests.fuzz.mutate import LARGEST, NUMBERS, alter, damage, repeated
 from tests.fuzz.strangers import mesh_corpus as drawn_corpus
 from tests.kept import scenes
+from tests.texts import text_of
 
 DATA = Path(__file__).parents[1] / "data"
 Structure = Callable[[random.Random, bytes], bytes]
 
-ROBOT = """<robot name="arm"><link name="base"/>
-<link name="arm"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0"
-  ixz="0" iyz="0"/></inertial>
-  <visual><geometry><mesh filename="MESH" scale="0.1 0.1 0.2"/></geometry></visual>
-  <collision><geometry><mesh filename="MESH"/></geometry></collision></link>
-<joint name="elbow" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
-MJCF = """<mujoco model="arm"><compiler angle="radian"/>
-<asset><mesh name="mesh" file="MESH" scale="0.1 0.1 0.2"/></asset>
-<worldbody><body name="arm"><joint name="elbow" axis="0 1 0"/><geom type="mesh" mesh="mesh"/></body>
-</worldbody></mujoco>"""
+ROBOT = text_of("robots/with_mesh.urdf").rstrip()
+MJCF = text_of("robots/with_mesh.xml").rstrip()
 INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-POSES = """<robot name="finger"><group name="all"><joint name="knuckle"/></group>
-<group_state name="closed" group="all"><joint name="knuckle" value="0.8"/>
-  <joint name="middle_joint" value="0.4"/></group_state>
-<group_state name="open" group="all"><joint name="knuckle" value="0"/></group_state></robot>"""
-DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="a" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array>
-<technique_common><accessor source="#a" count="4" stride="3"><param name="X" type="float"/>
-<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
-<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node>
-</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+POSES = text_of("robots/finger.srdf").rstrip()
+DAE = text_of("robots/tetrahedron.dae").rstrip()
 MEASURED = b"""t [s],pairs.ball-plate.normal_force [N],q.root_joint.2 [m],q.root_joint.2.sigma [m]
 0.001,0.0,0.01249,1e-5\n0.002,0.5,0.01246,1e-5\n0.003,0.9,0.01241,1e-5\n0.004,,0.0124,2e-5
 """

@@ -21,74 +21,11 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
 from tests.fuzz.mutate import NUMBERS, alter, damage, odd_value
 from tests.scenario.files import DROP, write
+from tests.texts import text_of
 
-PRESS = """
-title = "a finger presses on a surface file"
-gravity = [0.0, 0.0, -9.81]
+PRESS = text_of("scenarios/press.toml")
 
-[[robot]]
-name = "three_link_finger"
-lock = ["distal_joint"]
-start = { knuckle = 0.3, middle_joint = 0.4 }
-speed = { knuckle = 0.1 }
-placement = { xyz = [0.0, 0.0, 0.1], rpy_deg = [0.0, 10.0, 0.0] }
-
-[[robot]]
-urdf = "finger.urdf"
-label = "other"
-placement = { xyz = [1.0, 0.0, 0.0] }
-
-[[shell]]
-name = "box"
-file = "box.off"
-unit = "m"
-magnify = 2.0
-side = "outside"
-frame = "other/base"
-
-[[shell]]
-name = "ball"
-primitive = { type = "sphere", radius = 0.1 }
-segments = 12
-
-[[contact]]
-name = "tip"
-sphere = { frame = "three_link_finger/tip", radius = 0.01, offset = [0.0, 0.0, 0.001] }
-shell = "box"
-method = "facets"
-law = { type = "hertz", radius = 1, young = 1e6, poisson = 0.4, young_2 = 1e9, poisson_2 = 0.3 }
-friction = { type = "bristle", mu_static = 0.6, mu_dynamic = 0.5, stiffness = 1e4, damping = 3.0 }
-
-[[contact]]
-name = "other tip"
-sphere = { frame = "other/tip", radius = 0.01 }
-shell = "ball"
-law = { type = "adams", k = 1e5, e = 2.2, c = 10.0, d = 0.1, units = "mm-N-s" }
-friction = { type = "coulomb", mu_static = 0.3 }
-
-[controller]
-type = "joint-pd"
-kp = 1.0
-kd = { "other/knuckle" = 0.1 }
-
-[run]
-duration = 0.1
-integrator = "adaptive"
-rtol = 1e-6
-record_dt = 1e-3
-
-[[knob]]
-key = "contact.tip.friction.mu_static"
-
-[expect]
-"energy.relative_residual" = { max = 1e-2 }
-"""
-
-BOX = """OFF
-8 6 0
-0 0 0\n0 0 1\n0 1 0\n0 1 1\n1 0 0\n1 0 1\n1 1 0\n1 1 1
-4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3
-"""
+BOX = text_of("scenarios/box.off")
 
 EXPRESSIONS = (
     *("${9**9**9}", "${'x' * 10**10}", "${open('x').read()}", "${(lambda: 0)()}", "${", "${1 / 0}"),

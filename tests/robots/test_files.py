@@ -12,7 +12,6 @@ from sphshell_pin import robots
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import NameNotFound, RobotWarning
-from tests.studies import mostly_studies
 
 FOLDER = Path(__file__).parents[1] / "data" / "xacro"
 INERTIAL = (
@@ -89,22 +88,6 @@ def test_other_names_of_meshes(tmp_path):
         assert robots.load_file(arm(tmp_path, collision=uri)).collision_model.ngeoms == 1
 
 
-def test_a_damaged_off_file_is_refused_at_once(tmp_path):
-    """The reader that Pinocchio has goes on for ever at this one."""
-    mesh = tmp_path / "mesh.off"
-    mesh.write_bytes(b"OFF#% 7 0\n0 0 1e-30\n1 4 0\n0 0 1\xff")
-    with pytest.raises(robots.RobotError, match=r"mesh\.off"):
-        robots.load_file(arm(tmp_path, collision=str(mesh)))
-
-
-def test_tags_may_have_letters_of_any_language(tmp_path):
-    """An element that nobody knows is left alone, whatever its name."""
-    text = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
-    path = tmp_path / "finger.urdf"
-    path.write_text(text.replace("</robot>", "<größe/></robot>"), encoding="utf-8")
-    assert robots.load_file(path).model.nq == 3
-
-
 def test_a_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
     """Motion needs none; a collision mesh that is there and broken ends, as it would touch."""
     file = arm(tmp_path, visual=URI)
@@ -166,13 +149,6 @@ def test_part_of_a_robot_asks_for_the_file_that_includes_it(tmp_path, text):
     path = tmp_path / "part.urdf"
     path.write_text(text)
     with pytest.raises(robots.RobotError, match=r"name (that|the file of the robot)"):
-        robots.load_file(path)
-
-
-def test_sdf_is_known_by_its_content_too(tmp_path):
-    path = tmp_path / "model.xml"
-    path.write_text("<sdf version='1.6'><model name='m'/></sdf>")
-    with pytest.raises(robots.RobotError, match="has no SDF reader"):
         robots.load_file(path)
 
 
@@ -262,27 +238,6 @@ def check_reduced(whole: pin.Model, model: pin.Model) -> None:
     assert np.allclose(
         model.upperDryFrictionLimit @ abs(v), whole.upperDryFrictionLimit @ abs(g @ v)
     )
-
-
-MIMICKING = {
-    "alex_psyonic_hands": 8,
-    "baxter": 2,
-    "panda": 1,
-    "pr2": 10,
-    "romeo": 22,
-    "talos_full": 12,
-    "tiago_pro": 10,
-}
-
-
-@pytest.mark.robots
-@pytest.mark.parametrize("name", mostly_studies(MIMICKING, lambda name: name == "panda"))
-def test_mimic_joints_of_the_library_are_exact(name):
-    pytest.importorskip("example_robot_data")
-    whole, robot = robots.load(name), robots.load(name, mimic=True)
-    assert whole.model.nv - robot.model.nv == len(mimics(robot.model)) == MIMICKING[name]
-    assert robot.q0.shape == (robot.model.nq,)
-    check_reduced(whole.model, robot.model)
 
 
 @pytest.mark.parametrize("name", ["one_finger", "hand", "gripper"])

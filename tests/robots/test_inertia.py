@@ -13,6 +13,7 @@ from sphshell_pin.robots.mending import mended
 from sphshell_pin.study.robot_check import QUICK, check_robot
 from tests import meshes
 from tests.command import call
+from tests.texts import text_of
 
 JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
 <origin xyz="0.1 0 0.2"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" velocity="2"/>
@@ -161,20 +162,11 @@ def test_an_inertia_is_never_dropped(tmp_path: Path, ixz: str, refused: str) -> 
 
 @pytest.mark.parametrize("kind", ["collision", "visual"])
 def test_a_collada_mesh_has_the_unit_that_it_states(tmp_path: Path, kind: str) -> None:
-    numbers = "0 0 0 50 0 0 0 50 0 0 0 50"  # of a tetrahedron of 50 mm
-    (tmp_path / "part.dae").write_text(
-        '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" '
-        'version="1.4.1"><asset><unit name="millimeter" meter="0.001"/></asset>'
-        '<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="12">'
-        f'{numbers}</float_array><technique_common><accessor source="#a" count="4" stride="3">'
-        '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" '
-        'type="float"/></accessor></technique_common></source><vertices id="v"><input '
-        'semantic="POSITION" source="#p"/></vertices><triangles count="4"><input '
-        'semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>'
-        '</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node>'
-        '<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes><scene>'
-        '<instance_visual_scene url="#s"/></scene></COLLADA>'
-    )
+    # A tetrahedron of 50 mm.
+    text = text_of("robots/tetrahedron.dae").replace('meter="1"', 'meter="0.001"')
+    numbers = "0 0 0 1 0 0 0 1 0 0 0 1"
+    assert numbers in text
+    (tmp_path / "part.dae").write_text(text.replace(numbers, numbers.replace("1", "50")))
     file = tmp_path / "arm.urdf"
     file.write_text(
         f'<robot name="arm"><link name="a"/><link name="b"><{kind}><geometry><mesh '

@@ -13,6 +13,7 @@ from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.mjcf_compile import silent
+from tests.texts import text_of
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -22,8 +23,8 @@ FREE, BALL = 0, 1
 
 
 @cache
-def told_by_mujoco(name):
-    """Return joints, a state, and mass matrix and bias forces in it."""
+def of_mujoco(name):
+    """Return MuJoCo's model, its data in some state, and the mass matrix there."""
     with silent(mujoco):
         model = mujoco.MjModel.from_xml_path(str(FOLDER / name))
     data = mujoco.MjData(model)
@@ -37,33 +38,7 @@ def told_by_mujoco(name):
     mujoco.mj_forward(model, data)
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
-    joints = [
-        {
-            "name": model.joint(j).name,
-            "type": int(model.jnt_type[j]),
-            "qpos0": float(model.qpos0[model.jnt_qposadr[j]]),
-            "range": model.jnt_range[j].tolist() if model.jnt_limited[j] else None,
-            "damping": float(np.ravel(model.dof_damping[model.jnt_dofadr[j]])[0]),
-            "friction": float(model.dof_frictionloss[model.jnt_dofadr[j]]),
-            "armature": float(model.dof_armature[model.jnt_dofadr[j]]),
-        }
-        for j in range(model.njnt)
-    ]
-    spheres = {
-        model.geom(g).name: [*data.geom_xpos[g].tolist(), float(model.geom_size[g][0])]
-        for g in range(model.ngeom)
-        if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_SPHERE and model.geom(g).name
-    }
-    sites = {model.site(s).name: data.site_xpos[s].tolist() for s in range(model.nsite)}
-    return {
-        "joints": joints,
-        "qpos": data.qpos.tolist(),
-        "qvel": data.qvel.tolist(),
-        "mass": mass.tolist(),
-        "bias": data.qfrc_bias.tolist(),
-        "spheres": spheres,
-        "sites": sites,
-    }
+    return model, data, mass
 
 
 def load(name, **options):
@@ -72,80 +47,79 @@ def load(name, **options):
         return robots.load_file(FOLDER / name, **options)
 
 
-def state(model, told):
+def state(model, theirs, data):
     """Return q, v of the model, and the matrix from its velocities to those of MuJoCo."""
-    qpos, qvel = np.array(told["qpos"]), np.array(told["qvel"])
-    q, v, to_mujoco = np.zeros(model.nq), np.zeros(model.nv), np.eye(model.nv)
-    assert len(told["joints"]) == model.njoints - 1
-    for joint, one in zip(list(model.joints)[1:], told["joints"], strict=True):
+    qpos, q, v, to_mujoco = data.qpos, *map(np.zeros, (model.nq, model.nv)), np.eye(model.nv)
+    assert theirs.njnt == model.njoints - 1
+    for joint, kind in zip(list(model.joints)[1:], theirs.jnt_type, strict=True):
         at, av = joint.idx_q, joint.idx_v
-        if one["type"] == FREE:
+        if kind == FREE:
             q[at : at + 7] = [*qpos[at : at + 3], *qpos[at + 4 : at + 7], qpos[at + 3]]
             turn = pin.Quaternion(q[at + 3 : at + 7]).toRotationMatrix()
             to_mujoco[av : av + 3, av : av + 3] = turn  # linear velocity in the world's axes
-        elif one["type"] == BALL:
+        elif kind == BALL:
             q[at : at + 4] = [*qpos[at + 1 : at + 4], qpos[at]]
         else:
             q[at] = qpos[at]
-    v[:] = np.linalg.solve(to_mujoco, qvel)
+    v[:] = np.linalg.solve(to_mujoco, data.qvel)
     return q, v, to_mujoco
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_mass_and_forces_are_those_of_mujoco(name):
-    told, model = told_by_mujoco(name), load(name).model
-    q, v, to_mujoco = state(model, told)
+    (theirs, told, their_mass), model = of_mujoco(name), load(name).model
+    q, v, to_mujoco = state(model, theirs, told)
     data = model.createData()
     upper = np.triu(pin.crba(model, data, q))
     mass = upper + np.triu(upper, 1).T
-    expected = to_mujoco.T @ np.array(told["mass"]) @ to_mujoco
+    expected = to_mujoco.T @ their_mass @ to_mujoco
     assert np.allclose(mass, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
     # Of a free joint, MuJoCo's acceleration is that of the linear velocity in the world's axes.
     turning = np.zeros(model.nv)
-    for joint, one in zip(list(model.joints)[1:], told["joints"], strict=True):
-        if one["type"] == FREE:
+    for joint, kind in zip(list(model.joints)[1:], theirs.jnt_type, strict=True):
+        if kind == FREE:
             at = joint.idx_v
             turning[at : at + 3] = -np.cross(v[at + 3 : at + 6], v[at : at + 3])
     forces = pin.rnea(model, data, q, v, turning) - model.armature * turning
-    expected = to_mujoco.T @ np.array(told["bias"])
+    expected = to_mujoco.T @ told.qfrc_bias
     assert np.allclose(forces, expected, rtol=0, atol=1e-12 * max(np.abs(expected).max(), 1.0))
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_spheres_and_sites_are_where_mujoco_has_them(name):
-    told, robot = told_by_mujoco(name), load(name)
+    (theirs, told, _), robot = of_mujoco(name), load(name)
     model, data = robot.model, robot.model.createData()
-    q, _, _ = state(model, told)
+    q, _, _ = state(model, theirs, told)
     pin.framesForwardKinematics(model, data, q)
     found = {}
     for one in robot.collision_model.geometryObjects:
         if type(one.geometry).__name__ == "Sphere":
             center = data.oMi[one.parentJoint].act(one.placement.translation)
             found[one.name] = [*center, one.geometry.radius]
-    for sphere, expected in told["spheres"].items():
-        assert np.allclose(found[sphere], expected, rtol=0, atol=1e-14)
-    for site, expected in told["sites"].items():
-        here = data.oMf[model.getFrameId(site)].translation
-        assert np.allclose(here, expected, rtol=0, atol=1e-14)
+    for g in np.flatnonzero(theirs.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE):
+        if sphere := theirs.geom(g).name:
+            expected = [*told.geom_xpos[g], theirs.geom_size[g][0]]
+            assert np.allclose(found[sphere], expected, rtol=0, atol=1e-14)
+    for s in range(theirs.nsite):
+        here = data.oMf[model.getFrameId(theirs.site(s).name)].translation
+        assert np.allclose(here, told.site_xpos[s], rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_joints_have_the_names_and_numbers_of_the_file(name):
-    told, model = told_by_mujoco(name), load(name).model
-    for j, one in enumerate(told["joints"], 1):
-        joint = model.joints[j]
+    (theirs, _, _), model = of_mujoco(name), load(name).model
+    for j in range(theirs.njnt):
+        joint, first = model.joints[j + 1], theirs.jnt_dofadr[j]
         at, av = joint.idx_q, slice(joint.idx_v, joint.idx_v + joint.nv)
-        assert not one["name"] or model.names[j] == one["name"]
-        assert np.all(model.damping[av] == one["damping"])
-        assert np.all(model.upperDryFrictionLimit[av] == one["friction"])
-        assert np.all(model.lowerDryFrictionLimit[av] == -one["friction"])
-        assert np.all(model.armature[av] == one["armature"])
+        assert not theirs.joint(j).name or model.names[j + 1] == theirs.joint(j).name
+        assert np.all(model.damping[av] == np.ravel(theirs.dof_damping[first])[0])
+        assert np.all(model.upperDryFrictionLimit[av] == theirs.dof_frictionloss[first])
+        assert np.all(model.lowerDryFrictionLimit[av] == -theirs.dof_frictionloss[first])
+        assert np.all(model.armature[av] == theirs.dof_armature[first])
         if joint.nq == 1:
             limits = [model.lowerPositionLimit[at], model.upperPositionLimit[at]]
-            if one["range"] is None:
-                assert limits == [-np.inf, np.inf]
-            else:
-                assert np.allclose(limits, one["range"], rtol=0, atol=1e-15)
+            wanted = theirs.jnt_range[j] if theirs.jnt_limited[j] else [-np.inf, np.inf]
+            np.testing.assert_allclose(limits, wanted, rtol=0, atol=1e-15)
 
 
 def test_equalities_of_joints_are_mimic_joints():
@@ -360,19 +334,7 @@ def test_meshes_of_mjcf(tmp_path):
         assert robots.load_file(path).model.nv == 2
 
 
-SHOWN = """<mujoco model="arm"><compiler angle="radian" meshdir="a" texturedir="/dev"><lengthrange/>
-</compiler><option timestep="0.002"/><size nconmax="1000000000" memory="99999M"/>
-<visual><global offwidth="640"/></visual><statistic meansize="0.1"/>
-<default><default class="link"><geom material="gray"/><joint damping="2"/></default></default>
-<asset><texture name="t" type="2d" file="zero"/><hfield name="h" size="1 1 1 1" file="zero"/>
-<material name="gray" texture="t" rgba="0.1 0.2 0.3 1"/><mesh name="w" file="nix.stl"/></asset>
-<worldbody><light pos="0 0 1"/><geom name="ground" type="hfield" hfield="h"/>
-<body name="b" childclass="link" gravcomp="1" user="1 2 3"><camera name="c"/><joint name="j"/>
-<inertial pos="0 0 0.1" mass="2" diaginertia="1 1 1"/><geom size="0.1"/>
-<geom type="mesh" mesh="w" contype="0" conaffinity="0"/></body></worldbody>
-<actuator><motor joint="j"/><plugin joint="j" plugin="p"/></actuator>
-<sensor><jointpos joint="j"/></sensor><extension><plugin plugin="p"/></extension>
-<keyframe><key name="home" qpos="0.5" qvel="0.1" ctrl="3"/></keyframe></mujoco>"""
+SHOWN = text_of("robots/shown.xml").rstrip()
 
 
 def test_what_only_shows_or_moves_the_robot_is_not_read(tmp_path):

@@ -59,22 +59,14 @@ def test_packages_of_the_workspace_are_found_from_any_folder(
     assert robots.load_file(relative).model.inertias[1].lever[0] == pytest.approx(0.3)
 
 
-def test_a_relative_package_folder_is_that_of_the_working_folder(
+def test_a_relative_package_folder_is_that_of_the_working_folder_then(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("ROS_PACKAGE_PATH", "")  # which --package-dir adds to
     file = workspace(tmp_path, "elsewhere/arm_resources")
     monkeypatch.chdir(tmp_path)
-    relative = file.relative_to(tmp_path)
-    assert robots.load_file(relative, ["elsewhere"]).model.nv == 1
-    done = call("new", "--robot", relative, "--package-dir", "elsewhere", "--frame", "tip",
-                "--radius", "10mm", "--offset", 0.3, 0, 0, "--out", "arm.toml")  # fmt: skip
-    assert done.exit_code == 0, done.output
-    monkeypatch.setenv("ROS_PACKAGE_PATH", "")
-    (tmp_path / "runs").mkdir()
-    monkeypatch.chdir(tmp_path / "runs")
-    done = call("explain", "../arm.toml")
-    assert done.exit_code == 0, done.output
+    folders = Folders.of(file, ["elsewhere"])
+    monkeypatch.chdir(file.parent)
+    assert folders.package("arm_resources") == tmp_path / "elsewhere" / "arm_resources"
 
 
 def test_the_search_ends_at_the_workspace(tmp_path: Path) -> None:
@@ -174,21 +166,6 @@ def test_a_mesh_of_another_folder_is_not_taken_for_a_missing_one(
         robots.load_file(file)
 
 
-def test_a_package_whose_meshes_were_put_into_more_folders_and_the_nearer_of_two(
-    tmp_path: Path,
-) -> None:
-    file = workspace(tmp_path, "src/vendor/arm_resources")
-    package(tmp_path / "src" / "another" / "arm_resources")
-    mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
-    for name in ("collision/large/one.obj", "visual/large/one.obj"):
-        (mesh.parent / name).parent.mkdir(parents=True)
-        (mesh.parent / name).write_bytes(mesh.read_bytes())
-    mesh.unlink()
-    file.write_text(file.read_text().replace("/one.obj", "/collision/one.obj"))
-    (geometry,) = robots.load_file(file).collision_model.geometryObjects
-    assert geometry.meshPath.endswith("vendor/arm_resources/meshes/collision/large/one.obj")
-
-
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -236,3 +213,18 @@ def test_a_part_of_a_robot_names_the_robot_that_includes_it(tmp_path: Path, name
         whole.write_text(f'{head} name="arm"><xacro:include filename="macro.xacro"/></robot>')
     with pytest.raises(robots.RobotError, match=f"that includes this one: {re.escape(str(whole))}"):
         robots.load_file(part)
+
+
+def test_a_package_whose_meshes_were_put_into_more_folders_and_the_nearer_of_two(
+    tmp_path: Path,
+) -> None:
+    file = workspace(tmp_path, "src/vendor/arm_resources")
+    package(tmp_path / "src" / "another" / "arm_resources")
+    mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
+    for name in ("collision/large/one.obj", "visual/large/one.obj"):
+        (mesh.parent / name).parent.mkdir(parents=True)
+        (mesh.parent / name).write_bytes(mesh.read_bytes())
+    mesh.unlink()
+    file.write_text(file.read_text().replace("/one.obj", "/collision/one.obj"))
+    (geometry,) = robots.load_file(file).collision_model.geometryObjects
+    assert geometry.meshPath.endswith("vendor/arm_resources/meshes/collision/large/one.obj")

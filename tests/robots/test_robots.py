@@ -56,41 +56,6 @@ def test_without_the_library_own_robots_still_load(monkeypatch):
         robots.load("panda")
 
 
-@pytest.mark.robots
-def test_of_many_known_names_the_nearest_are_told():
-    pytest.importorskip("example_robot_data")
-    with pytest.raises(NameNotFound) as caught:
-        robots.load("pnda")
-    count = len(robots.names())
-    assert "no robot 'pnda'; the nearest are panda, " in str(caught.value)
-    assert f"has {count}: see sphshell-pin list" in str(caught.value)
-    assert len(caught.value.valid) == count
-
-
-@pytest.mark.robots
-@pytest.mark.parametrize(
-    ("name", "count", "radius"),
-    [("allegro_right_hand", 4, 0.012), ("a1", 4, 0.02), ("panda", 1, 0.012), ("ur5", 1, 0.012)],
-)
-def test_fingertips_of_known_robots(name, count, radius):
-    pytest.importorskip("example_robot_data")
-    tips = robots.fingertips(name)
-    model = robots.load(name).model
-    assert len(tips) == count
-    for tip in tips:
-        assert tip.radius == pytest.approx(radius)
-        assert model.existFrame(tip.frame)
-
-
-@pytest.mark.robots
-def test_a_robot_this_machine_cannot_read_is_told_in_a_sentence():
-    pytest.importorskip("example_robot_data")
-    if hasattr(pin, "buildModelFromSdf"):
-        pytest.skip("this pinocchio reads SDF files")
-    with pytest.raises(robots.RobotError, match=r"cassie.*wheel of pinocchio has no SDF reader"):
-        robots.load("cassie")
-
-
 @pytest.mark.parametrize("name", ["so100", "a1", "panda", "ball"])
 def test_the_base_of_a_shipped_robot_is_what_it_is_asked_to_be(name):
     plain, fixed, free = (robots.load(name, free_flyer=one) for one in (None, False, True))

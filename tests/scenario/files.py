@@ -8,67 +8,11 @@ import numpy as np
 from sphshell_pin.scenario import judge
 from sphshell_pin.scenario.running.run import simulate
 from tests.models import pose_of
+from tests.texts import text_of
 
-DROP = """
-title = "a ball falls on a box"
+DROP = text_of("scenarios/drop.toml")
 
-[robot]
-name = "ball"
-start = { root_joint = [0.01, 0.02, 0.0125, 0, 0, 0, 1] }
-
-[[shell]]
-name = "plate"
-primitive = { type = "box", size = [0.2, 0.2, 0.02] }
-placement = { xyz = [0, 0, -0.01] }
-
-[[contact]]
-name = "ball-plate"
-sphere = { frame = "ball", radius = 0.012 }
-shell = "plate"
-law = { type = "impact", stiffness = 1e6, exponent = 1.5, damping = 20.0 }
-
-[run]
-duration = 0.05
-dt = 1e-4
-"""
-
-FINGER = """
-title = "a finger bends over a plate"
-
-[robot]
-name = "three_link_finger"
-start = { knuckle = 0.3, middle_joint = 0.6, distal_joint = 0.5 }
-
-[[shell]]
-name = "plate"
-primitive = { type = "box", size = [0.4, 0.4, 0.02] }
-placement = { xyz = [0.0, 0.0, -0.3] }
-
-[[contact]]
-name = "tip-plate"
-sphere = { frame = "tip", radius = 0.01 }
-shell = "plate"
-law = { type = "impact", stiffness = 1e6, exponent = 1.5, damping = 20.0 }
-
-[controller]
-type = "joint-pd"
-kp = 0.05
-kd = 0.004
-q_ref = { knuckle = 0.6 }
-
-[[sensor]]
-name = "wrist"
-type = "force-torque"
-frame = "tip"
-rate = 300
-delay = 2e-3
-
-[run]
-duration = 0.1
-dt = 2e-4
-record_dt = 5e-3
-record = ["torque"]
-"""
+FINGER = text_of("scenarios/finger.toml")
 
 
 def write(folder: Path, text: str = DROP, name: str = "drop.toml") -> Path:

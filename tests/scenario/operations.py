@@ -30,11 +30,6 @@ def kill(_: str) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def interrupt(_: str) -> None:
-    """Do what Ctrl-C does."""
-    raise KeyboardInterrupt
-
-
 def fill(event: str) -> None:
     """Let nothing be written, as on a full disk."""
     if event in _TAKES_ROOM:

@@ -106,24 +106,6 @@ def test_trimmed_faces_edges_and_corners_are_found(center, contact, foot, tmp_pa
     assert faces.stationary_point(np.array(center), np.array([50.0, 50.0, 50.0])) is None
 
 
-def test_border_of_a_hole_is_a_curve(tmp_path):
-    """A ball on the rim of a hole touches its circle, where neither face has a closest point."""
-    require_kernel("this test")
-    from sphshell_pin.shell.cad.exact import TrimmedFaces
-    from sphshell_pin.shell.cad.surface import load_cad
-
-    path = shapes.write_brep(tmp_path / "plate.brep", shapes.drilled_plate())
-    faces = TrimmedFaces(load_cad(path, "mm", CadOptions()))
-    rng = np.random.default_rng(2)
-    for angle in rng.uniform(0, 2 * np.pi, 20):
-        out = np.array([np.cos(angle), np.sin(angle), 0.0])
-        rim = np.array([20.0, 20.0, 5.0]) + 10.0 * out
-        center = rim - 3.0 * out + [0.0, 0.0, 2.0]
-        found = faces.stationary_point(center, rim + rng.normal(scale=0.01, size=3))
-        assert found.point == pytest.approx(rim, abs=1e-11)
-        assert found.normal is None
-
-
 def test_files_and_table_have_the_audit(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     out = tmp_path / "out"

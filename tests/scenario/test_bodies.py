@@ -8,31 +8,14 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.errors import RobotWarning, ScenarioError
+from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.format.reading import read_scenario
 from tests.models import pose_of
 from tests.scenario.files import write
+from tests.texts import text_of
 
-TWO = """
-title = "a finger and a ball"
-gravity = [0, 1, -2]
-
-[[robot]]
-name = "three_link_finger"
-placement = { xyz = [0.1, 0.2, 0.3], rpy_deg = [0, 0, 90] }
-lock = ["middle_joint"]
-start = { knuckle = 0.3, middle_joint = 0.4 }
-speed = { knuckle = 1.5 }
-
-[[robot]]
-name = "ball"
-start = { root_joint = [1, 2, 3, 0, 0, 0.6, 0.8] }
-speed = { root_joint = [1, 2, 3, 4, 5, 6] }
-
-[run]
-duration = 1
-"""
+TWO = text_of("scenarios/finger_and_ball.toml")
 
 
 def assembled(folder, text=TWO):
@@ -55,26 +38,7 @@ def test_names_carry_the_robot_and_the_values_their_joint(tmp_path):
     np.testing.assert_allclose(assembly.v0, [1.5, 0, 0, 1, 2, 3, 4, 5, 6])
 
 
-MOUNTED = """
-title = "a finger on a turntable, and a ball"
-
-[[robot]]
-name = "turntable"
-start = { axle = 0.7 }
-
-[[robot]]
-name = "ball"
-start = { root_joint = [1, 2, 3, 0, 0, 0.6, 0.8] }
-
-[[robot]]
-name = "three_link_finger"
-frame = "turntable/disc"
-placement = { xyz = [0.1, 0.2, 0.3], rpy_deg = [0, 0, 90] }
-start = { knuckle = 0.3, middle_joint = 0.4, distal_joint = 0.5 }
-
-[run]
-duration = 1
-"""
+MOUNTED = text_of("scenarios/mounted.toml")
 
 
 def test_a_robot_may_be_mounted_on_another(tmp_path):
@@ -155,18 +119,6 @@ def test_faults_name_the_key(fault, tmp_path):
     assert words in str(caught.value)
 
 
-def test_a_missing_mesh_names_the_searched_folders(tmp_path):
-    (tmp_path / "r.urdf").write_text(
-        '<robot name="r"><link name="a"><collision><geometry>'
-        '<mesh filename="package://arm/a.stl"/></geometry></collision></link></robot>'
-    )
-    text = 'title = "x"\nrobot.urdf = "r.urdf"\nrun.duration = 1\n'
-    with pytest.warns(RobotWarning, match=r"package://arm/a.stl.*--package-dir"):
-        assembled(tmp_path, text)
-    with pytest.raises(ScenarioError, match="does not exist"):
-        assembled(tmp_path, text + 'robot.package_dirs = ["meshes"]\n')
-
-
 DATA = Path(__file__).parents[1] / "data"
 GRIPPER = f"""title = "x"
 [robot]
@@ -228,12 +180,3 @@ def test_one_joint_of_a_group_locks_all(tmp_path):
         right = pose_of(scene.model, np.zeros(1), "right")
         assert np.allclose(right.translation, [-0.06, 0, -0.02])
         assert reduce_visual(found).ngeoms == found.visual_model.ngeoms
-
-
-def test_several_robots_keep_their_armature(tmp_path):
-    two = GRIPPER.replace("[robot]", "[[robot]]")
-    two = two.replace("KEYS", two.partition("\n")[2].partition("[run]")[0].replace("KEYS", ""))
-    two = two.replace("[[robot]]", '[[robot]]\nlabel = "a"', 1)
-    model = assembled(tmp_path, two).model
-    # 0.02 of each of two fingers.
-    assert np.allclose(model.armature, [0, 0.04, 0, 0.04])

@@ -52,13 +52,6 @@ def test_primitives_are_closed_shells_of_their_size(primitive, tmp_path):
     assert 0.1 <= shell.size <= 0.8
 
 
-def test_magnify_scales_the_shell(tmp_path):
-    text = DROP.replace('name = "plate"', 'name = "plate"\nmagnify = 2.5', 1)
-    small, large = build(write(tmp_path)), build(write(tmp_path, text, "large.toml"))
-    ratio = large.scene.pairs[0].side_j.shell.size / small.scene.pairs[0].side_j.shell.size
-    assert ratio == pytest.approx(2.5)
-
-
 def test_a_python_controller_is_found_beside_the_file(tmp_path):
     (tmp_path / "own.py").write_text(
         "import numpy as np\ndef tau(t, q, v, contacts):\n    return 0\n"
@@ -155,19 +148,6 @@ def test_methods(method, tmp_path):
     built.q0[2] = 0.0119
     contacts = built.scene.contacts(built.q0, built.v0)
     np.testing.assert_allclose(contacts.depth, [1e-4], rtol=1e-9)
-
-
-def test_a_smooth_bowl_touches_once_where_a_faceted_one_pushes_twice(tmp_path):
-    box = 'primitive = { type = "box", size = [0.2, 0.2, 0.02] }'
-    ball = 'primitive = { type = "sphere", radius = 0.1 }\nsegments = 64'
-    text = DROP.replace(box, ball).replace("-0.01]", "0.0]")
-    counts = {}
-    for method in ("facets", "smooth"):
-        lines = f'method = "{method}"\n{LAW_LINE}'
-        built = build(write(tmp_path, text.replace(LAW_LINE, lines), f"{method}.toml"))
-        built.q0[:3] = [0.0, 0.0, -0.0884]  # 0.4 mm deep in the pole of a sphere, R = 100 mm
-        counts[method] = len(built.scene.contacts(built.q0, built.v0))
-    assert counts["smooth"] == 1 < counts["facets"]
 
 
 @pytest.mark.parametrize(

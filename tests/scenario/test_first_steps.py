@@ -1,8 +1,5 @@
 """What a first user meets: surfaces before the tip, parts of a file, names nearly right, Ctrl-C."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,7 +9,6 @@ from sphshell_pin.scenario.drafting.new import new_scenario
 from tests.command import call
 from tests.scenario.files import DROP, write
 from tests.scenario.test_new import arm_urdf
-from tests.test_import import EXTRAS
 
 
 def told(*arguments):
@@ -36,32 +32,6 @@ def test_no_joint_stands_behind_the_surface(axes, tmp_path):
     # The arm stands on the plane, or beside it.
     assert heights[0] >= -1e-9
     assert heights[1:].min() > 0.009
-
-
-def test_a_new_scenario_takes_one_body_of_a_cad_file(tmp_path):
-    pytest.importorskip("OCP")
-    from OCP.BRep import BRep_Builder
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-    from OCP.BRepTools import BRepTools
-    from OCP.gp import gp_Pnt
-    from OCP.TopoDS import TopoDS_Compound
-
-    builder, pair = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(pair)
-    builder.Add(pair, BRepPrimAPI_MakeBox(100.0, 100.0, 20.0).Shape())
-    builder.Add(pair, BRepPrimAPI_MakeBox(gp_Pnt(300, 0, 0), 40.0, 40.0, 40.0).Shape())
-    BRepTools.Write_s(pair, str(tmp_path / "two.brep"))
-    command = ["new", "--robot", "ball", "--surface", tmp_path / "two.brep", "--unit", "mm"]
-    command += ["--radius", "5mm", "--out", tmp_path / "a.toml"]
-    code, output = told(*command, "--face", "3")
-    assert code == 0, output
-    assert build(tmp_path / "a.toml").scenario.shell[0].faces == [3]
-    made = new_scenario(
-        "ball", tmp_path / "two.brep", unit="mm", faces=[7, 8, 9, 10, 11, 12], radius=0.005,
-        out=tmp_path / "b.toml",
-    )  # fmt: skip
-    (shell,) = build(made.path).shells.values()
-    np.testing.assert_allclose(np.ptp(shell.box, axis=0), 0.04, atol=1e-9)
 
 
 def test_a_scenario_is_found_by_its_whole_name(tmp_path):
@@ -88,50 +58,3 @@ def test_another_integrator_leaves_the_old_ones_settings_behind(tmp_path):
     code, output = told("explain", made.path, "--dt", "1e-4")
     assert code == 2
     assert "set run.integrator to semi-implicit-euler" in output
-
-
-def test_a_doubtful_unit_is_told_once_and_plainly(tmp_path):
-    box = "\n".join(f"v {x} {y} {z}" for x in (0, 99) for y in (0, 99) for z in (0, 9))
-    (tmp_path / "b.obj").write_text(
-        box + "\nf 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n",
-        encoding="utf-8",
-    )
-    command = ["--robot", "ball", "--surface", tmp_path / "b.obj", "--unit", "m", "--radius", "3mm"]
-    code, output = told("new", *command, "--out", tmp_path / "a.toml")
-    assert code == 0, output
-    assert "UnitWarning" not in output
-    assert ".py" not in output
-
-
-def test_noise_is_no_stl(tmp_path):
-    path = tmp_path / "noise.stl"
-    path.write_bytes(np.random.default_rng(0).bytes(3000))
-    code, output = told("check", path, "--unit", "mm")
-    assert code == 2
-    assert "No module" not in output
-
-
-def test_a_new_scenario_needs_no_extra_package(tmp_path):
-    program = f"import sys; sys.modules |= dict.fromkeys({EXTRAS})\n"
-    program += "from sphshell_pin.scenario.drafting.new import new_scenario as new\n"
-    program += "new(sys.argv[1], radius=0.01, out=sys.argv[2])"
-    command = [sys.executable, "-c", program, arm_urdf(tmp_path), tmp_path / "a.toml"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.parametrize("cause", [KeyboardInterrupt, ValueError])
-def test_ctrl_c_while_a_library_loads_is_an_interruption(cause, monkeypatch):
-    def load(*_):
-        try:
-            raise cause
-        except cause as error:
-            ring = ImportError("initialization failed")
-            error.__context__ = None if cause is KeyboardInterrupt else ring
-            raise ring from error
-
-    monkeypatch.setattr("sphshell_pin.scenario.build", load)
-    code, output = told("explain", "sphere_on_shell")
-    assert (code, "interrupted" in output) == (
-        (130, True) if cause is KeyboardInterrupt else (2, False)
-    )

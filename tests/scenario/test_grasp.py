@@ -1,7 +1,5 @@
 """A hand about a part: forces in closed form, distances, and drafts that are run."""
 
-from itertools import product
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -15,12 +13,15 @@ from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.hand import GAP
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
-from sphshell_pin.scenario.drafting.part import Part, word_primitive
+from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.format.shape_tables import Box, Cylinder
 from tests.models import pose_of
 from tests.scenario.files import run_well
 from tests.studies import mostly_studies
+from tests.texts import DATA
 
+# Three fingers, two against one, each with two hinges about y.
+GRIPPER = DATA / "robots" / "three_fingers.urdf"
 NO_WEIGHT = np.zeros(6)
 
 
@@ -63,36 +64,7 @@ def test_a_part_weighs_what_its_material_weighs():
 
 def test_an_open_surface_has_no_weight(tmp_path):
     with pytest.raises(SphshellError, match="is open, so it has no weight"):
-        new_scenario(gripper(tmp_path), sheet(tmp_path), tips="all", unit="m", out=out(tmp_path))
-
-
-def gripper(folder):
-    """Write a hand of three fingers, two against one, each with two hinges about y."""
-    parts = ['<robot name="gripper"><link name="palm"/>']
-    for name, side, y in (("thumb", 1, 0.0), ("left", -1, 0.03), ("right", -1, -0.03)):
-        above = "palm"
-        for k, (link, length) in enumerate((("upper", 0.06), ("lower", 0.05))):
-            at = f"{side * 0.035} {y} 0" if k == 0 else "0 0 -0.06"
-            low, high = ((-0.9, 0.4), (-0.2, 1.3))[k]
-            parts.append(
-                f'<joint name="{name}_{link}_hinge" type="revolute"><parent link="{above}"/>'
-                f'<child link="{name}_{link}"/><origin xyz="{at}"/><axis xyz="0 {side} 0"/>'
-                f'<limit lower="{low}" upper="{high}" effort="5" velocity="5"/></joint>'
-                f'<link name="{name}_{link}"><inertial><origin xyz="0 0 {-0.5 * length}"/>'
-                '<mass value="0.05"/><inertia ixx="2e-5" iyy="2e-5" izz="5e-6" ixy="0" ixz="0" '
-                f'iyz="0"/></inertial><collision><origin xyz="0 0 {-0.5 * length}"/><geometry>'
-                f'<box size="0.01 0.01 {0.8 * length}"/></geometry></collision>'
-            )
-            if link == "lower":
-                parts.append(
-                    f'<collision><origin xyz="0 0 {-length}"/><geometry><sphere radius="0.01"/>'
-                    "</geometry></collision>"
-                )
-            parts.append("</link>")
-            above = f"{name}_{link}"
-    file = folder / "gripper.urdf"
-    file.write_text("".join(parts) + "</robot>", encoding="utf-8")
-    return file
+        new_scenario(GRIPPER, sheet(tmp_path), tips="all", unit="m", out=out(tmp_path))
 
 
 def sheet(folder):
@@ -105,27 +77,15 @@ def out(folder):
     return folder / "made.toml"
 
 
-def hand_of(folder):
-    loaded = robots.load_file(gripper(folder))
+def hand_of():
+    loaded = robots.load_file(GRIPPER)
     tips = [Tip(s.frame, s.radius, np.array(s.offset), "") for s in robots.end_spheres(loaded)]
     return Hand(loaded.model, tips)
 
 
-def test_velocities_of_tips_are_those_of_differences(tmp_path):
-    hand, rng = hand_of(tmp_path), np.random.default_rng(3)
-    q, step = rng.uniform(-0.2, 0.4, hand.model.nq), 1e-6
-    found = hand.jacobians(q)
-    for k in range(hand.model.nv):
-        change = np.zeros(hand.model.nv)
-        change[k] = step
-        ahead = hand.centers(pin.integrate(hand.model, q, change))
-        behind = hand.centers(pin.integrate(hand.model, q, -change))
-        assert np.allclose(found[:, :, k], (ahead - behind) / (2 * step), atol=1e-8)
-
-
 def test_fingers_close_on_a_part(tmp_path):
     """All centers stand a radius and the gap away from a cylinder: a distance to its axis."""
-    hand, shell = hand_of(tmp_path), shell_of(Cylinder(radius=0.02, length=0.2))
+    hand, shell = hand_of(), shell_of(Cylinder(radius=0.02, length=0.2))
     along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
     q, points, normals = hand.close_on(
         np.tile([-0.3, 0.6], 3), shell, along_y, np.array([1e-4, 2e-4, -1e-4])
@@ -139,7 +99,7 @@ def test_fingers_close_on_a_part(tmp_path):
 
 def test_torques_do_the_work_of_the_forces(tmp_path):
     """Virtual work: of forces on points that move with the tips."""
-    hand, shell = hand_of(tmp_path), shell_of(Cylinder(radius=0.02, length=0.2))
+    hand, shell = hand_of(), shell_of(Cylinder(radius=0.02, length=0.2))
     along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
     q, points, normals = hand.close_on(np.tile([-0.3, 0.6], 3), shell, along_y, 0.0)
     forces = np.random.default_rng(0).normal(size=(3, 3))
@@ -162,7 +122,7 @@ def test_torques_do_the_work_of_the_forces(tmp_path):
 
 
 def test_what_is_out_of_reach_is_not_touched(tmp_path):
-    hand, shell = hand_of(tmp_path), shell_of(Box([0.02, 0.02, 0.02]))
+    hand, shell = hand_of(), shell_of(Box([0.02, 0.02, 0.02]))
     far = pin.SE3(np.eye(3), np.array([0, 0, -0.5]))
     assert hand.close_on(np.zeros(6), shell, far, GAP) is None
 
@@ -171,9 +131,7 @@ def test_what_is_out_of_reach_is_not_touched(tmp_path):
     "surface", mostly_studies(["box", "cylinder", "sphere"], lambda one: one != "cylinder")
 )
 def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
-    made = new_scenario(
-        gripper(tmp_path), surface, tips="all", against="plastic", out=out(tmp_path)
-    )
+    made = new_scenario(GRIPPER, surface, tips="all", against="plastic", out=out(tmp_path))
     assert (tmp_path / "made_part.urdf").is_file()
     built = build(made.path)  # what stands in the files, read again
     gaps = [pair.gap for pair in built.scene.explain(built.q0, built.v0).pairs]
@@ -188,8 +146,7 @@ def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
 
 def test_fingers_that_mimic_others_hold_too(tmp_path):
     """Two fingers move as one; motors make up for friction that would keep them from pressing."""
-    file = gripper(tmp_path)
-    text = file.read_text(encoding="utf-8")
+    file, text = tmp_path / "gripper.urdf", GRIPPER.read_text("utf-8")
     for link in ("upper", "lower"):
         at = text.index("</joint>", text.index(f'<joint name="right_{link}_hinge"'))
         text = f'{text[:at]}<mimic joint="left_{link}_hinge"/>{text[at:]}'
@@ -215,7 +172,7 @@ def test_fingers_that_mimic_others_hold_too(tmp_path):
     ],
 )
 def test_what_cannot_be_held_is_refused(options, why, tmp_path):
-    options = {"robot": gripper(tmp_path), "surface": "box", **options}
+    options = {"robot": GRIPPER, "surface": "box", **options}
     if options["surface"] == "large":
         import trimesh
 
@@ -226,28 +183,3 @@ def test_what_cannot_be_held_is_refused(options, why, tmp_path):
         new_scenario(robot, surface, tips="all", out=out(tmp_path), **options)
     assert not out(tmp_path).exists()
     assert not (tmp_path / "made_part.urdf").exists()
-
-
-@pytest.mark.parametrize(
-    ("side", "surface"),
-    mostly_studies(
-        product(("right", "left"), ("box", "cylinder", "sphere")),
-        {("right", "box")}.__contains__,
-    ),
-)
-def test_an_allegro_hand_holds(side, surface, tmp_path):
-    pytest.importorskip("example_robot_data")
-    robot = f"allegro_{side}_hand"
-    made = new_scenario(robot, surface, tips="all", against="plastic", out=out(tmp_path))
-    built = build(made.path)
-    result = run_well(built)
-    assert {name.rpartition("/")[2] for name in result.pairs} == {
-        f"link_{k}.0_tip" for k in (3, 7, 11, 15)
-    }
-
-
-@pytest.mark.parametrize("word", ["sphere", "cylinder", "box"])
-def test_a_part_of_one_word_is_five_radii_wide(word):
-    corners = word_primitive(word, 0.01).shell().vertices
-    height = 0.05 if word == "sphere" else 0.1
-    np.testing.assert_allclose(np.ptp(corners, axis=0), [0.05, 0.05, height], rtol=1e-2)

@@ -150,26 +150,6 @@ def test_a_refused_change_leaves_the_scenario_alone(tmp_path):
     assert rebuild(built, {}).scenario == built.scenario
 
 
-def test_build_reuses_what_another_build_of_the_file_made(tmp_path):
-    path = write(tmp_path)
-    built = build(path)
-    again = build(path, {STIFFNESS: "2e6"}, reuse=built)
-    assert again.shells["plate"] is built.shells["plate"]
-    assert again.assembly is built.assembly
-    other = build(write(tmp_path, name="other.toml"), reuse=built)
-    assert other.shells["plate"] is not built.shells["plate"]
-
-
-def test_the_users_functions_are_loaded_once(tmp_path):
-    built = build("gear_contact")
-    turned = rebuild(built, {"source.gears.law.stiffness": "1e9"})
-    assert turned.controller is built.controller
-    assert turned.scene.pairs[0].side_i.find is built.scene.pairs[0].side_i.find
-    # A file is run once for all its functions, which share what it keeps.
-    assert len({id(one.__globals__) for one in built.functions.values()}) == 1
-    assert len(built.functions) > 1
-
-
 def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
     key = "contact.ball-plate.law.damping"
     path = write(tmp_path, DROP + knob(key))

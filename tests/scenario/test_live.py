@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.errors import ScenarioError, SphshellError
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
-from tests.models import pose_of
 from tests.scenario.files import DROP, write
 
 LAW = "contact.ball-plate.law"
@@ -82,12 +81,6 @@ def test_a_push_moves_the_ball_for_its_time_only(live: LiveRun) -> None:
     assert abs(live.residual) < 1e-9
 
 
-def test_an_unknown_body_is_named_with_those_there_are(live: LiveRun) -> None:
-    assert "ball" in live.bodies
-    with pytest.raises(NameNotFound, match="ball"):
-        live.push("bal", [1.0, 0.0, 0.0], 0.1)
-
-
 def test_a_fault_of_the_users_own_function_ends_the_run_until_it_is_reset(tmp_path) -> None:
     (tmp_path / "mine.py").write_text(
         "def tau(t, q, v, contacts):\n"
@@ -149,35 +142,3 @@ def test_gravity_takes_push_and_audit_along(live: LiveRun) -> None:
     mass, v = float(live.scene.model.inertias[1].mass), live.v.copy()
     live.advance(0.05)
     assert live.v[2] - v[2] == pytest.approx(2.0 * 0.05 / mass, rel=1e-2)
-
-
-def tip_of(live: LiveRun) -> np.ndarray:
-    """Return where the point that follows the path is [m]."""
-    controller = live.built.controller
-    return pose_of(live.scene.model, live.q, controller.frame).act(np.asarray(controller.offset))
-
-
-@pytest.mark.robots
-def test_another_gravity_leaves_the_target_where_it_is() -> None:
-    pytest.importorskip("example_robot_data", reason="needs the example-robot-data loaders")
-    live = LiveRun(build("fingertip_on_blade"))
-    settle(live, 2.0)
-    live.change("controller.speed", 0.02)
-    settle(live, 1.0)
-    before = tip_of(live)
-    live.change("gravity.2", -9.8)
-    settle(live, 0.1)
-    assert np.linalg.norm(tip_of(live) - before) == pytest.approx(0.002, rel=0.1)
-
-
-@pytest.mark.robots
-def test_a_target_whose_wait_is_cut_short_sets_out_from_its_start() -> None:
-    pytest.importorskip("example_robot_data", reason="needs the example-robot-data loaders")
-    live = LiveRun(build("fingertip_on_blade", {"controller.lead_in": "3.0"}))
-    settle(live, 2.5)
-    before = tip_of(live)
-    live.change("controller.lead_in", 0.5)
-    settle(live, 0.1)
-    assert np.linalg.norm(tip_of(live) - before) < 0.001  # 87 mm of the path are behind 0.5 s
-    settle(live, 2.0)
-    assert 0.05 < np.linalg.norm(tip_of(live) - before) < 0.12

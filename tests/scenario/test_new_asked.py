@@ -1,5 +1,7 @@
 """The first picture of a new scenario, and what a user may ask of it: the place and the path."""
 
+from pathlib import Path
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -13,6 +15,7 @@ from sphshell_pin.scenario.running.run import simulate
 from tests.scenario.files import center_of
 from tests.scenario.test_new import arm_urdf
 
+GANTRY = Path(__file__).parents[1] / "data" / "robots" / "gantry.urdf.xacro"
 PLATE = (0.3, 0.24, 0.04)
 
 
@@ -85,28 +88,9 @@ def test_an_open_scan_is_touched_from_outside(up, arm, tmp_path):
     assert placed(built)[0][:, 2].min() == pytest.approx(0.0, abs=1e-5)
 
 
-GANTRY = """<robot name="gantry"><link name="frame"/>{}</robot>"""
-CARRIAGE = """
-<link name="{name}"><inertial><mass value="{mass}"/>
-  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="to_{name}" type="prismatic"><parent link="{parent}"/><child link="{name}"/>
-  <origin xyz="0 0 {up}"/><axis xyz="{axis}"/>
-  <limit lower="-0.3" upper="0.3" effort="300" velocity="1"/></joint>"""
-
-
 def test_a_gantry_slides(plate, tmp_path):
     """Nothing can turn its tip, so that it needs no joints against rolling."""
-    stages = [("bridge", 6, "frame", 0.6, "1 0 0"), ("trolley", 2, "bridge", 0, "0 1 0")]
-    stages += [("quill", 1, "trolley", 0, "0 0 1"), ("probe", 0.1, "quill", -0.3, "0 0 1")]
-    keys = ("name", "mass", "parent", "up", "axis")
-    text = GANTRY.format(
-        "".join(CARRIAGE.format(**dict(zip(keys, one, strict=True))) for one in stages)
-    )
-    text = text.replace('"to_probe" type="prismatic"', '"to_probe" type="fixed"')
-    (tmp_path / "gantry.urdf").write_text(text, encoding="utf-8")
-    made = new_scenario(
-        tmp_path / "gantry.urdf", plate, frame="probe", radius=0.01, out=tmp_path / "a.toml"
-    )
+    made = new_scenario(GANTRY, plate, frame="probe", radius=0.01, out=tmp_path / "a.toml")
     control = made.built.scenario.controller
     assert len(control.path) > 2
     assert control.rotational_stiffness == 0.0

@@ -15,7 +15,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, shipped_scenarios
-from sphshell_pin.scenario.drafting.clearance import Links, _fixed_to
+from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.fingertips import find_tips
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
@@ -56,33 +56,6 @@ def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, tmp_pa
     normal = pair.side_j.shell.closest_points([control.path[-1]]).normals[0]
     assert abs(away @ normal) == pytest.approx(pair.side_i.sphere.radius, rel=0.03)
     assert np.linalg.norm(away - normal * (away @ normal)) < 0.25 * pair.side_i.sphere.radius
-
-
-def test_no_link_is_in_a_closed_part(tmp_path):
-    """Corners of the links' cylinders against the signed distance of the part."""
-    part = sp.Shell.from_geometry(coal.Box(0.5, 0.4, 0.1))
-    part.to_file(tmp_path / "part.shl")
-    for place in ("below", "+x"):
-        made = new_scenario(
-            PROBE, tmp_path / "part.shl", place=place, out=tmp_path / "a.toml", force=True
-        )
-        built = made.built
-        result, _ = simulate(built)
-        (shell,), (pair,) = built.shells.values(), built.scene.pairs
-        assert shell.side == "outside"
-        geometry = built.assembly.loaded[0].collision_model
-        data, at = built.assembly.model.createData(), pin.GeometryData(geometry)
-        turns = np.linspace(0, 2 * np.pi, 12)
-        for q in result.q[:: max(1, len(result.q) // 5)]:
-            pin.updateGeometryPlacements(built.assembly.model, data, geometry, at, q)
-            for one, pose in zip(geometry.geometryObjects, at.oMg, strict=True):
-                if not isinstance(one.geometry, coal.Cylinder):
-                    continue
-                ring = one.geometry.radius * np.array([np.cos(turns), np.sin(turns), 0 * turns]).T
-                for z in np.linspace(-1, 1, 9) * one.geometry.halfLength:
-                    rim = [pose.act(p + [0, 0, z]) for p in ring]
-                    local = np.array([pair.side_j.placement.actInv(p) for p in rim])
-                    assert shell.closest_points(local).distances.min() > -1e-6
 
 
 def test_a_hard_tip_settles(tmp_path):
@@ -164,28 +137,6 @@ def test_a_tip_of_two_joints_begins_at_the_gap(tmp_path):
     assert pair.peak_force < 1.5 * made.built.scenario.controller.normal_force
 
 
-@pytest.mark.study
-def test_what_its_shape_fixes_may_float(tmp_path):
-    """A drone with an arm of two joints, which cannot press."""
-    path = tmp_path / "a.toml"
-    with pytest.raises(
-        SphshellError, match=r"do not allow it; .* or let it float, --base floating"
-    ):
-        new_scenario("borinot", out=path)
-    made = new_scenario("borinot", base="floating", out=path)
-    assert any("the robot floats" in why for why in made.why)
-
-
-@pytest.mark.study
-def test_an_arm_whose_collection_lets_it_float_is_fixed(tmp_path):
-    made = new_scenario("so101", BLADE, unit="mm", out=tmp_path / "a.toml")
-    assert made.why[0] == "the base is fixed, by the robot's shape: or --base"
-    assert 'name = "so101"\nbase = "fixed"' in made.text
-    built = build(made.path)
-    assert built.scene.model.nq == built.scene.model.nv  # no quaternion
-    run_well(built)
-
-
 def test_links_in_a_part_are_found():
     """A cube of 0.1 m before, around and beside links of the arm that stands straight up."""
     robot = robots.load_file(PROBE)
@@ -247,16 +198,6 @@ def test_what_the_file_states_of_the_joints_is_modelled(tmp_path):
     assert np.linalg.norm(away) < 1.1 * radius
 
 
-def test_a_sphere_is_put_where_it_is_asked_for(tmp_path):
-    offset = (0.0, 0.01, 0.09)
-    made = new_scenario(PROBE, frame="link_5", offset=offset, radius=0.008, out=tmp_path / "a.toml")
-    (pair,) = made.built.scene.pairs
-    assert pair.side_i.sphere.radius == 0.008
-    np.testing.assert_allclose(pair.side_i.sphere.offset, offset)
-    made = new_scenario(PROBE, offset=offset, radius=0.008, out=tmp_path / "b.toml")
-    assert made.built.scene.pairs[0].side_i.sphere == pair.side_i.sphere
-
-
 def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
     """A capsule ends in its own half ball; on a cylinder's end stands a ball, in its middle."""
     robot = robots.load_file(PROBE)
@@ -290,24 +231,6 @@ def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
     frame, *offset, radius = command.groups()
     offset = [float(one) for one in offset]
     new_scenario(PROBE, frame=frame, offset=offset, radius=float(radius), out=tmp_path / "a.toml")
-
-
-@pytest.mark.parametrize(
-    ("joint", "held", "fixed"),
-    [
-        (1, {2, 3}, {1, 2, 3}),
-        (3, {2, 3}, {1, 2, 3}),
-        (3, {3}, {2, 3}),
-        (2, {4}, {2}),
-        (3, {4}, {3, 4}),
-    ],
-)
-def test_links_beyond_locked_joints_are_fixed_to_one_another(joint, held, fixed):
-    """Of a chain of four joints."""
-    model = pin.Model()
-    for k in range(4):
-        model.addJoint(k, pin.JointModelRX(), pin.SE3.Identity(), f"joint{k}")
-    assert _fixed_to(model, joint, held) == fixed
 
 
 def pressing(points, posture=0.0):

@@ -10,9 +10,9 @@ import sphshell_pin as sp
 from sphshell_pin.errors import ResultError, SphshellError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
-from sphshell_pin.view.live.opening import player_of
 from tests import models
 from tests.scenario.files import DROP, without_pictures, write
+from tests.texts import text_of
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
@@ -153,30 +153,7 @@ def figure(result, scene):
     return 1.0
 """
 
-SOURCE = """
-title = "a ball falls on points of one's own"
-
-[robot]
-name = "ball"
-start = { root_joint = [0, 0, 0.0125, 0, 0, 0, 1] }
-
-[source]
-name = "ball-plate"
-find = "routine.py:find"
-frame_i = "ball"
-law = { type = "impact", stiffness = 1e6 }
-
-[controller]
-type = "python"
-function = "routine.py:torque"
-
-[run]
-duration = 0.02
-dt = 1e-4
-
-[figures]
-own = "routine.py:figure"
-"""
+SOURCE = text_of("scenarios/source.toml")
 
 
 @pytest.fixture
@@ -186,22 +163,6 @@ def with_code(tmp_path):
     run_built(build(write(tmp_path, SOURCE)), tmp_path / "out", recording=False)
     (tmp_path / "executed").unlink()
     return tmp_path
-
-
-def test_looking_at_results_executes_no_code(with_code):
-    """Somebody else's run.npz may name any file beside it."""
-    file = with_code / "out" / "run.npz"
-    result = sp.Result.load(file)
-    assert len(result.contacts)
-    for scenario in (None, with_code / "drop.toml"):
-        replay = Replay(file, scenario=scenario)
-        replay.seek(result.contacts.t[3])
-        assert len(replay.contacts)
-    player_of(file)
-    # The file alone, with settings of its own and no scenario beside it.
-    (with_code / "drop.toml").unlink()
-    Replay(file)
-    assert not (with_code / "executed").exists()
 
 
 def test_the_routine_is_loaded_where_it_is_trusted(with_code):

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SetupWarning
 from sphshell_pin.scenario import build, explain_built
 from sphshell_pin.scenario.drafting.new import new_scenario
@@ -99,14 +98,6 @@ def test_the_commands_say_so(scenario, tmp_path):
     assert "Warning: the controller's path is off the shell" in explained.output
 
 
-def test_the_live_page_says_so(scenario, capsys):
-    from sphshell_pin.scenario.live.live_run import LiveRun
-    from sphshell_pin.view.live.opening import _warn
-
-    _warn(LiveRun(build(scenario, OFF)))
-    assert "warning: the controller's path is off the shell" in capsys.readouterr().err
-
-
 WRONG = {
     "short": (
         "def tau(t, q):\n    return 0\n",
@@ -131,14 +122,3 @@ def test_a_callable_of_the_wrong_signature(kind, tmp_path):
     built = build(write(tmp_path))
     with pytest.raises(InvalidParameter, match=said):
         built.simulation.run(built.q0, None, 0.01, names["tau"])
-
-
-def test_callables_that_can_be_called_pass(tmp_path):
-    built = build(write(tmp_path))
-
-    class Torque:
-        def __call__(self, t, q, v, contacts, gain=1.0):
-            return np.zeros(len(v))
-
-    for one in (Torque(), lambda *arguments: np.zeros(6), lambda t, q, v, c: np.zeros(6)):
-        assert isinstance(built.simulation.run(built.q0, None, 0.001, one), sp.Result)

@@ -17,7 +17,6 @@ from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running import run
 from tests.command import call
-from tests.scenario import races
 from tests.scenario.files import write
 
 LAST = "summary.json"
@@ -214,18 +213,6 @@ def test_a_folder_called_like_a_result_is_told(no_pictures, tmp_path):
     assert os.listdir(tmp_path / "out") == ["energy.png"]
 
 
-def test_a_parent_that_another_process_removes_meanwhile_is_made_again(tmp_path, monkeypatch):
-    lock, gone = AtomicFolder._lock_by, iter([True])
-
-    def lock_by(folder, path):
-        if next(gone, False):
-            path.parent.rmdir()
-        lock(folder, path)
-
-    monkeypatch.setattr(AtomicFolder, "_lock_by", lock_by)
-    assert put(tmp_path / "x" / "out", "new") == {"a": "new", LAST: "new"}
-
-
 def test_a_folder_made_in_vain_is_removed(tmp_path):
     out = tmp_path / "x" / "y"
 
@@ -278,8 +265,3 @@ def test_of_processes_that_meet_in_a_new_folder_one_wins_and_loses_nothing(name,
         assert os.listdir(out) == [LAST]
         assert os.listdir(out.parent) == ["out"]
         shutil.rmtree(tmp_path / name.split("/")[0])
-
-
-def test_of_processes_that_run_into_one_new_folder_one_wins_and_keeps_its_results():
-    """`python -m tests.scenario.races` has more rounds."""
-    assert races.main(["--rounds", "2"]) == 0

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.base.atomic import AtomicFolder, write_whole
+from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.atomic.files import held_folder
 from sphshell_pin.cli import fit
-from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
+from sphshell_pin.errors import ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.drafting import new
@@ -30,7 +30,7 @@ from sphshell_pin.study.sweep.table import write_table
 from sphshell_pin.view.film import render_film
 from tests import meshes
 from tests.scenario.files import DROP, write
-from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
+from tests.scenario.operations import contents, counted, fill, killed_at, visible
 from tests.studies import mostly_studies
 
 MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
@@ -160,17 +160,6 @@ def test_a_full_disk_leaves_the_old_results_and_nothing_else(two_runs, results, 
         assert os.listdir(place) == ["out"], n
 
 
-def test_ctrl_c_at_any_operation_leaves_old_or_new_results(two_runs, results, place):
-    keep, before, after = two_runs
-    for n in ends(place, keep, lambda: results("new"), interrupt):
-        if visible(place) != before:
-            check_whole(place / "out")  # pictures that were not drawn are not listed
-            assert set(visible(place)) <= set(after)
-        results("new")
-        assert contents(place) == after, n
-        assert os.listdir(place) == ["out"], n
-
-
 @pytest.mark.parametrize("act", mostly_studies([None, fill], lambda act: act is fill))
 def test_where_names_cannot_be_exchanged_no_summary_stands_beside_mixed_files(
     act, two_runs, results, place, monkeypatch
@@ -187,27 +176,6 @@ def test_where_names_cannot_be_exchanged_no_summary_stands_beside_mixed_files(
         results("new")
         assert contents(place) == after, n
         assert os.listdir(place) == ["out"], n
-
-
-def test_killed_while_it_writes_what_stopped_early_it_leaves_nothing_behind(
-    two_runs, results, runs, place, monkeypatch
-):
-    keep, before, _ = two_runs
-    built, (computed, _) = runs["new"]
-
-    def stop():
-        monkeypatch.setattr(run, "simulate", lambda *_: (computed, Interrupted(0.01, computed)))
-        run_built(built, place / "out", recording=False)
-
-    for n in ends(place, keep, stop):
-        left = visible(place)
-        assert {name: left[name] for name in before if "stopped" not in name} == {
-            name: data for name, data in before.items() if "stopped" not in name
-        }
-        with AtomicFolder(place / "out", last="summary.json", inner=["stopped"]):
-            pass
-        assert contents(place) == visible(place), n
-        assert not list(place.rglob(".*")), n
 
 
 def of_report(title):

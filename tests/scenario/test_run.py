@@ -16,7 +16,7 @@ from sphshell_pin.errors import (
     ScenarioError,
     SimulationDiverged,
 )
-from sphshell_pin.scenario import build, explain_built, run_built, run_scenario
+from sphshell_pin.scenario import build, run_built, run_scenario
 from sphshell_pin.scenario.running.figures import figure_names, measuring
 from tests.programs import python
 from tests.scenario.files import DROP, write
@@ -44,12 +44,6 @@ def test_figures_of_an_earlier_run_go_with_its_numbers(tmp_path):
     assert "energy.png" in os.listdir(out)
     run_built(built, out, recording=False, figures=False)
     assert not [name for name in os.listdir(out) if name.endswith(".png")]
-
-
-def test_rows_beyond_a_million_are_announced_by_explain(tmp_path):
-    changes = {"run.duration": "4000", "run.dt": "1e-3", "run.record_dt": "1e-3"}
-    said = explain_built(build(write(tmp_path), changes)).warnings
-    assert [one for one in said if "4e+06 rows" in one]
 
 
 def test_the_folder_holds_what_was_computed(tmp_path):

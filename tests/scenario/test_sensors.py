@@ -10,25 +10,9 @@ from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, run_scenario
 from sphshell_pin.scenario.running.replay import Replay
 from tests.scenario.files import DROP, write
+from tests.texts import text_of
 
-SENSORS = """
-[[sensor]]
-type = "force-torque"
-name = "inside"
-frame = "root_joint"
-rate = 500
-cutoff = 100
-force_noise = 0.1
-
-[[sensor]]
-type = "contact-switch"
-name = "touch"
-contact = "ball-plate"
-threshold = 0.5
-
-[[knob]]
-key = "sensor.inside.cutoff"
-"""
+SENSORS = text_of("scenarios/sensors.toml")
 READING = """
 def tau(t, q, v, contacts, sensors):
     push = [0.0] * 6

@@ -10,58 +10,13 @@ from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, run_scenario
 from tests.command import call
 from tests.scenario.files import write
+from tests.texts import text_of
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
 LAW = 'law = { type = "hunt-crossley", stiffness = 1e6, dissipation = 0.5 }\n'
-TWO_BALLS = f"""
-title = "A ball falls on a ball"
-
-[[robot]]
-name = "ball"
-label = "upper"
-start = {{ root_joint = [0.002, 0.0, 0.04, 0.0, 0.0, 0.0, 1.0] }}
-
-[[robot]]
-name = "ball"
-label = "lower"
-start = {{ root_joint = [0.0, 0.0, 0.012, 0.0, 0.0, 0.0, 1.0] }}
-
-[[shell]]
-name = "plate"
-primitive = {{ type = "half-space", extent = 1.0 }}
-
-[[contact]]
-name = "balls"
-sphere = {{ frame = "upper/ball", radius = 0.012 }}
-other_sphere = {{ frame = "lower/ball", radius = 0.012 }}
-{LAW}
-[[contact]]
-name = "floor"
-spheres = [
-    {{ frame = "upper/ball", radius = 0.012 }},
-    {{ frame = "lower/ball", radius = 0.012, offset = [0, 0, 0.0] }},
-]
-shell = "plate"
-{LAW}
-[run]
-duration = 0.1
-"""
-HAND = f"""
-title = "A hand over a plate"
-[robot]
-name = "allegro_right_hand"
-[[shell]]
-name = "plate"
-primitive = {{ type = "half-space", extent = 1.0 }}
-[[contact]]
-name = "tips"
-spheres = "collision"
-shell = "plate"
-{LAW}
-[run]
-duration = 0.01
-"""
+TWO_BALLS = text_of("scenarios/two_balls.toml")
+HAND = text_of("scenarios/hand.toml")
 
 
 def test_a_ball_falls_on_a_ball(tmp_path):
@@ -83,36 +38,7 @@ def test_collision_spheres_of_a_hand(tmp_path):
     assert {pair.group for pair in scene.pairs} == {"tips"}
 
 
-def test_collision_spheres_of_frames_and_others(tmp_path):
-    names = [one.frame for one in robots.collision_spheres(robots.load("allegro_right_hand"))]
-    own = '{ frame = "palm", radius = 0.03 }'
-    frame = robots.load("allegro_right_hand").model.frames[1].name
-    text = HAND.replace('"collision"', f'["{names[1]}", {own.replace("palm", frame)}]')
-    scene = build(write(tmp_path, text)).scene
-    assert [(pair.frame_i, pair.side_i.sphere.radius) for pair in scene.pairs] == [
-        (names[1], 0.012),
-        (frame, 0.03),
-    ]
-
-
-EGG = f"""
-title = "An egg on a table"
-[robot]
-name = "ball"
-[robot.start]
-root_joint = [0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 1.0]
-[[shell]]
-name = "egg"
-primitive = {{ type = "ellipsoid", radii = [0.012, 0.012, 0.018] }}
-frame = "ball"
-[[contact]]
-name = "table"
-plane = {{ frame = "universe", offset = [0.0, 0.0, 0.001], normal = [0.0, 0.0, 2.0] }}
-shell = "egg"
-{LAW}
-[run]
-duration = 0.03
-"""
+EGG = text_of("scenarios/egg.toml")
 
 
 def test_an_egg_falls_on_a_plane(tmp_path):

@@ -75,19 +75,6 @@ def test_without_a_tool_frame_the_wrist_carries_it(tmp_path: Path) -> None:
     assert model.names[model.frames[model.getFrameId(tip.frame)].parentJoint] == "b"
 
 
-def test_what_spins_beside_sliding_jaws_is_held_with_them(tmp_path: Path) -> None:
-    file, spin = tmp_path / "arm.urdf", link("spin", ".01 .01 .01")
-    spin += joint("spin_joint", "wrist", "spin", "continuous", "0 0 .02", "0 0 1")
-    file.write_text(arm(jaws="prismatic", tool="ee").replace("</robot>", f"{spin}</robot>"))
-    assert gripper_joints(robots.load_file(file).model) == {3, 4, 5}
-
-
-def test_two_free_fingers_are_no_gripper(tmp_path: Path) -> None:
-    file = tmp_path / "arm.urdf"
-    file.write_text(arm(jaws="revolute", tool=None))
-    assert gripper_joints(robots.load_file(file).model) == set()
-
-
 def test_every_finger_gets_a_ball_at_the_end_of_its_mesh(tmp_path: Path) -> None:
     file = tmp_path / "hand.urdf"
     file.write_text(arm(jaws="revolute", tool=None))
@@ -165,13 +152,6 @@ def test_a_finger_of_one_joint_presses_along_its_motion(tmp_path: Path) -> None:
     center = place.actInv(reach.center(q))
     normal = place.rotation @ shell.closest_points(center[None]).normals[0]
     assert abs(motion @ normal) > 0.999 * np.linalg.norm(motion)
-
-
-def test_a_file_with_two_roots_is_refused_with_what_to_do(tmp_path: Path) -> None:
-    file = tmp_path / "two.urdf"
-    file.write_text(arm(jaws=None, tool=None).replace("</robot>", link("alone") + "</robot>"))
-    with pytest.raises(robots.RobotError, match=r"'alone', 'base'.*fix the others to it"):
-        robots.load_file(file)
 
 
 def test_a_ball_of_free_size_fits_the_part_and_stays_on_its_link(tmp_path: Path) -> None:

@@ -59,6 +59,10 @@ def test_a_spot_avoids_edges_and_grooves():
     )
     assert abs(good.point[0]) > 0.002
     np.testing.assert_allclose(np.abs(good.normal), [np.sqrt(0.5), 0, np.sqrt(0.5)], atol=1e-6)
+    # A path ends before the ridge, too.
+    ahead = -np.sign(good.point[0]) * np.array([1.0, 0.0, 0.0])
+    for way in paths_on_surface(shell, good, ahead, 0.1, 0.005):
+        assert (way[:, 0] * good.point[0] > 0.0).all()
 
 
 @pytest.mark.parametrize(
@@ -66,7 +70,7 @@ def test_a_spot_avoids_edges_and_grooves():
     [
         (coal.Box(0.2, 0.2, 0.04), None, False, [0, 0, 0.02], [0, 0, 1]),
         (coal.Box(0.2, 0.04, 0.2), None, False, [0, 0.02, 0], [0, 1, 0]),
-        (coal.Box(0.1, 0.1, 0.1), None, False, [0, 0, 0.05], [0, 0, 1]),
+        (coal.Box(0.1, 0.08, 0.1), None, False, [0, 0, 0.05], [0, 0, 1]),
         (coal.Box(0.2, 0.2, 0.04), [1, 0, 0], False, [0.1, 0, 0], [1, 0, 0]),
         (coal.Sphere(0.1), [0, 0, 1], True, [0, 0, -0.1], [0, 0, 1]),
         (coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), None, False, [0, 0, 0], [0, 0, 1]),

@@ -342,27 +342,6 @@ def test_the_page_of_the_docs_is_of_these_robots() -> None:
         assert list(verdicts) == robots.names()
 
 
-def test_the_command_takes_xacro_arguments_and_package_folders(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ROS_PACKAGE_PATH", "")
-    file = tmp_path / "hand.urdf.xacro"
-    text = (DATA / "xacro" / "hand.urdf.xacro").read_text()
-    inside = "finger_description/urdf"
-    file.write_text(text.replace(inside, f"$(find {inside.partition('/')[0]})/urdf"))
-    command = ["check-robot", str(file), "--quick", "--xacro-arg", "fingers=1"]
-    result = call(*command)
-    assert result.exit_code == 2
-    assert "no package 'finger_description'" in result.stdout
-    result = call(*command, "--package-dir", DATA / "xacro")
-    assert result.exit_code == 0, result.stdout
-    assert "2/2" in result.stdout
-    told = refused("check-robot", file, "--xacro-arg", "fingers")
-    assert "--xacro-arg = 'fingers' must be NAME=VALUE" in told
-    result = call("run", "x.toml", "--package-dir", tmp_path / "nix")
-    assert result.exit_code == 2
-
-
 def test_the_armature_of_a_free_joint_is_named_and_no_momentum_is_missed(tmp_path):
     """MuJoCo's joint of type free takes the armature of the defaults, an inertia of no body."""
     file = tmp_path / "leg.xml"

@@ -9,7 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, WeakLawWarning
-from sphshell_pin.testing.found import crossed, distances, pieces
+from sphshell_pin.testing.found import crossed, distances
 from tests import meshes
 from tests.contact.smooth.surfaces import shell_of
 from tests.models import (
@@ -144,10 +144,11 @@ def test_momentum_of_a_closed_system_is_kept() -> None:
         testing.assert_momentum_kept(closed_run(sp.RungeKutta4(5e-3)), tolerance=1e-9)
 
 
-def test_momentum_that_creeps_in_is_told() -> None:
+@pytest.mark.parametrize(("k", "size"), [(0, 1e-5), (3, 1e-2)])  # of the ball: linear, angular
+def test_momentum_that_creeps_in_is_told(k: int, size: float) -> None:
     result = closed_run(sp.Adaptive(1e-9))
     push = np.zeros(12)
-    push[0] = 1e-5
+    push[k] = size
     crept = replace(result, v=result.v + np.linspace(0, 1, len(result.t))[:, None] * push)
     with pytest.raises(AssertionError, match="momentum is not kept"):
         testing.assert_momentum_kept(crept)
@@ -160,6 +161,9 @@ def test_open_systems_have_no_momentum_to_keep() -> None:
     far = sp.Simulation(two_free_bodies(LAW), sp.Adaptive()).run(*two_free_state(-1.0), 1e-3)
     with pytest.raises(InvalidParameter, match="nothing touched"):
         testing.assert_momentum_kept(far)
+    fixed = sp.Simulation(on_plate(ball(gravity=0.0), LAW)).run(free_q([0, 0, 0.049]), None, 1e-3)
+    with pytest.raises(InvalidParameter, match="must not touch the universe"):
+        testing.assert_momentum_kept(fixed)
     with pytest.raises(InvalidParameter, match="must know its scene"):
         testing.assert_momentum_kept(replace(far, scene=None))
 
@@ -167,6 +171,11 @@ def test_open_systems_have_no_momentum_to_keep() -> None:
 def test_energy_is_kept() -> None:
     run = sp.Simulation(arm_scene(), sp.Adaptive(1e-9)).run(ARM_Q, ARM_V, 0.05)
     assert testing.assert_energy_kept(run) < 1e-6
+    pushed = sp.Simulation(on_plate(slider(), LAW), sp.Adaptive(1e-9)).run(
+        np.array([0.06]), None, 0.1, lambda *_: np.array([-20.0])
+    )
+    assert pushed.energy.control_work[-1] > 0.1
+    assert testing.assert_energy_kept(pushed) < 1e-6
     lossless = on_plate(ball(), linear_law(1e4))
     drop = sp.Simulation(lossless, sp.Adaptive(1e-9)).run(free_q([0, 0, 0.06]), np.zeros(6), 0.2)
     assert len(drop.contacts)
@@ -314,14 +323,6 @@ def test_distances_are_those_of_the_oracle() -> None:
         nearest = closest_on_triangles(point, corners.astype(np.longdouble))
         expected = np.linalg.norm((nearest - point).astype(float), axis=1)
         assert row == pytest.approx(expected, abs=1e-13)
-
-
-def test_pieces_hang_together_by_vertices() -> None:
-    triangles = np.array([[0, 1, 2], [2, 3, 4], [5, 6, 7], [7, 8, 9], [9, 0, 10]])
-    touched = np.array([True, True, True, True, False])
-    assert [one.tolist() for one in pieces(triangles, touched)] == [[0, 1], [2, 3]]
-    assert len(pieces(triangles, np.ones(5, bool))) == 1
-    assert pieces(triangles, np.zeros(5, bool)) == []
 
 
 def test_ways_through_triangles() -> None:

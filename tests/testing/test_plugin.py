@@ -50,19 +50,6 @@ def test_without_a_robot_such_tests_are_skipped_with_the_reason(suite: pytest.Py
     result.stdout.fnmatch_lines(["*give --sphshell-robot NAME|URDF*"])
 
 
-def test_a_parametrisation_of_ones_own_goes_first(suite: pytest.Pytester) -> None:
-    suite.makepyfile(
-        """
-        import pytest
-
-        @pytest.mark.parametrize("sphshell_robot, times", [("ball", 1), ("turntable", 2)])
-        def test_own(sphshell_robot, times):
-            assert sphshell_robot in ("ball", "turntable")
-        """
-    )
-    suite.runpytest_inprocess(*PLUGIN, "--sphshell-robot", "a1").assert_outcomes(passed=2)
-
-
 def test_scenes_and_assertions(suite: pytest.Pytester) -> None:
     suite.makepyfile(
         """
@@ -125,15 +112,6 @@ def test_a_suite_that_uses_none_of_it_imports_none_of_it(suite: pytest.Pytester)
     command = [sys.executable, "-m", "pytest", *PLUGIN, "-p", "no:cacheprovider"]
     done = subprocess.run(command, cwd=suite.path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
-
-
-def test_help_and_fixtures_are_told(suite: pytest.Pytester) -> None:
-    result = suite.runpytest_inprocess(*PLUGIN, "--help")
-    result.stdout.fnmatch_lines(["*--sphshell-robot=NAME|URDF*"])
-    result = suite.runpytest_inprocess(*PLUGIN, "--fixtures")
-    result.stdout.fnmatch_lines(
-        ["sphshell_robot*", "contact_scene_factory*", "robot_check*"], consecutive=False
-    )
 
 
 def test_the_suite_of_the_page(suite: pytest.Pytester) -> None:

@@ -13,8 +13,6 @@ from sphshell_pin.view.recording import render_recording
 from sphshell_pin.view.surface import (
     FACE_COLORS,
     RAMP,
-    check_coloring,
-    draw_distance,
     hex_colors,
     ramp_colors,
 )
@@ -76,29 +74,6 @@ def test_colours_run_from_none_to_the_largest_distance():
     assert sheet.shown() == ["surface"]
 
 
-def test_all_shells_share_one_range():
-    small, large = ball(8, 0.5), ball(8, 2.0)
-    sheet = Sheet(scene_of(small, large))
-    sheet.display.show("distance", True)
-    lightest = [colors[:, 1].max() for _, colors in sheet.drawn("distance")]
-    assert sheet.display.largest_distance == large.curvature_report().largest
-    # The distances of the small one are a quarter of the other's: the second of five colours.
-    expected = ramp_colors(np.array([0.25]), RAMP)[0, 1]
-    assert min(lightest) == pytest.approx(expected, abs=0.03)
-    assert max(lightest) > 0.85
-
-
-def test_many_elements_have_one_colour_each(monkeypatch):
-    shell = ball(8)
-    monkeypatch.setattr("sphshell_pin.view.surface.MOST_CURVED", 10)
-    film = Film()
-    draw_distance(film.canvas, shell, shell.curvature_report().largest)
-    colors = attribute(film.objects["distance"], "color").reshape(-1, 3, 3)
-    assert len(colors) == len(shell.triangles)
-    assert np.ptp(colors, axis=1).max() == 0.0
-    assert np.ptp(colors[:, 0], axis=0).max() > 0.1
-
-
 @pytest.mark.parametrize("method", ["smooth", "facets"])
 def test_each_kind_has_its_color(method):
     shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3), segments=36)
@@ -133,8 +108,3 @@ def test_a_recording_states_range_and_kinds():
     assert FACE_COLORS["torus"] in page
     with pytest.raises(InvalidParameter, match="surface, patches, distance"):
         render_recording(result, scene, color="depth")
-
-
-def test_other_colours_are_refused():
-    with pytest.raises(InvalidParameter, match="must be one of"):
-        check_coloring("red")

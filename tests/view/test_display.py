@@ -1,13 +1,11 @@
-import meshcat
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from sphshell_pin import ImpactLaw, Plane, Scene, Shell, Sphere
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.view import ArrowScale, Display
+from sphshell_pin.view import Display
 from sphshell_pin.view.camera import choose_view
-from tests.programs import python
 from tests.view.drawn import Film
 from tests.view.stand_ins import (
     a_scene,
@@ -119,23 +117,6 @@ def test_geometry_of_another_model_is_refused():
         filmed(scene, pin.neutral(reduced), visual_model=geometry)
 
 
-@pytest.mark.parametrize("size", [1e-3, 1.0, 300.0])
-def test_arrows_and_points_scale_with_the_scene(size):
-    model = ball_model()
-    scene = a_scene(model, contact_pair(model, "ball", 0.05 * size, plate(size)))
-    contacts = contact_log([{"normal_force": 5.0}])
-    where, _ = filmed(
-        scene,
-        ball_configuration([0, 0, 0.05 * size]),
-        contacts,
-        arrow_scale=ArrowScale(0.3 * size, 5.0),
-    )
-    shaft = where["contacts/normal_0/shaft"]
-    width, length = np.linalg.norm(shaft[:3, :2], axis=0)
-    assert 2e-4 * size < width < 2e-2 * size
-    assert 0.1 * size < length < 0.3 * size
-
-
 def test_wrong_arguments_are_named():
     scene = turntable_scene()
     canvas = Film().canvas
@@ -144,25 +125,6 @@ def test_wrong_arguments_are_named():
     display = Display(scene, visualizer=canvas)
     with pytest.raises(InvalidParameter, match=r"\(8,\)"):
         display.update(np.zeros(3))
-
-
-def test_a_stock_meshcat_page_takes_the_scene():
-    page = meshcat.Visualizer()
-    try:
-        display = Display(turntable_scene(), visualizer=page)
-        display.update(ball_configuration([0, 0, 0.2], 0.1), contact_log([{}]))
-        assert "set_3d_pane_size" in page.static_html()
-    finally:
-        page.window.server_proc.terminate()
-        page.window.server_proc.wait()
-
-
-def test_importing_the_folders_loads_no_picture_library():
-    script = (
-        "import sys, sphshell_pin.view, sphshell_pin.view.live, sphshell_pin.plot;"
-        "print({'meshcat', 'matplotlib', 'zmq', 'tornado', 'pydantic'} & set(sys.modules))"
-    )
-    assert python(script, check=True).stdout.strip() == "set()"
 
 
 def test_a_plane_is_drawn_where_its_shell_is_and_the_eye_above_it():

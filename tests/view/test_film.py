@@ -58,21 +58,6 @@ def test_a_picture_has_its_time_and_size(rendered, tmp_path):
 
 
 @pytest.mark.browser
-def test_a_gif_lasts_as_long_as_the_run_takes(rendered):
-    told = []
-    file = rendered("run.gif", fps=4, speed=1.5, told=lambda *numbers: told.append(numbers))
-    with Image.open(file) as opened:
-        assert opened.n_frames == 9
-        assert opened.size == SIZE
-        durations = []
-        for k in range(opened.n_frames):
-            opened.seek(k)
-            durations.append(opened.info["duration"])
-    assert sum(durations) == 9 * 250
-    assert told == [(k, 9) for k in range(1, 10)]
-
-
-@pytest.mark.browser
 def test_a_film_shows_the_pictures_in_their_order(rendered):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     file = rendered("run.mp4", fps=2, span=(0.5, 2.5), chart=False)

@@ -7,7 +7,6 @@ import pytest
 
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
-from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.view.live import Live
 from tests.scenario.files import FINGER, write
 from tests.view.test_live_in_browser import Tab
@@ -95,90 +94,3 @@ def test_quantities_and_their_curves_can_be_chosen(tab):
     assert tab.live._charts.keys == ("q.knuckle", "q.distal_joint")
     tab.page.locator("h1").click()
     assert not tab.page.locator("#curve-list").is_visible()
-
-
-def test_torques_and_sensors_come_once_they_are_chosen(tab):
-    tab.choose("Controller torque [N m]")
-    tab.step()
-    tab.wait("chart.run.rows.length > 3")
-    t, torque = tab.points("torque.knuckle")
-    rows = tab.live._charts._history.since(t[-1] - 1e-9)
-    assert rows.more["torque"][0, 0] == pytest.approx(torque[-1], rel=1e-6)
-    tab.choose("Sensor wrist [N]")
-    assert np.isfinite(tab.points("sensor.wrist.force_x")[1][1:]).all()
-    tab.choose("Energy residual [J]")
-    assert not tab.page.locator("#curves").is_visible()  # there is one curve only
-    assert tab.page.evaluate("chart.unit") == "J"
-
-
-def test_the_mouse_reads_values(tab):
-    tab.step()
-    tab.choose("Joint position [deg]")
-    box = tab.page.locator("#chart").bounding_box()
-    tab.page.mouse.move(box["x"] + 60, box["y"] + 50)
-    tab.wait("chart.read")
-    time, *values = tab.page.evaluate("chart.read")
-    shown = float(time.removesuffix(" s"))
-    for value, key in zip(values, tab.page.evaluate("chart.run.keys"), strict=True):
-        name = key.removeprefix("q.")
-        t, angle = tab.points(key)
-        number, unit, curve = value.split()
-        assert (unit, curve) == ("deg", name)
-        assert float(number) == pytest.approx(angle[np.abs(t - shown).argmin()], rel=1e-3)
-    tab.page.mouse.move(0, 0)
-
-
-def test_the_last_run_stays_as_a_ghost_and_a_kept_one_too(tab):
-    tab.choose("Joint velocity [deg/s]")
-    tab.step()
-    t, first = tab.points("v.knuckle")
-    tab.reset()
-    ghost_t, ghost = tab.points("v.knuckle", "ghost")
-    assert set(np.round(t, 6)) <= set(np.round(ghost_t, 6))
-    np.testing.assert_allclose(np.interp(t, ghost_t, ghost), first, rtol=1e-6, atol=1e-9)
-    assert "last run" in tab.page.locator("#curve-legend").inner_text()
-    # Another stiffness: at the same simulated time another curve.
-    tab.live.player.change("controller.kp", 0.1)
-    tab.step()
-    t, second = tab.points("v.knuckle")
-    assert np.abs(np.interp(t, ghost_t, ghost) - second).max() > 1.0
-    assert tab.page.evaluate("chart.lines(0, 1).filter((one) => one.ghost).length") == 3
-    tab.page.evaluate("globalThis.last = chart.ghost")
-    tab.page.keyboard.press("k")
-    tab.wait("chart.ghost !== last && document.getElementById('compare').value === 'kept'")
-    np.testing.assert_allclose(tab.points("v.knuckle", "ghost")[1][: len(second)], second)
-    tab.reset()
-    tab.reset()
-    assert tab.page.evaluate("document.getElementById('compare').value") == "kept"
-    assert len(tab.points("v.knuckle", "ghost")[0]) >= len(second)
-    tab.page.select_option("#compare", "")
-    assert tab.page.evaluate("chart.ghost") is None
-    assert "run" not in tab.page.locator("#curve-legend").inner_text()
-    # A parameter that restarts is the beginning of another run, too.
-    tab.page.select_option("#compare", "last")
-    tab.step()
-    tab.slide('[data-parameter="robot.three_link_finger.start.knuckle"]', 0.6)
-    tab.wait("state.t === 0 && chart.ghost?.rows.length > 3")
-
-
-def test_a_finished_run_has_its_charts_and_nothing_to_compare_with(browser, tmp_path):
-    built = build(write(tmp_path, FINGER))
-    result = built.simulation.run(
-        built.q0, built.v0, 0.4, built.controller, record_dt=5e-3, record=["torque"]
-    )
-    result = Replay(type(result)(**vars(result)))
-    with Live(result, running=False, speed=1.0) as live:
-        tab = ChartTab(browser, live)
-        assert not tab.page.locator("#keep").is_visible()
-        assert not tab.page.locator("#compare").is_visible()
-        tab.slide("#scrubber", 1.0)
-        tab.wait("state.t > 0.39")
-        tab.choose("Controller torque [N m]")
-        tab.wait("chart.run.rows.length > 10")
-        t, torque = tab.points("torque.knuckle")
-        for end, value in zip(t, torque, strict=True):  # the largest of its hundredth of a second
-            piece = np.abs(result.result.t - end) < 0.0101
-            recorded = result.result.torque[piece, 0]
-            assert np.abs(recorded - value).min() == pytest.approx(0.0, abs=1e-8)
-        tab.page.close()
-        assert tab.complaints == []

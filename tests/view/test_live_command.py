@@ -11,7 +11,6 @@ import pytest
 from sphshell_pin.scenario import run_scenario
 from sphshell_pin.view.live import Live, opening
 from tests.command import call
-from tests.programs import python
 from tests.scenario.files import without_pictures, write
 from tests.view.live_client import get
 from tests.view.live_player import BallPlayer
@@ -71,6 +70,7 @@ def test_faults_are_one_sentence(tmp_path, finished):
             ([scenario, "--port", live.server.port], "another port"),
             ([scenario, "--scenario", "gear_contact"], "only a finished run"),
             ([finished, "--set", "gravity.2=0"], "finished run"),
+            ([tmp_path], "has no run.npz"),
             ([finished, "--scenario", "gear_contact"], "nq"),
         ):
             told = view(*arguments, "--no-open")
@@ -78,14 +78,6 @@ def test_faults_are_one_sentence(tmp_path, finished):
             assert words in told.stderr
             assert told.stderr.count("\n") == 1
             assert "Traceback" not in told.output
-
-
-def test_without_meshcat_it_says_what_to_install(tmp_path):
-    code = f"import sys; sys.modules['meshcat'] = None; {ENTRY}"
-    done = python(code, "view", write(tmp_path), "--no-open")
-    assert done.returncode == 2
-    assert "sphshell-pin[view]" in done.stderr
-    assert done.stderr.count("\n") == 1
 
 
 def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch, tmp_path):
@@ -112,9 +104,3 @@ def test_other_machines_are_let_in_with_a_warning_only(tmp_path, monkeypatch):
         told = view(write(tmp_path), "--no-open", "--host", host)
         assert told.exit_code == 0
         assert ("everybody" in told.stderr) is warned
-
-
-def test_a_folder_without_a_result_is_named(tmp_path):
-    told = view(tmp_path, "--no-open")
-    assert told.exit_code == 2
-    assert "has no run.npz" in told.stderr

@@ -115,24 +115,6 @@ def test_without_key_and_button_the_mouse_moves_the_camera(arm):
     assert live.player.drag is None
 
 
-def test_a_finger_drags_where_the_button_is_on(arm):
-    live, tab = arm
-    wait_until_still(live, tab)
-    tab.click("#drag-mode")
-    x, y = tab.page.evaluate(ON_SCREEN, point_of(live).tolist())
-    finger = tab.page.context.new_cdp_session(tab.page)
-
-    def touch(kind, *points):
-        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
-
-    touch("touchStart", {"x": x, "y": y})
-    for step in range(1, 6):
-        touch("touchMove", {"x": x + 15 * step, "y": y})
-    tab.wait("state.drag && state.drag.newtons > 1")
-    touch("touchEnd")
-    tab.wait("!state.drag")
-
-
 def test_sliders_move_the_targets_of_the_joints_in_degrees(arm):
     live, tab = arm
     tab.slide('[data-parameter="target-elbow"]', 0.0)

@@ -107,17 +107,6 @@ def test_the_last_browser_drags_and_only_it_releases(arm):
     assert arm.player.drag is None
 
 
-def test_a_drag_goes_on_after_a_reset_where_the_browser_repeats_it(arm):
-    drag(arm, [1.0, 0.0, 0.5])
-    frames(arm, 10)
-    say(arm, "reset")
-    frames(arm, 1)
-    assert arm._state()["drag"] is None
-    drag(arm, [1.0, 0.0, 0.5])
-    frames(arm, 1)
-    assert arm.player.drag is not None
-
-
 def test_while_it_drags_no_button_pushes(ball):
     say(ball, "hold", OTHER_TAB, body="ball", direction=[1.0, 0.0, 0.0], newtons=1.0)
     node = "/meshcat/spheres/0_ball-plate"
@@ -145,27 +134,3 @@ def test_messages_that_cannot_be_are_one_sentence_and_the_run_goes_on(arm):
     assert "limits of the joint" in texts[2]
     assert not any("\n" in text for text in texts)
     assert arm.player.time > 0.05
-
-
-def test_a_slider_moves_a_target(arm):
-    for value in np.linspace(0.5, -1.0, 50):
-        say(arm, "target", joint="elbow", value=value)
-        say(arm, "target", joint="shoulder", value=0.1)
-    frames(arm, 1)
-    assert arm._state()["targets"] == {"shoulder": 0.1, "elbow": -1.0}
-    frames(arm, 240)
-    np.testing.assert_allclose(arm.player.q, [0.1, -1.0], atol=1e-3)
-
-
-def test_patches_are_computed_when_they_are_switched_on(ball):
-    frames(ball, 60)
-    assert ball._state()["show"]["pressure"] is False
-    assert ball.player.patches is None
-    say(ball, "show", part="pressure", on=True)
-    frames(ball, 2)
-    assert len(ball.player.patches) == 1
-    assert "MPa" in ball._state()["pressure"]
-    say(ball, "show", part="pressure", on=False)
-    frames(ball, 2)
-    assert ball.player.patches is None
-    assert ball._state()["pressure"] is None

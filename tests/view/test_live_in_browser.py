@@ -1,6 +1,5 @@
 """The live page in a real browser: pixels, clicks, keys, sliders, several tabs, no network."""
 
-import re
 from urllib.parse import urljoin
 
 import numpy as np
@@ -10,8 +9,7 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.live import Live
-from tests.scenario.files import FINGER, write
-from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
+from tests.view.live_player import BallPlayer, FilmPlayer
 from tests.view.test_recording_in_browser import count, is_blue, is_greenish, pixels_of, watch
 
 pytestmark = pytest.mark.browser
@@ -109,19 +107,6 @@ def test_ball_shell_and_arrow_are_seen_and_parts_can_be_hidden(opened):
     assert count(tab.scene(), NORMAL_COLOR) == 0
 
 
-def test_a_robot_is_seen_and_fills_its_part_of_the_window(opened):
-    _, tab = opened(ArmPlayer())
-    tab.wait("state.t === 0")
-    seen = tab.scene()
-    # The sample arm is pale yellow: less blue than red, which nothing else in the page is.
-    assert np.count_nonzero(seen[..., 0] - seen[..., 2] > 12) > 300
-    pane = tab.page.locator("#scene").bounding_box()
-    canvas = tab.page.locator("#scene > canvas").bounding_box()
-    assert canvas == pytest.approx(pane, abs=1)
-    tab.click("#fold")
-    tab.wait("document.querySelector('#scene > canvas').clientWidth === innerWidth")
-
-
 def test_the_button_and_the_keys(opened):
     live, tab = opened(BallPlayer())
     tab.wait("state.t > 0.1")
@@ -141,20 +126,6 @@ def test_the_button_and_the_keys(opened):
     tab.wait("!state.running")
     tab.page.keyboard.press("r")
     tab.wait("state.t === 0")
-
-
-def test_what_is_over_may_be_repeated(opened):
-    player = BallPlayer()
-    player.planned = 1000.0
-    _, tab = opened(player)
-    tab.wait("document.getElementById('reset').textContent === 'Reset'")
-    tab.page.locator("#run").click()
-    tab.wait("!state.running")
-    player.time = 1001.0
-    tab.page.keyboard.press("s")
-    tab.wait("document.getElementById('reset').textContent === 'Repeat'")
-    tab.page.locator("#reset").click()
-    tab.wait("state.running && document.getElementById('reset').textContent === 'Reset'")
 
 
 def test_a_slider_changes_what_the_simulation_uses(opened):
@@ -217,87 +188,6 @@ def test_a_finished_run_scrubs(opened):
     assert "1.500 / 2.000" in tab.page.locator("#scrub-value").inner_text()
     tab.page.keyboard.press(" ")
     tab.wait("state.t === 2 && !state.running")
-
-
-def test_a_second_tab_follows(opened):
-    # Standing still: two tabs that draw are too much for a machine without a graphics card.
-    live, tab = opened(BallPlayer(), running=False)
-    second = opened.again(live)
-    tab.slide("#speed", 0.25)
-    second.wait("state.speed < 0.9")
-    second.wait("document.getElementById('speed').value < 300")
-    second.click("[data-part=trails]")
-    tab.wait("!document.querySelector('[data-part=trails]').checked")
-    second.click("#run")
-    tab.wait("state.running && document.getElementById('run-word').innerText === 'Pause'")
-    second.wait("state.running")  # its click asks for the opposite of what it shows
-    second.click("#run")
-    tab.wait("!state.running")
-    assert not live.running
-    assert live.speed < 0.9
-
-
-@pytest.mark.robots
-def test_meshes_of_several_materials_are_drawn(opened, tmp_path):
-    """meshcat's merge nests the list of materials that one of several meshes has."""
-    pytest.importorskip("example_robot_data")
-    arm = FINGER.partition("[controller]")[0] + "[run]\nduration = 0.05\ndt = 1e-4\n"
-    arm = arm.replace("three_link_finger", "ur5").replace('frame = "tip"', 'frame = "tool0"')
-    arm = re.sub("^start = .*$", "", arm, flags=re.M)
-    _, tab = opened(LiveRun(build(write(tmp_path, arm))), running=False)
-    materials = """() => {
-        const found = [];
-        viewer.scene.traverse((one) => Array.isArray(one.material) && found.push(...one.material));
-        return found.map((one) => Boolean(one.isMaterial));
-    }"""
-    tab.wait(f"({materials})().length > 10")
-    assert all(tab.page.evaluate(materials))
-
-
-def test_the_end_is_said_and_a_new_run_is_found(opened):
-    live, tab = opened(BallPlayer())
-    port = live.server.port
-    live.stop()
-    tab.wait("document.getElementById('notice').innerText.includes('has ended')")
-    player = BallPlayer()
-    player.title = "Another run"
-    with Live(player, port=port):
-        tab.wait("document.getElementById('title').innerText === 'Another run'")
-
-
-def test_strip_and_list_show_the_forces(opened):
-    _, tab = opened(BallPlayer())
-    tab.wait("state.t > 1.0")
-    texts = tab.page.locator("#contacts td").all_inner_texts()
-    assert texts[0] == "ball"
-    # At rest the force is the weight, and the depth what the spring of 5 kN/m needs for it.
-    assert float(texts[1]) == pytest.approx(1e3 * 9.81 / 5e3, rel=0.02)
-    assert float(texts[2]) == pytest.approx(9.81, rel=0.02)
-    drawn = tab.page.evaluate("""() => {
-        const canvas = document.getElementById("chart");
-        const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-        let red = 0;
-        for (let k = 0; k < data.length; k += 4)
-            red += data[k] > 180 && data[k + 1] < 80 && data[k + 2] < 90 && data[k + 3] > 200;
-        return red;
-    }""")
-    assert drawn > 50
-
-
-def test_what_is_no_number_is_answered_by_a_sentence(opened):
-    live, tab = opened(BallPlayer(), running=False)
-    field = tab.page.locator("input[aria-label=stiffness]")
-    for typed in ("abc", "1e", ""):
-        tab.page.evaluate("document.getElementById('toasts').textContent = ''")
-        field.fill(typed)
-        field.press("Enter")
-        toast = tab.page.locator("#toasts div").inner_text()
-        assert toast == f'"{typed}" is no number: stiffness stays at 5000.'
-        assert field.input_value() == "5000"
-    assert live.player.knob_values["stiffness"] == 5e3
-    field.fill("6e3")
-    field.press("Enter")
-    tab.wait("state.parameters.stiffness === 6000")
 
 
 def test_contacts_of_a_hand_have_names_that_differ(opened):

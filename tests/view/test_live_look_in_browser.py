@@ -11,8 +11,8 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.live import Live
 from tests.scenario.files import DROP, write
-from tests.view.test_live_in_browser import LONG, Tab
-from tests.view.test_recording_in_browser import pixels_of
+from tests.texts import text_of
+from tests.view.test_live_in_browser import Tab
 
 pytestmark = pytest.mark.browser
 
@@ -25,38 +25,10 @@ KNOB = '\n[[knob]]\nkey = "contact.ball-plate.law.stiffness"\n'
 SCENARIO = DROP.replace("damping = 20.0 }", FRICTION) + KNOB
 
 # Everything that one can press or drag, and is seen, with its box in the page.
-TARGETS = """() => [...document.querySelectorAll(
-    "button, select, input:not([type=checkbox]), summary, label:has(input[type=checkbox])")]
-  .filter((one) => one.checkVisibility({visibilityProperty: true}) && !one.closest("dialog"))
-  .map((one) => {
-    const box = one.getBoundingClientRect();
-    return {name: one.id || one.textContent.trim(), left: box.left, right: box.right,
-            top: box.top + scrollY, bottom: box.bottom + scrollY,
-            floats: one.closest("#stage") !== null};
-  })"""
+TARGETS = text_of("page/targets.js").rstrip()
 
 # Of each piece of text that is seen: its color, and the colors behind it from the nearest on.
-TEXTS = """() => {
-  const found = [];
-  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-  while (walk.nextNode()) {
-    const text = walk.currentNode.textContent.trim(), one = walk.currentNode.parentElement;
-    if (!text || !one.checkVisibility({visibilityProperty: true})) continue;
-    if (one.closest("script, style, option, select, :disabled")) continue;
-    const behind = [];
-    for (let node = one; node; node = node.parentElement)
-      behind.push(getComputedStyle(node).backgroundColor);
-    found.push([text, getComputedStyle(one).color, behind]);
-  }
-  for (const one of document.querySelectorAll("select, input[type=text]")) {
-    if (!one.checkVisibility() || one.disabled) continue;
-    const behind = [];
-    for (let node = one; node; node = node.parentElement)
-      behind.push(getComputedStyle(node).backgroundColor);
-    found.push([one.id || one.type, getComputedStyle(one).color, behind]);
-  }
-  return found;
-}"""
+TEXTS = text_of("page/texts.js").rstrip()
 
 VARIABLES = """(names) => {
   const style = getComputedStyle(document.documentElement);
@@ -136,30 +108,6 @@ def test_a_finger_meets_every_control_of_a_narrow_page(look, size):
         assert one["right"] - one["left"] >= 40, one
 
 
-def test_on_a_phone_the_scene_stays_while_the_sheet_scrolls(look):
-    look.show((390, 844))
-    look.page.evaluate("scrollTo(0, 1200)")
-    look.wait("scrollY > 1000")
-    boxes = {
-        name: look.page.locator(name).bounding_box()
-        for name in ("#stage", "#transport", "#view-section")
-    }
-    assert boxes["#stage"]["y"] == 0
-    assert 0.4 * 844 < boxes["#stage"]["height"] < 0.5 * 844
-    assert boxes["#transport"]["y"] == pytest.approx(boxes["#stage"]["height"], abs=1)
-    assert 0 < boxes["#view-section"]["y"] < 844
-    look.click("#unfold")  # the scene alone
-    look.wait("document.querySelector('#stage').clientHeight > 780")
-    assert look.page.locator("#transport").bounding_box()["y"] + 58 <= 845
-    look.click("#unfold")
-    look.show((844, 390))
-    stage = look.page.locator("#stage").bounding_box()
-    run = look.page.locator("#run").bounding_box()
-    assert (stage["x"], stage["height"]) == (0, 390)
-    assert run["x"] >= stage["width"]
-    assert run["y"] < 40
-
-
 def luminance(color):
     """Relative luminance, WCAG 2.2."""
     linear = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
@@ -186,12 +134,6 @@ def paint(colors, below):
     return seen
 
 
-def test_the_measure_of_contrast_is_that_of_the_standard():
-    white, black, grey = np.ones(3), np.zeros(3), np.full(3, 0x77 / 255)
-    assert contrast(white, black) == pytest.approx(21)
-    assert contrast(grey, white) == pytest.approx(4.48, abs=0.01)  # #777, the known near miss
-
-
 @pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_all_text_has_contrast(look, scheme, size):
@@ -207,32 +149,6 @@ def test_all_text_has_contrast(look, scheme, size):
         for below in sky.values():  # the scene lies below what is not opaque
             ground = paint(behind, rgba(below)[0])
             assert contrast(paint([color], ground), ground) >= 4.5, (text, color, behind)
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_curves_and_labels_of_charts_have_contrast(look, scheme):
-    look.show(scheme=scheme)
-    curves = ["--normal", "--friction", *(f"--curve-{k}" for k in range(1, 9))]
-    found = look.page.evaluate(VARIABLES, ["--panel", "--faint", "--ink", *curves])
-    panel = rgba(found["--panel"])[0]
-    for name in ("--faint", "--ink", *curves):  # the values at the mouse have the curves' colors
-        assert contrast(rgba(found[name])[0], panel) >= 4.5, name
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_scene_and_the_chart_follow_the_preference(look, scheme):
-    look.show(scheme=scheme)
-    look.page.wait_for_timeout(300)
-    shot = look.page.locator("#stage").screenshot(timeout=LONG)
-    picture = pixels_of(shot) / 255
-    # Left and right of what stands in the middle there are the background and lines of the grid.
-    edges = np.median(luminance(picture[150:-50, [5, -5]]), axis=0)
-    assert (edges > 0.6).all() if scheme == "light" else (edges < 0.1).all()
-    assert look.page.evaluate("getComputedStyle(document.body).colorScheme") == "light dark"
-    assert (
-        look.page.evaluate("import('./theme.js').then((it) => it.color('--normal'))")
-        == ({"light": "#c81e3c", "dark": "#ff6b81"}[scheme])
-    )
 
 
 def test_every_control_has_a_name_and_messages_are_announced(look):
@@ -256,32 +172,6 @@ def test_every_control_has_a_name_and_messages_are_announced(look):
         return one.getAttribute("aria-live") || one.getAttribute("role");
     })""")
     assert live == ["status", "polite"]
-
-
-def test_focus_is_seen_and_a_focused_button_takes_its_keys(look):
-    look.page.locator("#title").click()
-    look.page.keyboard.press("Tab")
-    look.page.keyboard.press("Tab")
-    look.page.keyboard.press("Tab")
-    focused = look.page.evaluate("""() => {
-        const style = getComputedStyle(document.activeElement);
-        return [document.activeElement.id, style.outlineStyle, parseFloat(style.outlineWidth)];
-    }""")
-    assert focused[0] == "run"
-    assert focused[1] == "solid"
-    assert focused[2] >= 2
-    look.page.keyboard.press("Tab")  # Step
-    before = look.page.evaluate("state.t")
-    look.page.keyboard.press(" ")
-    look.wait(f"state.t > {before}")
-    assert not look.page.evaluate("state.running")
-    assert look.page.evaluate("document.activeElement.id") == "step"
-    # After a click of the mouse the space bar is the page's again.
-    look.page.locator("#step").click()
-    look.page.keyboard.press(" ")
-    look.wait("state.running")
-    look.page.keyboard.press(" ")
-    look.wait("!state.running")
 
 
 def test_the_overlay_lists_the_keys_that_the_documentation_has(look):

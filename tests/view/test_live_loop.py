@@ -15,7 +15,6 @@ from sphshell_pin.view import live as live_module
 from sphshell_pin.view.live import Live, loop, preview
 from sphshell_pin.view.live.loop import BUDGET, FPS
 from sphshell_pin.view.live.opening import player_of
-from tests.programs import python
 from tests.scenario.files import DROP, write
 from tests.view.live_driver import TAB, ForeignWindow, frames, say
 from tests.view.live_player import BallPlayer, FilmPlayer
@@ -62,15 +61,6 @@ def test_physics_too_slow_lowers_the_factor_and_not_the_frames(make):
     live.player.calls.clear()
     live.frame(5.0)
     assert live.player.calls[0][0] <= 2.0 * BUDGET
-
-
-def test_nothing_is_drawn_for_nobody(make):
-    live = make()
-    drawn = live._window.frame
-    state = live._panel.news(0)[0]
-    frames(live, 20)
-    assert live.player.time > 0.3
-    assert (live._window.frame, live._panel.news(0)[0]) == (drawn, state)
 
 
 def test_it_waits_for_the_first_browser_if_asked_to(make):
@@ -185,37 +175,6 @@ def test_it_keeps_real_time(make, monkeypatch):
     assert live.player.time == pytest.approx(0.5 * (clock.now - 5.0), abs=1.0 / FPS)
 
 
-def test_the_thread_runs_until_it_is_stopped():
-    with Live(BallPlayer()) as live:
-        while live.player.time == 0.0:
-            time.sleep(0.01)
-    stopped = live.player.time
-    assert not live._thread.is_alive()
-    time.sleep(0.1)
-    assert live.player.time == stopped
-
-
-def test_a_script_may_end_without_stopping_it():
-    code = (
-        "from sphshell_pin.scenario import build\n"
-        "from sphshell_pin.scenario.live.live_run import LiveRun\n"
-        "from sphshell_pin.view.live import Live\n"
-        "import time\n"
-        "live = Live(LiveRun(build('sphere_on_shell')), speed=10.0).start()\n"
-        "time.sleep(0.3)\n"
-    )
-    done = python(code)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_a_state_that_is_no_number_is_not_drawn(make):
-    live = make(watched=True)
-    live.player.q = np.full(3, np.nan)
-    live.player.advance = lambda *_: BallPlayer().advance(0.0)
-    frames(live, 3)
-    assert np.isfinite(live._window._matrices).all()
-
-
 def test_a_picture_in_somebody_elses_window(make):
     window = ForeignWindow()
     live = make(visualizer=meshcat.Visualizer(window=window))
@@ -291,29 +250,20 @@ def test_the_legend_says_where_arrows_are_cut(make):
 
 
 def test_a_queue_of_steps_gives_way_to_others(make, monkeypatch):
-    live = make()
+    live, taken = make(), []
     advance = live.player.advance
     monkeypatch.setattr(loop, "BUDGET", 1e-3)
-    monkeypatch.setattr(live.player, "advance", lambda *a: (time.sleep(0.005), advance(*a))[1])
+    monkeypatch.setattr(
+        live.player, "advance", lambda *a: (time.sleep(0.005), taken.append(1), advance(*a))[2]
+    )
     for _ in range(100):
         say(live, "step", seconds=1e-3)
         say(live, "look")  # between steps of one tab, which count once
     say(live, "speed", value=0.25)
-    begin = time.perf_counter()
     live.frame(0.0)
-    assert time.perf_counter() - begin < 0.4
+    assert 0 < len(taken) < 50
     assert live.speed == 0.25
     assert [text for _, text in live.told] == ["steps came faster than they run: some are left out"]
-
-
-def test_a_queue_of_events_ends_with_the_run(make, monkeypatch):
-    live = make()
-    for _ in range(9):
-        say(live, "step", seconds=1e-3)
-    done = []
-    monkeypatch.setattr(live, "_handle", lambda *_: (done.append(1), live._stop.set()))
-    live.frame(0.0)
-    assert done == [1]
 
 
 @pytest.mark.parametrize(
@@ -337,3 +287,12 @@ def test_a_value_that_cannot_be_is_answered_in_the_words_of_its_slider(
     assert client is TAB
     assert answer.startswith(told.format(key=key))
     assert str(tmp_path) not in answer
+
+
+def test_nothing_is_drawn_for_nobody(make):
+    live = make()
+    drawn = live._window.frame
+    state = live._panel.news(0)[0]
+    frames(live, 20)
+    assert live.player.time > 0.3
+    assert (live._window.frame, live._panel.news(0)[0]) == (drawn, state)

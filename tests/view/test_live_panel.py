@@ -28,17 +28,6 @@ def test_a_late_browser_gets_all_rows_and_the_newest_state():
     assert json.loads(panel.news(0)[1][1])["rows"] == [[5, 1.0]]
 
 
-def test_a_post_holds_until_the_next_of_its_name():
-    panel = Panel()
-    panel.post("hello", {"type": "hello"})
-    panel.post("last", {"type": "earlier", "rows": [1]})
-    number, _ = panel.news(0)
-    panel.post("last", {"type": "earlier", "rows": [2]})
-    (text,) = panel.news(number)[1]
-    assert json.loads(text)["rows"] == [2]
-    assert [json.loads(one).get("rows") for one in panel.news(0)[1]] == [None, [2]]
-
-
 def test_json_has_no_nan_and_no_infinity():
     value = {"a": np.nan, "b": [np.inf, np.float64(1 / 3)], "c": np.int32(3), "d": np.bool_(True)}
     text = dump({**value, "e": np.array([1.5, -np.inf])})

@@ -4,14 +4,11 @@ import asyncio
 import socket
 import threading
 import time
-from contextlib import suppress
 
 import pytest
-from tornado.websocket import WebSocketClosedError
 
 from sphshell_pin.errors import InvalidParameter, SphshellError
 from sphshell_pin.view.live import Live
-from sphshell_pin.view.live.events import LARGEST_MESSAGE
 from tests.view.live_client import Client, get, inside, run
 from tests.view.live_player import BallPlayer
 from tests.view.test_live_events import BAD
@@ -46,25 +43,6 @@ def test_the_page_is_served_whole_and_nothing_else(live):
         assert get(inside(live.url, name))[0] == 404
 
 
-def test_a_late_browser_gets_the_whole_scene(live):
-    async def visit():
-        async with Client(live.url) as early:
-            await early.until(lambda c: len(c.scenes) > 10)
-            async with Client(live.url) as late:
-                await late.until(lambda c: c.scenes and c.state and c.rows)
-                return early, late
-
-    early, late = run(visit())
-    kinds = [command["type"] for command in late.scenes[0]]
-    assert kinds.count("set_object") >= len(
-        [c for c in early.scenes[0] if c["type"] == "set_object"]
-    )
-    assert "move" in kinds
-    assert late.hello["title"] == BallPlayer.title
-    # Of the strip it gets what was there before it came.
-    assert late.rows[0][0] < 0.1
-
-
 def test_several_browsers_follow_each_other(live):
     async def visit():
         async with Client(live.url) as one, Client(live.url) as two:
@@ -80,19 +58,6 @@ def test_several_browsers_follow_each_other(live):
 
     run(visit())
     assert live.player.knob_values["stiffness"] == 7000.0
-
-
-def test_a_message_beyond_all_measure_only_ends_its_own_connection(live):
-    async def visit():
-        async with Client(live.url) as client, Client(live.url) as other:
-            with suppress(WebSocketClosedError):  # the server may close before all is written
-                await client.socket.write_message(100 * LARGEST_MESSAGE * "x")
-            await client.until(lambda _: False)
-            assert client.closed
-            await other.until(lambda c: len(c.scenes) > 3)
-
-    run(visit())
-    assert goes_on(live)
 
 
 def test_a_flood_is_answered_and_survived(live):
@@ -172,21 +137,6 @@ def test_a_browser_that_answers_late_skips_frames_and_gets_the_newest(live):
     assert 1 <= len(slow.scenes) < 0.5 * len(fast.scenes)
 
 
-def test_a_tab_that_is_closed_lets_go_what_it_held(live):
-    async def hold():
-        async with Client(live.url) as client:
-            await client.until(lambda c: c.state)
-            await client.say("hold", body="ball", direction=[1, 0, 0], newtons=2.0)
-            await client.until(lambda _: live.player.force[0] == 2.0)
-
-    run(hold())
-    deadline = time.monotonic() + 10.0
-    while live.player.time < live.player.push_end and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert live.player.time >= live.player.push_end
-    assert not live.server.watched
-
-
 def test_the_end_is_told():
     async def visit():
         live = Live(BallPlayer()).start()
@@ -217,14 +167,6 @@ def test_a_server_that_comes_back_on_its_port_is_another_session():
     with Live(BallPlayer(), port=port) as second:
         assert second.url == first.url
         assert run(session(second.url)) != before
-
-
-def test_a_browser_that_goes_during_the_handshake_leaves_no_complaint(live, caplog):
-    for _ in range(20):
-        with socket.create_connection(("127.0.0.1", live.server.port)) as raw:
-            raw.sendall(b"GET /socket HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n")
-    assert goes_on(live)
-    assert not caplog.records
 
 
 def test_no_message_stops_the_run(live):

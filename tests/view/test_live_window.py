@@ -57,14 +57,6 @@ def put(node, radius=1.0):
     set_object(node, sphere(radius), material("MeshPhong", 0))
 
 
-def test_any_number_of_nodes_may_be_placed(window, canvas):
-    for k in range(300):
-        canvas[f"n{k}"].set_transform(place(k))
-    window.commit()
-    told = Browser(window).look().matrices
-    assert [told[f"/meshcat/n{k}"][0, 3] for k in range(300)] == list(range(300))
-
-
 def test_only_what_moved_is_told(window, canvas):
     moves = [mover(canvas[f"n{k}"]) for k in range(200)]
     for k, move in enumerate(moves):
@@ -121,16 +113,6 @@ def test_a_slow_browser_gets_the_newest_and_a_late_one_the_whole(window, canvas)
         assert other.matrices.keys() == fast.matrices.keys()
         for name, matrix in fast.matrices.items():
             np.testing.assert_array_equal(other.matrices[name], matrix)
-
-
-def test_properties_come_after_their_object(window, canvas):
-    put(canvas["ball"])
-    show(canvas["ball"], False)
-    show(canvas["ball"], True)
-    put(canvas["ball"], 2.0)
-    window.commit()
-    kinds = [command["type"] for command in Browser(window).look().log]
-    assert kinds == ["set_property", "set_object"]  # as they were said last, each once
 
 
 def test_a_scene_that_is_drawn_anew_again_and_again_does_not_grow(window, canvas):

@@ -63,30 +63,3 @@ def test_a_result_without_a_scene_is_told(result):
     built = build("sphere_on_shell")
     with pytest.raises(InvalidParameter, match="height"):
         lost.view(built.scene, height=0)
-
-
-def test_a_loaded_result_is_mapped_on_the_shell_it_touched(result):
-    assert result.plot("map").axes[0].get_title() == "plate"
-    assert "on plate" in result.plot("path").axes[0].get_title()
-
-
-@pytest.mark.browser
-def test_the_frame_plays_in_a_page(result, tmp_path, browser):
-    page = tmp_path / "notebook.html"
-    page.write_text(f"<!DOCTYPE html><body>{result.view()._repr_html_()}</body>")
-    tab = browser.new_page()
-    complaints = []
-    tab.on("pageerror", lambda fault: complaints.append(str(fault)))
-    tab.goto(page.as_uri())
-    frame = tab.frames[1]
-    frame.wait_for_function("window.recording", timeout=60_000)
-    frame.wait_for_function("recording.time > 0.1 * recording.span", timeout=20_000)
-    tab.close()
-    assert complaints == []
-
-
-def test_a_result_is_drawn_with_the_options_of_films(result, tmp_path):
-    with pytest.raises(InvalidParameter, match=r"time = 99 must be in the run"):
-        result.render(tmp_path / "late.png", time=99)
-    with pytest.raises(InvalidParameter, match=r"must end in \.png"):
-        result.render(tmp_path / "film.avi")

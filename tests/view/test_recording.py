@@ -94,34 +94,6 @@ def test_a_run_without_contact_says_so(tmp_path):
     assert "no contact in this run" in page
 
 
-def test_without_spheres_the_legend_names_the_body_the_force_acts_on(tmp_path):
-    model = ball_model()
-    scene = a_scene(model, contact_pair(model, "ball", None, None, "table", name="gears"))
-    q = np.tile(ball_configuration(np.zeros(3)), (2, 1))
-    result = a_result([0.0, 0.1], q, [{"row": 1, "normal_force": 3.0}], ("gears",))
-    assert (
-        "normal force on ball," in write_recording(tmp_path / "a.html", result, scene).read_text()
-    )
-
-
-@pytest.mark.parametrize(("name", "value"), [("fps", 0.0), ("fps", np.nan), ("speed", -1.0)])
-def test_a_pace_that_is_not_positive_is_refused(tmp_path, name, value):
-    scene, result = ball_on_plate()
-    with pytest.raises(InvalidParameter, match=name):
-        write_recording(tmp_path / "run.html", result, scene, **{name: value})
-
-
-def test_a_folder_that_cannot_be_written_is_named_and_left_clean(tmp_path):
-    scene, result = ball_on_plate()
-    (tmp_path / "file").write_text("in the way")
-    with pytest.raises(ResultError, match=r"run\.html"):
-        write_recording(tmp_path / "file" / "run.html", result, scene)
-    (tmp_path / "run.html").mkdir()
-    with pytest.raises(ResultError, match=r"run\.html"):
-        write_recording(tmp_path / "run.html", result, scene)
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["file", "run.html"]
-
-
 def test_without_meshcat_one_sentence_says_how_to_get_it(tmp_path, monkeypatch):
     scene, result = ball_on_plate()
     monkeypatch.setitem(sys.modules, "meshcat", None)
@@ -130,15 +102,8 @@ def test_without_meshcat_one_sentence_says_how_to_get_it(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_chattering_contact_does_not_swell_the_page(tmp_path):
-    model = ball_model()
-    scene = a_scene(model, contact_pair(model, "ball", 0.05, plate()))
-    t = np.linspace(0.0, 2.0, 20_001)
-    q = np.tile(ball_configuration([0, 0, 0.05]), (len(t), 1))
-    rows = [
-        {"row": row, "point_world": [0.4 * np.sin(t[row]), 0.4 * np.cos(3.0 * t[row]), 0.0]}
-        for row in range(len(t))
-        if row % 4
-    ]
-    page = write_recording(tmp_path / "run.html", a_result(t, q, rows), scene)
-    assert page.stat().st_size < 1_300_000
+@pytest.mark.parametrize(("name", "value"), [("fps", 0.0), ("fps", np.nan), ("speed", -1.0)])
+def test_a_pace_that_is_not_positive_is_refused(tmp_path, name, value):
+    scene, result = ball_on_plate()
+    with pytest.raises(InvalidParameter, match=name):
+        write_recording(tmp_path / "run.html", result, scene, **{name: value})

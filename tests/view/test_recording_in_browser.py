@@ -3,15 +3,11 @@
 import io
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
-from sphshell_pin.dynamics.result.result_parts import PATCH
 from sphshell_pin.view import write_recording
 from sphshell_pin.view.arrows import NORMAL_COLOR
-from sphshell_pin.view.bodies import SPHERE_COLOR
-from sphshell_pin.view.patches import RAMP
-from tests.view.stand_ins import a_result, a_scene, ball_on_plate, contact_pair, plate
+from tests.view.stand_ins import ball_on_plate
 
 pytestmark = pytest.mark.browser
 
@@ -109,49 +105,6 @@ def test_the_trail_grows_with_time(ball_page, opened):
         counts.append(page.evaluate(visible))
     assert counts[0] == 0
     assert counts == sorted(set(counts))
-
-
-def test_a_robot_with_geometry_is_seen_and_moves(tmp_path, opened):
-    model = pin.buildSampleModelManipulator()
-    geometry = pin.buildSampleGeometryModelManipulator(model)
-    scene = a_scene(model, contact_pair(model, "effector_body", 0.08, plate()))
-    t = np.linspace(0.0, 1.0, 11)
-    q = [pin.integrate(model, pin.neutral(model), x * np.full(model.nv, 0.5)) for x in t]
-    page = opened(write_recording(tmp_path / "arm.html", a_result(t, q), scene, geometry))
-    first, last = at_time(page, 0.0), at_time(page, 1.0)
-    # The sample arm is pale yellow: less blue than red, which nothing else in the page is.
-    arm = [np.count_nonzero(pixels[..., 0] - pixels[..., 2] > 12) for pixels in (first, last)]
-    assert min(arm) > 300
-    moved = np.abs(first - last).max(axis=2) > 40
-    assert np.count_nonzero(moved) > 300
-    assert count(first, SPHERE_COLOR, 90) > 20
-
-
-def test_patches_have_the_colors_of_their_pressure(tmp_path, opened):
-    scene, result = ball_on_plate()
-    result.patch_rows = np.zeros(len(result.contacts.row), PATCH)
-    result.patch_rows["half_axes"] = 0.04, 0.03
-    result.patch_rows["axis_world"] = 0, 1, 0
-    result.patch_rows["peak_pressure"] = 2e6
-    page = opened(write_recording(tmp_path / "ball.html", result, scene))
-    touching = result.t[result.contacts.row[len(result.contacts.row) // 2]]
-    brightest = int(RAMP[-1].removeprefix("#"), 16)
-    assert count(at_time(page, touching), brightest, 60) > 20
-    assert count(at_time(page, 0.0), brightest, 60) == 0
-    assert "pressure of patches: 0 to 2 MPa" in page.locator("#legend").text_content()
-
-
-def test_a_mesh_that_the_viewer_cannot_draw_costs_no_more_than_itself(ball_page, tmp_path, opened):
-    page = ball_page.read_text()
-    # The first mesh fails, as some files of robots do.
-    broken = "const parse = MeshCat.Viewer.prototype.handle_command; let first = true; "
-    broken += "MeshCat.Viewer.prototype.handle_command = function (command) { "
-    broken += "if (command.type === 'set_object' && first) { first = false; throw Error('no'); } "
-    broken += "return parse.call(this, command); };"
-    at = page.index("return viewer_in(element")
-    file = tmp_path / "broken.html"
-    file.write_text(page[:at] + broken + page[at:])
-    assert "One mesh cannot be drawn" in opened(file).locator("#fault").inner_text()
 
 
 def test_a_damaged_page_says_so(ball_page, tmp_path, browser):

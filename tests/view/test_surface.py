@@ -12,11 +12,6 @@ def test_patches_share_no_vertices_and_keep_their_shape():
     np.testing.assert_array_equal(mesh.vertices[mesh.triangles], cube.vertices[cube.triangles])
 
 
-def test_within_a_patch_vertices_are_shared():
-    cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS, patches=np.zeros(6))
-    assert len(SurfaceMesh.of(cube).vertices) == 8
-
-
 def test_a_fine_shell_is_outlined_by_its_sharp_edges_only(monkeypatch):
     cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS)
     cube.edge_class[:7] = 0
@@ -40,11 +35,6 @@ def test_a_tube_keeps_its_radius_round_a_helix():
     counts = np.unique(edges, axis=0, return_counts=True)[1]
     assert np.count_nonzero(counts == 1) == 2 * 6
     assert counts.max() == 2
-
-
-def test_a_tube_survives_a_path_that_turns_back():
-    vertices, _ = tube(np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0.0]]), 0.01)
-    assert np.isfinite(vertices).all()
 
 
 def test_great_circles_lie_on_the_sphere_in_three_planes():
