@@ -8,7 +8,7 @@ import numpy as np
 
 from sphshell_pin.base.arrays import Array, Bytes, Ints, Longs, Mask
 from sphshell_pin.shell.base import ShellBase
-from sphshell_pin.shell.faces import described, distances_from, not_exact
+from sphshell_pin.shell.faces import ambiguous_band, described, distances_from, not_exact
 from sphshell_pin.shell.health import LARGE_OF_TURNS, CurvatureReport, Place
 from sphshell_pin.shell.raw import area_vectors
 
@@ -122,9 +122,31 @@ def curvature_report(shell: ShellBase) -> CurvatureReport:
         normals_set_aside=len(aside),
         set_aside_at=first,
         share_set_aside=len(aside) / shell.triangles.size,
-        faces=described(shell.faces, shell.num_elements) if _has_faces(shell) else "",
+        faces=_faces_in_words(shell) if _has_faces(shell) else "",
         not_exact=_not_exact(shell, 0.5 * longest * height) if _has_faces(shell) else (),
     )
+
+
+def _faces_in_words(shell: ShellBase) -> str:
+    """Say which faces there are, and where one of them may have swallowed a flat."""
+    of_element = np.full(shell.num_elements, -1)
+    for k, face in enumerate(shell.faces):
+        of_element[face.elements] = k
+    of = of_element[shell.triangle_element]
+    order = np.argsort(of, kind="stable")
+    starts = np.searchsorted(of[order], np.arange(len(shell.faces) + 1))
+    bands = [
+        ambiguous_band(face, shell.vertices[shell.triangles[order[begin:end]]])
+        for face, begin, end in zip(shell.faces, starts, starts[1:], strict=False)
+    ]
+    words = described(shell.faces, shell.num_elements)
+    if places := [band for band in bands if band is not None]:
+        at = "({:.4g}, {:.4g}, {:.4g}) m".format(*places[0])
+        words += (
+            f"; counted as round although wider than all other steps of its face, so it may be a "
+            f"flat: {len(places)}, one at {at}"
+        )
+    return words
 
 
 def _not_exact(shell: ShellBase, areas: Array) -> tuple[str, ...]:

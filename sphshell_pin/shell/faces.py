@@ -13,6 +13,9 @@ from sphshell_pin.shell.raw import KINDS
 
 MOST_GROUPS = 5  # in words
 
+CLEARLY_WIDER = 1.1
+"""Bands that differ by less stand off about as much: if one is a flat, that hardly matters."""
+
 
 @dataclass(frozen=True, eq=False)
 class Face:
@@ -129,6 +132,34 @@ def described(faces: Sequence[Face], elements: int) -> str:
             f"{len(flats)}, one at {at}"
         )
     return (", ".join(parts) or "none recognized") + share
+
+
+def ambiguous_band(face: Face, corners: Array) -> Array | None:
+    """Return the middle (3,) [m] of the widest band of a cylinder or cone that may be a flat.
+
+    That is a band between two rulings that is clearly wider than all others of the face, though not
+    so wide that it must be a plane. None if there is none.
+
+    corners : (t, 3, 3) of the triangles on the face [m]
+    """
+    if face.kind not in ("cylinder", "cone") or face.axis is None or face.name is not None:
+        return None
+    east = np.cross(face.axis, np.eye(3)[np.abs(face.axis).argmin()])
+    east /= np.linalg.norm(east)
+    away = corners - face.point
+    turn = np.arctan2(away @ np.cross(face.axis, east), away @ east)
+    first = turn[:, :1]
+    turn = first + np.angle(np.exp(1j * (turn - first)))
+    # The tip of a cone is on every ruling.
+    off = np.linalg.norm(np.cross(away, face.axis), axis=2)
+    turn[off < 1e-3 * off.max()] = np.nan
+    low, high = np.nanmin(turn, axis=1), np.nanmax(turn, axis=1)
+    width, middle = high - low, 0.5 * (low + high)
+    widest = width.argmax()
+    same = np.abs(np.angle(np.exp(1j * (middle - middle[widest])))) < 0.1 * width[widest]
+    if same.all() or width[widest] < CLEARLY_WIDER * width[~same].max():
+        return None
+    return np.asarray(corners[same].mean(axis=(0, 1)))
 
 
 def not_exact(faces: Sequence[Face], shares: Array, off: Array) -> tuple[str, ...]:

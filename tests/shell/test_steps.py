@@ -101,6 +101,23 @@ def test_a_flat_between_oblique_ends_is_plane(seed):
     kinds = [face.kind for face in shell.faces]
     assert kinds.count("plane") == 2 + int(2 * half > 1.3 * steps.max())
     assert kinds.count("cylinder") == 1
+    assert "may be a flat" not in shell.curvature_report().faces or 2 * half < 1.3 * steps.max()
+
+
+def test_a_flat_that_may_be_a_step_between_oblique_ends_is_named():
+    """An oblique cut is sampled in unequal steps: a flat that is a little wider stays round."""
+    widths = np.array([1.0, 0.7, 0.6, 0.75, 0.65] * 9)
+    for share, named in ((1.0, False), (1.2, True)):
+        steps = np.r_[widths, share]
+        angles = 2 * np.pi * np.cumsum(steps) / steps.sum()
+        x, y = RADIUS * np.cos(angles), RADIUS * np.sin(angles)
+        m = len(angles)
+        points = np.concatenate([np.c_[x, y, 0.5 * x], np.c_[x, y, 0.7 * y + 4 * LENGTH]])
+        walls = [[i, (i + 1) % m, m + (i + 1) % m, m + i] for i in range(m)]
+        shell = sp.Shell(points.astype(np.float32).astype(float), walls)
+        (face,) = shell.faces
+        assert face.kind == "cylinder"
+        assert ("may be a flat: 1, one at" in shell.curvature_report().faces) == named
 
 
 def test_a_band_beyond_whose_end_the_face_goes_on_is_no_plane():
