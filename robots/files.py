@@ -99,7 +99,7 @@ def read(
         else:
             text = read_bytes(file, MOST_TEXT)
     except (ValueError, OSError) as error:
-        raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
+        raise RobotError(f"{file}: {_not_read(file, '', error)}") from None
     found = described(text, folders, free_flyer=free_flyer)
     if assumed:
         values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
@@ -110,7 +110,7 @@ def read(
 
 def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) -> Description:
     """Return the description that `text`, of the file of `folders`, is; see `read`."""
-    file, what = folders.file, "URDF"
+    file, tag = folders.file, ""
     try:
         text = _BEFORE_XML.sub(b"", text)
         tag = check_size(text)
@@ -122,7 +122,6 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
         if tag == "mujoco":
             from sphshell_pin.robots.mjcf import read_mjcf
 
-            what = "MJCF"
             return read_mjcf(root, folders, floats=free_flyer)
         check_tree(root)
         notes = tuple(add_limits(root))
@@ -130,9 +129,18 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
     except (ValueError, OSError, LookupError, RuntimeError) as error:  # the last: Pinocchio's
         if isinstance(error, SphshellError):
             raise
-        said = f"{file}: not a {what} that can be read: {_line(error)}"
+        said = f"{file}: {_not_read(file, tag, error)}"
         whole = including(file) if INCLUDED in said and folders.kept is None else None
         raise RobotError(said if whole is None else f"{said}: {whole}") from None
+
+
+def _not_read(file: Path, tag: str, error: Exception) -> str:
+    """Return why a file whose root element is `tag`, "" if that is not known, cannot be read."""
+    kind = {".xacro": "a xacro file", ".xml": "an MJCF", ".mjcf": "an MJCF"}.get(
+        file.suffix.lower(), "a URDF"
+    )
+    kind = {"robot": "a URDF", "mujoco": "an MJCF"}.get(tag, kind)
+    return f"not {kind} that can be read: {_line(error)}"
 
 
 def is_path(robot: str | PathLike[str]) -> bool:
@@ -171,8 +179,8 @@ def build_model(
         model = pin.buildModelFromXML(ET.tostring(description.root, encoding="unicode"), *root)
         check_memory(model.nv)
     except (ValueError, RuntimeError, OSError) as error:
-        what = "URDF" if description.mjcf is None else "MJCF"
-        raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None
+        what = "a URDF" if description.mjcf is None else "an MJCF"
+        raise RobotError(f"{file}: not {what} that pinocchio can read: {_line(error)}") from None
     for name in wound:
         at = model.joints[model.getJointId(name)].idx_q
         model.lowerPositionLimit[at], model.upperPositionLimit[at] = -np.inf, np.inf

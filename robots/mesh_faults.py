@@ -9,6 +9,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from urllib.parse import unquote
@@ -78,58 +79,70 @@ def collada_root(content: bytes) -> ET.Element:
     return root
 
 
+@dataclass
+class _Node:
+    """A node or a geometry, or the name of some: keys of what it holds, and its own triangles."""
+
+    inner: list[str | int] = field(default_factory=list)
+    triangles: int = 0
+    count: int = 0
+    """1 of a node, which the reader copies wherever it is held."""
+
+
 def _collada_fault(root: ET.Element) -> str:
     """Say what of a Collada file assimp would read without end, or copy too often."""
-    named: dict[str, list[int]] = defaultdict(list)
-    graph: dict[int, list[int]] = {}
-    links: list[tuple[int, str]] = []
-    triangles: dict[str, int] = defaultdict(int)
-    own: dict[int, int] = defaultdict(int)
+    nodes: dict[str | int, _Node] = defaultdict(_Node)
+    largest = _Node()
     for one in root.iter():
         tag = _tag(one)
         if tag in ("p", "vcount", "v") and not _INDICES.fullmatch(one.text or ""):
             return f"its <{tag}> holds what is no index"
         if tag == "geometry":  # three numbers and what is between them are six characters or more
             size = sum(len(text.text or "") // 6 + 1 for text in one.iter() if _tag(text) == "p")
-            triangles[f"#{one.get('id')}"] += size
-        if tag in ("node", "visual_scene"):
-            graph[id(one)] = [id(inner) for inner in one if _tag(inner) == "node"]
-            for key in {one.get("id"), one.get("name")} - {None}:
-                named[f"#{key}"].append(id(one))
-            links += [
-                (id(one), inner.get("url", "")) for inner in one if _tag(inner) == "instance_node"
-            ]
-    for node in root.iter():
-        if id(node) in graph:
-            for inner in node:
-                if _tag(inner) == "instance_geometry":
-                    own[id(node)] += triangles[inner.get("url", "")]
-                elif _tag(inner) == "instance_controller":  # of any geometry
-                    own[id(node)] += max(triangles.values(), default=0)
-    for holder, url in links:
-        graph[holder] += named[url]
-    return _tree_fault(graph, own)
+            geometry = nodes[f"geometry#{one.get('id')}"]
+            geometry.triangles += size
+            largest = max(largest, geometry, key=lambda one: one.triangles)
+        elif tag in ("node", "visual_scene"):
+            nodes[id(one)].count = 1
+            nodes[id(one)].inner = [_held(inner) for inner in one]
+            for name in {one.get("id"), one.get("name")} - {None}:
+                nodes[f"node#{name}"].inner.append(id(one))
+    nodes["controller"] = largest  # of any geometry
+    return _tree_fault(nodes)
+
+
+def _held(element: ET.Element) -> str | int:
+    """Return the key of what an element inside a node stands for."""
+    tag = _tag(element)
+    if tag == "node":
+        return id(element)
+    kind = tag.removeprefix("instance_")
+    return kind if kind == "controller" else f"{kind}{element.get('url', '')}"
 
 
 def _tag(element: ET.Element) -> str:
     return str(element.tag).rpartition("}")[2]
 
 
-def _tree_fault(graph: Mapping[int, Sequence[int]], own: Mapping[int, int]) -> str:
-    """Say if nodes with their inner ones, and their own triangles, are too many once expanded."""
-    nodes, triangles, depth = dict[int, int](), dict[int, int](), dict[int, int]()
+def _tree_fault(nodes: Mapping[str | int, _Node]) -> str:
+    """Say if nodes with what they hold are too many once expanded, too deep, or too large."""
+    counts, triangles, depth = (
+        dict[str | int, int](),
+        dict[str | int, int](),
+        dict[str | int, int](),
+    )
     try:
-        order = tuple(TopologicalSorter(graph).static_order())
+        order = tuple(TopologicalSorter({k: one.inner for k, one in nodes.items()}).static_order())
     except CycleError:
         return "one of its nodes holds itself"
     for key in order:
-        inner = graph.get(key, ())
-        nodes[key] = 1 + sum(nodes[one] for one in inner)
-        triangles[key] = own.get(key, 0) + sum(triangles[one] for one in inner)
-        depth[key] = 1 + max((depth[one] for one in inner), default=0)
+        one = nodes.get(key, _Node())
+        counts[key] = one.count + sum(counts[inner] for inner in one.inner)
+        triangles[key] = one.triangles + sum(triangles[inner] for inner in one.inner)
+        depth[key] = one.count + max((depth[inner] for inner in one.inner), default=0)
     if max(depth.values(), default=0) > DEEPEST_NODE:
         return f"its nodes are nested more than {DEEPEST_NODE} deep"
-    if max(nodes.values(), default=0) > MOST_NODES:
+    if max(counts.values(), default=0) > MOST_NODES:
         return f"its nodes stand for more than {MOST_NODES} nodes"
     if max(triangles.values(), default=0) > MOST_TRIANGLES:
         return f"its nodes stand for more than {MOST_TRIANGLES} triangles"
@@ -171,14 +184,15 @@ def _gltf_fault(path: Path, content: bytes) -> str:
             )
             for mesh in document.get("meshes", [])
         ]
-        nodes = document.get("nodes", [])
-        graph = {k: [int(one) for one in node.get("children", [])] for k, node in enumerate(nodes)}
-        own = {k: meshes[node["mesh"]] // 3 for k, node in enumerate(nodes) if "mesh" in node}
+        nodes: dict[str | int, _Node] = {"meshes": _Node(triangles=sum(meshes) // 3)}
+        for k, node in enumerate(document.get("nodes", [])):
+            size = meshes[node["mesh"]] // 3 if "mesh" in node else 0
+            nodes[k] = _Node([int(one) for one in node.get("children", [])], size, 1)
     except (ValueError, RecursionError):
         return f"{path}: its JSON cannot be read"
     except (TypeError, AttributeError, LookupError, OverflowError):
         return f"{path}: its JSON is not that of a glTF"
-    fault = _tree_fault(graph | {-1: []}, own | {-1: sum(meshes) // 3})
+    fault = _tree_fault(nodes)
     return f"{path}: {fault}" if fault else _reference_fault(path, names)
 
 

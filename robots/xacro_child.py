@@ -76,10 +76,20 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     except Exception as error:  # of the package xacro, which raises what happens to come up
         if isinstance(error.__cause__ or error.__context__, MemoryError):
             raise MemoryError from None
-        reason = " ".join(str(error).split()) or type(error).__name__
-        # xacro says so of all that a substitution may fail for.
-        reason = reason.replace("Undefined substitution argument there is", "there is")
+        reason = _reason(error) or type(error).__name__
         where = Path((xacro.filestack or [file])[-1]).name
         of = f" (in {where})" if where != file.name else ""
         raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
     return str(document.toxml())
+
+
+def _reason(error: Exception) -> str:
+    """Return what the package xacro says of an error: once, and without Python's classes."""
+    said = " ".join(str(error).split())
+    cause = getattr(error, "exc", None)
+    told = " ".join(str(cause).split())
+    if isinstance(cause, OSError):  # its text follows xacro's own sentence
+        said = said.replace(f" {told}", "")
+    said = said.replace(f"{type(cause)}: {told} ", "")
+    # xacro says so of all that a substitution may fail for.
+    return said.replace("Undefined substitution argument there is", "there is")

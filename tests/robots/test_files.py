@@ -127,6 +127,7 @@ def test_a_joint_without_a_limit_element_has_no_limits(tmp_path):
         ("r.step", "CAD file"),
         ("r.srdf", "give the URDF as the file"),
         ("r.txt", "root element is <model>; robots are read from URDF"),
+        ("r.xml", "not an MJCF that can be read: its root element is <model>"),
     ],
 )
 def test_other_formats_name_the_next_step(tmp_path, name, words):

@@ -226,7 +226,7 @@ def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, word
 )
 def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, monkeypatch, inside, head, words):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(robots.RobotError, match=rf"not a MJCF that can be read: .*{words}"):
+    with pytest.raises(robots.RobotError, match=rf"not an MJCF that can be read: .*{words}"):
         robots.load_file(written(tmp_path, inside, head))
     assert {one.name for one in tmp_path.iterdir()} == {"r.xml"}  # no log of MuJoCo's
 

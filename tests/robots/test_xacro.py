@@ -202,7 +202,12 @@ def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
     for inside, words in (
         ("${nix}", "xacro cannot expand it: .*nix"),
         ('<xacro:include filename="$(find nix)/a.xacro"/>', "no package 'nix' in .*--package-dir"),
-        ('<xacro:include filename="b.xacro"/>', r"b\.xacro"),
+        (
+            '<xacro:include filename="b.xacro"/>',
+            r"expand it: No such file or directory: \S*b\.xacro$",
+        ),
+        ("$(nix)", r"expand it: Unknown substitution command \[nix\]\. Valid [^.]*$"),
+        ("$(eval nix + 1)", "not a xacro file that can be read: .* it: name 'nix' is not defined$"),
         ("<link name='a'>", "xacro cannot expand it"),
         ("<xacro:macro name='m'><xacro:m/></xacro:macro><xacro:m/>", "nested too deeply"),
     ):

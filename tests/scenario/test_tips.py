@@ -136,6 +136,29 @@ def test_a_drone_touches_with_its_body_or_its_feet(tmp_path: Path, feet: int) ->
     assert {int(one.parentJoint) for one in carriers} == {1}
 
 
+@pytest.mark.parametrize("tilts", [False, True])
+def test_what_carries_rotors_alone_falls_on_its_body(tmp_path: Path, tilts: bool) -> None:
+    """The turn of a rotor moves no sphere across a part; its body does not stand on one either."""
+    out = link("body", ".2 .2 .05").replace('mass value="1"', 'mass value="9"')
+    for x, name in ((0.2, "front"), (-0.2, "back")):
+        at, carrier = f"{x} 0 .05", "body"
+        if tilts:
+            out += link(f"{name}_arm") + joint(
+                f"{name}_t", carrier, f"{name}_arm", "continuous", at, "1 0 0"
+            )
+            at, carrier = "0 0 .05", f"{name}_arm"
+        out += link(name, ".1 .02 .01") + joint(
+            f"{name}_j", carrier, name, "continuous", at, "0 0 1"
+        )
+    file = tmp_path / "drone.urdf"
+    file.write_text(f'<robot name="drone">{out}</robot>')
+    made = new_scenario(file, "box", out=tmp_path / "new.toml")
+    assert "the base is floating, by the robot's shape: or --base" in made.why
+    assert made.built.scene.model.nv == 6  # rotors are locked
+    (pair,) = made.built.scene.pairs
+    assert pair.spheres[0].in_joint.translation[2] < -0.025  # below its body
+
+
 def test_a_finger_of_one_joint_presses_along_its_motion(tmp_path: Path) -> None:
     """Pressed along another direction it jams: friction bears part of the force."""
     shape = '<geometry><sphere radius=".01"/></geometry>'

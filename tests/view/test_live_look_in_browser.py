@@ -151,6 +151,28 @@ def test_all_text_has_contrast(look, scheme, size):
             assert contrast(paint([color], ground), ground) >= 4.5, (text, color, behind)
 
 
+@pytest.mark.parametrize("size", NARROW + WIDE)
+def test_messages_lie_over_no_line_of_the_legend(look, size):
+    look.show(size)
+    boxes = look.page.evaluate("""async () => {
+      const { notice, toast } = await import("./notices.js");
+      const hidden = [...document.querySelectorAll("#legend > div[hidden]")].slice(0, 3);
+      for (const one of hidden) one.hidden = false;
+      notice("The run has ended.", "test");
+      for (const k of [1, 2]) toast(`A message of more than a line on a narrow page, no. ${k}`);
+      const those = document.querySelectorAll("#status, #legend, #notice, #toasts div");
+      const boxes = [...those].map((one) => one.getBoundingClientRect().toJSON());
+      for (const one of hidden) one.hidden = true;
+      notice(null);
+      document.getElementById("toasts").replaceChildren();
+      return boxes;
+    }""")
+    assert len(boxes) == 5
+    for a, b in itertools.combinations(boxes, 2):
+        apart_x = min(a["right"], b["right"]) <= max(a["left"], b["left"])
+        assert apart_x or min(a["bottom"], b["bottom"]) <= max(a["top"], b["top"]), (a, b)
+
+
 def test_every_control_has_a_name_and_messages_are_announced(look):
     nameless = look.page.evaluate("""() => [...document.querySelectorAll(
         "button, input, select, summary, canvas, iframe, dialog")].filter((one) => {

@@ -66,6 +66,19 @@ def find_tips(
     return found
 
 
+def only_turns(model: pin.Model) -> bool:
+    """Whether what its body carries only turns, without end: rotors or wheels, and what tilts them.
+
+    Several limbs of at most two joints, all without limits, and lighter than the body.
+    """
+    first = 2 if floats(model) else 1
+    depths = [len(model.supports[j]) - first for j in _leaves(model)]
+    endless = all("RUB" in one.shortname() for one in list(model.joints)[first:])
+    carried = sum(one.mass for one in list(model.inertias)[first:])
+    heavy = model.inertias[first - 1].mass > carried
+    return endless and heavy and len(depths) > 1 and max(depths) <= 2
+
+
 def every_finger(robot: LoadedRobot) -> list[Tip]:
     """Return the fingertips of a hand: spheres of its collision geometry, else at links' ends.
 
@@ -189,6 +202,8 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
     The joints `held` are those of grippers, whose jaws are no ends.
     """
     leaves, free = _leaves(model, held), floats(model)
+    if free and only_turns(model):
+        return [(frame_on_joint(model, 1) or model.names[1], "its body, beside rotors or wheels")]
     carriers = {int(one.parentFrame) for one in model.frames}
     childless = [
         one

@@ -138,8 +138,8 @@ class LinkGeometry:
     def _ahead(self) -> Array:
         """Return the unit vector (3,) towards the end, in the frame.
 
-        To the jaws of a gripper. Else away from the joint's axis; along it where the link is about
-        it, away from the link before.
+        To the jaws of a gripper; of a body that floats down. Else away from the joint's axis;
+        along it where the link is about it, away from the link before.
         """
         model, place = self._model, self._frame.placement.inverse()
         here = _middle(self.corners)
@@ -147,6 +147,8 @@ class LinkGeometry:
             away = here - _middle(_moved(place, self._corners(self._joint)))
             return np.asarray(away / max(float(np.linalg.norm(away)), 1e-12))
         joint = model.joints[self._joint]
+        if joint.nv == 6:
+            return np.asarray(place.rotation @ np.array([0.0, 0.0, -1.0]))
         before = self._corners(int(model.parents[self._joint]))
         behind = place.act(model.jointPlacements[self._joint].actInv(_middle(before)))
         origin, away = place.translation, here - behind

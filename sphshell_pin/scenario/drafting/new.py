@@ -20,7 +20,7 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, S
 from sphshell_pin.robots import floats, is_path
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
-from sphshell_pin.scenario.drafting.fingertips import find_tips
+from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
 from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand, with_part
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
@@ -287,9 +287,9 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
 def _base(model: pin.Model) -> Literal["fixed", "floating"] | None:
     """Return what the base has to be by the robot's shape; None: what its file states will do.
 
-    A single body floats, a single limb is an arm.
+    A single body floats, with rotors or wheels too; a single limb is an arm.
     """
-    if not model.nv:
+    if not model.nv or (not floats(model) and only_turns(model)):
         return "floating"
     limbs = sum(int(parent) == 1 for parent in model.parents)
     return "fixed" if floats(model) and limbs == 1 else None

@@ -43,6 +43,9 @@ MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
 PATH_RATE = 3.0
 LEAD_IN = 0.5
 FORCE_RISE = 0.25
+# Energy of a mass that touches, as a part of force times depth at rest: it presses then less than
+# half as hard again.
+TOUCH_ENERGY = 0.3
 # Ramps of the target's speed and acceleration, each [s].
 RAMP = 0.25
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
@@ -169,10 +172,17 @@ def press_force(
     return press
 
 
-def press_gap(radius: float, force: float, materials: tuple[Material, Material]) -> float:
-    """Return the gap at the start [m]: one and a half times the depth under `force` [N] at rest."""
+def press_gap(
+    radius: float, force: float, mass: float, materials: tuple[Material, Material]
+) -> float:
+    """Return the gap at the start [m]: in parts of the depth under `force` [N] at rest.
+
+    One and a half; less of a large `mass` [kg], whose energy at the first touch, 4 gap^1.5
+    sqrt(mass force) / rise by the motion in `press_plan`, is then a part of force times depth.
+    """
     rest = float((force / hertz_stiffness(radius, *materials)) ** (2 / 3))
-    return min(TIP_GAP * radius, 1.5 * rest)
+    calm = float((TOUCH_ENERGY * FORCE_RISE / (4 * math.sqrt(mass * rest / force))) ** (2 / 3))
+    return min(TIP_GAP * radius, min(1.5, calm) * rest)
 
 
 def press_plan(

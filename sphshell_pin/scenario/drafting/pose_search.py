@@ -192,7 +192,7 @@ class _Search:
             except SphshellError as error:  # of this posture: another one may do
                 self.tried.errors.append(error)
                 continue
-            gap = press_gap(tip.radius, force, pair)
+            gap = press_gap(tip.radius, force, stance.mass, pair)
             place = found.with_gap(gap)
             way = find_way(asked, place, self.links, tip.radius, gap, self.room)
             yield Candidate(place, way, pair, force, gap, weak)
@@ -289,8 +289,9 @@ def _drop(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Work
         hold = ", or hold it with --base fixed" if model.njoints > 2 else ""
         raise SphshellError(f"{said}--place, --at and --path{hold}")
     centers = sphere_centers(built, tips)
-    root = q0[:7]
-    if model.njoints == 2:
+    root, lock = q0[:7], tuple[str, ...]()
+    if int(model.frames[find_frame(model, tips[0].frame)].parentJoint) == 1:
+        lock = joints_aside(model, tips[0])
         pair = chosen_materials(asked, tips, 0.0)
         plan = plan_fall(shell, tips[0], centers[0], root, pair, inside=asked.inside)
         tips = tips[:1]
@@ -302,9 +303,9 @@ def _drop(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Work
         leg = float(np.linalg.norm(root[:3] - centers, axis=1).max())
         pair = chosen_materials(asked, tips, mass / len(tips))
         plan = plan_stand(shell, tuple(tips), centers, mass, inertia, leg, pair)
-    links = Links(model, built.assembly.loaded[0].collision_model, shell, tips, ())
-    kinds = {"joints": stated_kinds(model, ())}
-    section = built.scenario.robot[0].model_copy(update=kinds)
+    links = Links(model, built.assembly.loaded[0].collision_model, shell, tips, lock)
+    stated = {"joints": stated_kinds(model, lock), "lock": list(lock)}
+    section = built.scenario.robot[0].model_copy(update=stated)
     tried = Tried(postures=1)
     while True:
         text, made = draft(section, plan)
