@@ -18,6 +18,7 @@ from sphshell_pin.dynamics.scene.scene import ContactPair
 from sphshell_pin.dynamics.scene.sides import ShellSide, SphereSide
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
+from sphshell_pin.shell.raw import area_vectors, random_places
 from sphshell_pin.testing.conservation import scene_of
 from sphshell_pin.testing.finding import Finding, Optional, worst
 
@@ -79,14 +80,6 @@ def crossed(start: Array, end: Array, corners: Array) -> Longs:
     share = np.einsum("tx,tx->t", v, other) / safe
     hit = (first >= 0) & (second >= 0) & (first + second <= 1) & (share >= 0) & (share <= 1)
     return np.flatnonzero(hit & (det != 0.0))
-
-
-def samples(corners: Array, count: int, rng: np.random.Generator) -> Array:
-    """Return `count` random points (count, 3) of triangles (t, 3, 3), spread by area."""
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(spans, axis=1)
-    chosen = rng.choice(len(corners), count, p=area / area.sum())
-    return np.asarray(np.einsum("nk,nkx->nx", rng.dirichlet(np.ones(3), count), corners[chosen]))
 
 
 # Points nearer to each other, in radii, count as one; how far off they are is measured separately.
@@ -200,9 +193,9 @@ def sphere_centers(corners: Array, radius: float, count: int, rng: np.random.Gen
     """Return centers (count, 3) round triangles (t, 3, 3): deep, barely touching, near and far."""
     # Deep to shallow, barely, near, far.
     kinds = (0.02, 0.98), (1.0 - 1e-6, 1.0 + 1e-6), (1.01, 2.0), (5.0, 50.0)
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    spans = area_vectors(corners)
     normals = spans / np.linalg.norm(spans, axis=1)[:, None]
-    points = samples(corners, count, rng)
+    points = random_places(corners, count, rng)[1]
     home = np.argmin(distances(points, corners), axis=1)
     away = np.array([radius * rng.uniform(*kinds[k % len(kinds)]) for k in range(count)])
     # Along the normal most centers are as near as meant; askew they meet edges and borders.

@@ -333,9 +333,8 @@ def _add_contact(
     with bodies.blamed_on(path, f"{key}.spheres"):
         several = spheres_of(contact, assembly, carrier)
     with bodies.blamed_on(path, key), warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", errors.UnitWarning
-        )  # Scene.explain reports it for every scenario
+        # Scene.explain reports it for every scenario.
+        warnings.simplefilter("ignore", errors.UnitWarning)
         law, friction = laws
         how: dict[str, Any] = {"law": law, "friction": friction, "name": contact.name}
         how["method"], one = contact.method, contact.sphere or contact.plane

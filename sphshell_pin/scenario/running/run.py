@@ -179,10 +179,8 @@ def simulate(
     run = built.scenario.run
     try:
         with warnings.catch_warnings():
-            for kind in (
-                errors.WeakLawWarning,
-                errors.SetupWarning,
-            ):  # explain_built and the report say them
+            # explain_built and the report say them.
+            for kind in (errors.WeakLawWarning, errors.SetupWarning):
                 warnings.simplefilter("ignore", kind)
             result = built.simulation.run(
                 built.q0,
