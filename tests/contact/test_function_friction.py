@@ -123,3 +123,9 @@ def test_a_scenario_names_it(tmp_path) -> None:
     mu = {"ball-plate.friction.mu": [0.1, 0.5]}
     runs = built.simulation.rollout(starts, speeds, 0.02, vary=mu)
     assert runs[0].v[-1][0] > runs[1].v[-1][0]
+
+
+def test_pinocchios_constraints_take_its_largest_coefficient() -> None:
+    scene = models.on_plate(models.ball(), TWIN, OWN)
+    (made,) = scene.constraints(BALL).models
+    np.testing.assert_allclose(made.getFriction(), OWN.largest_coefficient)

@@ -1,5 +1,7 @@
 """Arguments and results of the derivatives of the dynamics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -133,3 +135,15 @@ def test_single_columns_of_the_start_of_a_run() -> None:
     np.testing.assert_array_equal(some.force_world, all_of_them.force_world[..., at])
     with pytest.raises(InvalidParameter, match=r"v0\.1.*twice"):
         Simulation(scene).run(q, v, 0.01, sensitivities=["v0.1", "v0"])
+
+
+def test_pairs_whose_names_begin_alike() -> None:
+    """Names of pairs may have dots."""
+    scene, q, v = SCENE
+    pair = scene.pairs[0]
+    names = ("tip", "tip.law")
+    twins = tuple(replace(pair, name=name) for name in names)
+    scene = scene.with_pairs(twins)
+    got = scene.dynamics_derivatives(q, v, parameters=[f"{one}.law.stiffness" for one in names])
+    assert got.by_parameters[:, 0].any()
+    np.testing.assert_allclose(got.by_parameters[:, 1], got.by_parameters[:, 0], rtol=1e-9)

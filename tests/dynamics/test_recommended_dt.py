@@ -2,11 +2,13 @@
 
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.scene.explain import relaxation_time, weakness
 from sphshell_pin.errors import SetupWarning
 from tests import models
 from tests.dynamics.scenes import in_touch, two_spheres
@@ -389,6 +391,25 @@ def test_joints_have_scales_of_their_own() -> None:
     assert scale(limits=stop, speed=0.01) == pytest.approx(impact(0.01), rel=1e-12)
     assert scale(limits=stop, speed=0.01, friction=dry) == pytest.approx(ring, rel=1e-12)
     assert scale(limits=stop, speed=50.0, friction=dry) == pytest.approx(impact(50.0), rel=1e-12)
+
+
+def test_relaxation_and_weakness_follow_the_speed_that_the_law_can_stop() -> None:
+    for stiffness in (1e4, 1e12):
+        pair = (scene := falling(sp.ImpactLaw(stiffness, 1.0))).pairs[0]
+        limit = RADIUS * math.sqrt(stiffness / MASS)
+        figures = scene.explain([RADIUS], [-(1 - 1e-9) * limit]).pairs[0]
+        assert weakness(pair, figures) is None
+        expected = min(0.02 * math.pi * math.sqrt(MASS / stiffness), 2e-5)
+        assert relaxation_time(pair, figures) == pytest.approx(expected, rel=1e-9)
+        figures = scene.explain([RADIUS], [-(1 + 1e-9) * limit]).pairs[0]
+        assert "the law cannot stop the sphere" in str(weakness(pair, figures))
+        assert weakness(pair, replace(figures, impact_depth=RADIUS)) is not None
+        assert relaxation_time(pair, replace(figures, depth_limit_speed=math.nan)) == 2e-5
+    pair = (scene := falling(TABLE)).pairs[0]
+    unknown = replace(scene.explain([RADIUS]).pairs[0], depth_limit_speed=math.nan)
+    assert relaxation_time(pair, unknown) == 2e-5
+    own = source([[0.0, 0.0, 0.0]], [1e-3])
+    assert relaxation_time(own.pairs[0], own.explain([0.0]).pairs[0]) == 2e-5
 
 
 @pytest.mark.parametrize(("share", "soft"), [(0.08, False), (0.15, True), (0.3, True)])

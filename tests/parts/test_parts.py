@@ -1,14 +1,11 @@
 """The study of mesh files measures what it says: its solids, its exact distances, its files."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from tests.oracle.cad import ExactShape
-from tests.parts.cad_mesh import KINDS, area_vectors, joined, meshed_faces
+from tests.parts.cad_mesh import area_vectors, joined, meshed_faces
 from tests.parts.files import KINDS_OF_FILE
-from tests.parts.found import faces_found
 from tests.parts.judge import (
     Part,
     forces_on_planes,
@@ -76,24 +73,3 @@ def test_a_decimated_file_has_fewer_triangles(part: Part) -> None:
     _, rows, _ = loaded(part, "decimated")
     assert 0.25 < len(rows) / len(part.fine.triangles) < 0.8
     assert (rows == -1).all()
-
-
-def test_faces_are_counted_by_their_cad_face(part: Part, monkeypatch: pytest.MonkeyPatch) -> None:
-    shell, rows, _ = loaded(part, "exact normals")
-    by_itself = faces_found(shell, part.mesh, rows)
-    assert by_itself.triangles.sum() == len(shell.triangles)
-    assert by_itself.recognized.sum() > 0.8 * by_itself.triangles.sum() > 0
-    assert by_itself.off.sum() == 0
-    kind = part.mesh.kind[shell.source_element]
-    cylinders, tori = (np.flatnonzero(kind == KINDS.index(name)) for name in ("cylinder", "torus"))
-    found = (
-        SimpleNamespace(kind="cylinder", elements=cylinders),
-        SimpleNamespace(kind="sphere", elements=tori[:5]),
-    )
-    monkeypatch.setitem(shell.__dict__, "faces", found)
-    counted = faces_found(shell, part.mesh, rows)
-    assert counted.recognized.tolist() == [0, len(cylinders), 0, 0, 5, 0]
-    assert counted.same.tolist() == [0, len(cylinders), 0, 0, 0, 0]
-    assert counted.recognized_exact.tolist() == counted.recognized.tolist()
-    on_cylinders = len(np.unique(part.mesh.face[shell.source_element[cylinders]]))
-    assert counted.faces.tolist()[:2] == counted.pieces.tolist()[:2] == [0, on_cylinders]

@@ -192,3 +192,7 @@ def test_all_degenerate(write):
     lines = version_1("1", ["0 0 0", "1 0 0", "2 0 0"], ["3 1 2 3"])
     with pytest.raises(InvalidShell, match="no element is left"):
         Shell.from_file(write(lines))
+
+
+def test_what_follows_the_polygons_is_ignored(write):
+    assert Shell.from_file(write([*version_1(), "1 2 3", "7"])).is_closed
