@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.integrate import solve_ivp
 
 from benchmarks.peers import drake, scenes
 from benchmarks.peers.merged import merged_urdf
@@ -92,23 +91,6 @@ def test_the_modulus_gives_the_load_at_the_depth_of_the_spring(name):
     pressure = drake.modulus(scene) * inside / scene.radius
     force = np.trapezoid(2 * np.pi * across * pressure, across)
     assert force == pytest.approx(drake.load(scene), rel=0.01)
-
-
-def test_the_law_of_the_bowl_has_the_period_of_the_spring():
-    scene = scenes.SCENES["bowl"]()
-    pull = scene.stiffness**2 / drake.load(scene) / scene.mass
-
-    def rate(_, state):
-        place, velocity = state[:2], state[2:]
-        out = np.linalg.norm(place)
-        back = pull * max(0.0, out - swing.ARM) ** 2 / out
-        return np.concatenate([velocity, -back * place - [0, 9.81]])
-
-    x, _, z = swing.start(0.0)
-    t = np.arange(0.0, 1.35 * swing.reference_period(), 1e-3)
-    found = solve_ivp(rate, (0, t[-1]), [x, z, 0, 0], "DOP853", t, rtol=1e-10, atol=1e-12).y
-    period = swing.mean_period(t, found[0], found[2], 1)
-    assert period == pytest.approx(swing.reference_period(), rel=1e-5)
 
 
 def test_continuous_collision_detection_of_bullet_stops_the_ball():

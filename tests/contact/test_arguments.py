@@ -46,15 +46,6 @@ def test_contact_wrench(wrong, depth) -> None:
         contact_wrench([0, 0, 0], [0, 0, 1], depth, **{**right, **wrong})
 
 
-def test_surfaces_of_other_than_real_numbers() -> None:
-    vertices, elements = np.eye(3), [[0, 1, 2]]
-    for wrong in (vertices.astype(complex), vertices.astype(str), vertices.astype(bool)):
-        with pytest.raises(InvalidShell, match="vertices"):
-            Shell(wrong, elements)
-        with pytest.raises(InvalidShell, match="normals"):
-            Shell(vertices, elements, normals=wrong)
-
-
 def test_path_of_a_surface_file(tmp_path) -> None:
     for wrong in (None, 3):
         with pytest.raises(InvalidParameter, match="path"):
@@ -70,39 +61,3 @@ def test_nothing_in_reach() -> None:
     assert len(contacts) == 0
     assert contacts.point.shape == contacts.normal.shape == (0, 3)
     assert contacts.depth.shape == contacts.element.shape == contacts.feature.shape == (0,)
-
-
-ODD = {
-    "array": np.full(7, 1e308),
-    "empty": np.zeros(0),
-    "masked": np.ma.masked_all(7),
-    "huge": [10**400] * 7,
-    "list": [float("inf")] * 7,
-}
-
-
-@pytest.mark.parametrize("odd", ODD)
-def test_arrays_where_none_belong(odd: str) -> None:
-    value = ODD[odd]
-    cube = shell_of(meshes.cube())
-    calls = {
-        "method": lambda: cube.contacts([0, 0, 1], 0.1, method=value),
-        "method of a batch": lambda: cube.contacts_batch([[0, 0, 1]], 0.1, method=value),
-        "side": lambda: Shell(cube.vertices, cube.triangles, side=value),
-        "path": lambda: cube.to_file(value),
-        "vertices": lambda: Shell(value, [[0, 1, 2]]),
-        "normals": lambda: Shell(cube.vertices, cube.triangles, normals=value),
-        "crease_angle": lambda: Shell(cube.vertices, cube.triangles, crease_angle=value),
-        "radii": lambda: cube.contacts_batch(np.zeros((2, 3)), value),
-    }
-    for call in calls.values():
-        with pytest.raises(SphshellError):
-            call()
-
-
-def test_a_flag_that_is_an_array() -> None:
-    cube = shell_of(meshes.cube())
-    with pytest.raises(InvalidParameter, match="clean"):
-        Shell(cube.vertices, cube.triangles, clean=np.ones(2))
-    with pytest.raises(InvalidParameter, match="gradient"):
-        cube.contacts([0, 0, 1], 0.1, gradient=np.ones(2))

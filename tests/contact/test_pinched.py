@@ -1,14 +1,9 @@
-"""Vertices that elements share without an edge: the potential does not jump there.
-
-`python -m tests.contact.test_pinched` walks 5000 r on each surface.
-"""
+"""Vertices that elements share without an edge: the potential does not jump there."""
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from sphshell_pin import ImpactLaw, Shell
-from sphshell_pin.cli import app
+from sphshell_pin import Shell
 from sphshell_pin.study.report.surfaces import wavy_sheet
 from tests import meshes
 from tests.contact.helpers import energy
@@ -116,23 +111,6 @@ def test_two_triangles(method: str) -> None:
     assert over.weight.tolist() == [1]
 
 
-@pytest.mark.parametrize("method", ["smooth", "facets"])
-def test_derivative_of_the_force(method: str) -> None:
-    shell, radius = bowtie()
-
-    def force(center):
-        terms = shell.contacts(center, radius, method=method).terms
-        return (terms.weight * terms.depth**1.5) @ terms.normal
-
-    center = np.array([-0.9, 0.05, 0.5])
-    found = shell.contacts(center, radius, method=method, gradient=True)
-    assert -1 in found.weight
-    slope = found.force_gradient(ImpactLaw(1.0, exponent=1.5))
-    for k, along in enumerate(np.eye(3) * 1e-6):
-        change = (force(center + along) - force(center - along)) / 2e-6
-        assert np.allclose(slope[:, k], change, atol=1e-7)
-
-
 def test_the_health_counts_them() -> None:
     shell, _ = bowtie()
     assert (shell.health.pinched_vertices, shell.health.pinched_at) == (1, (0.0, 0.0, 0.0))
@@ -148,16 +126,3 @@ def test_the_health_counts_them() -> None:
     # Counted after the cleaning: these two become one vertex.
     apart = np.r_[BOWTIE, [[1e-9, 0, 0]]]
     assert Shell(apart, [[0, 2, 1], [5, 3, 4]]).health.pinched_vertices == 1
-
-
-def test_the_command_shows_them(tmp_path) -> None:
-    bowtie()[0].to_file(tmp_path / "bowtie.obj")
-    shown = CliRunner().invoke(app, ["check", str(tmp_path / "bowtie.obj"), "--unit", "m"])
-    assert "(pinched), one at (0, 0, 0) m" in " ".join(shown.output.split())
-
-
-if __name__ == "__main__":
-    for case, how in CASES:
-        surface, size = SURFACES[case]()
-        worst = jumps_of(surface, size, how, 5000)
-        print(f"{case:14s} {how:7s} {surface.health.pinched_vertices:4d} pinched  5000 r", worst)

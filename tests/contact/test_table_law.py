@@ -64,13 +64,6 @@ def test_the_slope_is_continuous_at_the_rows() -> None:
         assert below == pytest.approx(above, rel=1e-9, abs=1e-9)
 
 
-def test_two_rows_are_a_spring() -> None:
-    law = sp.TableLaw([0.0, 1e-3], [0.0, 5.0])
-    assert law.normal_force(4e-3) == pytest.approx(20.0)
-    assert law.energy(4e-3) == pytest.approx(0.5 * 5e3 * 16e-6)
-    assert law.contact_time(1e-4, 0.1) == pytest.approx(np.pi * 1e-3, rel=1e-6)
-
-
 def test_it_reproduces_the_spring_that_it_was_taken_from() -> None:
     for depth in np.linspace(0.0, 2e-3, 997):
         assert TABLE.normal_force(depth) == pytest.approx(
@@ -86,17 +79,6 @@ def test_it_reproduces_the_spring_that_it_was_taken_from() -> None:
         lambda law: law.shortest_time(1.0, 0.3, 10.0),
     ):
         assert question(TABLE) == pytest.approx(question(SPRING), rel=1e-5)
-
-
-def bounce(law: sp.TableLaw | sp.ImpactLaw) -> sp.Result:
-    scene = models.on_plate(models.slider(), law)
-    return sp.Simulation(scene, sp.Adaptive(1e-10)).run([0.051], [-0.1], 0.3, record_dt=1e-3)
-
-
-def test_a_run_is_that_of_the_spring_and_keeps_its_energy() -> None:
-    table, spring = bounce(TABLE), bounce(SPRING)
-    np.testing.assert_allclose(table.q, spring.q, atol=1e-6)
-    assert np.abs(table.energy.residual).max() < 1e-8
 
 
 def test_derivatives_rollout_explain_and_pickle() -> None:

@@ -210,12 +210,6 @@ def test_an_unknown_name_lists_the_valid_ones(error, valid: str, call: Call) -> 
         assert name in str(caught.value)
 
 
-def test_a_tolerance_is_no_step() -> None:
-    for kind in (sp.Adaptive, sp.Implicit):
-        with pytest.raises(TypeError, match="dt"):
-            kind(dt=1e-3)
-
-
 def test_a_rounded_placement_passes() -> None:
     rounded = pin.SE3(np.round(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), 8), np.ones(3))
     pair = Scene(ball()).add_contact(Sphere(0.05, "ball"), plate(), placement=rounded, law=LAW)

@@ -1,6 +1,6 @@
 """Arguments and results of the derivatives of the dynamics."""
 
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +8,6 @@ import pytest
 from sphshell_pin import CoulombFriction, Simulation
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-from tests import differences
 from tests.dynamics.scenes import (
     BRISTLE,
     COULOMB,
@@ -20,23 +19,6 @@ from tests.dynamics.scenes import (
 )
 
 SCENE = in_bowl(LAWS["impact"], COULOMB)
-
-
-def test_repeated_calls_give_the_same_bits_and_leave_the_scene_as_it_was() -> None:
-    scene, q, v = in_bowl(LAWS["hertz, two materials"], FRICTIONS["mindlin"])
-    names = differences.names_of(scene)
-    forces = np.array([f.vector for f in scene.external_forces(q, v)])
-    one = scene.dynamics_derivatives(q, v, parameters=names)
-    scene.dynamics_derivatives(q, -v, np.ones(3), parameters=names[::-1])
-    other = scene.dynamics_derivatives(q, v, parameters=names)
-    assert one.by_parameters.tobytes() == other.by_parameters.tobytes()
-    assert one.by_q.tobytes() == other.by_q.tobytes()
-    again = np.array([f.vector for f in scene.external_forces(q, v)])
-    assert again.tobytes() == forces.tobytes()
-    with pytest.raises(FrozenInstanceError):
-        one.by_q = one.by_v  # type: ignore[misc]
-    with pytest.raises(ValueError, match="read-only"):
-        one.by_q[0, 0] = 1.0
 
 
 @pytest.mark.parametrize(
@@ -107,18 +89,6 @@ def test_names_that_are_refused(names: object, said: str) -> None:
         scene.dynamics_derivatives(q, v, parameters=STIFFNESS)
 
 
-def test_pairs_whose_names_begin_alike() -> None:
-    """Names of pairs may have dots."""
-    scene, q, v = SCENE
-    pair = scene.pairs[0]
-    names = ("tip", "tip.law")
-    twins = tuple(replace(pair, name=name) for name in names)
-    scene = scene.with_pairs(twins)
-    got = scene.dynamics_derivatives(q, v, parameters=[f"{one}.law.stiffness" for one in names])
-    assert got.by_parameters[:, 0].any()
-    np.testing.assert_allclose(got.by_parameters[:, 1], got.by_parameters[:, 0], rtol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("q", "v", "tau", "named"),
     [
@@ -165,3 +135,15 @@ def test_single_columns_of_the_start_of_a_run() -> None:
     np.testing.assert_array_equal(some.force_world, all_of_them.force_world[..., at])
     with pytest.raises(InvalidParameter, match=r"v0\.1.*twice"):
         Simulation(scene).run(q, v, 0.01, sensitivities=["v0.1", "v0"])
+
+
+def test_pairs_whose_names_begin_alike() -> None:
+    """Names of pairs may have dots."""
+    scene, q, v = SCENE
+    pair = scene.pairs[0]
+    names = ("tip", "tip.law")
+    twins = tuple(replace(pair, name=name) for name in names)
+    scene = scene.with_pairs(twins)
+    got = scene.dynamics_derivatives(q, v, parameters=[f"{one}.law.stiffness" for one in names])
+    assert got.by_parameters[:, 0].any()
+    np.testing.assert_allclose(got.by_parameters[:, 1], got.by_parameters[:, 0], rtol=1e-9)

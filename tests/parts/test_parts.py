@@ -1,26 +1,18 @@
 """The study of mesh files measures what it says: its solids, its exact distances, its files."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from tests.oracle.cad import ExactShape
-from tests.parts import tables
-from tests.parts.__main__ import chosen, sections
-from tests.parts.cad_mesh import KINDS, area_vectors, joined, meshed_faces
+from tests.parts.cad_mesh import area_vectors, joined, meshed_faces
 from tests.parts.files import KINDS_OF_FILE
-from tests.parts.found import Found, faces_found
 from tests.parts.judge import (
     Part,
-    Verdict,
     forces_on_planes,
-    judged,
     loaded,
     random_part,
 )
 from tests.parts.occ import area_and_volume
-from tests.parts.running import outcome
 from tests.parts.solids import FAMILIES, family_of, random_solid
 from tests.parts.truth import ExactFaces
 
@@ -48,13 +40,6 @@ def test_every_family_makes_a_closed_mesh_of_its_volume() -> None:
         assert inside / 3 == pytest.approx(volume, rel=0.05), family
 
 
-def test_a_number_makes_the_same_part_again() -> None:
-    first, second = (random_part(3) for _ in range(2))
-    np.testing.assert_array_equal(first.mesh.vertices, second.mesh.vertices)
-    np.testing.assert_array_equal(first.places.points, second.places.points)
-    assert area_and_volume(random_solid(3)) != area_and_volume(random_solid(3, seed=2))
-
-
 @pytest.mark.parametrize("family", ["rounded_box", "thin_box", "crossing_cylinders", "loft"])
 def test_places_are_as_far_as_they_say(family: str) -> None:
     solid = random_solid(tuple(FAMILIES).index(family))
@@ -70,13 +55,6 @@ def test_flat_elements_are_exact_on_planes(part: Part) -> None:
     forces = forces_on_planes(shell, part.touches, "facets")
     assert len(forces) > 10
     np.testing.assert_allclose(forces, 1.0, rtol=0.01)
-
-
-def test_exact_normals_are_not_worse_than_flat(part: Part) -> None:
-    verdict = judged(part, "exact normals")
-    assert not verdict.worse
-    assert verdict.ratio < 0.2
-    assert verdict.off_plane == 0
 
 
 @pytest.mark.parametrize("kind", EXPORTED)
@@ -95,70 +73,3 @@ def test_a_decimated_file_has_fewer_triangles(part: Part) -> None:
     _, rows, _ = loaded(part, "decimated")
     assert 0.25 < len(rows) / len(part.fine.triangles) < 0.8
     assert (rows == -1).all()
-
-
-def test_faces_are_counted_by_their_cad_face(part: Part, monkeypatch: pytest.MonkeyPatch) -> None:
-    shell, rows, _ = loaded(part, "exact normals")
-    by_itself = faces_found(shell, part.mesh, rows)
-    assert by_itself.triangles.sum() == len(shell.triangles)
-    assert by_itself.recognized.sum() > 0.8 * by_itself.triangles.sum() > 0
-    assert by_itself.off.sum() == 0
-    kind = part.mesh.kind[shell.source_element]
-    cylinders, tori = (np.flatnonzero(kind == KINDS.index(name)) for name in ("cylinder", "torus"))
-    found = (
-        SimpleNamespace(kind="cylinder", elements=cylinders),
-        SimpleNamespace(kind="sphere", elements=tori[:5]),
-    )
-    monkeypatch.setitem(shell.__dict__, "faces", found)
-    counted = faces_found(shell, part.mesh, rows)
-    assert counted.recognized.tolist() == [0, len(cylinders), 0, 0, 5, 0]
-    assert counted.same.tolist() == [0, len(cylinders), 0, 0, 0, 0]
-    assert counted.recognized_exact.tolist() == counted.recognized.tolist()
-    on_cylinders = len(np.unique(part.mesh.face[shell.source_element[cylinders]]))
-    assert counted.faces.tolist()[:2] == counted.pieces.tolist()[:2] == [0, on_cylinders]
-
-
-def verdict(number: int, curved: float, flat: float, lost: int = 0) -> Verdict:
-    return Verdict(
-        number=number,
-        family="peg",
-        file="binary STL",
-        triangles=100,
-        deflection=1e-3,
-        largest={"smooth": curved, "facets": flat},
-        mean={"smooth": curved / 2, "facets": flat / 2},
-        wrong_signs={"smooth": 0, "facets": 0},
-        touches=10,
-        off_plane=lost,
-        forces={"smooth": (0.0 if lost else 1.0, 1.0), "facets": (1.0, 1.0)},
-        lost={"smooth": lost, "facets": 0},
-        ok=True,
-        seconds=0.01,
-        recognized=1.0,
-        found=Found(*(np.ones(6, int) for _ in range(8))),
-    )
-
-
-def test_tables_count_what_is_worse() -> None:
-    verdicts = [verdict(0, 1e-4, 1e-3), verdict(1, 4e-3, 1e-3, lost=2), verdict(2, 0.05, 0.05)]
-    assert [one.worse for one in verdicts] == [False, True, False]
-    cells = tables.summary(verdicts)
-    assert cells[:3] == ["2 (1 spoiled)", "1", f"{(0.1 * 4.0) ** 0.5:.3f}"]
-    assert cells[4] == "1 of 2"
-    found = sections(verdicts)
-    assert len(found) == 2
-    for section in found:
-        assert len({len(row) for row in section.table}) == 1
-
-
-def test_only_takes_numbers_and_families() -> None:
-    assert chosen(3, []) == [0, 1, 2]
-    assert chosen(60, ["7", "rounded_box"]) == [7, 0, 26, 52]
-
-
-def test_a_part_that_fails_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
-        raise RuntimeError("StdFail_NotDone")
-
-    monkeypatch.setattr("tests.parts.running.random_part", fails)
-    assert outcome(5, 1, ()).skipped == "RuntimeError: StdFail_NotDone"

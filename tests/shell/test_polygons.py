@@ -61,24 +61,6 @@ def test_the_diagonal_does_not_depend_on_numbering(numbers, turned, width, slant
     assert triangles[0] == triangles[1]
 
 
-def test_a_square_has_a_diagonal_of_its_own():
-    for turn in range(4):
-        surface = clean(CUBE, [np.roll(CUBE_QUADS[1], turn)])
-        corners = {tuple(surface.vertices[v]) for v in np.intersect1d(*surface.triangles)}
-        assert corners == {(1.0, 0.0, 0.0), (1.0, 1.0, 1.0)}
-
-
-def test_flat_corners_are_kept_and_make_no_empty_triangles():
-    points = ring(np.array([[0.0, 0], [0.5, 0], [1, 0], [1, 0.5], [1, 1], [0.2, 1], [0, 1]]))
-    surface = clean(points, [list(range(7))])
-    assert surface.health.vertices == 7
-    assert surface.health.elements == 5
-    assert surface.health.worst_shape > 0.05
-    assert surface.health.polygons == 1
-    assert surface.health.largest_polygon == 7
-    assert total(surface) == pytest.approx(1.0)
-
-
 def test_a_hole_reached_by_a_bridge_stays_a_hole():
     outer = [[0.0, 0], [3, 0], [3, 3], [0, 3]]
     inner = [[1.0, 1], [1, 2], [2, 2], [2, 1]]

@@ -91,10 +91,6 @@ def test_text_lines_are_skipped_and_said(write):
     assert "made by hand" in str(shell.health)
 
 
-def test_what_follows_the_polygons_is_ignored(write):
-    assert Shell.from_file(write([*version_1(), "1 2 3", "7"])).is_closed
-
-
 def test_polygons_may_have_many_corners(write):
     turn = 2 * np.pi * np.arange(15) / 15
     points = [f"{np.cos(t)} {np.sin(t)} 0" for t in turn]
@@ -196,3 +192,7 @@ def test_all_degenerate(write):
     lines = version_1("1", ["0 0 0", "1 0 0", "2 0 0"], ["3 1 2 3"])
     with pytest.raises(InvalidShell, match="no element is left"):
         Shell.from_file(write(lines))
+
+
+def test_what_follows_the_polygons_is_ignored(write):
+    assert Shell.from_file(write([*version_1(), "1 2 3", "7"])).is_closed
