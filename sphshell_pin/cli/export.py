@@ -7,13 +7,12 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sphshell_pin.cli.app import OfOption, RunArgument, command, echo, progress_bar
+from sphshell_pin.cli.app import OfOption, RunArgument, command, echo
 from sphshell_pin.errors import InvalidParameter, ResultError
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
-    from sphshell_pin.scenario.running.replay import Replay
 
 FORMATS = ("mcap", "csv", "parquet")
 
@@ -39,7 +38,7 @@ def export(
     to FORMAT : mcap (ROS 2 messages), csv or parquet (tables); by default as --out ends.
     out : The .mcap file, or the folder of the tables; by default beside the run: RUN.mcap, RUN_csv,
         RUN_parquet.
-    start TIME : Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.
+    start SECONDS : Of mcap: when t = 0 was, in seconds since 1970.
     """
     from sphshell_pin.scenario.running.replay import Replay
 
@@ -59,8 +58,11 @@ def export(
     words += [] if of is None else ["--scenario", of]
     command = shlex.join(["sphshell-pin", *words])
     if to == "mcap":
-        replay = Replay(file_of(run), of)
-        files = [_write_mcap(out or beside(run, ".mcap"), replay, begin, command)]
+        from sphshell_pin.export.mcap import write_mcap
+
+        replay, place = Replay(file_of(run), of), out or beside(run, ".mcap")
+        made = write_mcap(place, replay.result, replay.scene, start=begin, command=command)
+        files = [made]
     else:
         from sphshell_pin.export.tables import write_tables
 
@@ -87,22 +89,14 @@ def beside(run: Path, ending: str) -> Path:
 
 def nanoseconds(text: str) -> int:
     """Return the time that --start states, in nanoseconds since 1970."""
-    from datetime import UTC, datetime, timedelta
     from decimal import Decimal, InvalidOperation
 
-    must = "must be seconds since 1970, or a date such as 2026-11-22T21:00:00Z"
     with contextlib.suppress(InvalidOperation):
         seconds = Decimal(text)
         # Larger ones are not written out in digits.
-        if not seconds.is_finite() or seconds.adjusted() > 12:
-            raise InvalidParameter("--start", text, must)
-        return round(seconds * 10**9)
-    try:
-        time = datetime.fromisoformat(text)
-    except ValueError:
-        raise InvalidParameter("--start", text, must) from None
-    since = (time if time.tzinfo else time.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
-    return (since // timedelta(microseconds=1)) * 1000
+        if seconds.is_finite() and seconds.adjusted() <= 12:
+            return round(seconds * 10**9)
+    raise InvalidParameter("--start", text, "must be seconds since 1970")
 
 
 def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | None]:
@@ -119,17 +113,3 @@ def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | 
         result = Result.load(file_of(run))
         echo(f"warning: joints have numbers instead of names: {fault}", err=True)
         return result, None
-
-
-def _write_mcap(place: Path, replay: Replay, start: int, command: str) -> Path:
-    from sphshell_pin.export.mcap import write_mcap
-
-    with progress_bar(place.name, total=1.0) as update:
-        return write_mcap(
-            place,
-            replay.result,
-            replay.scene,
-            start=start,
-            command=command,
-            progress=lambda share: update(completed=share),
-        )

@@ -61,7 +61,6 @@ def check(
     radius: str | None = None,
     tolerance: float = 0.01,
     json: Path | None = None,
-    map_: Path | None = None,
 ) -> None:
     """Print the health of a surface file: what was found, what was repaired, how far it is curved.
 
@@ -81,7 +80,6 @@ def check(
     radius : With --against: radius of the spheres, 2 % of the size unless given.
     tolerance : With --against: share by which forces may differ.
     json : With --against: write all figures to this file.
-    map_ : With --against: draw both parts to this .png, by what differs.
     """
     from sphshell_pin import Shell
     from sphshell_pin.shell.cad import CAD_SUFFIXES
@@ -119,17 +117,6 @@ def check(
 
         text = dumps({"files": [str(file), str(against)], **found.to_dict()}, indent=1)
         write_whole(json, text.encode())
-    if map_ is not None:
-        from sphshell_pin.plot.differences import plot_differences
-        from sphshell_pin.plot.figure import write_figure
-        from sphshell_pin.study.against import differences_on
-
-        parts = [
-            (f"{'AB'[of]} {path.name}", one, differences_on(found, of, one))
-            for of, (path, one) in enumerate(((file, shell), (against, other)))
-        ]
-        title = f"{len(found.off)} of {len(found.faces)} faces differ"
-        say(f"wrote {write_figure(map_, plot_differences(title, parts))}")
     raise typer.Exit(0 if found.same else MISSED)
 
 

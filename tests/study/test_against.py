@@ -29,10 +29,6 @@ def bracket(bulge: float = 0.0, unit: str = "m", sides: slice = slice(None)) -> 
     return Shell(np.concatenate([*lids, middle]), elements[sides], name="bracket")
 
 
-def turned(angle: float, *axis: float) -> pin.SE3:
-    return pin.SE3(pin.AngleAxis(angle, np.array(axis)).matrix(), np.zeros(3))
-
-
 def off(found: Against) -> list[tuple[int, str, float]]:
     return [(face.of, face.kind, face.worst) for face in found.off]
 
@@ -81,49 +77,26 @@ def test_missing_faces_are_lost_contacts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("placement", "scale", "says"),
-    [
-        (pin.SE3.Identity(), 25.4, "25.4 times as large, as in to mm: the unit of one of them"),
-        (pin.SE3.Identity(), 1e-3, "0.001 times as large"),
-        (pin.SE3(np.eye(3), np.array([0.001, 0, 0.02])), 1.0, "moved by (0.001, "),
-        (turned(np.pi / 2, 1.0, 0.0, 0.0), 1.0, "turned by 90 degrees"),
-        (turned(0.7, 0.6, 0.0, 0.8), 1.0, "turned by 40.11 degrees"),
-        (turned(0.7, 0.6, 0.0, 0.8), 25.4, "turned by 40.11 degrees"),
-    ],
+    ("place", "scale", "says"),
+    [((0.0, 0.0, 0.0), 25.4, "25.4 times as large"), ((0.001, 0.0, 0.02), 1.0, "(0.001, 0, 0.02)")],
 )
 def test_a_part_in_another_place_or_unit_is_told_so(
-    placement: pin.SE3, scale: float, says: str
+    place: tuple[float, float, float], scale: float, says: str
 ) -> None:
     first = bracket()
-    second = first.transformed(placement, scale)
-    second.unit = "in"
-    found = compare_shells(first, second)
+    found = compare_shells(first, first.transformed(pin.SE3(np.eye(3), np.array(place)), scale))
     assert not found.same
     assert found.faces == ()
     assert says in found.verdict()
-    assert "mirrored" not in found.verdict()
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.4])
-def test_a_mirrored_part_is_told_so(turn: float) -> None:
-    first = bracket()
-    # No plane of symmetry: one corner is cut.
-    points = np.array(first.vertices)
-    points[0] += [0.01, 0.004, 0.003]
-    elements = first.triangles
-    one = Shell(points, elements)
-    other = Shell(points * [-1.0, 1.0, 1.0], elements).transformed(turned(turn, 0.0, 0.6, 0.8))
-    assert "mirrored" in compare_shells(one, other).verdict()
-    assert compare_shells(one, one).same
 
 
 def test_the_command_prints_the_faces_and_ends_with_1(tmp_path: Any) -> None:
     one, two = tmp_path / "one.obj", tmp_path / "two.stl"
     bracket().to_file(one, "mm")
     bracket(1e-3).to_file(two, "m")
-    out, drawn = tmp_path / "figures.json", tmp_path / "map.png"
+    out = tmp_path / "figures.json"
     units = ("--unit", "mm", "--against-unit", "m")
-    options = ("--json", out, "--radius", "2mm", "--map", drawn)
+    options = ("--json", out, "--radius", "2mm")
     told = call("check", one, *units, "--against", two, *options)
     assert told.exit_code == 1, told.output
     assert "A one.obj, B two.stl; spheres of radius 0.002 m" in " ".join(told.output.split())
@@ -131,7 +104,6 @@ def test_the_command_prints_the_faces_and_ends_with_1(tmp_path: Any) -> None:
     figures = json.loads(out.read_text())
     assert figures["files"] == [str(one), str(two)]
     assert (figures["same"], figures["radius"]) == (False, 0.002)
-    assert drawn.read_bytes().startswith(b"\x89PNG")
     assert 5e-4 < abs(figures["faces"][0]["worst"]) <= 1.001e-3
     assert call("check", one, *units[:2], "--against", one, "--against-unit", "mm").exit_code == 0
     assert "--against-unit" in refused("check", one, *units[:2], "--against", two)

@@ -5,7 +5,7 @@ from html import escape
 from pathlib import Path
 from string import Template
 
-from sphshell_pin.study.report.contents import Finding, Picture, Section, Table, findings_table
+from sphshell_pin.study.report.contents import Picture, Section, Table, findings_table
 
 TEMPLATE = Path(__file__).with_name("page.html")
 
@@ -27,42 +27,14 @@ def tally_of(sections: list[Section]) -> str:
     return f"{sum(judged)} of {len(judged)} aims are met.{more}"
 
 
-def not_met(sections: list[Section]) -> dict[str, list[str]]:
-    """Return the aims that were missed, and those that were not measured, each in a line."""
-    findings = [f for section in sections for f in section.findings]
-    named = [(f, whole_name(findings, k)) for k, f in enumerate(findings)]
-    missed = [f"{name}: {f.text}, aim {f.aim_text}" for f, name in named if f.met is False]
-    unmeasured = [f"{name}, aim {f.aim_text}" for f, name in named if f.unmeasured]
-    unmeasured += [f"all of: {one.title}" for one in sections if one.error is not None]
-    unmeasured += [line for section in sections for line in section.unmeasured]
-    return {"Aims that are missed": missed, "Not measured in this run": unmeasured}
-
-
-def whole_name(findings: list[Finding], k: int) -> str:
-    """Return what finding k is, with the finding before it that "the same" refers to."""
-    what, first = findings[k].what, k
-    while first and findings[first].what.startswith("the same"):
-        first -= 1
-    return what if first == k else f"{findings[first].what}; {what}"
-
-
 def render(sections: list[Section], machine: dict[str, str], caution: str = "") -> str:
     """Return the page; `caution` is what a reader should know of the machine."""
-    findings = [f for section in sections for f in section.findings]
-    lists = "".join(
-        f'<p class="tally">{title}:</p><ul class="aims">'
-        f"{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
-        for title, lines in not_met(sections).items()
-        if lines
-    )
     missing = '<span class="missed"> not measured</span>'
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         title=escape(TITLE),
         introduction=escape(TEXT),
         caution=f'<p class="error" role="note">{escape(caution)}</p>' if caution else "",
         tally=tally_of(sections),
-        lists=lists,
-        cards="".join(_card(f) for f in findings if f.headline),
         links="".join(
             f'<li><a href="#{one.key}">{escape(one.title)}</a>{missing if one.error else ""}</li>'
             for one in sections
@@ -72,15 +44,6 @@ def render(sections: list[Section], machine: dict[str, str], caution: str = "") 
             for name, text in machine.items()
         ),
         sections="".join(_section(k, section) for k, section in enumerate(sections, 1)),
-    )
-
-
-def _card(finding: Finding) -> str:
-    kind = {True: "met", False: "missed", None: "plain"}[finding.met]
-    verdict = {True: "\u2713 aim ", False: "\u2717 aim missed: ", None: ""}[finding.met]
-    return (
-        f'<li class="{kind}"><b>{escape(finding.text)}</b><span>{escape(finding.what)}</span>'
-        f"<small>{verdict}{escape(finding.aim_text)}</small></li>"
     )
 
 
