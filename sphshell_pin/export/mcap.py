@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -69,7 +68,7 @@ def write_mcap(
             if origin is not None:
                 data = json.dumps(origin.settings, indent=1).encode()
                 writer.add_attachment(run.first, run.first, "settings.json", "text/json", data)
-            schemas: dict[str, Any] = {}
+            schemas = {}
             for time, topic, kind, message in run.static():
                 schemas[kind] = writer.register_msgdef(full_name(kind), schema_of(kind))
                 # A channel has metadata only if it is registered by MCAP's own writer.

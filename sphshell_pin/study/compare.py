@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -185,7 +185,7 @@ def tables_of(comparison: Comparison) -> dict[str, Table]:
         "figures": ("run", "figure", "unit", "first", "other", "difference", "relative"),
         "curves": ("run", "curve", "unit", "largest", "at [s]", "rms", "largest over range"),
     }
-    rows: dict[str, list[tuple[Any, ...]]] = {"figures": [*figures], "curves": [*curves]}
+    rows: dict[str, list[tuple[str | float, ...]]] = {"figures": [*figures], "curves": [*curves]}
     return {
         name: {title: [row[k] for row in rows[name]] for k, title in enumerate(columns)}
         for name, columns in titles.items()

@@ -22,7 +22,7 @@ from sphshell_pin.study.report.contents import Progress, Section, findings_table
 from sphshell_pin.study.report.machine import caution_of, describe
 from sphshell_pin.study.report.page import render
 
-PAGE, DATA = "report.html", "report.json"
+PAGE, DATA = "report.md", "report.json"
 _OWN = (".csv", ".png")
 _STATED = ("key", "title", "error", "seconds", "notes")
 Tell = Callable[[str, float], None]
