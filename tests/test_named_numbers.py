@@ -101,7 +101,7 @@ def test_a_number_has_one_name(part, table, name, tmp_path):
     set_ = rebuild(built, {key: repr(after)})
     assert set_.scenario == build(path, {key: repr(after)}).scenario
     assert value_in(set_.scene, set_.simulation.sensors) == after
-    assert [axis.key for axis in plan_sweep(path, {key: [after]}).axes] == [key]
+    assert list(plan_sweep(path, {key: [after]}).points.values) == [key]
     if name != "seed":
         (free,) = free_parameters([key], built.scenario, path)
         assert (free.key, free.start) == (key, before)

@@ -76,7 +76,7 @@ def findings_of(ratios: list[Ratio]) -> list[Finding]:
     return [
         Finding(
             key, f"{what} ({name_of(one.peer.engine)}) / ours", one.median, TIMES, one.low,
-            one.high, aim, sense=">=", headline=True,
+            one.high, aim, sense=">=",
         )
         for key, what, one, aim in chosen
     ]  # fmt: skip

@@ -53,7 +53,6 @@ def blocks_of(data: Data) -> dict[str, str]:
         "queries_sizes": lambda rows: pivot(rows, row=(0, 1), column=2, value=3),
         "integrators_costs": lambda rows: pivot(rows, row=(0,), column=1, value=3),
         "steps": lambda rows: [[row[0], row[1], row[4]] for row in rows],
-        "steps_components": lambda rows: [[row[0], row[1], row[4]] for row in rows],
     }
     for name in shown.keys() & tables.keys():
         tables[name] = markdown(shown[name](cells_of(tables[name])))

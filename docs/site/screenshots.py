@@ -1,8 +1,8 @@
 """Takes pictures of the pages that users see: `python docs/site/screenshots.py FOLDER`.
 
 Each at 1440 x 900 and 390 x 844, light and dark: the live page of a scenario, its recording, and,
-where they were made before, the pages of the report (`sphshell-pin report`) and of these documents
-(`make docs`). `--picture` writes docs/pictures/live_page.png besides, which was made with
+where they were made before, the pages of these documents (`make docs`). `--picture` writes
+docs/pictures/live_page.png besides, which was made with
 `--time 5.9 --change contact.tip-blade.method=facets`. Needs playwright and a Chromium.
 """
 
@@ -40,13 +40,12 @@ def main() -> None:
     options.add_argument("--scenario", default="fingertip_on_blade")
     options.add_argument("--time", type=float, default=3.0, help="shown on the live page [s]")
     options.add_argument("--change", metavar="KEY=WORD", help="a menu changed at half that time")
-    options.add_argument("--report", type=Path, default=ROOT / "results" / "report" / "report.html")
     options.add_argument("--site", type=Path, default=ROOT / "build" / "site" / "index.html")
-    options.add_argument("--only", choices=("live", "recording", "report", "docs"), action="append")
+    options.add_argument("--only", choices=("live", "recording", "docs"), action="append")
     options.add_argument("--picture", action="store_true", help="write docs/pictures/live_page.png")
     given = options.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
-    wanted = given.only or ["live", "recording", "report", "docs"]
+    wanted = given.only or ["live", "recording", "docs"]
     with browser() as chromium:
         if "live" in wanted:
             with live_page(given.scenario, given.time, given.change) as url:
@@ -56,12 +55,12 @@ def main() -> None:
                 run_scenario(given.scenario, Path(folder) / "out")
                 url = (Path(folder) / "out" / "recording.html").as_uri()
                 shoot(chromium, given.folder, "recording", url, "window.recording")
-        for name in {"report", "docs"}.intersection(wanted):
-            page = (given.report if name == "report" else given.site).resolve()
+        if "docs" in wanted:
+            page = given.site.resolve()
             if page.is_file():
-                shoot(chromium, given.folder, name, page.as_uri(), "true")
+                shoot(chromium, given.folder, "docs", page.as_uri(), "true")
             else:
-                print(f"no pictures of the {name}: there is no {page}", file=sys.stderr)
+                print(f"no pictures of the docs: there is no {page}", file=sys.stderr)
     if given.picture:
         shutil.copyfile(given.folder / "live_1440x900_light.png", LIVE_PAGE)
         print(LIVE_PAGE)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -17,9 +16,6 @@ from sphshell_pin.errors import FrameNotFound, SphshellError
 
 if TYPE_CHECKING:
     from sphshell_pin.study.robot_check import RobotReport
-
-# A pipe has no width: so wide the table need not fold.
-_PIPE_WIDTH, _WIDE = 170, 125
 
 
 @command("check-robot")
@@ -153,28 +149,20 @@ def _check(
 
 
 def _print(reports: Sequence[RobotReport]) -> None:
+    """Print the largest error of each check, and what is to be said of the robots."""
     from sphshell_pin.study.robot_check.checks import CHECKS
-    from sphshell_pin.study.robot_check.report import PASS, as_table, remarks
+    from sphshell_pin.study.robot_check.report import PASS, error_text, remarks
 
-    console = common.terminal()
-    if not sys.stdout.isatty():
-        console.width = _PIPE_WIDTH
-    # On a narrow terminal without the frame and the size, and with short titles: a figure that is
-    # folded cannot be read.
-    narrow = console.width < _WIDE
-    titles = [key[: 6 if narrow else None] for key in CHECKS]
-    table = common.make_table("robot", *([] if narrow else ["frame", "nq/nv"]), *titles, "verdict")
-    for column in table.columns[1 if narrow else 2 :]:
-        column.no_wrap = True
-    for one, (name, frame, size, *figures, verdict) in zip(reports, as_table(reports), strict=True):
-        shown = [
-            common.colored(text, "red" if text and not one.met(key) else "")
-            for key, text in zip(CHECKS, figures, strict=True)
-        ]
-        color = "green" if verdict == PASS else "red"
-        where = [] if narrow else [common.plain(frame), size]
-        table.add_row(common.plain(name), *where, *shown, common.colored(verdict, color))
-    console.print(table)
+    rows = []
+    for key, check in CHECKS.items():
+        found = [(one.findings[key].error, one.name) for one in reports if key in one.findings]
+        if found:
+            error, name = max(found)
+            color = "red" if error > check.tolerance else ""
+            rows.append(
+                (key, common.colored(error_text(error), color), f"{check.tolerance:g}", name)
+            )
+    common.print_table(("check", "largest error", "allowed", "of robot"), rows)
     for sentence in remarks(reports):
         common.say(sentence)
     passed = sum(one.verdict == PASS for one in reports)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +14,6 @@ from sphshell_pin.errors import InvalidParameter, ResultError
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
-    from sphshell_pin.scenario.running.replay import Replay
 
 
 FORMATS = ("mcap", "csv", "parquet")
@@ -42,7 +40,7 @@ def export(
     to FORMAT : mcap (ROS 2 messages), csv or parquet (tables); by default as --out ends.
     out : The .mcap file, or the folder of the tables; by default beside the run: RUN.mcap, RUN_csv,
         RUN_parquet.
-    start TIME : Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.
+    start SECONDS : Of mcap: when t = 0 was, in seconds since 1970.
     """
     from sphshell_pin.scenario.running.replay import Replay
 
@@ -62,8 +60,11 @@ def export(
     words += [] if of is None else ["--scenario", of]
     command = shlex.join(["sphshell-pin", *words])
     if to == "mcap":
-        replay = Replay(file_of(run), of)
-        files = [_write_mcap(out or beside(run, ".mcap"), replay, begin, command)]
+        from sphshell_pin.export.mcap import write_mcap
+
+        replay, place = Replay(file_of(run), of), out or beside(run, ".mcap")
+        made = write_mcap(place, replay.result, replay.scene, start=begin, command=command)
+        files = [made]
     else:
         from sphshell_pin.export.tables import write_tables
 
@@ -90,22 +91,14 @@ def beside(run: Path, ending: str) -> Path:
 
 def nanoseconds(text: str) -> int:
     """Return the time that --start states, in nanoseconds since 1970."""
-    from datetime import UTC, datetime, timedelta
     from decimal import Decimal, InvalidOperation
 
-    must = "must be seconds since 1970, or a date such as 2026-11-22T21:00:00Z"
     with contextlib.suppress(InvalidOperation):
         seconds = Decimal(text)
         # Larger ones are not written out in digits.
-        if not seconds.is_finite() or seconds.adjusted() > 12:
-            raise InvalidParameter("--start", text, must)
-        return round(seconds * 10**9)
-    try:
-        time = datetime.fromisoformat(text)
-    except ValueError:
-        raise InvalidParameter("--start", text, must) from None
-    since = (time if time.tzinfo else time.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
-    return (since // timedelta(microseconds=1)) * 1000
+        if seconds.is_finite() and seconds.adjusted() <= 12:
+            return round(seconds * 10**9)
+    raise InvalidParameter("--start", text, "must be seconds since 1970")
 
 
 def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | None]:
@@ -122,62 +115,3 @@ def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | 
         result = Result.load(file_of(run))
         common.echo(f"warning: joints have numbers instead of names: {fault}", err=True)
         return result, None
-
-
-def _write_mcap(place: Path, replay: Replay, start: int, command: str) -> Path:
-    from sphshell_pin.export.mcap import write_mcap
-
-    with common.progress_bar(place.name, total=1.0) as update:
-        return write_mcap(
-            place,
-            replay.result,
-            replay.scene,
-            start=start,
-            command=command,
-            progress=lambda share: update(completed=share),
-        )
-
-
-@command()
-def taxels(
-    run: common.RunArgument,
-    *,
-    contact: str,
-    shape: tuple[int, int] = (16, 16),
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
-    up: tuple[float, float, float] | None = None,
-    extent_deg: tuple[float, float] = (90.0, 90.0),
-    speed: float = 1.0,
-    out: Path | None = None,
-) -> None:
-    """Write what a grid of tactile sensors on a sphere felt: taxels.npz, and a film of it.
-
-    The run must have recorded patches (record in its table run).
-
-    Example: sphshell-pin taxels results/polished_valve --contact tool --axis 0 0 1
-
-    Options
-    -------
-    contact : Contact whose sphere has the taxels.
-    shape : Numbers of taxels: rows and columns.
-    axis : From the sphere's center to the middle of the grid, in its frame.
-    up : Direction of the columns, in the same frame; by default any.
-    extent_deg : Angles over which rows and columns reach.
-    speed : Simulated seconds in a second of the film.
-    out : Folder to write into; by default that of the run.
-    """
-    from sphshell_pin.patches import TaxelGrid
-    from sphshell_pin.scenario.running.replay import Replay
-
-    height, width = map(math.radians, extent_deg)
-    grid = TaxelGrid(contact, shape, axis=axis, up=up, extent=(height, width))
-    file = file_of(run)
-    replay = Replay(file)
-    images = grid.images(replay.result, replay.scene)
-    folder = file.parent if out is None else out
-    folder.mkdir(parents=True, exist_ok=True)
-    common.echo(images.save(folder / "taxels.npz"))
-    with common.if_installed():
-        common.echo(images.save_film(folder / "taxels.gif", speed=speed))
-    felt, missed = float(images.forces.max()), float(abs(images.outside).max())
-    common.echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")

@@ -153,18 +153,11 @@ def _print_report(found: Fit, files: list[Path]) -> None:
             for one in found.parameters
         ),
     )
-    if len(found.parameters) > 1:
-        rows = []
-        for k, (one, row) in enumerate(zip(found.parameters, found.correlation, strict=True), 1):
-            cells = ["-" if math.isnan(r) else f"{r:+.3f}" for r in row[:k].tolist()]
-            rows.append((f"{k} {one.key}", *cells))
-        common.print_table(("correlation", *(str(k + 1) for k in range(len(rows)))), rows)
-    rows = []
-    for series in found.series:
-        sigma = f"{math.sqrt(float((series.sigma**2).mean())):.4g}{' given' * series.given}"
-        called = f"{series.name} of {series.experiment}"
-        rows.append((called, f"{len(series.t)}", f"{series.rms:.4g}", sigma, series.unit))
-    common.print_table(("data", "values", "rms residual", "sigma", "unit"), rows)
+    series = (
+        (f"{one.name} of {one.experiment}", f"{len(one.t)}", f"{one.rms:.4g}", one.unit)
+        for one in found.series
+    )
+    common.print_table(("data", "values", "rms residual", "unit"), series)
     for remark in found.remarks:
         common.echo(f"note: {remark}", err=True)
     common.say(f"files: {', '.join(map(str, files))}")

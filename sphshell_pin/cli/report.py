@@ -19,8 +19,7 @@ def report(*, quick: bool = False, out: Path = Path("results/report")) -> None:
     """Measure speed against error on this machine and write a page of it.
 
     Contact forces, queries, integrators and steps, each against its aim. The machine should have
-    nothing else to do. Exit code 1: a section could not be measured; a missed aim is listed, and is
-    no error.
+    nothing else to do. Exit code 1: a section could not be measured; a missed aim is no error.
 
     Example: sphshell-pin report --quick
 
@@ -48,13 +47,9 @@ def report(*, quick: bool = False, out: Path = Path("results/report")) -> None:
 def _print(made: Report) -> None:
     rows = []
     for one in [one for section in made.sections for one in section.findings]:
-        word = {True: "met", False: "missed", None: ""}[one.met]
-        word = "not measured" if one.unmeasured else word
-        cell = common.colored(word, "green" if word == "met" else "red")
+        cell = common.colored(one.verdict, "green" if one.met else "red")
         rows.append((one.what, one.text, one.spread_text, one.aim_text, cell))
     common.print_table(("figure", "median", "quartiles", "aim", "verdict"), rows)
-    for line in [line for section in made.sections for line in section.unmeasured]:
-        common.echo(f"not measured: {line}", err=True)
     if made.caution:
         common.echo(f"caution: {made.caution}", err=True)
     for section in made.failed:

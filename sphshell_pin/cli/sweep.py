@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 import typer
 
 from sphshell_pin.cli.common import (
@@ -32,11 +29,8 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from sphshell_pin.study.sweep import Plan, SweepReport
-
-    Pictures = list[tuple[str, Callable[[], Figure]]]
 
 # So many failed runs are listed one by one.
 _MOST_FAILURES = 5
@@ -59,8 +53,6 @@ def sweep(
     scheduler: str | None = None,
     plot: list[str] | None = None,
     pictures: bool = True,
-    verdicts: bool = False,
-    retry_failed: bool = False,
     dt: DtOption = None,
     duration: DurationOption = None,
     compiled: CompiledOption = False,
@@ -71,7 +63,7 @@ def sweep(
 
     With --dist the values are drawn from distributions: quantiles, tornado, Sobol indices.
 
-    The same command resumes where an earlier one was stopped.
+    The same command resumes where an earlier one was stopped, and does failed runs again.
 
     Example: sphshell-pin sweep sphere_on_shell --vary contact.law.k=1e3:1e5:log:20
 
@@ -91,8 +83,6 @@ def sweep(
     scheduler : Address of a Dask scheduler whose workers do the runs.
     plot FIGURE : Figure to draw; may be given several times.
     pictures : Draw curves or maps of the table.
-    verdicts : A column for each expectation: met or not.
-    retry_failed : Do failed runs of an earlier call again.
     """
     from sphshell_pin.study.sweep import plan_sweep, run_plan
 
@@ -101,7 +91,6 @@ def sweep(
         vary,
         changes=changes_of(set_, dt, duration, compiled),
         together=together,
-        verdicts=verdicts,
         dist=dist,
         sample=sample,
         n=n,
@@ -109,8 +98,11 @@ def sweep(
         indices=indices,
         tornado=tornado,
     )
-    figures = _drawn(plan, plot or [], wanted=pictures)
-    file = out or Path("results") / str(plan.head["scenario"]) / "sweep.parquet"
+    name = plan.job.path.stem
+    for figure in plot or ():
+        if figure not in plan.figures:
+            raise NameNotFound("figure", figure, "a run of this scenario", plan.figures)
+    file = out or Path("results") / name / "sweep.parquet"
     columns = "MofNCompleteColumn", "[red]{task.fields[failures]}[/red]", "TimeRemainingColumn"
     try:
         with progress_bar("runs", *columns, total=None, failures="") as update:
@@ -124,9 +116,7 @@ def sweep(
                 workers=workers,
                 scheduler=scheduler,
                 out=file,
-                retry_failed=retry_failed,
                 progress=progress,
-                note=lambda sentence: echo(sentence, err=True),
             )
     except KeyboardInterrupt as stop:
         again = shlex.join(["sphshell-pin", *sys.argv[1:]])
@@ -134,141 +124,114 @@ def sweep(
     total = len(plan.runs)
     before = f"; {report.resumed} were done before" if report.resumed else ""
     done = f"{total - report.failed} done, {report.failed} failed{before}"
-    say(f": {total} runs, {done}", bold=str(plan.head["scenario"]))
-    if not plot:
-        figures = [name for name in figures if report.table[name].notna().any()][:1]
-    report_plan = _report_grid if plan.design is None else _report_sample
-    drawn = report_plan(plan, report.table, figures)
-    files = [file, *(_draw(file, drawn) if pictures else [])]
+    say(f": {total} runs, {done}", bold=name)
+    figures = plot or _first_figures(report.table)
+    if plan.points.parts:
+        _print_sample(plan, report.table)
+    else:
+        _print_ranges(report.table)
+    files = [file]
+    for figure in figures:
+        analyses = _analyses(report.table, figure)
+        files += _draw(file, report.table, figure, analyses) if pictures else []
     _print_failures(plan, report)
     say(f"files: {', '.join(map(str, files))}")
     if report.failed == total:
         raise typer.Exit(ERROR)
 
 
-def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
-    """Return the figures that may be drawn; refuse wrong ones before anything runs."""
-    from sphshell_pin.plot.sweep import drawable_keys
-    from sphshell_pin.study.sweep.table import main_figures
-
-    for name in plot:
-        if name not in plan.figures:
-            raise NameNotFound("figure", name, "a run of this scenario", plan.figures)
-    if plan.design is None and wanted:
-        try:
-            drawable_keys(plan.varied)
-        except InvalidParameter as fault:
-            if plot:
-                raise
-            echo(f"no picture: {fault}", err=True)
-            return []
-    return plot or main_figures(plan.figures)
+def _first_figures(table: pd.DataFrame) -> list[str]:
+    """Return the first of the scenario's own figures, else the first peak force, if any."""
+    names = [str(name) for name in table.columns if table[name].notna().any()]
+    own = [name for name in names if name.startswith("figures.")]
+    return [*own, *(name for name in names if name.endswith(".peak_force"))][:1]
 
 
-def _draw(file: Path, pictures: Pictures) -> list[Path]:
-    """Write pictures beside the table's `file`, called by what they show; return their paths."""
+def _draw(
+    file: Path, table: pd.DataFrame, figure: str, analyses: dict[str, pd.DataFrame]
+) -> list[Path]:
+    """Write the picture of `figure` beside the table's `file`; return its path, if any."""
     from sphshell_pin.plot.figure import write_figure
-
-    paths: list[Path] = []
-    with if_installed():
-        for name, plot in pictures:
-            path = file.with_name(f"{file.stem}.{name.replace('/', '_')}.png")
-            paths.append(write_figure(path, plot()))
-    return paths
-
-
-def _report_grid(plan: Plan, table: pd.DataFrame, figures: list[str]) -> Pictures:
-    """Print the range of each figure; return the pictures of `figures`."""
     from sphshell_pin.plot.sweep import plot_sweep
+    from sphshell_pin.plot.uncertainty import plot_uncertainty
+
+    path = file.with_name(f"{file.stem}.{figure.replace('/', '_')}.png")
+    try:
+        with if_installed():
+            if "design" in table:
+                return [write_figure(path, plot_uncertainty(table, figure, **analyses))]
+            return [write_figure(path, plot_sweep(table, figure))]
+    except InvalidParameter as fault:
+        echo(f"no picture: {fault}", err=True)
+    return []
+
+
+def _print_ranges(table: pd.DataFrame) -> None:
+    """Print the range of each figure of a grid."""
+    from sphshell_pin.study.sweep.indices import figures_of
 
     rows = []
-    for name in plan.figures:
+    for name in figures_of(table):
         column = table[name]
         if not name.startswith("final.") and column.nunique() > 1:
             low, high = column.idxmin(), column.idxmax()
             rows.append((name, f"{column[low]:.6g}", f"{low}", f"{column[high]:.6g}", f"{high}"))
     print_table(("figure", "smallest", "in run", "largest", "in run"), rows)
-    return [(name, partial(plot_sweep, table, name)) for name in figures]
 
 
-def _report_sample(plan: Plan, table: pd.DataFrame, figures: list[str]) -> Pictures:
-    """Print inputs, quantiles, tornado and indices of a sample; return the pictures of `figures`.
+def _print_sample(plan: Plan, table: pd.DataFrame) -> None:
+    """Print the inputs of a sample, and the quantiles of the figures that vary."""
+    from sphshell_pin.study.sweep import quantiles
 
-    What cannot be computed is said in a sentence.
-    """
-    from sphshell_pin.plot.uncertainty import plot_uncertainty
-    from sphshell_pin.study import sweep
-    from sphshell_pin.study.sweep.sampling import DRAWN
-
-    assert plan.design is not None
     inputs = []
-    for key, one in plan.design.dists.items():
-        ends = (f"{end:.6g}" for end in one.quantile(np.array([0.05, 0.5, 0.95])))
-        inputs.append((key, str(one), *ends, plan.units.get(key, "")))
-    print_table(("input", "distribution", "5 %", "median", "95 %", "unit"), inputs)
-    rows = table[table["design"].isin(DRAWN)]
-    if len(rows):
-        _print_quantiles(sweep.quantiles(table), figures)
-    pictures: Pictures = []
-    for name in figures:
-        shown: dict[str, Any] = {"values": rows[name].to_numpy(float)} if len(rows) else {}
-        for what, called, part, compute, show in (
-            ("tornado", "tornado", "median", sweep.tornado, _print_tornado),
-            ("indices", "Sobol indices", "A", sweep.sobol_indices, _print_indices),
-        ):
-            if part in plan.design.parts:
-                try:
-                    shown[what] = compute(table, name)
-                    show(name, shown[what])
-                except InvalidParameter as fault:
-                    echo(f"no {called}: {fault}", err=True)
-        if shown:
-            units = table.attrs.get("units")
-            pictures.append((name, partial(plot_uncertainty, name, units=units, **shown)))
-    return pictures
-
-
-def _print_quantiles(found: pd.DataFrame, figures: list[str]) -> None:
-    """Print the quantiles of the figures that vary; in how many runs expectations are met."""
-    percents = [name for name in found.columns if name not in ("mean", "runs")]
+    for key, one in plan.points.dists.items():
+        ends = (f"{end:.6g}" for end in one.ppf([0.05, 0.5, 0.95]))
+        inputs.append((key, *ends, plan.units.get(key, "")))
+    print_table(("input", "5 %", "median", "95 %", "unit"), inputs)
+    try:
+        found = quantiles(table)
+    except InvalidParameter:  # only a tornado
+        return
     rows, met = [], []
     for name, row in ((str(name), row) for name, row in found.iterrows()):
         if name.startswith("met."):
             met.append((name.removeprefix("met."), f"{100 * row['mean']:.4g} % of the runs"))
-        elif name in figures or (not name.startswith("final.") and row[5] < row[95]):
-            rows.append((name, *(f"{row[one]:.6g}" for one in percents), str(int(row["runs"]))))
-    print_table(("figure", *(f"{one} %" for one in percents), "runs"), rows)
+        elif not name.startswith("final.") and row[5] < row[95]:
+            rows.append((name, *(f"{one:.6g}" for one in row.iloc[:5]), f"{row['runs']:.0f}"))
+    print_table(("figure", "5 %", "25 %", "median", "75 %", "95 %", "runs"), rows)
     print_table(("expectation", "met in"), met)
 
 
-def _print_tornado(figure: str, found: pd.DataFrame) -> None:
-    ends = found[["low_value", "high_value", "low", "high"]]
-    print_table(
-        ("input alone", "at 5 %", "at 95 %", f"{figure} at 5 %", "at 95 %"),
-        ((str(key), *(f"{one:.6g}" for one in row)) for key, row in ends.iterrows()),
-    )
-    say(f"{figure} is {found['median'].iloc[0]:.6g} with all inputs at their medians")
+def _analyses(table: pd.DataFrame, figure: str) -> dict[str, pd.DataFrame]:
+    """Print tornado and Sobol indices of a figure, and return them by these names.
 
+    What cannot be computed is said.
+    """
+    from sphshell_pin.study import sweep
 
-def _print_indices(figure: str, found: pd.DataFrame) -> None:
-    rows = []
-    for key, row in found.iterrows():
-        shown = [str(key)]
-        for kind in ("first", "total"):
-            low, high = row[f"{kind}_low"], row[f"{kind}_high"]
-            shown += [f"{row[kind]:.4f}", f"{low:.4f} to {high:.4f}"]
-        rows.append(shown)
-    interval = "95 % interval"
-    titles = (f"Sobol indices of {figure}", "first order", interval, "total", interval)
-    print_table(titles, rows)
+    found, parts = {}, set(table.get("design", ()))
+    for name, part, compute in (
+        ("tornado", "median", sweep.tornado),
+        ("indices", "A", sweep.sobol_indices),
+    ):
+        if part not in parts:
+            continue
+        try:
+            found[name] = compute(table, figure)
+        except InvalidParameter as fault:
+            echo(f"no {name}: {fault}", err=True)
+            continue
+        titles = (f"{name} of {figure}", *map(str, found[name].columns))
+        rows = ((str(key), *(f"{x:.6g}" for x in row)) for key, row in found[name].iterrows())
+        print_table(titles, rows)
+    return found
 
 
 def _print_failures(plan: Plan, report: SweepReport) -> None:
     failed = report.table[report.table["status"] == "failed"]
     for _, row in failed.head(_MOST_FAILURES).iterrows():
         values = [
-            f"{axis.key} = {row[axis.key]} {plan.units.get(axis.key, '')}".rstrip()
-            for axis in plan.axes
+            f"{key} = {row[key]} {plan.units.get(key, '')}".rstrip() for key in plan.points.values
         ]
         echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
     if len(failed) > _MOST_FAILURES:

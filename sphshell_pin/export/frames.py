@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,8 +37,8 @@ class Frames:
         return self.moving.get(joint, (WORLD, pin.SE3.Identity()))
 
     @classmethod
-    def of(cls, scene: Scene, also: Iterable[str] = ()) -> Frames:
-        """Return the frames of the links, spheres and shells of `scene`, and those called `also`.
+    def of(cls, scene: Scene) -> Frames:
+        """Return the frames of the links, spheres and shells of `scene`.
 
         A joint's first link stands for all that is fixed to it, its own frame where it has none.
         Spheres are called sphere/PAIR, the second of a pair sphere/PAIR/other, shells shell/NAME,
@@ -47,7 +47,7 @@ class Frames:
         model, made = scene.model, cls()
         named = {name for pair in scene.pairs for name in (pair.frame_i, pair.frame_j)}
         wanted = {k for k, one in enumerate(model.frames) if one.type == pin.FrameType.BODY}
-        wanted |= {find_frame(model, name) for name in (*named, *also)}
+        wanted |= {find_frame(model, name) for name in named}
         taken = {WORLD, *(model.frames[k].name for k in wanted)}
         links = [model.frames[k] for k in sorted(wanted - {0})]
         for frame in reversed(links):  # the first of a joint is the last that is put there
@@ -84,9 +84,21 @@ def xyz(vector: Array) -> Message:
     return dict(zip("xyz", np.asarray(vector, dtype=float).tolist(), strict=True))
 
 
-def quaternion(rotation: Array) -> Message:
-    """Return a rotation matrix as a message."""
-    return dict(zip("xyzw", pin.Quaternion(rotation).coeffs().tolist(), strict=True))
+def stamp_of(time: int) -> Message:
+    """Return the time [ns] as a message."""
+    return dict(zip(("sec", "nanosec"), divmod(time, 10**9), strict=True))
+
+
+def header(time: int, frame: str) -> Message:
+    """Return the header of a message at a time [ns] in a frame."""
+    return {"stamp": stamp_of(time), "frame_id": frame}
+
+
+def transform(time: int, parent: str, name: str, place: pin.SE3) -> Message:
+    """Return where the frame `name` is in its parent, at a time [ns]."""
+    turn = dict(zip("xyzw", pin.Quaternion(place.rotation).coeffs().tolist(), strict=True))
+    at = {"translation": xyz(place.translation), "rotation": turn}
+    return {"header": header(time, parent), "child_frame_id": name, "transform": at}
 
 
 def free_name(wanted: str, taken: set[str], mark: str = "-") -> str:

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
     from sphshell_pin.study.compare import Comparison, Curve, CurveDifference
 
-MOST_PAIRS = 2
-MOST_TRAJECTORIES = 4
+MOST_CURVES = 6
 FIRST_COLOR = "#101418"
 COLORS = ("#d4202a", "#2f6fde", "#2a9d5c", "#f08a00", "#8a4fbf", "#0f9aa8")
 
@@ -24,8 +23,8 @@ COLORS = ("#d4202a", "#2f6fde", "#2a9d5c", "#f08a00", "#8a4fbf", "#0f9aa8")
 def plot_compare(comparison: Comparison) -> Figure:
     """Return a Figure of all runs: each curve over time, and beside it what is off the first.
 
-    Drawn are normal force and depth of the pairs with the largest forces, and of the joints that
-    move and the paths of these pairs' spheres those which differ most, as a share of their range.
+    Drawn are the normal forces, then the curves that differ most as a share of their range, six of
+    all.
 
     Raises MissingExtra without matplotlib.
     """
@@ -60,31 +59,15 @@ def _chosen(comparison: Comparison) -> tuple[list[str], int]:
     for run in comparison.runs:
         for name, curve in run.curves.items():
             every.setdefault(name, []).append(curve)
-    moves = [name for name, curves in every.items() if any(np.ptp(one.values) for one in curves)]
-    peaks = {
-        name: max(float(np.abs(one.values).max()) for one in every[name])
-        for name in moves
-        if name.endswith(".normal_force")
+    away = {
+        name: 0.0 for name, curves in every.items() if any(np.ptp(one.values) for one in curves)
     }
-    pairs = [
-        name.removeprefix("pairs.").removesuffix(".normal_force")
-        for name in sorted(peaks, key=lambda name: -peaks[name])[:MOST_PAIRS]
-    ]
-    names = [f"pairs.{pair}.{what}" for pair in pairs for what in ("normal_force", "depth")]
-    away = dict.fromkeys(moves, 0.0)
-    for other in comparison.others:
-        for one in other.curves:
-            if one.name in away:
-                away[one.name] = max(away[one.name], one.largest / _range(every[one.name]))
-    paths = {f"sphere.{pair}.{axis}" for pair in pairs for axis in "xyz"}
-    trajectories = [name for name in moves if name.startswith("q.") or name in paths]
-    names += sorted(trajectories, key=lambda name: -away[name])[:MOST_TRAJECTORIES]
-    return names, len(moves) - sum(name in moves for name in names)
-
-
-def _range(curves: list[Curve]) -> float:
-    """Return the range of `curves` together, above zero."""
-    return float(np.ptp(np.concatenate([one.values for one in curves])))
+    for one in (one for other in comparison.others for one in other.curves if one.name in away):
+        extent = float(np.ptp(np.concatenate([curve.values for curve in every[one.name]])))
+        away[one.name] = max(away[one.name], one.largest / extent)
+    # Forces first; of equal differences in the runs' order.
+    names = sorted(away, key=lambda name: (not name.endswith(".normal_force"), -away[name]))
+    return names[:MOST_CURVES], len(names[MOST_CURVES:])
 
 
 def _quantity(name: str) -> str:

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from itertools import permutations, product
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from sphshell_pin.base.checks import check_positive
 from sphshell_pin.contact import ImpactLaw
 from sphshell_pin.shell.raw import KINDS, area_vectors, random_places
 from sphshell_pin.shell.shell import Shell
-from sphshell_pin.units import METERS_PER_UNIT
 
 RADIUS, DEPTH = 0.02, 0.025
 """Radius of the spheres as a share of the size; depth as a share of the radius."""
@@ -26,17 +24,8 @@ MOST_PLACES, FEWEST, MOST_PER_FACE = 6000, 12, 64
 TOLERANCE = 0.01
 """Share by which forces may differ, unless stated."""
 
-SAMPLES = 200
-"""Points by which it is found whether one part is the other in another place or unit."""
-
-ELSEWHERE, SETTLED = 1e-4, 0.2
-"""A part is elsewhere if points of it are farther from the other than this share of the size, and
-moving them leaves at most that share of their distance."""
-
-NEAR, SAME_SCALE = 0.02, 0.01
-"""A share of the size within which a part lies on the other; by which scales of one part differ, as
-elements cut corners."""
-
+NEAR = 0.02
+"""Share of the size by which the boxes of one part may differ."""
 LAW = ImpactLaw(1.0, exponent=1.5)
 
 
@@ -83,7 +72,7 @@ class Against:
     radius, depth : of the largest spheres and of all [m]
     size : of the first shell [m]
     tolerance : share by which forces may differ
-    moved : how the second must be moved or scaled to lie on the first, in words, or ""
+    moved : how the box of the second is not that of the first, in words, or ""
     faces : of both, those that differ most first; none if the second is elsewhere
     unreached : faces of both that no sphere touches alone
     """
@@ -152,7 +141,7 @@ def compare_shells(
     radius = RADIUS * size if radius is None else check_positive("radius", radius, "m")
     tolerance = check_positive("tolerance", tolerance)
     rng = np.random.default_rng(0)
-    moved = _moved(first, second, rng)
+    moved = _moved(first, second)
     pairs = () if moved else ((first, second), (second, first))
     found = [
         face
@@ -250,60 +239,14 @@ def _force(other: Shell, own: Shell, center: Array, radius: float) -> float:
     return float(one / two)
 
 
-def _moved(first: Shell, second: Shell, rng: np.random.Generator) -> str:
-    """Return in words how the second is the first in another place, size or mirrored, or ""."""
-    points = random_places(first.vertices[first.triangles], SAMPLES, rng)[1]
-    (area, middle, axes), (other_area, other_middle, other_axes) = map(_moments, (first, second))
-    scale, unit = _scale(float(np.sqrt(other_area / area)), second.unit)
-
-    def away(rotation: Array, scale: float, center: Array) -> float:
-        there = (points - middle) @ rotation.T * scale + center
-        found = second.closest_points(there, method="facets")
-        return float(np.mean(np.abs(found.distances))) / scale
-
-    here = away(np.eye(3), 1.0, middle)
-    if here <= ELSEWHERE * first.size:
+def _moved(first: Shell, second: Shell) -> str:
+    """Return in words how the box of the second is not that of the first, or ""."""
+    one, other = (np.asarray(shell.box) for shell in (first, second))
+    if np.abs(one - other).max() <= NEAR * first.size:
         return ""
-    signs = [np.diag(one) for one in product((1.0, -1.0), repeat=3)]
-    turns = [np.eye(3)[list(order)] @ sign for order in permutations(range(3)) for sign in signs]
-    turns += [other_axes @ sign @ axes.T for sign in signs]
-    # A symmetric part has several: as it is before turned, and turned before mirrored.
-    turns.sort(key=lambda turn: (np.linalg.det(turn) < 0.0, -np.trace(turn)))
-    left = np.array([away(turn, scale, other_middle) for turn in turns])
-    best = int(np.flatnonzero(left <= 1.5 * left.min() + ELSEWHERE * first.size)[0])
-    if left[best] > SETTLED * min(here, NEAR * first.size):
-        return ""
-    words, turn = [], turns[best]
-    if scale != 1.0:
-        words.append(f"{scale:.4g} times as large")
-    mirrored = bool(np.linalg.det(turn) < 0.0)
-    if mirrored:
-        words.append("mirrored")
-    angle = np.degrees(np.arccos(np.clip((np.trace(-turn if mirrored else turn) - 1) / 2, -1, 1)))
-    if not mirrored and angle > 0.1:
-        words.append(f"turned by {angle:.4g} degrees")
-    shift = other_middle - scale * turn @ middle
-    if not mirrored and np.linalg.norm(shift) > ELSEWHERE * second.size:
-        words.append("moved by ({:.4g}, {:.4g}, {:.4g}) m".format(*shift))
-    return f"the second is the first {', '.join(words) or 'in another place'}{unit}"
-
-
-def _moments(shell: Shell) -> tuple[float, Array, Array]:
-    """Area [m^2], its center (3,) [m], and its principal axes as columns (3, 3)."""
-    corners = shell.vertices[shell.triangles]
-    area = 0.5 * np.linalg.norm(area_vectors(corners), axis=1)
-    middle = area @ corners.mean(axis=1) / area.sum()
-    spokes = np.concatenate([corners.mean(axis=1)[:, None], corners], axis=1) - middle
-    weights = area[:, None] * np.array([0.75, 1 / 12, 1 / 12, 1 / 12])
-    moments = np.einsum("tk,tkx,tky->xy", weights, spokes, spokes)
-    return float(area.sum()), middle, np.linalg.eigh(moments)[1]
-
-
-def _scale(measured: float, taken: str | None) -> tuple[float, str]:
-    """Return the scale that is meant by a measured one, and the unit that explains it, in words."""
-    for right, meters in METERS_PER_UNIT.items():
-        factor = METERS_PER_UNIT.get(taken or "", 0.0) / meters or 1.0
-        if abs(measured / factor - 1.0) < SAME_SCALE:
-            words = f", as {taken} to {right}: the unit of one of them is wrong"
-            return factor, "" if factor == 1.0 else words
-    return (1.0 if abs(measured - 1.0) < SAME_SCALE else measured), ""
+    low, high = (f"({x:.4g}, {y:.4g}, {z:.4g})" for x, y, z in one)
+    lower, higher = (f"({x:.4g}, {y:.4g}, {z:.4g})" for x, y, z in other)
+    return (
+        f"the first reaches from {low} to {high} m, the second, {second.size / first.size:.4g} "
+        f"times as large, from {lower} to {higher} m"
+    )

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.tables import Table, column, quantity_of
+from sphshell_pin.base.tables import Table, quantity_of
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import state_titles
 from sphshell_pin.dynamics.result.result_parts import PairSeries
@@ -43,29 +43,24 @@ class Measured:
     settings: Mapping[str, object]
 
 
-@dataclass(frozen=True)
-class FigureDifference:
-    """A figure of the first run and of another one; `relative` is nan where the first is 0."""
+class FigureDifference(NamedTuple):
+    """A figure of the first run and of another one.
+
+    `absolute` is the other less the first, `relative` that over the size of the first, nan where
+    this is 0.
+    """
 
     name: str
     unit: str
     first: float
     other: float
-
-    @property
-    def absolute(self) -> float:
-        """The other less the first, in `unit`."""
-        return self.other - self.first
+    absolute: float
+    relative: float
 
     @property
     def same(self) -> bool:
         """Whether the two are equal to the last bit, or both not known."""
         return self.first == self.other or (math.isnan(self.first) and math.isnan(self.other))
-
-    @property
-    def relative(self) -> float:
-        """`absolute` over the size of the first."""
-        return self.absolute / abs(self.first) if self.first else float("nan")
 
 
 @dataclass(frozen=True)
@@ -179,38 +174,22 @@ def measured(label: str, result: Result, scene: Scene | None) -> Measured:
 
 
 def tables_of(comparison: Comparison) -> dict[str, Table]:
-    """Return the tables of a comparison by their names: all figures, and all curves.
-
-    figures: one row a figure, and for each other run its value and its differences. curves: one row
-    a curve of another run.
-    """
-    first = comparison.runs[0]
-    named = dict.fromkeys(
-        (name, unit) for run in comparison.runs for name, (_, unit) in run.figures.items()
-    )
-    figures: dict[str, ArrayLike] = {
-        "figure": [name for name, _ in named],
-        "unit": [unit for _, unit in named],
-        first.label: [first.figures.get(name, (math.nan,))[0] for name, _ in named],
+    """Return the tables "figures" and "curves": a row for each of another run."""
+    figures = [(other.label, *one) for other in comparison.others for one in other.figures]
+    curves = [
+        (other.label, one.name, one.unit, one.largest, one.at, one.rms, one.of_range)
+        for other in comparison.others
+        for one in other.curves
+    ]
+    titles = {
+        "figures": ("run", "figure", "unit", "first", "other", "difference", "relative"),
+        "curves": ("run", "curve", "unit", "largest", "at [s]", "rms", "largest over range"),
     }
-    for run, other in zip(comparison.runs[1:], comparison.others, strict=True):
-        found = {one.name: one for one in other.figures}
-        figures[run.label] = [run.figures.get(name, (math.nan,))[0] for name, _ in named]
-        for title in ("absolute", "relative"):
-            figures[f"{run.label}: {title} difference"] = [
-                getattr(found[name], title) if name in found else math.nan for name, _ in named
-            ]
-    curves = [(other.label, one) for other in comparison.others for one in other.curves]
-    beside: Table = {
-        "curve": [one.name for _, one in curves],
-        "unit": [one.unit for _, one in curves],
-        "run": [label for label, _ in curves],
-        "largest difference": [one.largest for _, one in curves],
-        column("at", "s"): [one.at for _, one in curves],
-        "rms difference": [one.rms for _, one in curves],
-        "largest over range": [one.of_range for _, one in curves],
+    rows: dict[str, list[tuple[str | float, ...]]] = {"figures": [*figures], "curves": [*curves]}
+    return {
+        name: {title: [row[k] for row in rows[name]] for k, title in enumerate(columns)}
+        for name, columns in titles.items()
     }
-    return {"figures": figures, "curves": beside}
 
 
 def _difference(first: Measured, other: Measured) -> Difference:
@@ -228,7 +207,7 @@ def _difference(first: Measured, other: Measured) -> Difference:
     return Difference(
         other.label,
         tuple(
-            FigureDifference(name, unit, value, other.figures[name][0])
+            _figure_difference(name, unit, value, other.figures[name][0])
             for name, (value, unit) in first.figures.items()
             if name in other.figures
         ),
@@ -242,6 +221,12 @@ def _difference(first: Measured, other: Measured) -> Difference:
         tuple(part for part in other.parts if part not in first.parts),
         span,
     )
+
+
+def _figure_difference(name: str, unit: str, first: float, other: float) -> FigureDifference:
+    away = other - first
+    relative = away / abs(first) if first else math.nan
+    return FigureDifference(name, unit, first, other, away, relative)
 
 
 def _curve_difference(

@@ -24,13 +24,13 @@ def folder(tmp_path_factory):
 
 def test_files_are_written_beside_the_run(folder, monkeypatch):
     monkeypatch.chdir(folder)
-    printed = call("export", "drop", "--to", "mcap", "--start", "2026-11-22T21:00:00.5Z")
+    printed = call("export", "drop", "--to", "mcap", "--start", "1795381200.5")
     assert (printed.exit_code, printed.stdout) == (0, "drop.mcap\n"), printed.output
     with open("drop.mcap", "rb") as stream:
         reader = make_reader(stream)
         assert reader.get_summary().statistics.message_start_time == 1795381200_500_000_000
         about = next(reader.iter_metadata()).metadata
-    command = "sphshell-pin export drop --to mcap --start 2026-11-22T21:00:00.5Z"
+    command = "sphshell-pin export drop --to mcap --start 1795381200.5"
     assert about["command"] == command
     assert Path(about["scenario"]).name == "drop.toml"
     for format in ("csv", "parquet"):
@@ -52,9 +52,7 @@ def test_names_of_what_is_written(tmp_path, monkeypatch):
 def test_times_are_exact():
     assert nanoseconds("0") == 0
     assert nanoseconds("1800000000.123456789") == 1_800_000_000_123_456_789
-    assert nanoseconds("1970-01-01T01:00:00+01:00") == 0
-    assert nanoseconds("1970-01-02") == 86_400 * 10**9
-    for wrong in ("now", "nan", "1970-13-01"):
+    for wrong in ("now", "nan", "1e99", "1970-01-02"):
         with pytest.raises(InvalidParameter, match="seconds since 1970"):
             nanoseconds(wrong)
 

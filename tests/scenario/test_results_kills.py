@@ -26,7 +26,7 @@ from sphshell_pin.scenario.running import run
 from sphshell_pin.shell.converting import convert
 from sphshell_pin.study.report import making
 from sphshell_pin.study.report.contents import Column, Section, Table
-from sphshell_pin.study.sweep.table import write_table
+from sphshell_pin.study.sweep.driver import write_table
 from sphshell_pin.view.film import render_film
 from tests import meshes
 from tests.scenario.files import DROP, write

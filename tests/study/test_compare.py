@@ -121,9 +121,9 @@ def test_tables_have_every_run(finger):
     one = measured("one", finger, finger.scene)
     tables = tables_of(compare([one, replace(one, label="two"), replace(one, label="three")]))
     figures = tables["figures"]
-    assert figures["one"] == figures["two"] == figures["three"]
-    assert set(figures["two: absolute difference"]) == {0.0}
-    assert set(tables["curves"]["run"]) == {"two", "three"}
+    assert figures["first"] == figures["other"]
+    assert set(figures["difference"]) == {0.0}
+    assert set(tables["curves"]["run"]) == set(figures["run"]) == {"two", "three"}
     assert len({len(column) for column in figures.values()}) == 1
 
 
@@ -168,11 +168,11 @@ def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
     names = ["compare.png", "curves.csv", "figures.csv"]
     assert sorted(one.name for one in (tmp_path / "both").iterdir()) == names
     head, *lines = (tmp_path / "both" / "figures.csv").read_text().splitlines()
-    assert head == "figure,unit,soft,stiff,stiff: absolute difference,stiff: relative difference"
+    assert head == "run,figure,unit,first,other,difference,relative"
     stats = [sp.Result.load(one / "run.npz").stats for one in (soft, stiff)]
     peaks = [one.pairs["ball-plate"].peak_force for one in stats]
-    (line,) = (one for one in lines if one.startswith("pairs.ball-plate.peak_force,"))
-    assert [float(one) for one in line.split(",")[2:4]] == peaks
+    (line,) = (one for one in lines if one.startswith("stiff,pairs.ball-plate.peak_force,"))
+    assert [float(one) for one in line.split(",")[3:5]] == peaks
     printed = call("compare", soft, soft, "--out", tmp_path / "same", "--no-picture")
     assert printed.exit_code == 0
     assert "equal to the last bit" in printed.output

@@ -21,8 +21,8 @@ def test_numbers(value, text):
 def test_nothing_measured_meets_no_aim():
     assert Finding("a", "a", math.nan, aim=1.0).met is None
     assert Finding("a", "a", math.nan, aim=1.0, sense=">=").met is None
-    assert Finding("a", "a", math.nan, aim=1.0).unmeasured
-    assert not Finding("a", "a", math.nan).unmeasured
+    assert Finding("a", "a", math.nan, aim=1.0).verdict == "not measured"
+    assert Finding("a", "a", math.nan).verdict == ""
     assert Finding("a", "a", 1.0, aim=1.0).met is True
     assert Finding("a", "a", 1.0).met is None
 

@@ -13,7 +13,6 @@ import sphshell_pin as sp
 from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
 from sphshell_pin.scenario.format.reading import find_scenario
-from sphshell_pin.study.fit.report import Series, is_noise
 from sphshell_pin.study.fit.search import covariance_of
 from sphshell_pin.study.quantities import quantities_of, row_step
 from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
@@ -97,15 +96,6 @@ def test_intervals_hold_the_truth_as_often_as_they_say(sets):
     assert (inside >= least).all(), inside
 
 
-def test_touches_out_of_step_do_not_mislead(bounce):
-    """From far off, pulses of force do not overlap; the times are then fitted one after another."""
-    t = np.linspace(0.0, 0.24, 1201)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
-    found = sp.fit(bounce, data, [STIFFNESS, DISSIPATION], changes={DISSIPATION: 0.8})
-    assert found[DISSIPATION].value == pytest.approx(0.3, rel=0.02)
-    assert found[STIFFNESS].value == pytest.approx(1e5, rel=0.02)
-
-
 REST = {
     "robot.ball.speed.root_joint": "[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]",
     # Where the weight presses it to.
@@ -162,18 +152,6 @@ def test_a_value_at_its_bound_is_said(bounce):
     assert found[DISSIPATION].at_bound
     assert found[DISSIPATION].value == 0.35
     assert any("stands at its bound, 0.35 s/m" in one for one in found.remarks)
-
-
-def test_residuals_that_are_not_noise_are_said(bounce):
-    t = np.linspace(0.0, 0.1, 401)
-    columns = columns_of(bounce, t, [FORCE])
-    (name, force), *_ = columns.items()
-    rng = np.random.default_rng(0)
-    hum = force.max() * (0.02 * rng.normal(size=401) + 0.05 * np.sin(300.0 * t))
-    found = sp.fit(bounce, {"t [s]": t, name: force + hum}, [STIFFNESS])
-    assert any("are not noise" in one for one in found.remarks)
-    found = sp.fit(bounce, {"t [s]": t, **noisy(columns, 0.02)}, [STIFFNESS])
-    assert not found.remarks
 
 
 def test_wrong_deviations_are_said(bounce):
@@ -283,19 +261,6 @@ def test_inexact_slopes_keep_the_value_and_are_said():
     assert not one.determined
     assert one.value != one.start
     assert f"the data do not determine {START}: what was measured feels it no more" in remarks
-
-
-def test_false_alarms_of_the_test_for_noise_are_rare():
-    rng = np.random.default_rng(0)
-
-    def left(values):
-        ones = np.ones(len(values))
-        return Series("e", "f", "N", ones, values, 0 * ones, ones, True)
-
-    # Only half of the alarms are of neighbors that are alike.
-    alarms = sum(not is_noise(left(rng.normal(size=60))) for _ in range(2000))
-    assert stats.binom.ppf(0.001, 2000, 0.005) <= alarms <= stats.binom.ppf(0.999, 2000, 0.005)
-    assert not is_noise(left(np.convolve(rng.normal(size=60), [0.5, 0.5])))
 
 
 @pytest.mark.parametrize(

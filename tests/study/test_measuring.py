@@ -10,21 +10,12 @@ import sphshell_pin as sp
 from benchmarks import growth
 from sphshell_pin.study.report import closed_forms, timing
 from sphshell_pin.study.report.contents import Spread
-from sphshell_pin.study.report.swing import GRAVITY, MASS, RADIUS
+from sphshell_pin.study.report.swing import GRAVITY, MASS
 
 
 def integrated(slope, start, t, method="DOP853"):
     """Return rows of a solution by SciPy."""
     return solve_ivp(slope, (0, t[-1]), start, method, t, rtol=1e-10, atol=1e-15).y.T
-
-
-def test_closed_form_of_the_bobbing_ball():
-    case = closed_forms.bob()
-    t = np.linspace(0, 0.1, 26)
-    sag = MASS * GRAVITY / 1e4
-    rows = integrated(lambda _, y: [y[1], -1e4 / MASS * y[0]], [0.8 * sag, 0.0], t)
-    assert case.exact(t)[:, 0] == pytest.approx(rows[:, 0] / (0.8 * sag), abs=1e-7)
-    assert case.q0[0] == pytest.approx(RADIUS - sag + 0.8 * sag)
 
 
 def test_closed_form_of_the_bounces():

@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
-from sphshell_pin.study.sweep import axes_of, plan_sweep
-from sphshell_pin.study.sweep.grid import points_of, text_of
+from sphshell_pin.study.sweep import grid_of, plan_sweep
 from tests.study.resting import write
 
 KEY = "contact.law.stiffness"
 
 
 def values(text):
-    (axis,) = axes_of([f"key={text}"])
-    return axis.values
+    return grid_of([f"key={text}"]).values["key"]
 
 
 def test_equal_steps_have_both_ends_and_short_numbers():
@@ -40,21 +38,18 @@ def test_lists_are_numbers_words_truths_or_lists():
     assert values("a.py:f,b.py:g") == ("a.py:f", "b.py:g")
 
 
-def test_python_values_are_taken_as_they_are():
-    axes = axes_of({"a": np.geomspace(1, 8, 4), "b": ["x", "y"], "c": "1:2:2", "d": [np.int64(3)]})
-    assert axes[0].values == tuple(np.geomspace(1, 8, 4).tolist())
-    assert [axis.values for axis in axes[1:]] == [("x", "y"), (1.0, 2.0), (3,)]
-
-
-def test_texts_of_numbers_are_exact():
-    for value in (0.1 + 0.2, 1e-308, math.pi, 2**53):
-        assert float(text_of(value)) == value
+def test_python_values_are_taken_as_they_are_and_numbers_as_exact_texts():
+    given = [0.1 + 0.2, 1e-308, math.pi, 2**53, np.int64(3)]
+    found = grid_of({"a": given, "b": [True, False, "x", [1, "y"], 7]}, together=True)
+    assert found.values["a"] == (*given[:4], 3)
+    assert [float(one["a"]) for one in found.changes] == given
+    assert [one["b"] for one in found.changes] == ["true", "false", "x", '[1, "y"]', "7"]
 
 
 def test_the_last_key_turns_fastest_unless_all_go_together():
-    axes = axes_of({"a": [1, 2], "b": ["x", "y"]})
-    assert points_of(axes, False) == [(1, "x"), (1, "y"), (2, "x"), (2, "y")]
-    assert points_of(axes, True) == [(1, "x"), (2, "y")]
+    vary = {"a": [1, 2], "b": ["x", "y"]}
+    assert grid_of(vary).values == {"a": (1, 1, 2, 2), "b": ("x", "y", "x", "y")}
+    assert grid_of(vary, together=True).values == {"a": (1, 2), "b": ("x", "y")}
 
 
 @pytest.mark.parametrize(
@@ -79,14 +74,14 @@ def test_the_last_key_turns_fastest_unless_all_go_together():
 )
 def test_wrong_values_are_told(vary, words):
     with pytest.raises(InvalidParameter, match=words):
-        axes_of(vary)
+        grid_of(vary)
 
 
 def test_too_many_runs_and_keys_of_different_lengths_are_told():
     with pytest.raises(InvalidParameter, match="too many"):
-        points_of(axes_of(["a=0:1:2000", "b=0:1:2000"]), False)
+        grid_of(["a=0:1:2000", "b=0:1:2000"])
     with pytest.raises(InvalidParameter, match="a has 2, b has 3"):
-        points_of(axes_of(["a=1,2", "b=1,2,3"]), True)
+        grid_of(["a=1,2", "b=1,2,3"], together=True)
 
 
 @pytest.mark.parametrize(
@@ -124,4 +119,4 @@ def test_integrators_may_vary_where_the_file_gives_a_step(tmp_path):
 
 def test_axes_have_the_units_of_the_scenario(tmp_path):
     plan = plan_sweep(write(tmp_path), {KEY: [1e5, 2e5], "run.rtol": [1e-5], "run.duration": [0.1]})
-    assert [plan.units.get(axis.key) for axis in plan.axes] == ["N/m^1.5", None, "s"]
+    assert [plan.units.get(key) for key in plan.points.values] == ["N/m^1.5", None, "s"]

@@ -3,7 +3,7 @@
 import csv
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.regular_file import read_text
+from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound
 from sphshell_pin.study.fit.units import factor_to_si
@@ -23,7 +24,6 @@ Source = str | PathLike[str] | Mapping[str, ArrayLike]
 TIME, SIGMA = "t", ".sigma"
 # A time may be so much beyond the end of a run, as a part of it, for having been rounded.
 _ROUNDED = 1e-6
-_HEADER = re.compile(r"\s*(.*?)\s*(?:\[([^\[\]]*)\])?\s*")
 _EXAMPLE = "t [s],pairs.tip.normal_force [N]"
 _LARGEST = 1e70  # of data and 1 / sigma: the squares of their quotients do not overflow
 
@@ -69,47 +69,50 @@ class Measured:
     columns: tuple[Column, ...]
 
 
+@dataclass(frozen=True)
 class _Table:
     """Columns (n,) by their headers; `lines` (n,) of the file, if it is one."""
 
-    def __init__(
-        self, source: str, columns: Sequence[tuple[str, Array]], lines: Sequence[int] | None = None
-    ) -> None:
-        self.source, self.lines = source, lines
-        self.columns: dict[str, tuple[str, str | None, Array]] = {}
-        for header, values in columns:
-            found = _HEADER.fullmatch(header)
-            assert found is not None
-            if found[1] in self.columns:
-                raise self.fault(f"two columns are called '{found[1]}'")
-            self.columns[found[1]] = header.strip(), found[2], values
+    source: str
+    columns: dict[str, Array]
+    lines: list[int] | None = None
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """The headers by the names in them."""
+        out: dict[str, str] = {}
+        for header in self.columns:
+            name = quantity_of(header.strip())[0].strip()
+            if name in out:
+                raise self.fault(f"two columns are called '{name}'")
+            out[name] = header
+        return out
 
     def values(self, name: str, unit: str) -> Array:
-        """Return the values (n,) of a column in the SI `unit`.
-
-        DataError for one that is infinite or too large, and for a unit of another kind.
-        """
-        header, given, values = self.columns[name]
+        """Return the values (n,) of a column in the SI `unit`."""
+        header = self.headers[name]
+        values, stated = self.columns[header], header.strip()
         hint = "" if name == TIME else "; put nan where nothing was measured"
-        for wrong, reason in (
-            (np.isinf(values), f"'{{}}' in column '{header}' is not a finite number{hint}"),
-            (
-                np.abs(values) > _LARGEST,
-                f"{{:g}} in column '{header}' is too large to compute with",
-            ),
-        ):
-            for row in np.flatnonzero(wrong):
-                raise self.fault(reason.format(values[row]), int(row))
+        self.check(
+            np.isinf(values), values, f"'{{:g}}' in column '{stated}' is not a finite number{hint}"
+        )
+        too_large = f"{{:g}} in column '{stated}' is too large to compute with"
+        self.check(np.abs(values) > _LARGEST, values, too_large)
         try:
+            given = quantity_of(stated)[1] if "[" in stated else None
             return values * factor_to_si(name, given, unit)
         except InvalidParameter as fault:
             raise self.fault(str(fault)) from None
 
+    def check(self, wrong: NDArray[np.bool_], values: Array, reason: str) -> None:
+        """Raise DataError for the first row that is `wrong`; {} in the reason is its value."""
+        for row in np.flatnonzero(wrong):
+            raise self.fault(reason.format(values[row], values[row - 1]), int(row))
+
     def fault(self, reason: str, row: int | None = None) -> DataError:
-        if row is None or self.lines is not None:
-            line = None if row is None or self.lines is None else self.lines[row]
-            return DataError(self.source, reason, line)
-        return DataError(self.source, f"row {row}: {reason}")
+        if row is not None and self.lines is None:
+            return DataError(self.source, f"row {row}: {reason}")
+        return DataError(self.source, reason, None if row is None else (self.lines or [])[row])
 
 
 def read_experiment(
@@ -137,16 +140,29 @@ def read_experiment(
     else:
         name = experiment.name or f"experiment {number}"
         table = _take_columns(given, name)
-    t = _times(table, duration)
-    measured = [label for label in table.columns if label != TIME]
+    if TIME not in table.headers:
+        named = ", ".join(table.headers) or "none"
+        raise table.fault(f"has no column '{TIME} [s]'; its columns are: {named}")
+    t = table.values(TIME, "s")
+    if not len(t):
+        raise table.fault("has no rows of data")
+    steps = np.diff(t, prepend=-np.inf)
+    must = "that of the row above, {:.9g} s: times must increase"
+    end = f"the end of the run, {duration:.9g} s: cut the data, or set run.duration"
+    table.check(np.isnan(t), t, "the time is missing")
+    table.check(steps == 0.0, t, f"time {{:.9g}} s is the same as {must}")
+    table.check(steps < 0.0, t, f"time {{:.9g}} s is before {must}")
+    table.check(t < 0.0, t, "time {:.9g} s is before the start of the run, which is at 0")
+    table.check(t > duration * (1 + _ROUNDED), t, f"time {{:.9g}} s is after {end}")
+    measured = [label for label in table.headers if label != TIME]
     for label in only or ():
-        if label not in table.columns:
+        if label not in measured:
             raise NameNotFound("column", label, table.source, measured)
     columns = []
     for label in measured:
         base = label.removesuffix(SIGMA)
         if base != label and label not in known:
-            if base not in table.columns:
+            if base not in measured:
                 raise table.fault(f"column '{label}' has no column '{base}' to belong to")
         elif only is None or label in only:
             if label not in known:
@@ -155,32 +171,7 @@ def read_experiment(
             columns.append(_column(table, known[label], (sigma or {}).get(label)))
     if not columns:
         raise table.fault(f"has no column of data beside the time, as in '{_EXAMPLE}'")
-    return Measured(name, t, tuple(columns))
-
-
-def _times(table: _Table, duration: float) -> Array:
-    """Return the times [s], checked."""
-    if TIME not in table.columns:
-        named = ", ".join(table.columns) or "none"
-        raise table.fault(f"has no column '{TIME} [s]'; its columns are: {named}")
-    t = table.values(TIME, "s")
-    if not len(t):
-        raise table.fault("has no rows of data")
-    steps, must = (
-        np.diff(t, prepend=-np.inf),
-        "that of the row above, {:.9g} s: times must increase",
-    )
-    end = f"the end of the run, {duration:.9g} s: cut the data, or set run.duration"
-    for wrong, reason in (
-        (np.isnan(t), "the time is missing"),
-        (steps == 0.0, f"time {{:.9g}} s is the same as {must}"),
-        (steps < 0.0, f"time {{:.9g}} s is before {must}"),
-        (t < 0.0, "time {:.9g} s is before the start of the run, which is at 0"),
-        (t > duration * (1 + _ROUNDED), f"time {{:.9g}} s is after {end}"),
-    ):
-        for row in np.flatnonzero(wrong):
-            raise table.fault(reason.format(t[row], t[row - 1]), int(row))
-    return np.minimum(t, duration)
+    return Measured(name, np.minimum(t, duration), tuple(columns))
 
 
 def _column(table: _Table, quantity: Quantity, sigma: float | None) -> Column:
@@ -189,18 +180,14 @@ def _column(table: _Table, quantity: Quantity, sigma: float | None) -> Column:
     rows = np.flatnonzero(~np.isnan(values))
     if not len(rows):
         raise table.fault(f"column '{name}' has no value")
-    given = None if sigma is None else np.full(len(rows), sigma)
-    if name + SIGMA in table.columns:
-        given = table.values(name + SIGMA, quantity.unit)[rows]
-        for row in rows[~(given > 0.0)]:
-            reason = f"'{name}{SIGMA}' must be positive wherever '{name}' has a value"
-            raise table.fault(reason, int(row))
-    if given is not None and not (given.min() >= 1 / _LARGEST and given.max() <= _LARGEST):
-        raise table.fault(
-            f"'{name}': standard deviations must be from {1 / _LARGEST:g} to {_LARGEST:g} "
-            f"{quantity.unit}, to compute with them".rstrip()
-        )
-    return Column(quantity, rows, values[rows], given)
+    given = None if sigma is None else np.full(len(values), sigma)
+    if name + SIGMA in table.headers:
+        given = table.values(name + SIGMA, quantity.unit)
+    if given is not None:
+        usable = (given >= 1 / _LARGEST) & (given <= _LARGEST)
+        must = f"must be positive wherever '{name}' has a value, and not too small to compute with"
+        table.check(~np.isnan(values) & ~usable, given, f"'{name}{SIGMA}' {must}")
+    return Column(quantity, rows, values[rows], None if given is None else given[rows])
 
 
 def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
@@ -218,7 +205,7 @@ def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
     if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
         shown = ", ".join(f"'{key}' {one.shape}" for key, one in columns.items())
         raise DataError(name, f"columns must be of one length, of shape (n,): {shown}")
-    return _Table(name, list(columns.items()))
+    return _Table(name, columns)
 
 
 def _read_csv(path: Path) -> _Table:
@@ -229,38 +216,38 @@ def _read_csv(path: Path) -> _Table:
         raise DataError(source, f"cannot be read: {fault.strerror}") from None
     except UnicodeDecodeError:
         raise DataError(source, "is not a text file in UTF-8") from None
+    numbered = enumerate(text.splitlines(), 1)
     lines = {
-        number: line
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip(", \t") and not line.lstrip().startswith("#")
+        k: one for k, one in numbered if one.strip(", \t") and not one.lstrip().startswith("#")
     }
     if not lines:
         raise DataError(source, f"is empty: it needs a header, as '{_EXAMPLE}', and rows")
     try:
-        rows = [next(csv.reader([line], strict=True)) for line in lines.values()]
+        head, *rows = (next(csv.reader([line], strict=True)) for line in lines.values())
     except csv.Error as fault:
         raise DataError(source, f"is not a csv file: {fault}") from None
     first, *numbers = lines
-    head = [one.strip() for one in rows[0]]
     if len(head) == 1 and re.search(r"[;\t]", head[0]):
         reason = "columns must be separated by commas, and decimals written with a point"
         raise DataError(source, reason, first)
     if all(_number(one) is not None for one in head):
         raise DataError(source, f"the first line must be a header, as '{_EXAMPLE}'", first)
-    values = []
-    for number, row in zip(numbers, rows[1:], strict=True):
+    if len({one.strip() for one in head}) < len(head):
+        raise DataError(source, "two columns are called the same", first)
+    values = np.full((len(rows), len(head)), math.nan)
+    for k, (number, row) in enumerate(zip(numbers, rows, strict=True)):
         if len(row) != len(head):
             reason = f"has {len(row)} values, the header has {len(head)} columns"
             raise DataError(source, reason, number)
-        values.append([_number(cell) if cell.strip() else math.nan for cell in row])
-        for cell, title, value in zip(row, head, values[-1], strict=True):
-            if value is None:
-                reason = f"'{cell.strip()}' in column '{title}' is not a finite number"
-                if title.partition(" ")[0] != TIME:
-                    reason += "; leave the cell empty where nothing was measured"
-                raise DataError(source, reason, number)
-    columns = np.array(values, dtype=float).reshape(-1, len(head)).T
-    return _Table(source, list(zip(head, columns, strict=True)), numbers)
+        for i, (cell, title) in enumerate(zip(row, head, strict=True)):
+            found = _number(cell) if cell.strip() else math.nan
+            if found is None:
+                reason = f"'{cell.strip()}' in column '{title.strip()}' is not a finite number"
+                timed = quantity_of(title.strip())[0] == TIME
+                hint = "" if timed else "; leave the cell empty where nothing was measured"
+                raise DataError(source, reason + hint, number)
+            values[k, i] = found
+    return _Table(source, dict(zip(head, values.T, strict=True)), numbers)
 
 
 def _number(text: str) -> float | None:

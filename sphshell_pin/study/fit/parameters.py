@@ -60,10 +60,6 @@ class Free:
             return x * self.scale
         return math.exp(x) if x < 700.0 else math.inf
 
-    def rate(self, x: float) -> float:
-        """Return the derivative of the value by x."""
-        return self.to_value(x) if self.log else self.scale
-
     def text(self, x: float) -> str:
         """Return the value at `x` as --set takes it, within the bounds whatever was rounded."""
         return repr(min(max(self.to_value(x), self.low), self.high))

@@ -87,7 +87,7 @@ class Fit(Summarized):
         those that the data do not determine
     series : each measured column of each experiment, with residuals
     remarks : sentences on what the data do not determine, on what is strongly correlated, on values
-        at a bound, on residuals that are not noise
+        at a bound, on residuals that are not as large as given deviations
     dof : measured values less parameters
     level : probability of the intervals
     runs : how many runs were made
@@ -163,30 +163,22 @@ class Fit(Summarized):
         return scenario_text(source, {**(changes or {}), **texts}, folder)
 
     def to_json(self) -> str:
-        """Return everything but the series, as JSON; null for what is infinite or nan."""
-        data = {
-            "scenario": self.scenario,
-            "level": self.level,
-            "degrees_of_freedom": self.dof,
-            "runs": self.runs,
-            "converged": self.converged,
-            "parameters": [vars(one) for one in self.parameters],
-            "correlation": self.correlation,
-            "series": [
-                {
-                    "experiment": one.experiment,
-                    "column": one.name,
-                    "unit": one.unit,
-                    "values": len(one.t),
-                    "rms": one.rms,
-                    "sigma": float(np.sqrt(np.mean(one.sigma**2))),
-                    "sigma_given": one.given,
-                }
-                for one in self.series
-            ],
-            "remarks": list(self.remarks),
-        }
-        return json_text(data, indent=2)
+        """Return everything but the values of the series, as JSON; null for infinite and nan."""
+        series = [
+            {
+                "experiment": one.experiment,
+                "column": one.name,
+                "unit": one.unit,
+                "values": len(one.t),
+                "rms": one.rms,
+                "sigma": float(np.sqrt(np.mean(one.sigma**2))),
+                "sigma_given": one.given,
+            }
+            for one in self.series
+        ]
+        return json_text(
+            {**vars(self), "parameters": [*map(vars, self.parameters)], "series": series}, indent=2
+        )
 
     def __str__(self) -> str:
         """Return a line for each parameter, then the remarks."""
@@ -197,47 +189,23 @@ class Fit(Summarized):
         return "\n".join([*lines, *self.remarks])
 
 
-def is_noise(one: Series, tests: int = 1) -> bool:
-    """Whether the residuals of a column are independent; `tests` columns are tested.
-
-    Of independent normal residuals the ratio of von Neumann, sum (r_i - r_(i-1))^2 / sum r_i^2 has
-    the mean 2 and the variance 4 (n - 2) / (n^2 - 1) (Ann. Math. Statist. 12 (1941) 367); it is
-    nearly normal. Residuals that alternate pass; a false alarm in any column has the probability
-    FALSE_ALARM at most.
-    """
-    residuals, n = one.residuals / one.sigma, len(one.t)
-    power = float(residuals @ residuals)
-    if n < 4 or not power > 0.0:
-        return True
-    ratio = float(np.sum(np.diff(residuals) ** 2)) / power
-    limit = float(stats.norm.isf(0.5 * FALSE_ALARM / tests))
-    return 2.0 - ratio <= limit * math.sqrt(4.0 * (n - 2) / (n**2 - 1.0))
-
-
 def remarks_on(
     fitted: Sequence[Fitted],
     correlation: Array,
     together: Sequence[Sequence[int]],
     series: Sequence[Series],
     dof: int,
-    tolerance: float,
 ) -> list[str]:
-    """Return what is to be said of a fit whose runs have the relative error `tolerance`.
-
-    `together` are parameters that the data determine only together.
-    """
-    out = []
-    groups = [members for members in together if len(members) > 1]
-    for members in groups:
-        names = " and ".join(fitted[k].key for k in members)
-        out.append(f"the data do not determine {names} separately")
+    """Return what is to be said of a fit; `together` are determined only together."""
+    groups = [" and ".join(fitted[k].key for k in some) for some in together if len(some) > 1]
+    out = [f"the data do not determine {names} separately" for names in groups]
     for k, one in enumerate(fitted):
         if one.at_bound:
             out.append(
                 f"{one.key} stands at its bound, {one.value:.6g} {one.unit}".rstrip()
                 + ": it has no interval, and those of others hold for it so"
             )
-        elif not one.determined and not any(k in members for members in groups):
+        elif not one.determined and not any(len(some) > 1 and k in some for some in together):
             why = "what was measured feels it no more than the error of the runs"
             if math.isfinite(one.low) or math.isfinite(one.high):
                 why = f"its interval, {interval_text(one)} {one.unit}".rstrip()
@@ -247,14 +215,6 @@ def remarks_on(
             if correlation[k, i] ** 2 > SHARED:
                 pair = f"{fitted[i].key} and {one.key}"
                 out.append(f"{pair} are correlated, {correlation[k, i]:+.3f}")
-    # Where less is left, it is the error of the runs.
-    shown = [one for one in series if one.rms > 10.0 * tolerance * np.abs(one.measured).max()]
-    out += [
-        f"the residuals of {one.name} of {one.experiment} are not noise: the scenario leaves "
-        "something out, or the data were filtered, and the intervals are too narrow"
-        for one in shown
-        if not is_noise(one, len(series))
-    ]
     if all(one.given for one in series):
         squares = sum(float(np.sum((one.residuals / one.sigma) ** 2)) for one in series)
         low, high = stats.chi2.ppf([0.5 * FALSE_ALARM, 1 - 0.5 * FALSE_ALARM], dof)

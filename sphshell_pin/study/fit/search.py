@@ -22,7 +22,7 @@ from sphshell_pin.errors import (
 from sphshell_pin.scenario.format.build import Built, rebuild
 from sphshell_pin.study.fit.data import Measured
 from sphshell_pin.study.fit.parameters import Free
-from sphshell_pin.study.fit.report import Fit, Fitted, Series, is_noise, remarks_on
+from sphshell_pin.study.fit.report import Fit, Fitted, Series, remarks_on
 from sphshell_pin.study.quantities import row_step
 
 Progress = Callable[[int, float], object]
@@ -31,12 +31,6 @@ Progress = Callable[[int, float], object]
 _FIXED_STEP_TOLERANCE, _LEAST_TOLERANCE = 1e-9, 1e-12
 # Weights that are estimated change the values, which change the weights.
 _MOST_ROUNDS, _SAME_SIGMA = 6, 0.02
-# Derivatives: an error that no longer matters, and how often a step is halved to come to it.
-_SMALL_ERROR, _MOST_HALVINGS = 0.01, 8
-# Parts of the experiments' time that are fitted one after the other where all at once fail.
-_STAGES = (0.125, 0.25, 0.5)
-# A value feels the parameters if its derivative is so large a part of the largest.
-_FELT = 1e-3
 # How far the first step may go in x.
 _FIRST_STEP = 0.5
 
@@ -56,18 +50,17 @@ class Search:
         self, trials: Sequence[Trial], free: Sequence[Free], progress: Progress | None
     ) -> None:
         self.trials, self.free, self.count = trials, tuple(free), 0
-        self.x, self.low, self.high = (
+        self.start, self.low, self.high = (
             np.array([one.to_x(getattr(one, end)) for one in free])
             for end in ("start", "low", "high")
         )
-        self.converged = False
-        self._progress = progress
-        self._failure: SphshellError | None = None
-        self._misfit = math.nan
-        self._known: dict[bytes, Array | None] = {}
+        self.x, self.converged = self.start, False
+        self._progress, self._misfit = progress, math.nan
+        self._known: dict[bytes, Array | SphshellError] = {}
         columns = [(trial, column) for trial in trials for column in trial.data.columns]
-        ends = np.cumsum([len(column.values) for _, column in columns]).tolist()
-        self._parts = [slice(*pair) for pair in zip([0, *ends], ends, strict=False)]
+        self.measured = np.concatenate([column.values for _, column in columns])
+        sizes = [len(column.values) for _, column in columns]
+        self._parts = np.split(np.arange(len(self.measured)), np.cumsum(sizes)[:-1])
         self._series = [
             Series(
                 trial.data.name,
@@ -75,47 +68,44 @@ class Search:
                 column.quantity.unit,
                 trial.data.t[column.rows],
                 column.values,
-                np.full(len(column.values), np.nan),
+                np.full(len(column.values), column.values.mean()),
                 np.ones(len(column.values)) if column.sigma is None else column.sigma,
                 column.sigma is not None,
             )
             for trial, column in columns
         ]
-        self.measured = np.concatenate([one.measured for one in self._series])
         integrators = [trial.built.simulation.integrator for trial in trials]
         found = [getattr(one, "rtol", _FIXED_STEP_TOLERANCE) for one in integrators]
         self.tolerance = float(max(*found, _LEAST_TOLERANCE))
-        middles = [np.full_like(one.measured, one.measured.mean()) for one in self._series]
-        self.sigma = self._pooled(np.concatenate(middles))
+        self.sigma = self._pooled(np.concatenate([one.fitted for one in self._series]))
 
     def run(self) -> None:
         """Search; weights that are not given are estimated from the residuals, and it goes on."""
-        if self._predict(self.x) is None:
-            assert self._failure is not None
-            self._failure.add_note("this is the run at the start values")
-            raise self._failure
-        start, sigma = self.x, self.sigma
-        self._settle()
-        shown = [one for one in self.series() if one.rms > 0.0]
-        if all(is_noise(one, len(shown)) for one in shown):
-            return
-        # Where the run's touches miss the data's, the residuals may have another least place.
-        best = self.x, self.sigma, self.converged
-        scatter, self.x, self.sigma = self._scatter(), start, sigma
-        for share in _STAGES:
-            self._minimize(self._until(share))
-        self._settle()
-        if not self._scatter() < scatter:
-            self.x, self.sigma, self.converged = best
+        first = self._predict(self.x)
+        if isinstance(first, SphshellError):
+            first.add_note("this is the run at the start values")
+            raise first
+        for _ in range(_MOST_ROUNDS):
+            self._minimize()
+            before, self.sigma = self.sigma, self._pooled(self._values(self.x))
+            # The weight of all data together changes nothing.
+            if np.ptp(self.sigma / before) < _SAME_SIGMA:
+                break
 
     def report(self, scenario: str, level: float) -> Fit:
         """Return the fit at the values found."""
-        jacobian, error = self._final_derivatives()
+        # Central differences over one step and over twice the step: what they differ by, and what
+        # the tolerance of a run does to them, is their error.
+        step = float(np.cbrt(3.0 * self.tolerance))
+        jacobian = self._derivatives(self.x, step, sides=2)
+        rounding = self.tolerance * np.abs(self._values(self.x)) / self.sigma / step
+        further = self._derivatives(self.x, 2.0 * step, sides=2)
+        error = np.maximum(np.abs(jacobian - further), rounding[:, None])
         # What cannot be felt stays where it was.
         felt = np.linalg.norm(jacobian, axis=0) > 2.0 * np.linalg.norm(error, axis=0)
-        back = np.where(felt, self.x, [one.to_x(one.start) for one in self.free])
-        before, after = self._residuals(self.x), self._residuals(back)
-        if after @ after <= (1.0 + 1e-6) * (before @ before):
+        back, here = np.where(felt, self.x, self.start), self._residuals(self.x)
+        there = self._residuals(back)
+        if there @ there <= (1.0 + 1e-6) * (here @ here):
             self.x = back
         dof = len(self.measured) - len(self.free)
         factor = float(stats.t.ppf(0.5 + 0.5 * level, dof))
@@ -137,9 +127,13 @@ class Search:
         lost = ~np.isfinite(deviations)
         correlation[lost], correlation[:, lost] = np.nan, np.nan
         np.fill_diagonal(correlation, 1.0)
-        series = self.series()
+        values = self._values(self.x)
+        series = tuple(
+            replace(one, fitted=values[part], sigma=self.sigma[part])
+            for one, part in zip(self._series, self._parts, strict=True)
+        )
         together = [free[members].tolist() for members in blind]
-        remarks = remarks_on(fitted, correlation, together, series, dof, self.tolerance)
+        remarks = remarks_on(fitted, correlation, together, series, dof)
         if not self.converged:
             remarks.insert(0, "the search ended before the residuals were least: start nearer")
         return Fit(
@@ -154,17 +148,8 @@ class Search:
             self.converged,
         )
 
-    def series(self) -> tuple[Series, ...]:
-        """Return all measured columns beside what the scenario says at x."""
-        values = self._predict(self.x)
-        assert values is not None
-        return tuple(
-            replace(one, fitted=values[part], sigma=self.sigma[part])
-            for one, part in zip(self._series, self._parts, strict=True)
-        )
-
-    def _predict(self, x: Array) -> Array | None:
-        """Return the predicted values (N,) at x, experiment by experiment; None where one fails."""
+    def _predict(self, x: Array) -> Array | SphshellError:
+        """Return the predicted values (N,) at x, experiment by experiment, or why one fails."""
         key = x.tobytes()
         if key not in self._known:
             try:
@@ -172,9 +157,13 @@ class Search:
             except Interrupted:
                 raise
             except SphshellError as failure:
-                self._failure = failure
-                self._known[key] = None
+                self._known[key] = failure
         return self._known[key]
+
+    def _values(self, x: Array) -> Array:
+        """Return the predicted values (N,) at x, nan where a run fails."""
+        found = self._predict(x)
+        return np.full(len(self.measured), np.nan) if isinstance(found, SphshellError) else found
 
     def _run(self, trial: Trial, x: Array) -> Array:
         texts = {
@@ -212,34 +201,21 @@ class Search:
         return np.concatenate(parts)
 
     def _residuals(self, x: Array) -> Array:
-        values = self._predict(x)
-        if values is None:
-            # The search then takes a shorter step.
-            return np.full(len(self.measured), np.nan)
-        residuals = (self.measured - values) / self.sigma
+        # Where a run fails they are nan: the search then takes a shorter step.
+        residuals = (self.measured - self._values(x)) / self.sigma
         self._misfit = float(np.sqrt(np.mean(residuals**2)))
         return np.asarray(residuals)
 
-    def _settle(self) -> None:
-        """Go to the least residuals from where the search is, with weights that fit them."""
-        for _ in range(_MOST_ROUNDS):
-            self._minimize()
-            before, self.sigma = self.sigma, self._pooled(self._predict(self.x))
-            ratio = self.sigma / before
-            # The weight of all data together changes nothing.
-            if np.ptp(ratio) < _SAME_SIGMA:
-                break
-
-    def _minimize(self, use: Array | float = 1.0) -> None:
-        """Make the residuals least, each times `use`."""
+    def _minimize(self) -> None:
+        """Make the residuals least from where the search is."""
         start, step = self.x, 2.0 * math.sqrt(self.tolerance)
         # Differences smaller than the error of a run say nothing.
         least = max(1e-8, self.tolerance)
         # From 0, TRF's first step has the length of x_scale: half of the value.
         found = optimize.least_squares(
-            lambda x: use * self._residuals(start + x),
+            lambda x: self._residuals(start + x),
             np.zeros(len(start)),
-            jac=lambda x: -self._derivatives(start + x, step) * np.reshape(use, (-1, 1)),
+            jac=lambda x: -self._derivatives(start + x, step, sides=1),
             bounds=(self.low - start, self.high - start),
             x_scale=_FIRST_STEP,
             ftol=least,
@@ -247,95 +223,44 @@ class Search:
             gtol=1e-12,
             max_nfev=100,
         )
-        inside = start + np.asarray(found.x)
         # TRF stays inside: it says which bounds it was driven to.
-        mask = np.asarray(found.active_mask)
-        self.x = np.where(mask < 0, self.low, np.where(mask > 0, self.high, inside))
-        if self._predict(self.x) is None:
-            self.x = inside
+        mask, inside = np.asarray(found.active_mask), start + np.asarray(found.x)
+        ends = np.where(mask < 0, self.low, np.where(mask > 0, self.high, inside))
+        self.x = inside if isinstance(self._predict(ends), SphshellError) else ends
         self.converged = bool(found.status > 0)
 
-    def _derivatives(self, x: Array, step: float) -> Array:
-        """Return the derivatives (N, p) of the weighted predicted values: one-sided differences."""
-        return np.column_stack([self._slope(x, k, step, sides=1) for k in range(len(x))])
-
-    def _slope(self, x: Array, k: int, step: float, sides: int = 2) -> Array:
-        """Return the derivatives (N,) of the weighted predicted values by x[k].
+    def _derivatives(self, x: Array, step: float, sides: int) -> Array:
+        """Return the derivatives (N, p) of the weighted predicted values, differences of `sides`.
 
         A side beyond a bound, or whose run fails, is left out; where both fail they are 0.
         """
-        found: list[tuple[float, Array]] = []
-        for signed in (step, -step):
-            other = x.copy()
-            other[k] += signed
-            inside = len(found) < sides and self.low[k] <= other[k] <= self.high[k]
-            if inside and (values := self._predict(other)) is not None:
-                found.append((float(other[k]), values))
-        here = self._predict(x)
-        assert here is not None
-        (above, one), (below, another) = (*found, (float(x[k]), here), (float(x[k]) - step, here))[
-            :2
-        ]
-        return np.asarray((one - another) / (above - below) / self.sigma)
+        here, columns = (0.0, self._values(x)), []
+        for k in range(len(x)):
+            found: list[tuple[float, Array]] = []
+            for signed in (step, -step):
+                other = x.copy()
+                other[k] += signed
+                if len(found) < sides and self.low[k] <= other[k] <= self.high[k]:
+                    values = self._values(other)
+                    found += [(float(other[k] - x[k]), values)] if np.isfinite(values).all() else []
+            (a, above), (b, below) = (*found, here, (step, here[1]))[:2]
+            columns.append((above - below) / (a - b) / self.sigma)
+        return np.column_stack(columns)
 
-    def _final_derivatives(self) -> tuple[Array, Array]:
-        """Return the weighted derivatives (N, p) at the solution, and their error.
-
-        The error is by how much differences over one step and over twice the step differ, and a
-        column's step is halved as long as that makes it less. It is no less than what the tolerance
-        of a run does to a difference.
-        """
-        derivatives, errors = [], []
-        values = self._predict(self.x)
-        assert values is not None
-        rounding = self.tolerance * np.abs(values) / self.sigma
-        for k in range(len(self.x)):
-            step = float(np.cbrt(3.0 * self.tolerance))
-            near = self._slope(self.x, k, step)
-            error = near - self._slope(self.x, k, 2.0 * step)
-            for _ in range(_MOST_HALVINGS):
-                nearer = self._slope(self.x, k, 0.5 * step)
-                if not np.linalg.norm(nearer - near) < np.linalg.norm(error):
-                    break
-                near, error, step = nearer, nearer - near, 0.5 * step
-                if np.linalg.norm(error) <= _SMALL_ERROR * np.linalg.norm(near):
-                    break
-            derivatives.append(near)
-            errors.append(np.maximum(np.abs(error), rounding / step))
-        return np.column_stack(derivatives), np.column_stack(errors)
-
-    def _until(self, share: float) -> Array:
-        """Return 1 for the first values that feel the parameters, a `share` of them, else 0 (N,).
-
-        Values before these are taken, too: the parameters do nothing to them.
-        """
-        derivatives = self._derivatives(self.x, 2.0 * math.sqrt(self.tolerance))
-        felt = np.linalg.norm(derivatives, axis=1)
-        times = np.concatenate([one.t for one in self._series])
-        last = np.quantile(times[felt > _FELT * felt.max(initial=1e-300)], share)
-        return np.asarray(times <= last, dtype=float)
-
-    def _scatter(self) -> float:
-        """Return how likely the residuals are, whatever sigma weights them: less is better."""
-        values = self._predict(self.x)
-        sigma = self._pooled(values)
-        weighted = (self.measured - values) / sigma
-        return float(np.sum(np.log(sigma)) + 0.5 * weighted @ weighted)
-
-    def _pooled(self, values: Array | None) -> Array:
+    def _pooled(self, values: Array) -> Array:
         """Return the given sigma, else the rms of the residuals of all columns of one name."""
-        assert values is not None
         count = len(self.measured)
         factor = count / (count - len(self.free))
-        names = np.repeat([one.name for one in self._series], [len(one.t) for one in self._series])
-        given = np.repeat([one.given for one in self._series], [len(one.t) for one in self._series])
         out = np.concatenate([one.sigma for one in self._series])
-        for name in set(names[~given]):
-            same = names == name
+        for name in {one.name for one in self._series if not one.given}:
+            pairs = zip(self._series, self._parts, strict=True)
+            same = np.concatenate(
+                [part for one, part in pairs if one.name == name and not one.given]
+            )
             # Data without noise are as exact as a run.
             least = self.tolerance * float(np.abs(self.measured[same]).max())
             rms = math.sqrt(factor * float(np.mean((self.measured - values)[same] ** 2)))
-            out[same & ~given] = max(rms, least) or 1.0
+            out[same] = max(rms, least) or 1.0
         return np.asarray(out)
 
 
@@ -348,24 +273,19 @@ def covariance_of(jacobian: Array, error: Array) -> tuple[Array, list[Longs]]:
     (1969) 14). By Weyl's theorem a singular value below the norm of the error may be 0; by Wedin's
     its vector is known to an angle of the error over the gap to the other singular values, and a
     parameter that takes part in it by more is not determined.
-
     Source of both: Stewart and Sun, Matrix Perturbation Theory (1990), IV.4 and V.4.
     """
-    count = jacobian.shape[1]
     lengths = np.linalg.norm(jacobian, axis=0)
     felt = np.flatnonzero(lengths > 2.0 * np.linalg.norm(error, axis=0))
-    covariance = np.diag(np.full(count, math.inf))
+    covariance = np.diag(np.full(jacobian.shape[1], math.inf))
     if not len(felt):
         return covariance, []
     scale = lengths[felt]
-    rows = np.zeros((max(len(felt) - len(jacobian), 0), len(felt)))
-    _, values, vectors = np.linalg.svd(
-        np.vstack((jacobian[:, felt] / scale, rows)), full_matrices=False
-    )
-    floor = max(
-        float(np.linalg.norm(error[:, felt] / scale, 2)),
-        float(np.finfo(float).eps) * max(jacobian.shape) * float(values[0]),
-    )
+    # Rows of zeros, so that there are as many vectors as parameters.
+    rows = np.vstack((jacobian[:, felt] / scale, np.zeros((len(felt), len(felt)))))
+    _, values, vectors = np.linalg.svd(rows, full_matrices=False)
+    rounding = float(np.finfo(float).eps) * max(jacobian.shape) * float(values[0])
+    floor = max(float(np.linalg.norm(error[:, felt] / scale, 2)), rounding)
     seen = values > floor
     inner = (vectors[seen].T / values[seen] ** 2) @ vectors[seen] / np.outer(scale, scale)
     angle = floor / float(values[seen].min()) if seen.any() else 0.0
@@ -389,10 +309,9 @@ def _fitted(one: Free, x: float, beyond: float, half: float) -> Fitted:
     bound to the other, or, for one that is not negative, to 0 by its slope at the value.
     """
     value = float(one.text(x))
-    if math.isnan(half):
-        return Fitted(one.name, one.unit, one.start, value, math.nan, math.nan, True, True)
-    if math.isinf(half):
-        return Fitted(one.name, one.unit, one.start, value, -math.inf, math.inf, False)
+    if not math.isfinite(half):
+        held = math.isnan(half)
+        return Fitted(one.name, one.unit, one.start, value, -half, half, held, held)
     low, high = one.to_value(x + beyond - half), one.to_value(x + beyond + half)
     # One that must be positive is searched by its logarithm: its relative deviation is that of x.
     from_zero = half < 1.0 if one.log else one.low != 0.0 or low > 0.0

@@ -10,7 +10,7 @@ import tomlkit
 from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.format.reading import change_data, change_scenario, parse_scenario
-from sphshell_pin.study.sweep.job import files_of
+from sphshell_pin.study.sweep.plan import files_of
 
 
 def scenario_text(source: Path, changes: Mapping[str, str], folder: Path) -> str:

@@ -1,4 +1,4 @@
-"""Motions with a closed form: a ball on a spring, bounces, a stiff plate."""
+"""Motions with a closed form: bounces, a stiff plate."""
 
 import math
 from collections.abc import Callable
@@ -71,23 +71,6 @@ def ball_on_plate(law: sp.ImpactLaw, joint: pin.JointModel) -> sp.Scene:
     )
     scene.add_contact(sp.Sphere(RADIUS, "ball"), square, law=law)
     return scene
-
-
-def bob() -> Case:
-    """Let a ball bob on an undamped spring that it never leaves: a cosine."""
-    stiffness = 1e4
-    omega, sag = math.sqrt(stiffness / MASS), MASS * GRAVITY / stiffness
-    amplitude = 0.8 * sag
-    return Case(
-        name="bob",
-        title="Ball bobs on a spring",
-        scene=ball_on_plate(sp.ImpactLaw(stiffness, 1.0), pin.JointModelPZ()),
-        q0=np.array([RADIUS - sag + amplitude]),
-        duration=0.1,
-        record_dt=0.004,
-        figures=lambda result: (result.q - RADIUS + sag) / amplitude,
-        exact=lambda t: np.cos(omega * t)[:, None],
-    )
 
 
 FALL = 0.02  # [m]

@@ -42,8 +42,7 @@ class Spread(NamedTuple):
 class Finding:
     """One figure, with its quartiles over the rounds and its aim where there are such.
 
-    `sense` says on which side of `aim` it should be; a `headline` stands
-    at the top of the page too.
+    `sense` says on which side of `aim` it should be.
     """
 
     key: str
@@ -54,7 +53,6 @@ class Finding:
     high: float | None = None
     aim: float | None = None
     sense: Literal["<=", ">="] = "<="
-    headline: bool = False
 
     @classmethod
     def of_rounds(
@@ -64,11 +62,10 @@ class Finding:
         ratios: Array,
         aim: float | None = None,
         sense: Literal["<=", ">="] = "<=",
-        headline: bool = False,
     ) -> Finding:
         """Return the median of the ratios (rounds,) of every round, with its quartiles."""
         median, low, high = Spread.of(ratios)
-        return cls(key, what, median, TIMES, low, high, aim, sense, headline)
+        return cls(key, what, median, TIMES, low, high, aim, sense)
 
     @property
     def met(self) -> bool | None:
@@ -78,9 +75,10 @@ class Finding:
         return bool(self.value <= self.aim if self.sense == "<=" else self.value >= self.aim)
 
     @property
-    def unmeasured(self) -> bool:
-        """Whether there is an aim, and nothing was measured."""
-        return self.aim is not None and math.isnan(self.value)
+    def verdict(self) -> str:
+        """`met`, `missed` or `not measured`; empty without an aim."""
+        words = {True: "met", False: "missed", None: "not measured"}
+        return "" if self.aim is None else words[self.met]
 
     @property
     def text(self) -> str:
@@ -202,8 +200,6 @@ class Section:
     tables: list[Table] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     error: str | None = None
-    unmeasured: list[str] = field(default_factory=list)
-    """Aims that were not measured, and why."""
     seconds: float = 0.0  # that measuring it took
 
 
@@ -214,16 +210,11 @@ def about(doc: str | None) -> str:
 
 def findings_table(findings: Sequence[Finding]) -> Table:
     """Return findings as a table; its verdict is empty for a finding without an aim."""
-    words = {True: "met", False: "missed", None: ""}
-
-    def word(finding: Finding) -> str:
-        return "not measured" if finding.unmeasured else words[finding.met]
-
     return Table(
         "findings",
         "Findings.",
         columns("finding", "figure", "quartiles", "aim", "verdict"),
-        [(f.what, f.text, f.spread_text, f.aim_text, word(f)) for f in findings],
+        [(f.what, f.text, f.spread_text, f.aim_text, f.verdict) for f in findings],
     )
 
 

@@ -168,11 +168,11 @@ def findings_of(rows: list[Row]) -> list[Finding]:
     on_flat = "force error on a flat plate, any refinement, side force included"
     worst = max(error_at(line, "largest") for line in lines)
     return [
-        Finding("force_error", error, max(map(error_at, lines)), aim=1e-4, headline=True),
+        Finding("force_error", error, max(map(error_at, lines)), aim=1e-4),
         Finding("force_error_largest", largest, worst),
         Finding("force_order", lowest, min(map(order, lines)), aim=3.5, sense=">="),
         Finding("force_order_estimated", by_mesh, estimated, aim=2.0, sense=">="),
-        Finding("flat_error", on_flat, flat, aim=1e-12, headline=True),
+        Finding("flat_error", on_flat, flat, aim=1e-12),
     ]
 
 

@@ -8,8 +8,9 @@ from datetime import datetime
 from importlib import metadata
 from pathlib import Path
 
-BUSY = 0.2
-"""Cores that other processes may use on average before a report says so."""
+BUSY = 0.5
+"""Load before the measurements from which on a report says that the machine was busy."""
+
 # Distributions whose speed shows on the page, in its order; others are left out.
 PACKAGES = (
     "sphshell-pin",
@@ -25,47 +26,14 @@ PACKAGES = (
 )
 
 
-class OtherWork:
-    """What other processes of the machine use of its processors, from now on.
-
-    It is the time in which processors were not idle, less what this process and its children, those
-    that have ended, have used; stolen time of a virtual machine counts as used by others.
-    """
-
-    def __init__(self) -> None:
-        self._begin = _clocks()
-
-    def cores(self) -> float | None:
-        """Return how many cores others have used on average; None where the system does not say."""
-        begin, end = self._begin, _clocks()
-        if begin is None or end is None or end[0] <= begin[0]:
-            return None
-        wall, machine, own = (after - before for before, after in zip(begin, end, strict=True))
-        return max(machine - own, 0.0) / wall
-
-
-def _clocks() -> tuple[float, float, float] | None:
-    """Return the time, that of all processors in use, and that of this process [s]."""
-    try:
-        line = Path("/proc/stat").read_text(encoding="ascii").partition("\n")[0].split()
-        # user nice system idle iowait irq softirq steal; what guests use is in user, too.
-        ticks = [int(one) for one in line[1:9]]
-        used = (sum(ticks) - ticks[3] - ticks[4]) / os.sysconf("SC_CLK_TCK")
-    except (OSError, ValueError, IndexError, AttributeError):
-        return None
-    times = os.times()
-    own = times.user + times.system + times.children_user + times.children_system
-    return times.elapsed, used, own
-
-
-def caution_of(cores: float | None) -> str:
-    """Return the sentence about a machine on which others used so many cores; "" if it was idle."""
-    if cores is None or cores <= BUSY:
+def caution_of(load: float) -> str:
+    """Return the sentence about a machine with this load; "" if it was idle."""
+    if load <= BUSY:
         return ""
     return (
-        f"The machine was busy: other processes used {cores:.2f} cores on average during the "
-        f"measurements (an idle machine: at most {BUSY:g}). Times are too long, and ratios of "
-        "times uncertain, whether their aims are met here or missed. Errors do not depend on it."
+        f"The machine was busy: its load was {load:.2f} before the measurements (an idle machine: "
+        f"at most {BUSY:g}). Times may be too long, and ratios of times are uncertain, whether "
+        "their aims are met here or missed. Errors do not depend on it."
     )
 
 

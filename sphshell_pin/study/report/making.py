@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import json
+import os
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -18,12 +19,12 @@ from sphshell_pin.errors import ResultError, SetupWarning, SphshellError, WeakLa
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report import convergence, integrators, queries, steps, timing
 from sphshell_pin.study.report.contents import Progress, Section, findings_table
-from sphshell_pin.study.report.machine import OtherWork, caution_of, describe
+from sphshell_pin.study.report.machine import caution_of, describe
 from sphshell_pin.study.report.page import render
 
-PAGE, DATA = "report.html", "report.json"
+PAGE, DATA = "report.md", "report.json"
 _OWN = (".csv", ".png")
-_STATED = ("key", "title", "error", "seconds", "notes", "unmeasured")
+_STATED = ("key", "title", "error", "seconds", "notes")
 Tell = Callable[[str, float], None]
 """Called with the section's title and the share of all that is done."""
 
@@ -94,7 +95,7 @@ def make_report(
 
 
 def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None) -> Report:
-    begin, others = time.perf_counter(), OtherWork()
+    begin, load = time.perf_counter(), os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     machine = describe(command)
     whole = sum(part.seconds[not quick] for part in parts)
     sections, done = [], 0.0
@@ -105,10 +106,8 @@ def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None
         sections.append(measured(part, quick=quick, progress=progress))
         done += share
     machine["measured in"] = f"{time.perf_counter() - begin:.0f} s{', quick' if quick else ''}"
-    cores = others.cores()
-    if cores is not None:
-        machine["other processes"] = f"used {cores:.2f} cores on average"
-    return Report(sections, machine, caution=caution_of(cores))
+    machine["load before"] = f"{load:.2f}"
+    return Report(sections, machine, caution=caution_of(load))
 
 
 def _tell(tell: Tell | None, title: str, base: float, share: float, of_part: float) -> None:

@@ -1,14 +1,6 @@
-"""The page: one HTML file that makes no external requests, in light and dark, and for paper."""
+"""The page: Markdown, with the pictures and tables that stand beside it."""
 
-import base64
-from html import escape
-from pathlib import Path
-from string import Template
-
-from sphshell_pin.study.report.contents import Finding, Picture, Section, Table, findings_table
-
-TEMPLATE = Path(__file__).with_name("page.html")
-
+from sphshell_pin.study.report.contents import Section, findings_table
 
 TITLE, TEXT = (
     "sphshell_pin: speed against error",
@@ -27,105 +19,18 @@ def tally_of(sections: list[Section]) -> str:
     return f"{sum(judged)} of {len(judged)} aims are met.{more}"
 
 
-def not_met(sections: list[Section]) -> dict[str, list[str]]:
-    """Return the aims that were missed, and those that were not measured, each in a line."""
-    findings = [f for section in sections for f in section.findings]
-    named = [(f, whole_name(findings, k)) for k, f in enumerate(findings)]
-    missed = [f"{name}: {f.text}, aim {f.aim_text}" for f, name in named if f.met is False]
-    unmeasured = [f"{name}, aim {f.aim_text}" for f, name in named if f.unmeasured]
-    unmeasured += [f"all of: {one.title}" for one in sections if one.error is not None]
-    unmeasured += [line for section in sections for line in section.unmeasured]
-    return {"Aims that are missed": missed, "Not measured in this run": unmeasured}
-
-
-def whole_name(findings: list[Finding], k: int) -> str:
-    """Return what finding k is, with the finding before it that "the same" refers to."""
-    what, first = findings[k].what, k
-    while first and findings[first].what.startswith("the same"):
-        first -= 1
-    return what if first == k else f"{findings[first].what}; {what}"
-
-
 def render(sections: list[Section], machine: dict[str, str], caution: str = "") -> str:
     """Return the page; `caution` is what a reader should know of the machine."""
-    findings = [f for section in sections for f in section.findings]
-    lists = "".join(
-        f'<p class="tally">{title}:</p><ul class="aims">'
-        f"{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
-        for title, lines in not_met(sections).items()
-        if lines
-    )
-    missing = '<span class="missed"> not measured</span>'
-    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
-        title=escape(TITLE),
-        introduction=escape(TEXT),
-        caution=f'<p class="error" role="note">{escape(caution)}</p>' if caution else "",
-        tally=tally_of(sections),
-        lists=lists,
-        cards="".join(_card(f) for f in findings if f.headline),
-        links="".join(
-            f'<li><a href="#{one.key}">{escape(one.title)}</a>{missing if one.error else ""}</li>'
-            for one in sections
-        ),
-        machine="".join(
-            f"<div><dt>{escape(name)}</dt><dd>{escape(text)}</dd></div>"
-            for name, text in machine.items()
-        ),
-        sections="".join(_section(k, section) for k, section in enumerate(sections, 1)),
-    )
-
-
-def _card(finding: Finding) -> str:
-    kind = {True: "met", False: "missed", None: "plain"}[finding.met]
-    verdict = {True: "\u2713 aim ", False: "\u2717 aim missed: ", None: ""}[finding.met]
-    return (
-        f'<li class="{kind}"><b>{escape(finding.text)}</b><span>{escape(finding.what)}</span>'
-        f"<small>{verdict}{escape(finding.aim_text)}</small></li>"
-    )
-
-
-def _section(number: int, section: Section) -> str:
-    parts = [f'<section id="{section.key}"><h2><i>{number}</i>{escape(section.title)}</h2>']
-    if section.text:
-        parts.append(f"<p>{escape(section.text)}</p>")
-    if section.error is not None:
-        reason = f"This section could not be measured: {escape(section.error)}"
-        parts.append(f'<p class="error">{reason}</p>')
-    if section.findings:
-        parts.append(_html(findings_table(section.findings), "findings"))
-    parts += [f'<p class="note">{escape(note)}</p>' for note in section.notes]
-    parts += [_picture(picture) for picture in section.pictures]
-    parts += [_table(table) for table in section.tables]
-    if section.seconds > 0:
-        parts.append(f'<p class="note">Measured in {section.seconds:.0f} s.</p>')
-    return "\n".join([*parts, "</section>\n"])
-
-
-def _picture(picture: Picture) -> str:
-    data = base64.b64encode(picture.png).decode()
-    return (
-        f'<figure><img src="data:image/png;base64,{data}" alt="{escape(picture.description)}">'
-        f"<figcaption>{escape(picture.caption)}</figcaption></figure>"
-    )
-
-
-def _table(table: Table) -> str:
-    caption = f"{escape(table.caption)} <code>{table.name}.csv</code>"
-    return f'<p class="caption">{caption}</p>{_html(table)}'
-
-
-def _html(table: Table, kind: str = "") -> str:
-    def row(tag: str, cells: list[str]) -> str:
-        made = (
-            f'<{tag} class="{"n " * right}{text if text in ("met", "missed") else ""}">'
-            f"{escape(text)}</{tag}>"
-            for text, right in zip(cells, table.numeric, strict=True)
-        )
-        return f"<tr>{''.join(made)}</tr>"
-
-    heads = row("th", [column.heading for column in table.columns])
-    body = "".join(row("td", cells) for cells in table.cells)
-    return (
-        f'<div class="scroll"><table class="{kind}"><thead>{heads}</thead>'
-        f"<tbody>{body}</tbody></table></div>"
-    )
+    parts = [f"# {TITLE}", TEXT, caution, tally_of(sections)]
+    for section in sections:
+        parts += [f"## {section.title}", section.text]
+        if section.error is not None:
+            parts.append(f"This section could not be measured: {section.error}")
+        if section.findings:
+            parts.append(findings_table(section.findings).markdown())
+        parts += section.notes
+        parts += [f"![{one.description}]({one.name}.png)" for one in section.pictures]
+        for table in section.tables:
+            parts += [f"{table.caption} [{table.name}.csv]({table.name}.csv)", table.markdown()]
+    parts += ["## Machine and run", "\n".join(f"- {key}: {text}" for key, text in machine.items())]
+    return "\n\n".join(part.strip() for part in parts if part) + "\n"

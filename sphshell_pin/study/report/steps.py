@@ -2,8 +2,7 @@
 
 Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
 triangles, forces, losses and figures of every pair included, against Pinocchio's ABA and integrate
-alone, in a compiled loop. What a component adds is a difference to the scene without contact, whose
-step is ABA, continuous collision detection, the energy audit and summaries.
+alone, in a compiled loop.
 """
 
 import time
@@ -17,14 +16,10 @@ from sphshell_pin import robots
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.study.report.contents import (
-    TIME_COLUMNS,
     Finding,
     Progress,
     Section,
-    Spread,
-    Table,
     about,
-    columns,
     times_table,
 )
 from sphshell_pin.study.report.surfaces import wavy_sheet
@@ -36,7 +31,6 @@ FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 START = np.array([0, 0.35, 0, -2.0, 0, 2.35, 0.8])
 PRESSED, AWAY = 5e-4, -1.0  # of the sheet above the height at which it just touches [m]
 LAW = sp.ImpactLaw(1e4, 1.5, 50.0, 1e-4)
-UNDAMPED = sp.ImpactLaw(1e4, 1.5)
 FRICTION = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
 
 
@@ -112,63 +106,19 @@ CONTROL_FREE, CONTROL_TOUCHING = "joint PD + gravity, no contact", "joint PD + g
 WHOLE = (BARE, FREE, FAR, TOUCHING, CONTROL_FREE, CONTROL_TOUCHING)
 
 
-def with_moving_sheet(shell: sp.Shell) -> sp.Scene:
-    """Let the Panda carry the sheet on its hand and touch a fixed ball with it.
-
-    The same joints move; the wrench acts on the shell's side instead of the sphere's.
-    """
-    scene = panda()
-    tip = tip_position(scene, START)
-    data = scene.model.createData()
-    pin.framesForwardKinematics(scene.model, data, START)
-    hand = data.oMf[scene.model.getFrameId("panda_hand_tcp")]
-    sheet_world = pin.SE3(np.eye(3), tip + [0, 0, 5e-4 - RADIUS])
-    scene.add_contact(
-        sphere=sp.Sphere(RADIUS, "universe", tuple(tip)),
-        shell=shell,
-        frame="panda_hand_tcp",
-        placement=hand.actInv(sheet_world),
-        law=UNDAMPED,
-    )
-    return scene
-
-
 def measure(rounds: int, progress: Progress = silent) -> Times:
-    """Return the times of a step [s]: of WHOLE, then of scenes that differ by one component."""
+    """Return the times of a step [s] of WHOLE."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
     pd = sp.JointPD(100.0, 10.0)
-
-    def on_sheet(
-        law: sp.ImpactLaw = LAW,
-        friction: sp.CoulombFriction | None = FRICTION,
-        *rises: float,
-    ) -> sp.Scene:
-        scene = panda()
-        for rise in rises or (PRESSED,):
-            with_sheet(scene, shell, rise, law, friction)
-        return scene
-
-    def zero(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
-        return np.zeros_like(v)
-
-    scenes: dict[str, tuple[sp.Scene, AnyController]] = {
-        FREE: (panda(), None),
-        FAR: (on_sheet(LAW, FRICTION, AWAY), None),
-        TOUCHING: (on_sheet(), None),
-        CONTROL_FREE: (panda(), pd),
-        CONTROL_TOUCHING: (on_sheet(), pd),
-        "fingers not locked, no contact": (panda(lock=()), None),
-        "far sphere, no damping, no friction": (on_sheet(UNDAMPED, None, AWAY), None),
-        "touching, no damping, no friction": (on_sheet(UNDAMPED, None), None),
-        "... and damping": (on_sheet(LAW, None), None),
-        "... and friction": (on_sheet(UNDAMPED), None),
-        "... and a far second sphere": (on_sheet(UNDAMPED, None, PRESSED, AWAY), None),
-        "... and a touching second sphere": (on_sheet(UNDAMPED, None, PRESSED, PRESSED), None),
-        "... and the shell on a moving body": (with_moving_sheet(shell), None),
-        "... and a Python controller": (on_sheet(UNDAMPED, None), zero),
+    runs = {
+        BARE: bare(panda()),
+        FREE: runner(panda()),
+        FAR: runner(with_sheet(panda(), shell, AWAY)),
+        TOUCHING: runner(with_sheet(panda(), shell, PRESSED)),
+        CONTROL_FREE: runner(panda(), pd),
+        CONTROL_TOUCHING: runner(with_sheet(panda(), shell, PRESSED), pd),
     }
-    runs = {name: runner(scene, controller) for name, (scene, controller) in scenes.items()}
-    return take_turns({BARE: bare(panda()), **runs}, rounds, progress)
+    return take_turns(runs, rounds, progress)
 
 
 KEY, TITLE = "steps", "Cost of a step"
@@ -191,26 +141,11 @@ def assemble(steps: Times, imports: Times) -> Section:
     controlled = steps[CONTROL_TOUCHING] / steps[CONTROL_FREE]
     imported = imports["sphshell_pin"] / imports["pinocchio"]
     findings = [
-        ratio("step_touching", touching, steps[TOUCHING] / bare, aim=1.8, headline=True),
+        ratio("step_touching", touching, steps[TOUCHING] / bare, aim=1.8),
         ratio("step_far", "the same with the sphere far away", steps[FAR] / bare),
-        ratio("step_control", control, controlled, aim=1.35, headline=True),
+        ratio("step_control", control, controlled, aim=1.35),
         ratio("import", importing, imported, aim=1.2),
     ]
-    whole, over = {name: steps[name] for name in WHOLE}, "over_bare: over ABA + integrate"
-    caption = "Whole steps, in turn in one process."
-    table = times_table("steps", caption, "scene", whole, BARE, over)
-    return Section(KEY, TITLE, TEXT, findings, tables=[table, components_table(steps)])
-
-
-def components_table(steps: Times) -> Table:
-    """Return what each component of a scene adds."""
-    return Table(
-        "steps_components",
-        "What a component adds to the step; a scene without it does not pay.",
-        columns("scene", TIME_COLUMNS, "added_s: added [us]"),
-        [
-            (name, *Spread.of(times), float(np.median(times - steps[FREE])))
-            for name, times in steps.items()
-            if name == FREE or name not in WHOLE
-        ],
-    )
+    caption, over = "Whole steps, in turn in one process.", "over_bare: over ABA + integrate"
+    table = times_table("steps", caption, "scene", steps, BARE, over)
+    return Section(KEY, TITLE, TEXT, findings, tables=[table])

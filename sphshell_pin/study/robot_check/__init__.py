@@ -16,7 +16,7 @@ from sphshell_pin.robots import RobotError
 from sphshell_pin.study.robot_check.checks import QUICK, SPEED, Sizes, run_checks
 from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.robot_check.report import RobotReport
-from sphshell_pin.study.robot_check.setting import Touch, fixed_touch, free_touch, setting_of
+from sphshell_pin.study.robot_check.setting import Touch, setting_of, touch_of
 
 __all__ = ["QUICK", "RobotReport", "Sizes", "Touch", "check_robot", "contact_scene"]
 
@@ -121,8 +121,8 @@ def contact_scene(
     subject = load_subject(robot, free_flyer=free_flyer)
     rng = _random(seed, subject.name)
     setting = setting_of(subject, rng, frame, radius)
-    make = free_touch if free else fixed_touch
-    return make(setting, rng, -check_finite("depth", depth), SPEED * setting.radius)
+    gap = -check_finite("depth", depth)
+    return touch_of(setting, rng, gap, SPEED * setting.radius, free=free)
 
 
 def _random(seed: int, name: str) -> np.random.Generator:

@@ -16,11 +16,10 @@ from sphshell_pin.study.robot_check.setting import (
     PLATE,
     Setting,
     Touch,
-    fixed_touch,
-    free_touch,
     meeting_posture,
     random_torques,
     stopping_law,
+    touch_of,
 )
 from sphshell_pin.testing.conservation import elastic_energy, energy, kinetic_energy, momentum
 from sphshell_pin.testing.differences import derivatives
@@ -111,8 +110,8 @@ def run_checks(
     speed = SPEED * setting.radius
     touches: list[tuple[Touch, Array]] = []
     for _ in range(sizes.postures):
-        for make in (fixed_touch, free_touch):
-            touch = make(setting, rng, -_DEPTH, speed)
+        for free in (False, True):
+            touch = touch_of(setting, rng, -_DEPTH, speed, free=free)
             touches.append((touch, random_torques(touch.scene.model, touch.q, rng)))
 
     def runs(measure: Callable[[Setting, np.random.Generator], list[Finding]]) -> list[Finding]:
@@ -153,12 +152,12 @@ def _variants(scene: Scene) -> list[Scene]:
 
 
 def _momentum(setting: Setting, rng: np.random.Generator) -> list[Finding]:
-    touch = free_touch(setting, rng, 0.05, SPEED * setting.radius)
+    touch = touch_of(setting, rng, 0.05, SPEED * setting.radius, free=True)
     return [momentum(_run(touch, Adaptive(_RTOL), _DURATION))]
 
 
 def _energies(setting: Setting, rng: np.random.Generator) -> list[Finding]:
-    touch = fixed_touch(setting, rng, 0.05, SPEED * setting.radius)
+    touch = touch_of(setting, rng, 0.05, SPEED * setting.radius)
     pair = touch.scene.pairs[0]
     lossless = Scene(touch.scene.model)
     law = stopping_law(touch.mass, touch.speed, 0.2 * setting.radius)
@@ -193,7 +192,7 @@ def _impact(setting: Setting, rng: np.random.Generator) -> list[Result]:
     radius, step, gap = setting.radius, 1e-2, 2.0
     # From gap + 1 radii before the surface to 2 behind it, for the center.
     speed = (gap + 3.0) * radius / step
-    touch = fixed_touch(setting, rng, gap, speed, least=True)
+    touch = touch_of(setting, rng, gap, speed, least=True)
     pair = touch.scene.pairs[0]
     scene = Scene(touch.scene.model)
     # Whatever the joints do, the law can take up all the energy they have.
@@ -206,7 +205,7 @@ def _impact(setting: Setting, rng: np.random.Generator) -> list[Result]:
 
 def _contacts(setting: Setting, rng: np.random.Generator, poses: int) -> list[Finding]:
     """Ask the scene for contacts at many postures, the patch deep in the sphere to far from it."""
-    touch = free_touch(setting, rng, 0.0, SPEED * setting.radius)
+    touch = touch_of(setting, rng, 0.0, SPEED * setting.radius, free=True)
     scene = Scene(touch.scene.model)
     law = touch.scene.pairs[0].law
     scene.add_contact(setting.sphere, setting.shell, PLATE, law=law, method="facets")

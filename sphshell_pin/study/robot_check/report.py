@@ -65,20 +65,6 @@ def error_text(error: float) -> str:
     return "0" if error == 0.0 else f"{error:.0e}" if math.isfinite(error) else "no figure"
 
 
-def as_table(reports: Sequence[RobotReport]) -> list[list[str]]:
-    """Return a row of texts for each robot: name, frame, size, an error for each check, verdict."""
-    return [
-        [
-            one.name,
-            one.frame,
-            f"{one.nq}/{one.nv}" if one.nv else "",
-            *(error_text(one.findings[key].error) if key in one.findings else "" for key in CHECKS),
-            one.verdict,
-        ]
-        for one in reports
-    ]
-
-
 def remarks(reports: Sequence[RobotReport]) -> list[str]:
     """Return all remarks as sentences, robots with the same remark together."""
     of: dict[str, list[str]] = {}

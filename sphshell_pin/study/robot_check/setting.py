@@ -116,51 +116,42 @@ def patch(radius: float) -> Shell:
     return Shell(np.stack([x, y, z], 1), triangles, normals=normals, name="patch")
 
 
-def fixed_touch(
-    setting: Setting, rng: np.random.Generator, gap: float, speed: float, *, least: bool = False
+def touch_of(
+    setting: Setting,
+    rng: np.random.Generator,
+    gap: float,
+    speed: float,
+    *,
+    free: bool = False,
+    least: bool = False,
 ) -> Touch:
     """Put the patch into the world, `gap` [radii] before the sphere that comes with `speed` [m/s].
 
-    A negative gap is a depth. With `least` the joints move no faster than they must.
+    A negative gap is a depth. If it is `free`, the robot's root and the patch float without
+    gravity; the patch is as heavy as the robot is in the contact, and turns a little. With `least`
+    the joints move no faster than they must.
     """
-    model = setting.model
-    q, v, way = _motion(model, setting.sphere, rng, speed)
+    sphere = setting.sphere
+    model = _floating(setting.model, sphere) if free else setting.model
+    q, v, way = _motion(model, sphere, rng, speed)
     if least:
-        jacobian = center_jacobian(model, model.createData(), q, setting.sphere)
-        v = np.linalg.pinv(jacobian) @ (speed * way)
-    contact = _Contact.facing(way, rng, gap, setting)
-    scene = Scene(model)
-    data = placed_data(model, q)
-    mass = contact.mass(model, data, q, setting.sphere)
-    law, friction = _law(mass, speed, setting.radius)
-    pose = contact.pose(model, data, setting.sphere)
-    scene.add_contact(
-        setting.sphere, setting.shell, placement=pose, law=law, friction=friction, name="touch"
-    )
-    return Touch(scene, q, v, speed, mass)
-
-
-def free_touch(setting: Setting, rng: np.random.Generator, gap: float, speed: float) -> Touch:
-    """Let the robot's root and the patch float without gravity; else as `fixed_touch`.
-
-    The patch is as heavy as the robot is in the contact, and turns a little.
-    """
-    model = _floating(setting.model, setting.sphere)
-    q, v, way = _motion(model, setting.sphere, rng, speed)
+        v = np.linalg.pinv(center_jacobian(model, model.createData(), q, sphere)) @ (speed * way)
     contact = _Contact.facing(way, rng, gap, setting)
     data = placed_data(model, q)
-    of_robot = contact.mass(model, data, q, setting.sphere)
-    plate = model.joints[model.getJointId(PLATE)]
-    width = 2.0 * _HALF * setting.radius
-    model.inertias[plate.id] = pin.Inertia.FromBox(of_robot, width, width, 0.1 * width)
-    q[plate.idx_q : plate.idx_q + 7] = pin.SE3ToXYZQUAT(contact.pose(model, data, setting.sphere))
-    v[plate.idx_v : plate.idx_v + 3] = 0.0
-    v[plate.idx_v + 3 : plate.idx_v + 6] = 0.1 * speed / width * rng.normal(size=3)
-    mass = contact.mass(model, placed_data(model, q, data), q, setting.sphere, plate.id)
+    mass, pose = contact.mass(model, data, q, sphere), contact.pose(model, data, sphere)
+    frame = "universe"
+    if free:
+        plate, width = model.joints[model.getJointId(PLATE)], 2.0 * _HALF * setting.radius
+        model.inertias[plate.id] = pin.Inertia.FromBox(mass, width, width, 0.1 * width)
+        q[plate.idx_q : plate.idx_q + 7] = pin.SE3ToXYZQUAT(pose)
+        v[plate.idx_v : plate.idx_v + 3] = 0.0
+        v[plate.idx_v + 3 : plate.idx_v + 6] = 0.1 * speed / width * rng.normal(size=3)
+        mass = contact.mass(model, placed_data(model, q, data), q, sphere, plate.id)
+        frame, pose = PLATE, None
     scene = Scene(model)
     law, friction = _law(mass, speed, setting.radius)
     scene.add_contact(
-        setting.sphere, setting.shell, PLATE, law=law, friction=friction, name="touch"
+        sphere, setting.shell, frame, placement=pose, law=law, friction=friction, name="touch"
     )
     return Touch(scene, q, v, speed, mass)
 
@@ -168,7 +159,7 @@ def free_touch(setting: Setting, rng: np.random.Generator, gap: float, speed: fl
 def meeting_posture(
     model: pin.Model, data: pin.Data, setting: Setting, rng: np.random.Generator, gap: float
 ) -> Array:
-    """Return a random posture (nq,) of a `free_touch`'s model with the patch `gap` [radii] away."""
+    """Return a random posture (nq,) of a free touch's model, the patch `gap` [radii] away."""
     q = random_posture(model, rng)
     placed_data(model, q, data)
     way = rng.normal(size=3)

@@ -1,23 +1,19 @@
 """Sweeps: one scenario run many times with other values, over processes or a Dask cluster."""
 
-from sphshell_pin.study.sweep.distributions import Distribution, LogNormal, Normal, Uniform
 from sphshell_pin.study.sweep.driver import SweepReport, run_plan, sweep
-from sphshell_pin.study.sweep.grid import Axis, axes_of
 from sphshell_pin.study.sweep.indices import quantiles, sobol_indices, tornado
 from sphshell_pin.study.sweep.plan import Plan, plan_sweep
+from sphshell_pin.study.sweep.points import Points, grid_of, sample_of
 
 __all__ = [
-    "Axis",
-    "Distribution",
-    "LogNormal",
-    "Normal",
     "Plan",
+    "Points",
     "SweepReport",
-    "Uniform",
-    "axes_of",
+    "grid_of",
     "plan_sweep",
     "quantiles",
     "run_plan",
+    "sample_of",
     "sobol_indices",
     "sweep",
     "tornado",

@@ -3,29 +3,35 @@
 from __future__ import annotations
 
 import contextlib
-import os
+import sys
 import time
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterable, Mapping
+from concurrent.futures import CancelledError
+from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
-from sphshell_pin.errors import InvalidParameter, SweepError
+from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.errors import InvalidParameter, ResultError, SweepError, import_extra
+from sphshell_pin.study.sweep import worker
 from sphshell_pin.study.sweep.distributions import Dist
-from sphshell_pin.study.sweep.grid import Vary
-from sphshell_pin.study.sweep.job import FAILED, Outcome, need
-from sphshell_pin.study.sweep.plan import Plan, plan_sweep
-from sphshell_pin.study.sweep.table import check_place, read_outcomes, table_of, write_table
-from sphshell_pin.study.sweep.workers import run_all
+from sphshell_pin.study.sweep.indices import DESIGN, figures_of
+from sphshell_pin.study.sweep.plan import Changes, Plan, plan_sweep
+from sphshell_pin.study.sweep.points import Vary, text_of
+from sphshell_pin.study.sweep.worker import Outcome
 
 if TYPE_CHECKING:
     import pandas as pd
 
 # A table that grows is written after so many seconds, and so many times as long as writing takes.
 _SAVE_AFTER, _SAVE_SELDOM = 5.0, 20.0
+_CONNECT_TIMEOUT = 10.0
 Progress = Callable[[int, int, int], object]
 """Called with the numbers of runs done, failed among them, and in all."""
+_need = partial(import_extra, extra="sweep", purpose="a sweep")
 
 
 @dataclass(frozen=True)
@@ -48,8 +54,6 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     out: str | PathLike[str] | None = None,
-    verdicts: bool = False,
-    retry_failed: bool = False,
     progress: Progress | None = None,
     dist: Dist | Iterable[str] | None = None,
     sample: str | None = None,
@@ -73,12 +77,11 @@ def sweep(
         runs in this process.
     scheduler : address of a Dask scheduler, "tcp://host:port", whose workers do the runs instead.
     out : .parquet file of the table. It is written as it grows, each time whole; the same call, or
-        one with more values, does the runs that it does not hold yet. None: nothing is kept.
-    verdicts : give each expectation of the scenario a column: 1 where met, 0 where missed.
-    retry_failed : do again the runs that failed, as the table says.
+        one with more values, does the runs that it does not hold yet, and those that failed. None:
+        nothing is kept.
     progress : called with the numbers of runs done, failed among them, and in all.
-    dist : in place of `vary`, what is uncertain: a mapping from dotted keys of numbers to
-        distributions, `Normal`, `Uniform`, `LogNormal` or texts as "normal(1e5,1e4)"; or texts
+    dist : in place of `vary`, what is uncertain: a mapping from dotted keys of numbers to texts
+        such as "normal(1e5,1e4)" or distributions of scipy.stats such as norm(1e5, 1e4); or texts
         "key=normal(1e5,1e4)". Inputs are independent of each other.
     sample : "sobol" (points of a scrambled Sobol sequence) or "lhs" (a Latin hypercube).
     n : number of points; a power of 2 for "sobol".
@@ -92,7 +95,8 @@ def sweep(
     pandas.DataFrame : row i is run i: `run`, the varied keys, `status` ("done", "failed"), `error`
         (why it failed, in one sentence), with `dist` also `design` (what the run is for: "sample";
         "A", "B", "AB KEY" of Saltelli's design; "median", "5 % KEY", "95 % KEY"), the figures of a
-        run's summary [SI units] (NaN where a run has none), `settings`, the digest of its settings.
+        run's summary [SI units] (NaN where a run has none), `met.FIGURE` (1 where an expectation
+        of the scenario was met, else 0), `settings`, the digest of all that the run depends on.
         Bit for bit the same however and wherever the runs were made, on one kind of processor.
 
     The units of columns, by their names, are attrs["units"] of the table: those of keys as the
@@ -116,7 +120,6 @@ def sweep(
         vary,
         changes=changes,
         together=together,
-        verdicts=verdicts,
         dist=dist,
         sample=sample,
         n=n,
@@ -124,14 +127,7 @@ def sweep(
         indices=indices,
         tornado=tornado,
     )
-    return run_plan(
-        plan,
-        workers=workers,
-        scheduler=scheduler,
-        out=None if out is None else Path(out),
-        retry_failed=retry_failed,
-        progress=progress,
-    ).table
+    return run_plan(plan, workers=workers, scheduler=scheduler, out=out, progress=progress).table
 
 
 def run_plan(
@@ -139,80 +135,192 @@ def run_plan(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-    out: Path | None = None,
-    retry_failed: bool = False,
+    out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
-    note: Callable[[str], object] = lambda _: None,
 ) -> SweepReport:
-    """Do what the table at `out` does not hold yet, and write the table; see `sweep`.
+    """Do what the table at `out` does not hold yet, and write the table; see `sweep`."""
+    if scheduler is not None and workers is not None:
+        raise InvalidParameter("workers", workers, "is for this machine: a scheduler has its own")
+    if workers is not None and (type(workers) is not int or workers < 0):
+        raise InvalidParameter("workers", workers, "must be a whole number, 0 or more")
+    _need("pandas")
+    path = None if out is None else Path(out)
+    outcomes = {} if path is None else _read(plan, path)
+    resumed, failed = len(outcomes), 0
 
-    `note` is called with what a person who waits should know, in one sentence.
-    """
-    workers = _count_workers(workers, scheduler)
-    need("pandas")
-    outcomes = {} if out is None else _kept(plan, out, retry_failed=retry_failed)
-    resumed = len(outcomes)
-    failed = sum(one.status == FAILED for one in outcomes.values())
-
-    def report_progress() -> None:
+    def report() -> None:
         if progress is not None:
             progress(len(outcomes), failed, len(plan.runs))
 
     def save() -> None:
-        if out is not None:
-            write_table(out, table_of(plan, outcomes))
+        if path is not None:
+            write_table(path, _table_of(plan, outcomes))
 
-    missing = [run for run in plan.runs if run.number not in outcomes]
+    missing = {i: run for i, run in enumerate(plan.runs) if i not in outcomes}
     next_save = time.monotonic() + _SAVE_AFTER
+    report()
     try:
-        with contextlib.closing(run_all(plan.job, missing, workers, scheduler, note)) as done:
-            report_progress()
-            for outcome in done:
-                outcomes[outcome.number] = outcome
-                failed += outcome.status == FAILED
-                report_progress()
+        with contextlib.closing(_outcomes(plan, missing, workers, scheduler)) as done:
+            for number, outcome in done:
+                outcomes[number] = outcome
+                failed += bool(outcome.error)
+                report()
                 if (start := time.monotonic()) > next_save:
                     save()
                     end = time.monotonic()
                     next_save = end + max(_SAVE_AFTER, _SAVE_SELDOM * (end - start))
     except KeyboardInterrupt:
-        kept = "were done" if out is None else f"are done and kept in {out}"
+        kept = "were done" if path is None else f"are done and kept in {path}"
         text = f"{len(outcomes)} of {len(plan.runs)} runs {kept}"
         raise KeyboardInterrupt(text) from None
     finally:
         if len(outcomes) > resumed:
             save()
-    return SweepReport(table_of(plan, outcomes), resumed, failed)
+    return SweepReport(_table_of(plan, outcomes), resumed, failed)
 
 
-def _kept(plan: Plan, out: Path, *, retry_failed: bool) -> dict[int, Outcome]:
-    """Return the outcomes of the plan's runs that the table at `out` holds.
+def write_table(path: Path, table: pd.DataFrame) -> None:
+    """Write the table to `path` in place of an earlier one; the same table gives the same bytes.
+
+    Raises ResultError where it cannot be written; an earlier table stays as it was.
+    """
+    try:
+        with atomic_file(path) as file:
+            table.to_parquet(file, compression="zstd", write_page_checksum=True, index=False)
+    except OSError as fault:
+        raise ResultError(path, f"cannot be written: {fault.strerror or fault}") from None
+
+
+def _table_of(plan: Plan, outcomes: Mapping[int, Outcome]) -> pd.DataFrame:
+    """Return the table of the runs that have an outcome, their numbers in order.
+
+    Figures that only some runs have, where robots or contacts vary, come last.
+    """
+    pandas, numbers = _need("pandas"), sorted(outcomes)
+    rows = [outcomes[i] for i in numbers]
+    columns = {"run": pandas.Series(numbers, dtype="int64")}
+    for key, values in plan.points.values.items():
+        # Numbers where all values are, else texts.
+        whole = pandas.Series(values)
+        numeric = whole.dtype.kind in "bif"
+        columns[key] = whole[numbers] if numeric else pandas.Series(map(text_of, values))[numbers]
+    columns["status"] = pandas.Series(
+        ["failed" if one.error else "done" for one in rows], dtype=object
+    )
+    columns["error"] = pandas.Series([one.error for one in rows], dtype=object)
+    if plan.points.parts:
+        columns[DESIGN] = pandas.Series([plan.points.parts[i] for i in numbers])
+    others = {name for one in rows for name in one.figures} - set(plan.figures)
+    figures = pandas.DataFrame(
+        [one.figures for one in rows], columns=[*plan.figures, *sorted(others)], dtype=float
+    )
+    columns = {name: one.reset_index(drop=True) for name, one in columns.items()}
+    settings = pandas.Series([plan.digests[i] for i in numbers], dtype=object, name="settings")
+    frame: pd.DataFrame = pandas.concat([pandas.DataFrame(columns), figures, settings], axis=1)
+    frame.attrs["units"] = {name: one for name, one in plan.units.items() if name in frame}
+    return frame
+
+
+def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
+    """Return the outcomes of the plan's runs that the table at `path` holds, but failed ones.
+
+    Raises
+    ------
+    InvalidParameter, ResultError
+        No table can be written there, or what is there is not that of a sweep.
+    SweepError
+        It holds other runs as well, which would be lost.
+    """
+    if path.suffix.lower() != ".parquet":
+        raise InvalidParameter("out", str(path), "must end in .parquet")
+    _need("pyarrow")
+    if path.is_dir():
+        raise ResultError(path, "is a folder: give another --out")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        (path.parent / f".{path.name}.try").touch()
+        (path.parent / f".{path.name}.try").unlink()
+    except OSError as fault:
+        why = f"the folder cannot be written: {fault.strerror}; give another with --out"
+        raise ResultError(path.parent, why) from None
+    if not path.exists() or not path.stat().st_size:
+        return {}
+    try:
+        table = _need("pandas").read_parquet(path, page_checksum_verification=True)
+        figures = table[figures_of(table)].to_dict("records")
+        rows = zip(table["settings"], table["error"], figures, strict=True)
+        kept = {settings: Outcome(error, own) for settings, error, own in rows}
+    except (OSError, ValueError, KeyError, TypeError):  # pyarrow's faults are ValueErrors
+        why = "is a file that no sweep wrote, or a damaged one: give another --out, or delete it"
+        raise ResultError(path, why) from None
+    if others := len(kept.keys() - set(plan.digests)):
+        raise SweepError(
+            f"{path} holds {others} runs that this sweep does not have (with other values, files "
+            "or versions of the libraries): delete it to start again, or give another --out"
+        )
+    held = ((i, kept.get(settings)) for i, settings in enumerate(plan.digests))
+    return {i: one for i, one in held if one is not None and not one.error}
+
+
+def _outcomes(
+    plan: Plan, runs: Mapping[int, Changes], workers: int | None, scheduler: str | None
+) -> Generator[tuple[int, Outcome], None, None]:
+    """Yield number and outcome of each run, as they come; closing ends what is under way.
+
+    Dask starts a worker that died anew, and gives its run to another one.
 
     Raises
     ------
     SweepError
-        It holds other runs as well, which would be lost.
+        No scheduler answers or it went away, or a worker cannot be started or do any run.
     """
-    check_place(out)
-    kept = read_outcomes(out, plan.head)
-    if others := len(kept.keys() - set(plan.digests)):
-        raise SweepError(
-            f"{out} holds {others} runs with values or settings that this sweep does not have: "
-            "delete it to start again, or give another --out"
-        )
-    return {
-        i: replace(kept[settings], number=i)
-        for i, settings in enumerate(plan.digests)
-        if settings in kept and not (retry_failed and kept[settings].status == FAILED)
+    if not runs or (scheduler is None and workers == 0):
+        yield from ((i, worker.run_one(plan.job, run)) for i, run in runs.items())
+        return
+    distributed = _need("distributed")
+    where = f"the Dask scheduler at {scheduler}" if scheduler else "the scheduler on this machine"
+    with contextlib.ExitStack() as stack:
+        # A new process loads the module that is called __main__, also one that takes the place of
+        # another: a script would begin its sweep again.
+        stack.callback(sys.modules.update, {"__main__": sys.modules["__main__"]})
+        sys.modules["__main__"] = ModuleType("__main__")
+        client = stack.enter_context(contextlib.closing(_client(workers, len(runs), scheduler)))
+        submit = partial(client.submit, worker.run_one, plan.job, pure=False)
+        numbers = {submit(run): i for i, run in runs.items()}
+        for future in distributed.as_completed(list(numbers), loop=client.loop):
+            number = numbers.pop(future)
+            try:
+                yield number, future.result()
+            except distributed.KilledWorker:
+                yield number, Outcome("its worker process died each time it was tried")
+            except SweepError:
+                raise
+            except (CancelledError, OSError):
+                raise SweepError(f"{where} went away") from None
+            except Exception as fault:
+                raise SweepError(
+                    f"the workers of {where} cannot do the runs, is the same sphshell-pin "
+                    f"installed there? ({type(fault).__name__}: {' '.join(str(fault).split())})"
+                ) from None
+
+
+def _client(workers: int | None, runs: int, scheduler: str | None) -> Any:
+    distributed = _need("distributed")
+    local = {
+        "n_workers": min(workers or _need("dask.system").CPU_COUNT, runs),
+        "threads_per_worker": 1,
+        "memory_limit": None,
+        "preload": worker.__name__,
+        "dashboard_address": None,
+        "silence_logs": "CRITICAL",
     }
-
-
-def _count_workers(workers: int | None, scheduler: str | None) -> int:
-    if scheduler is not None and workers is not None:
-        raise InvalidParameter("workers", workers, "is for this machine: a scheduler has its own")
-    if workers is None:
-        allowed = getattr(os, "sched_getaffinity", None)
-        return len(allowed(0)) if allowed else os.cpu_count() or 1
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 0:
-        raise InvalidParameter("workers", workers, "must be a whole number, 0 or more")
-    return workers
+    remote = {"address": scheduler, "timeout": _CONNECT_TIMEOUT}
+    try:
+        return distributed.Client(**(remote if scheduler else local), set_as_default=False)
+    # Another server at that address may be misread in any way.
+    except Exception as fault:
+        why = "no worker process can be started"
+        if scheduler:
+            why = f"no Dask scheduler answers at {scheduler}: start one with dask scheduler, and "
+            why += "give the address that it prints"
+        raise SweepError(f"{why} ({' '.join(str(fault).split())})") from None

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.errors import InvalidParameter, NameNotFound
-from sphshell_pin.study.sweep.job import need
-from sphshell_pin.study.sweep.sampling import DRAWN, HIGH, LOW, MEDIAN, A, B, at_quantile, swapped
-from sphshell_pin.study.sweep.table import DESIGN, figures_of, varied_keys
+from sphshell_pin.errors import InvalidParameter, NameNotFound, import_extra
+from sphshell_pin.study.sweep.points import DRAWN, HIGH, LOW, MEDIAN, A, B, at_quantile, swapped
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
+DESIGN = "design"
+"""The column that says what each run of a sampled sweep is for."""
 QUANTILES = (5, 25, 50, 75, 95)
 """In percent."""
 RESAMPLES = 999
@@ -24,18 +25,16 @@ _ROUNDING = 64 * np.finfo(float).eps
 _BATCH = 16  # resamples at a time: 8 bytes * n (d + 2) each
 
 
-def drawn(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows that are a sample of the inputs' distributions.
+def varied_keys(table: pd.DataFrame) -> list[str]:
+    """Return the names of the columns that were varied."""
+    names = [str(name) for name in table.columns]
+    return names[1 : names.index("status")]
 
-    Raises InvalidParameter if the table is not that of a sweep with `sample`.
-    """
-    _check_design(table)
-    rows = table[table[DESIGN].isin(DRAWN)]
-    if rows.empty:
-        raise InvalidParameter(
-            "table", None, "no sample, only a tornado: make the sweep with sample = sobol", "has"
-        )
-    return rows
+
+def figures_of(table: pd.DataFrame) -> list[str]:
+    """Return the figures of a table."""
+    names = [str(name) for name in table.columns]
+    return [name for name in names[names.index("error") + 1 :] if name not in (DESIGN, "settings")]
 
 
 def quantiles(table: pd.DataFrame) -> pd.DataFrame:
@@ -51,16 +50,9 @@ def quantiles(table: pd.DataFrame) -> pd.DataFrame:
     InvalidParameter
         The table is not that of a sweep with `sample`.
     """
-    rows = drawn(table)
-    found = {}
-    for name in figures_of(table):
-        values = rows[name].to_numpy(float)
-        values = values[~np.isnan(values)]
-        mean = float(np.mean(values)) if len(values) else np.nan
-        found[name] = [*_quantiles(values), mean, len(values)]
-    pandas = need("pandas")
-    made = pandas.DataFrame.from_dict(found, orient="index", columns=[*QUANTILES, "mean", "runs"])
-    return made.astype({"runs": int})
+    rows = _rows(table, DRAWN, "a sample: make the sweep with sample = sobol")[figures_of(table)]
+    found = rows.quantile([one / 100 for one in QUANTILES]).T.set_axis(list(QUANTILES), axis=1)
+    return found.assign(mean=rows.mean(), runs=rows.count())
 
 
 def sobol_indices(
@@ -94,21 +86,16 @@ def sobol_indices(
         The table is not that of a sweep with `indices`, a run has no such figure, or the figure is
         the same in all runs.
     """
-    _check_design(table)
     if not isinstance(confidence, float) or not 0.0 < confidence < 1.0:
         raise InvalidParameter("confidence", confidence, "must lie between 0 and 1")
-    table = table.sort_values("run")
     keys = varied_keys(table)
     wanted = [A, B, *map(swapped, keys)]
-    if A not in set(table[DESIGN]):
-        raise InvalidParameter(
-            "table", None, "no runs for Sobol indices: make the sweep with indices", "has"
-        )
-    rows = {one: table[table[DESIGN] == one] for one in wanted}
+    every = _rows(table, wanted, "Sobol indices: make the sweep with indices").sort_values("run")
+    rows = {one: every[every[DESIGN] == one] for one in wanted}
     n = len(rows[A])
     if n & (n - 1) or any(len(one) != n for one in rows.values()):
         raise InvalidParameter("table", None, "rows: Sobol indices need all of a sweep", "lacks")
-    _check_complete(table[table[DESIGN].isin(wanted)], figure, "Sobol indices")
+    _check_complete(every, figure, "Sobol indices")
     values = np.array([rows[one][figure].to_numpy(float) for one in wanted])
     if np.ptp(values) <= _ROUNDING * np.abs(values).max():
         raise InvalidParameter(
@@ -116,7 +103,7 @@ def sobol_indices(
             figure,
             f"is {values.flat[0]:.6g} in all runs: without a variance it has no Sobol indices",
         )
-    found = need("scipy.stats").bootstrap(
+    found = import_extra("scipy.stats", "sweep", "Sobol indices").bootstrap(
         (np.arange(n),),
         lambda points, axis: _estimate(values[:, points]),
         vectorized=True,
@@ -130,7 +117,8 @@ def sobol_indices(
     columns: dict[str, Array] = {}
     for kind, *three in zip(("first", "total"), _estimate(values), low, high, strict=True):
         columns |= dict(zip((kind, f"{kind}_low", f"{kind}_high"), three, strict=True))
-    return need("pandas").DataFrame(columns, index=keys)
+    pandas = import_extra("pandas", "sweep", "Sobol indices")
+    return pandas.DataFrame(columns, index=keys)
 
 
 def tornado(table: pd.DataFrame, figure: str) -> pd.DataFrame:
@@ -149,42 +137,35 @@ def tornado(table: pd.DataFrame, figure: str) -> pd.DataFrame:
     InvalidParameter
         The table is not that of a sweep with `tornado`, or one of its runs has no such figure.
     """
-    _check_design(table)
     keys = varied_keys(table)
-    parts = [MEDIAN, *(at_quantile(key, one) for key in keys for one in (LOW, HIGH))]
-    rows = table[table[DESIGN].isin(parts)]
-    if len(rows) != len(parts):
-        raise InvalidParameter(
-            "table", None, "no runs for a tornado: make the sweep with tornado", "has"
-        )
+    ends = {key: [at_quantile(key, one) for one in (LOW, HIGH)] for key in keys}
+    parts = [MEDIAN, *(part for both in ends.values() for part in both)]
+    rows = _rows(table, parts, "a tornado: make the sweep with tornado")
     _check_complete(rows, figure, "a tornado")
-    values = dict(zip(rows[DESIGN], rows[figure].to_numpy(float), strict=True))
     inputs = rows.set_index(DESIGN)
-    lines = []
-    for key in keys:
-        low, high = (at_quantile(key, one) for one in (LOW, HIGH))
-        ends = inputs.loc[low, key], inputs.loc[high, key]
-        lines.append([*ends, values[low], values[MEDIAN], values[high]])
+    values = inputs[figure].astype(float)
+    lines = [
+        [*inputs.loc[both, key], values[both[0]], values[MEDIAN], values[both[1]]]
+        for key, both in ends.items()
+    ]
     columns = ["low_value", "high_value", "low", "median", "high"]
-    found = need("pandas").DataFrame(lines, index=keys, columns=columns)
+    found = import_extra("pandas", "sweep", "a tornado").DataFrame(
+        lines, index=keys, columns=columns
+    )
     found.attrs = dict(table.attrs)
-    ends = found[["low", "median", "high"]]
-    change = ends.max(axis=1) - ends.min(axis=1)
-    return found.loc[change.sort_values(ascending=False, kind="stable").index]
+    change = np.ptp(found[["low", "median", "high"]].to_numpy(float), axis=1)
+    return found.iloc[np.argsort(-change, kind="stable")]
 
 
-def _quantiles(values: Array) -> list[float]:
-    if not len(values):
-        return [np.nan] * len(QUANTILES)
-    with np.errstate(invalid="ignore"):  # between two infinities
-        return [float(one) for one in np.percentile(values, QUANTILES)]
-
-
-def _check_design(table: pd.DataFrame) -> None:
+def _rows(table: pd.DataFrame, parts: Iterable[str], purpose: str) -> pd.DataFrame:
+    """Return the rows of a sampled table that are `parts` of its design."""
     if DESIGN not in table.columns:
-        raise InvalidParameter(
-            "table", None, "no column 'design': it is not that of a sweep with dist", "has"
-        )
+        must = "no column 'design': it is not that of a sweep with dist"
+        raise InvalidParameter("table", None, must, "has")
+    rows = table[table[DESIGN].isin(list(parts))]
+    if rows.empty:
+        raise InvalidParameter("table", None, f"no runs for {purpose}", "has")
+    return rows
 
 
 def _check_complete(rows: pd.DataFrame, figure: str, purpose: str) -> None:
@@ -214,6 +195,6 @@ def _estimate(values: Array) -> Array:
     d, many, n = len(values) - 2, values.shape[1:-1], values.shape[-1]
     a, b, *swaps = values.reshape(d + 2, -1, n)
     functions = {"f_A": a, "f_B": b, "f_AB": np.array(swaps)}
-    found = need("scipy.stats").sobol_indices(func=functions, n=n)
+    found = import_extra("scipy.stats", "sweep", "Sobol indices").sobol_indices(func=functions, n=n)
     both = np.stack([found.first_order, found.total_order]).reshape(2, -1, d)
     return np.moveaxis(both, 1, -1).reshape(2, d, *many)

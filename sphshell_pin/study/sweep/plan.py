@@ -2,68 +2,80 @@
 
 from __future__ import annotations
 
-import re
+import hashlib
+import json
+import os
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError
 from sphshell_pin.scenario import Built, Scenario, find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.build import build_scenario
-from sphshell_pin.scenario.format.reading import full_name, look_up
-from sphshell_pin.scenario.format.sliders import meaning
-from sphshell_pin.scenario.running.figures import check_expectations, figure_units
+from sphshell_pin.scenario.format.reading import change_scenario, full_name, look_up
+from sphshell_pin.scenario.format.sliders import check_knobs, meaning
+from sphshell_pin.scenario.running.figures import (
+    MORE_STATS,
+    NOT_REPEATABLE,
+    check_expectations,
+    figure_names,
+    figure_units,
+)
 from sphshell_pin.scenario.running.run import versions
 from sphshell_pin.study.sweep.distributions import Dist
-from sphshell_pin.study.sweep.grid import HOW, Axis, Value, Vary, axes_of, points_of, text_of
-from sphshell_pin.study.sweep.job import Job, Run, digest, digest_files, files_of, need
-from sphshell_pin.study.sweep.sampling import Design, design_of
-from sphshell_pin.study.sweep.table import varied_columns
-from sphshell_pin.study.sweep.worker import changed, sweep_figures, verdict_names
+from sphshell_pin.study.sweep.points import HOW, Points, Vary, grid_of, sample_of
 
-if TYPE_CHECKING:
-    import pandas as pd
+_MORE_OF_PAIR = ("impulse", "peak_force_time")
+Changes = Mapping[str, str]
+"""Values of one run by dotted key."""
 
-_START = re.compile(r"robot\.(?:\w+\.)?(start|speed)\.(.+)")
+
+@dataclass(frozen=True)
+class Job:
+    """What all runs of a sweep share; it goes to each worker."""
+
+    name: str
+    """A shipped scenario's name, or the absolute path of a file."""
+    scenario: Scenario
+    """As read and changed by --set, before any value is varied."""
+    sample: Changes
+    """A run that could be built where the sweep began: a worker must be able to as well."""
+    uses: Mapping[str, str]
+    """Versions of libraries and digests of files beside the scenario, by name."""
+    token: str
+    """Identifies this job."""
+
+    @property
+    def path(self) -> Path:
+        """The scenario's file; a shipped one may stand elsewhere on a worker's machine."""
+        return Path(self.name) if os.path.isabs(self.name) else find_scenario(self.name)
 
 
 @dataclass(frozen=True)
 class Plan:
     """A sweep whose keys and values were checked."""
 
-    axes: tuple[Axis, ...]
-    points: list[tuple[Value, ...]]
-    """The values of each run, in the order of `axes`."""
-    runs: list[Run]
+    points: Points
+    runs: list[Changes]
+    """What each run changes."""
     digests: list[str]
-    """Digests of each run's settings."""
+    """Digests of each run's settings, with the files and libraries that it uses."""
     figures: tuple[str, ...]
     """Columns that a finished run fills."""
     job: Job
-    head: Mapping[str, object]
-    """What the runs of this sweep share; those of another may not stand in its table."""
-    design: Design | None
-    """What the runs of a sample are for."""
     units: Mapping[str, str]
     """Units of keys and figures, those that are known."""
-
-    @property
-    def varied(self) -> pd.DataFrame:
-        """The columns of the varied keys, as a pandas.DataFrame."""
-        frame: pd.DataFrame = need("pandas").DataFrame(varied_columns(self.axes, self.points))
-        return frame
 
 
 def plan_sweep(
     scenario: str | PathLike[str],
     vary: Vary | Iterable[str] | None = None,
     *,
-    changes: Mapping[str, str] | None = None,
+    changes: Changes | None = None,
     together: bool = False,
-    verdicts: bool = False,
     dist: Dist | Iterable[str] | None = None,
     sample: str | None = None,
     n: int | None = None,
@@ -80,57 +92,94 @@ def plan_sweep(
     for name, value in refused.items():
         if value:
             raise InvalidParameter(name, value, must)
-    design = None
     if dist is not None:
-        design = design_of(dist, sample, n, seed=seed, indices=indices, tornado=tornado)
-        word, axes, points = "dist", design.axes, design.points
+        points = sample_of(dist, sample, n, seed=seed, indices=indices, tornado=tornado)
     elif vary is not None:
-        word, axes = "vary", axes_of(vary)
-        points = points_of(axes, together)
+        points = grid_of(vary, together)
     else:
         what = f"what varies, as {HOW}; or dist what is uncertain, as key=normal(mean,deviation)"
         raise InvalidParameter("vary", None, what, "must say")
-    path = find_scenario(scenario)
-    _check_keys(axes, changes or {}, path, word)
+    path, word = find_scenario(scenario), "vary" if dist is None else "dist"
+    _check_keys(list(points.values), changes or {}, path, word)
     fixed = read_scenario(path, changes)
-    runs = [
-        Run(i, {axis.key: text_of(value) for axis, value in zip(axes, point, strict=True)})
-        for i, point in enumerate(points)
-    ]
-    digests, names = _check_runs(runs, fixed, path, design)
+    runs: list[Changes] = [*points.changes]
+    digests, uses = _check_runs(runs, fixed, path, sampled=dist is not None)
     probe, built = _build_one(runs, fixed, path)
+    check_expectations(built)
     figures = sweep_figures(built)
-    if verdicts:
-        check_expectations(built)
-        figures += [f"met.{name}" for name in verdict_names(fixed)]
-    for axis in axes:
-        if axis.key in figures:
-            raise InvalidParameter(
-                word,
-                axis.key,
-                "is what a column of figures is called: give each routine a figure of its own",
-            )
+    for key in points.values:
+        if key in figures:
+            must = "is what a column of figures is called: give each routine a figure of its own"
+            raise InvalidParameter(word, key, must)
     shipped = path == shipped_scenarios().get(path.stem)
-    files, used = digest_files(path.parent, names), versions()
-    head = {"scenario": path.stem, "verdicts": verdicts, "files": files, "versions": used}
-    job = Job(
-        name=path.stem if shipped else str(path.absolute()),
-        shipped=shipped,
-        scenario=fixed,
-        sample=probe,
-        verdicts=verdicts,
-        files=files,
-        versions=used,
-        token=digest([str(path.absolute()), head, digests]),
-    )
-    units = _units(axes, runs, fixed, built)
-    return Plan(axes, points, runs, digests, tuple(figures), job, head, design, units)
+    name = path.stem if shipped else str(path.absolute())
+    job = Job(name, fixed, probe, uses, digest([str(path.absolute()), digests]))
+    # The unit of a key may follow another one that varies.
+    ends = [changed(fixed, run, path) for run in (runs[0], runs[-1])]
+    units = dict(figure_units(built))
+    for key in points.values:
+        unit, other = (_unit(one, key, path) for one in ends)
+        if unit and unit == other:
+            units[key] = unit
+    return Plan(points, runs, digests, tuple(figures), job, units)
+
+
+def sweep_figures(built: Built) -> list[str]:
+    """Return the names of the figures that a row of a sweep has: all that repeat bit for bit."""
+    names = [name for name in figure_names(built) if name not in NOT_REPEATABLE]
+    names += [f"pairs.{pair.name}.{one}" for pair in built.scene.pairs for one in _MORE_OF_PAIR]
+    return [*names, *MORE_STATS, *(f"met.{name}" for name in judged(built.scenario))]
+
+
+def judged(scenario: Scenario) -> list[str]:
+    """Return the figures of `scenario` that its expectations judge, without those of time."""
+    return [name for name in scenario.expect if name not in NOT_REPEATABLE]
+
+
+def changed(scenario: Scenario, changes: Changes, path: Path) -> Scenario:
+    """Return the scenario of a run; a ScenarioError for what no scenario may have."""
+    found = change_scenario(scenario, changes, path)
+    check_knobs(found, path, ranges=False)
+    return found
+
+
+def digest(data: object) -> str:
+    """Return the SHA-256 of `data`, made of what JSON knows, in hexadecimal digits."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def uses_of(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """Return the versions of libraries, and the SHA-256 of each file of `names` in `folder`."""
+    found = versions()
+    for name in sorted(names):
+        path = folder / name
+        found[name] = "absent"
+        if os.path.isfile(path):
+            with open_regular(path) as file:
+                found[name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return found
+
+
+def files_of(scenario: Scenario) -> set[str]:
+    """Return the files that `scenario` names: surfaces, robots, Python routines, tables of laws."""
+    routines = [one.find for one in scenario.source] + list(scenario.figures.values())
+    named = [one.file for one in scenario.shell]
+    named += [name for one in scenario.robot for name in (one.path, one.srdf)]
+    stated = [scenario.controller]
+    for pair in scenario.contact:
+        stated += pair.law, pair.friction
+    for source in scenario.source:
+        stated += source.law, source.friction
+    named += [file for part in stated for file in part.files]
+    named += [routine.rpartition(":")[0] for routine in routines]
+    return {name for name in named if name}
 
 
 def _check_runs(
-    runs: list[Run], scenario: Scenario, path: Path, design: Design | None
-) -> tuple[list[str], set[str]]:
-    """Return the digests of all runs' settings, and the files that they name.
+    runs: list[Changes], scenario: Scenario, path: Path, *, sampled: bool
+) -> tuple[list[str], dict[str, str]]:
+    """Return the digests of all runs, and all that they use.
 
     Raises
     ------
@@ -139,18 +188,21 @@ def _check_runs(
     InvalidParameter
         A distribution that reaches such values.
     """
-    digests, names = [], set[str]()
-    faults: list[ScenarioError] = []
+    uses = uses_of(path.parent, ())
+    digests, faults = [], list[ScenarioError]()
     for run in runs:
         try:
             one = changed(scenario, run, path)
         except ScenarioError as fault:
             faults.append(fault)
-            if design is None or len(faults) == len(runs):
+            if not sampled or len(faults) == len(runs):
                 raise
-        else:
-            digests.append(digest(one.model_dump(mode="json")))
-            names |= files_of(one)
+            continue
+        files = files_of(one)
+        if not files <= uses.keys():
+            uses |= uses_of(path.parent, files - uses.keys())
+        used = {name: uses[name] for name in (*versions(), *files)}
+        digests.append(digest([path.stem, one.model_dump(mode="json"), used]))
     if faults:
         raise InvalidParameter(
             "dist",
@@ -160,14 +212,13 @@ def _check_runs(
             "uniform(low,high) has two ends",
             f"does not fit: {len(faults)}",
         )
-    return digests, names
+    return digests, uses
 
 
-def _check_keys(axes: Iterable[Axis], changes: Mapping[str, str], path: Path, word: str) -> None:
+def _check_keys(keys: list[str], changes: Changes, path: Path, word: str) -> None:
     """Refuse two keys for one value: which of them holds would be a matter of order."""
     scenario = read_scenario(path)
     more = "put all its values together" if word == "vary" else "leave one of the two out"
-    keys = [axis.key for axis in axes]
     # What is not in the file: read_scenario raises if no file may have it.
     meant, fixed = ([full_name(scenario, key, path) for key in some] for some in (keys, changes))
     for key, whole in zip(keys, meant, strict=True):
@@ -184,24 +235,7 @@ def _unit(scenario: Scenario, key: str, path: Path) -> str:
         return ""  # not in the file; read_scenario raises if no file may have it
 
 
-def _units(
-    axes: tuple[Axis, ...], runs: list[Run], scenario: Scenario, built: Built
-) -> dict[str, str]:
-    """Return the units of figures and axes, but of axes whose unit follows another that varies."""
-    units = dict(figure_units(built))
-    ends = [changed(scenario, run, built.path) for run in (runs[0], runs[-1])]
-    for axis in axes:
-        unit, other = (_unit(one, axis.key, built.path) for one in ends)
-        found = _START.fullmatch(axis.key)
-        if found and len(scenario.robot) == 1:
-            # A start value has the unit of the joint, which the built scene knows.
-            unit = other = units.get(f"final.{'q' if found[1] == 'start' else 'v'}.{found[2]}", "")
-        if unit and unit == other:
-            units[axis.key] = unit
-    return units
-
-
-def _build_one(runs: list[Run], scenario: Scenario, path: Path) -> tuple[Run, Built]:
+def _build_one(runs: list[Changes], scenario: Scenario, path: Path) -> tuple[Changes, Built]:
     """Build the first run, or else the last: where neither can be, no run can be built."""
     faults: list[SphshellError] = []
     for run in (runs[0], runs[-1]):

@@ -1,0 +1,232 @@
+"""Which runs a sweep makes: the points of a grid, or a sample of uncertain inputs."""
+
+import itertools
+import json
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.checks import stated_pairs
+from sphshell_pin.errors import InvalidParameter, import_extra
+from sphshell_pin.study.sweep.distributions import Dist, Frozen, distributions_of
+
+Value = bool | int | float | str
+"""A value of a varied key, as a table holds it; a list of the scenario file is its text."""
+Vary = Mapping[str, str | Sequence[object]]
+
+MOST_RUNS = 1_000_000
+HOW = "key=lo:hi:n, key=lo:hi:log:n or key=a,b,c"
+# Steps between the ends are rounded: 0.3 rather than 0.30000000000000004, on every machine.
+_DIGITS = 12
+_PLAIN = r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*"
+_NUMBER = re.compile(_PLAIN)
+_RANGE = re.compile(rf"({_PLAIN}):({_PLAIN}):(\s*log\s*:)?\s*(\d+)\s*")
+
+DRAWN = SAMPLE, A, B = "sample", "A", "B"
+"""Parts of a design whose runs are drawn from the distributions, each independent of the others."""
+MEDIAN = "median"
+LOW, HIGH = 5, 95
+"""Between these quantiles [%] an input moves in the tornado."""
+# Sobol points are whole multiples of 2^-30. Half a step more keeps them off 0 and 1, where a
+# quantile may be infinite, and in the intervals that make them even.
+_HALF_STEP = 2.0**-31
+
+
+@dataclass(frozen=True)
+class Points:
+    """The values that each varied key takes, run by run: (n,) by key."""
+
+    values: Mapping[str, Sequence[Value]]
+    parts: tuple[str, ...] = ()
+    """What each run of a sample is for: "sample"; "A", "B", "AB KEY"; "median", "5 % KEY", ..."""
+    dists: Mapping[str, Frozen] = field(default_factory=dict)
+
+    @property
+    def changes(self) -> list[dict[str, str]]:
+        """The values of each run by key, as --set takes them."""
+        texts = [[text_of(one) for one in column] for column in self.values.values()]
+        return [dict(zip(self.values, row, strict=True)) for row in zip(*texts, strict=True)]
+
+
+def swapped(key: str) -> str:
+    """Return the part of the design whose points are those of A with the `key` of B."""
+    return f"AB {key}"
+
+
+def at_quantile(key: str, percent: int) -> str:
+    """Return the part of the design in which `key` is at a quantile, all others at the median."""
+    return f"{percent} % {key}"
+
+
+def grid_of(vary: Vary | Iterable[str], together: bool = False) -> Points:
+    """Return the grid of a mapping from keys to values, or of texts such as "run.dt=1e-5,1e-4".
+
+    Values are a sequence, or a text: "lo:hi:n" (n equal steps, ends included), "lo:hi:log:n" (n
+    values, each the same multiple of the one before), "a,b,c" (numbers, words, TOML lists). The
+    last key varies fastest; with `together` the first run takes the first value of every key, and
+    so on.
+
+    Raises
+    ------
+    InvalidParameter
+        A text that says no values, a key or a value given twice, nothing to vary, too many runs,
+        or keys of different lengths with `together`.
+    """
+    axes: dict[str, tuple[Value, ...]] = {}
+    for key, given in stated_pairs("--vary", vary, f"must be {HOW}"):
+        if not isinstance(given, Iterable):
+            raise InvalidParameter(f"vary {key}", given, "must be a list of values, or a text")
+        values = _parse(key, given) if isinstance(given, str) else tuple(map(_plain, given))
+        if not values:
+            raise InvalidParameter("vary", key, "must have at least one value", key)
+        # 1 and 1.0 are one value, true is another; as text: a nan is not even equal to itself.
+        texts = [
+            text_of(float(one) if type(one) is int and abs(one) < 2**53 else one) for one in values
+        ]
+        for value, text in zip(values, texts, strict=True):
+            if texts.count(text) > 1:
+                raise InvalidParameter(f"vary {key}", text_of(value), "is given twice")
+        if key in axes:
+            raise InvalidParameter("vary", key, "is given twice: put all its values together")
+        axes[key] = values
+    if not axes:
+        raise InvalidParameter("vary", {}, f"must say what varies: {HOW}")
+    lengths = {key: len(values) for key, values in axes.items()}
+    if together:
+        if len(set(lengths.values())) > 1:
+            given = ", ".join(f"{key} has {n}" for key, n in lengths.items())
+            raise InvalidParameter("together", True, f"needs as many values of every key: {given}")
+        return Points(axes)
+    if (runs := math.prod(lengths.values())) > MOST_RUNS:
+        raise InvalidParameter("vary", runs, f"runs are too many: {MOST_RUNS} at most")
+    columns = zip(*itertools.product(*axes.values()), strict=True)
+    return Points(dict(zip(axes, columns, strict=True)))
+
+
+def sample_of(
+    dist: Dist | Iterable[str],
+    sample: str | None = None,
+    n: int | None = None,
+    *,
+    seed: int = 0,
+    indices: bool = False,
+    tornado: bool = False,
+) -> Points:
+    """Return the runs for inputs distributed as `dist`; see `sphshell_pin.study.sweep.sweep`.
+
+    The points of "sobol" are those of a scrambled Sobol sequence, those of "lhs" a Latin hypercube
+    [scipy.stats.qmc]. With `indices` the design is Saltelli's: A and B are the halves of one
+    sequence in 2 d dimensions, and each AB is A with one column of B [Saltelli et al., Computer
+    Physics Communications 181 (2010), 259-270]. The d + 2 runs of a point follow each other.
+
+    Raises
+    ------
+    InvalidParameter
+        A distribution, `n` or another argument is wrong.
+    MissingExtra
+        scipy is not installed.
+    """
+    dists = distributions_of(dist)
+    _check(sample, n, seed, indices=indices, tornado=tornado)
+    d = len(dists)
+    shares, parts = np.empty((0, d)), list[str]()
+    if sample is not None and n is not None:
+        runs = n * (d + 2 if indices else 1)
+        if runs > MOST_RUNS:
+            raise InvalidParameter("n", n, f"makes {runs} runs, too many: {MOST_RUNS} at most")
+        shares, parts = _unit_points(sample, n, 2 * d if indices else d, seed), [SAMPLE] * n
+        if indices:
+            a, b = shares[:, :d], shares[:, d:]
+            swaps = [np.where(np.arange(d) == i, b, a) for i in range(d)]
+            shares = np.stack([a, b, *swaps], axis=1).reshape(-1, d)
+            parts = [A, B, *map(swapped, dists)] * n
+    if tornado:
+        alone = np.full((d, 2, d), 0.5)
+        alone[range(d), :, range(d)] = LOW / 100, HIGH / 100
+        shares = np.vstack([shares, np.full((1, d), 0.5), alone.reshape(-1, d)])
+        parts += [MEDIAN, *(at_quantile(key, one) for key in dists for one in (LOW, HIGH))]
+    values = {}
+    for (key, one), share in zip(dists.items(), shares.T, strict=True):
+        with np.errstate(over="ignore", invalid="ignore"):
+            values[key] = np.asarray(one.ppf(share), dtype=float).tolist()
+        if not np.all(np.isfinite(values[key])):
+            raise InvalidParameter(f"dist {key}", str(one), "has values that are not finite")
+    return Points(values, tuple(parts), dists)
+
+
+def _check(sample: str | None, n: int | None, seed: int, *, indices: bool, tornado: bool) -> None:
+    if sample is None and (n is not None or not tornado):
+        must = "with dist: sobol or lhs, and n points (or tornado alone)"
+        raise InvalidParameter("sample", None, must, "must be given")
+    if sample not in (None, "sobol", "lhs"):
+        raise InvalidParameter("sample", sample, "must be sobol or lhs")
+    for name, value, least in (("n", 2 if sample is None else n, 2), ("seed", seed, 0)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise InvalidParameter(name, value, f"must be a whole number, {least} or more")
+    if indices and sample != "sobol":
+        raise InvalidParameter("indices", True, "the points of a sequence: sample = sobol", "need")
+    if sample == "sobol" and n is not None and n & (n - 1):
+        below = 1 << (n.bit_length() - 1)
+        must = f"must be a power of 2 with sample = sobol, such as {below} or {2 * below}"
+        raise InvalidParameter("n", n, must)
+
+
+def _unit_points(sample: str, n: int, d: int, seed: int) -> Array:
+    """Return `n` points in the unit cube (n, d)."""
+    qmc = import_extra("scipy.stats", "sweep", "a sweep").qmc
+    if sample == "sobol":
+        return np.asarray(qmc.Sobol(d, rng=seed).random(n)) + _HALF_STEP
+    return np.asarray(qmc.LatinHypercube(d, rng=seed).random(n))
+
+
+def text_of(value: Value) -> str:
+    """Return `value` as --set takes it; numbers are exact."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return value if isinstance(value, str) else repr(value)
+
+
+def _parse(key: str, text: str) -> tuple[Value, ...]:
+    if ":" in text and _NUMBER.fullmatch(text.partition(":")[0]):
+        return _range(key, text)
+    try:
+        found = tomllib.loads(f"values = [{text}]")["values"]
+    except tomllib.TOMLDecodeError:
+        found = [_word(one.strip()) for one in text.split(",")]
+    return tuple(map(_plain, found))
+
+
+def _range(key: str, text: str) -> tuple[Value, ...]:
+    parts = _RANGE.fullmatch(text)
+    low, high, n = (float(parts[1]), float(parts[2]), int(parts[4])) if parts else (0.0, 0.0, 0)
+    log = parts is not None and parts[3] is not None
+    positive = min(low, high) > 0.0 or not log
+    if not (2 <= n <= MOST_RUNS and low != high and positive and math.isfinite(high - low)):
+        must = "finite ends that differ (positive ones with log), n 2 or more"
+        raise InvalidParameter(f"vary {key}", text, f"must be lo:hi:n or lo:hi:log:n, {must}")
+    steps = (np.geomspace if log else np.linspace)(low, high, n)
+    return low, *(float(f"{one:.{_DIGITS}g}") for one in steps[1:-1]), high
+
+
+def _word(text: str) -> object:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return float(text) if _NUMBER.fullmatch(text) else text
+
+
+def _plain(value: object) -> Value:
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        inner = (_plain(one) for one in value)
+        texts = (json.dumps(one) if isinstance(one, str) else text_of(one) for one in inner)
+        return f"[{', '.join(texts)}]"
+    if isinstance(value, Value):
+        return value
+    raise InvalidParameter("vary", value, "must be numbers, words, or lists of numbers")
