@@ -36,6 +36,7 @@ def taxels(
     out : Folder to write into; by default that of the run.
     """
     from sphshell_pin.patches import TaxelGrid
+    from sphshell_pin.plot.taxels import save_film
     from sphshell_pin.scenario.running.replay import Replay
 
     height, width = map(math.radians, extent_deg)
@@ -47,6 +48,6 @@ def taxels(
     folder.mkdir(parents=True, exist_ok=True)
     echo(images.save(folder / "taxels.npz"))
     with if_installed():
-        echo(images.save_film(folder / "taxels.gif", speed=speed))
+        echo(save_film(folder / "taxels.gif", images, speed=speed))
     felt, missed = float(images.forces.max()), float(abs(images.outside).max())
     echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")
