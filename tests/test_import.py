@@ -224,10 +224,9 @@ def called() -> dict[str, set[str]]:
 
 
 def shown_above(name: str, others: set[str]) -> set[str]:
-    """Return the modules of upper layers among `others` that a value may show itself by."""
-    shows = ("dynamics.result.", "patches.taxels")
+    """Return the modules of upper layers among `others` that a result may show itself by."""
     above = {one for one in others if level(one) > level(name)}
-    return above if name.removeprefix("sphshell_pin.").startswith(shows) else set()
+    return above if name.startswith("sphshell_pin.dynamics.result.") else set()
 
 
 @pytest.fixture(scope="module")

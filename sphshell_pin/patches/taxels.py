@@ -50,12 +50,6 @@ class TaxelImages(Summarized):
             np.savez_compressed(stream, t=self.t, forces=self.forces, outside=self.outside)
         return Path(path)
 
-    def save_film(self, path: str | PathLike[str], *, fps: float = 30, speed: float = 1.0) -> Path:
-        """Write a film of the images of a grid, .gif or .mp4: see `sphshell_pin.plot.taxels`."""
-        from sphshell_pin.plot.taxels import save_film
-
-        return save_film(Path(path), self, fps=fps, speed=speed)
-
 
 @dataclass(frozen=True)
 class TaxelGrid:

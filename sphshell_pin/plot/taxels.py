@@ -15,6 +15,8 @@ from sphshell_pin.errors import InvalidParameter, import_extra
 from sphshell_pin.plot.figure import new_figure, reading_unit
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from matplotlib.figure import Figure
 
     from sphshell_pin.patches.taxels import TaxelImages
@@ -49,7 +51,9 @@ def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
     return figure
 
 
-def save_film(path: Path, images: TaxelImages, *, fps: float, speed: float) -> Path:
+def save_film(
+    path: str | PathLike[str], images: TaxelImages, *, fps: float = 30, speed: float = 1.0
+) -> Path:
     """Write a film of a grid's images at `path`, .gif or .mp4.
 
     `fps` frames a second, of which each shows `speed` / `fps` seconds of simulated time.
@@ -59,6 +63,7 @@ def save_film(path: Path, images: TaxelImages, *, fps: float, speed: float) -> P
     matplotlib, or for a .mp4 without imageio-ffmpeg.
     """
     fps, speed = check_positive("fps", fps), check_positive("speed", speed)
+    path = Path(path)
     check_film(path, (LARGE, LARGE), fps)
     frames = _frames(images, fps, speed)
     # Films of odd sizes are refused by some players.

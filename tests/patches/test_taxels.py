@@ -9,6 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches import ShellTaxels, TaxelGrid
+from sphshell_pin.plot.taxels import save_film
 from sphshell_pin.results import TaxelImages
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider, total_force
 
@@ -122,16 +123,16 @@ def test_films(tmp_path):
     image = pytest.importorskip("PIL.Image")
     t = np.linspace(0.0, 0.05, 51)
     images = TaxelImages(t, np.random.default_rng(0).random((51, 4, 6)), np.zeros(51))
-    film = images.save_film(tmp_path / "taxels.gif", fps=20, speed=0.1)
+    film = save_film(tmp_path / "taxels.gif", images, fps=20, speed=0.1)
     with image.open(film) as opened:
         assert opened.n_frames == 11
         assert opened.width * 4 == opened.height * 6
     with pytest.raises(InvalidParameter, match=r"\.gif or \.mp4"):
-        images.save_film(tmp_path / "taxels.avi")
+        save_film(tmp_path / "taxels.avi", images)
     for t, speed in ((-1e308, 1.0), (np.nan, 1.0), (0.0, 1e-300)):
         odd = dataclasses.replace(images, t=np.concatenate([[t], images.t[1:]]))
         with pytest.raises(InvalidParameter, match=r"speed = .* frames, of 1 to 100000"):
-            odd.save_film(tmp_path / "taxels.gif", speed=speed)
+            save_film(tmp_path / "taxels.gif", odd, speed=speed)
 
 
 def test_mistakes(slid):

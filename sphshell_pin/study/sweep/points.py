@@ -155,7 +155,7 @@ def sample_of(
         with np.errstate(over="ignore", invalid="ignore"):
             values[key] = np.asarray(one.ppf(share), dtype=float).tolist()
         if not np.all(np.isfinite(values[key])):
-            raise InvalidParameter(f"dist {key}", str(one), "has values that are not finite")
+            raise InvalidParameter("dist", key, "has values that are not finite")
     return Points(values, tuple(parts), dists)
 
 
