@@ -62,10 +62,8 @@ def mimics(model: pin.Model) -> dict[str, Mimic]:
 def group_of(model: pin.Model, name: str) -> list[str]:
     """Return the joints that move with joint `name`: itself, what it mimics, what mimics that."""
     rules = mimics(model)
-    leader = rules[name].of if name in rules else name
-    return [
-        one for one in list(model.names)[1:] if one == leader or leader_of(rules, one) == leader
-    ]
+    leader = leader_of(rules, name)
+    return [one for one in list(model.names)[1:] if leader_of(rules, one) == leader]
 
 
 def leader_of(rules: dict[str, Mimic], name: str) -> str:

@@ -16,12 +16,7 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import (
-    check_configuration,
-    check_name,
-    check_names,
-    check_vector,
-)
+from sphshell_pin.base.checks import check_configuration, check_name, check_names, check_vector
 from sphshell_pin.base.summary import Detail, Fact, Summarized, names
 from sphshell_pin.contact import Friction, FunctionFriction, ImpactLaw, NormalLaw, Plane, Sphere
 from sphshell_pin.dynamics.compiled.robot import load_compiled
