@@ -190,18 +190,14 @@ SOLIDS = {
 }
 
 
-INTEGRATORS = [sp.Adaptive(1e-6, 1e-9), sp.Implicit(1e-6, 1e-9), sp.RungeKutta4(5e-5)]
+INTEGRATORS = [sp.Adaptive(1e-7, 1e-10), sp.Implicit(1e-7, 1e-10), sp.RungeKutta4(5e-5)]
 FALLS = [("box", one, friction) for one in INTEGRATORS for friction in FRICTIONS[1:]]
 FALLS += [(name, one, FRICTIONS[1]) for name in ("coin", "cone") for one in INTEGRATORS[:2]]
 
 
 @pytest.mark.parametrize(("name", "integrator", "friction"), FALLS)
 def test_solids_come_to_rest_at_an_ordinary_cost(name: str, integrator, friction) -> None:
-    """They fall, rattle, and lie still; the energies close.
-
-    But for what damping loses while it holds the force at zero, which is no part of the motion and
-    of its control of errors.
-    """
+    """They fall, rattle, and lie still; the energies close, but with fixed steps over touches."""
     make, inertia, turned, v = SOLIDS[name]
     shell = make()
     scene = thrown(shell, inertia, LAW, friction)
@@ -209,10 +205,11 @@ def test_solids_come_to_rest_at_an_ordinary_cost(name: str, integrator, friction
     height = 0.005 - (shell.vertices @ turn[2]).min()
     q = np.r_[0, 0, height, pin.Quaternion(turn).coeffs()]
     duration = 1.0 if name == "box" else 0.5
-    result = sp.Simulation(scene, integrator).run(q, np.array(v, float), duration, record_dt=0.1)
+    result = sp.Simulation(scene, integrator).run(q, np.array(v, float), duration, record_dt=1e-3)
     assert result.stats.steps <= 20_000 * duration
     assert np.abs(result.v[-1]).max() < 1e-6
-    assert np.abs(result.energy.residual).max() < 5e-4 * result.energy.exchanged
+    closes = 5e-4 if isinstance(integrator, sp.RungeKutta4) else 1e-6
+    assert np.abs(result.energy.residual).max() < closes * result.energy.exchanged
 
 
 def test_a_face_with_a_notch_is_warned_of() -> None:

@@ -1,8 +1,9 @@
 #include "contact/faces/crown.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "contact/faces/shares.hpp"
 
 namespace sphshell {
 namespace {
@@ -118,80 +119,25 @@ bool Crown::share_disc(const Flats& flats, const Flats::Disc& disc, const Mat3& 
   return true;
 }
 
-// Inverts ridge + X X^T, with the rows of X the active ones' places: by Woodbury's formula a system
-// of three.
+// The places that touch are those that have a share.
 bool Crown::solve(const Flats& flats, SharedContact& out) {
   const double radius = kRadius * flats.size, ridge = kRidge * flats.size * flats.size;
   std::vector<Candidate>& all = candidates_;
-  const auto top = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+  const auto deepest = std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
     return a.point.z() < b.point.z();
   });
-  const Vec3 first = top->point;
+  const Vec3 first = deepest->point;
   for (Candidate& one : all) {
     one.from = one.point - first;
     one.lead = -radius * one.from.z() + one.from.squaredNorm() / 2;
-    one.share = 0, one.active = false;
   }
-  top->share = 1, top->active = true;
-  Eigen::LLT<Mat3> small;
-  const auto factor = [&] {
-    Mat3 sum = ridge * Mat3::Identity();
-    for (const Candidate& one : all)
-      if (one.active) sum += one.from * one.from.transpose();
-    small.compute(sum);
-  };
-  // What is divided, less a multiple of what ones are, so that the shares' sum changes by `total`.
-  const auto solve_for = [&](const auto& value, double total, const auto& result) {
-    Vec3 moment = Vec3::Zero(), ones = Vec3::Zero();
-    double sum = 0, count = 0;
-    for (const Candidate& one : all)
-      if (one.active)
-        moment += value(one) * one.from, ones += one.from, sum += value(one), count += 1;
-    moment = small.solve(moment).eval();
-    const Vec3 of_ones = small.solve(ones);
-    const double level = (sum - ones.dot(moment) - ridge * total) / (count - ones.dot(of_ones));
-    for (Candidate& one : all)
-      if (one.active)
-        result(one) =
-            (value(one) - one.from.dot(moment) - level * (1 - one.from.dot(of_ones))) / ridge;
-    return level;
-  };
-  double level = -ridge;
-  // Each round raises D: it ends.
-  for (std::size_t round = 0; round < 20 * all.size(); ++round) {
-    Vec3 mean = Vec3::Zero();
-    for (const Candidate& one : all) mean += one.share * one.from;
-    Candidate* best = nullptr;
-    double most = level + 1e-12 * ridge;
-    for (Candidate& one : all) {
-      const double gain = one.lead - one.from.dot(mean);
-      if (!one.active && gain > most) most = gain, best = &one;
-    }
-    if (!best) break;
-    best->active = true;
-    for (bool whole = false; !whole;) {
-      factor();
-      level = solve_for([](const Candidate& one) { return one.lead; }, 1,
-                        [](Candidate& one) -> double& { return one.by; });
-      double step = 1;
-      for (const Candidate& one : all)
-        if (one.active && one.by < 0) step = std::min(step, one.share / (one.share - one.by));
-      whole = step == 1;
-      for (Candidate& one : all) {
-        if (!one.active) continue;
-        one.share += step * (one.by - one.share);
-        if (whole || one.share > 1e-15 || one.by >= 0) continue;
-        one.share = 0, one.active = false;
-      }
-    }
-  }
-  int active = 0;
-  for (const Candidate& one : all) active += one.active;
-  if (active < 2) return false;
-  factor();
+  Shares<Candidate> shares(all, ridge);
+  shares.maximize(*deepest);
+  const auto is_active = [](const Candidate& one) { return one.active; };
+  if (std::count_if(all.begin(), all.end(), is_active) < 2) return false;
   Vec3 mean = Vec3::Zero();
   double rise = 0, squares = 0;
-  out.places.clear(), out.point.setZero(), out.depth_by.setZero();
+  out.places.clear(), out.depth_by.setZero();
   for (const Candidate& one : all) {
     if (!one.active) continue;
     mean += one.share * one.from;
@@ -203,11 +149,10 @@ bool Crown::solve(const Flats& flats, SharedContact& out) {
   out.depth = -first.z() + (rise + (ridge * (1 - squares) - mean.squaredNorm()) / 2) / radius;
   // Distances between the places stay as they are: only the depths change.
   for (int column = 0; column < 6; ++column) {
-    solve_for([&](const Candidate& one) { return -radius * one.point_by(2, column); }, 0,
-              [](Candidate& one) -> double& { return one.by; });
-    std::size_t i = 0;
+    shares.follow([&](const Candidate& one) { return -radius * one.point_by(2, column); });
+    auto place = out.places.begin();
     for (const Candidate& one : all)
-      if (one.active) out.places[i++].share_by[column] = one.by;
+      if (one.active) (place++)->share_by[column] = one.solution;
   }
   return true;
 }

@@ -3,13 +3,10 @@
 
 #include <vector>
 
-#include "contact/query/contact.hpp"
+#include "contact/laws/wrench_derivatives.hpp"
 #include "shell/faces/flats.hpp"
 
 namespace sphshell {
-
-using Matrix36 = Eigen::Matrix<double, 3, 6>;
-using Row6 = Eigen::Matrix<double, 1, 6>;  // by a displacement
 
 // A contact that several places of a shell share, all in the frame of a plane, z = 0. A
 // displacement of the shell is that of its point at the origin and a rotation about it.
@@ -55,7 +52,7 @@ class Crown {
     Matrix36 point_by;
     Vec3 from;    // the deepest one
     double lead;  // R times how much deeper it is, and half the square of the distance
-    double share = 0, by = 0;
+    double share = 0, solution = 0;  // see Shares
     bool active = false;
   };
   void add(int vertex, const Vec3& point, const Matrix36& point_by);

@@ -5,8 +5,6 @@
 
 namespace sphshell {
 
-using Row6 = Eigen::Matrix<double, 1, 6>;
-
 // A contact of a constant normal force with and without friction, and how the wrench and the rates
 // of bristles answer that force. The force passes for one in proportion to the depth.
 struct BristleSlopes {

@@ -11,6 +11,7 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;  // a twist or a wrench, linear par
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Matrix63 = Eigen::Matrix<double, 6, 3>;
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
+using Row6 = Eigen::Matrix<double, 1, 6>;  // of a number, by a displacement
 
 // A contact and the motion of the sphere's body against the shell; all in the shell's frame, twists
 // and wrenches about its origin.

@@ -89,6 +89,7 @@ void Recorder::add_rows(const Stepping& made) {
       const double share = (due() - from.t) / (to.t - from.t);
       made.interpolate(share, due(), between_);
       scene_.evaluate(between_.q, between_.v, between_.z, true);
+      made.close_loss(between_);
       add_row(between_, share);
       moved = true;
     }

@@ -52,14 +52,29 @@ void Stepping::set_fine(bool fine) {
   scene_.relax_in(is_explicit ? settings_.dt : 0);
 }
 
+// Sets what the next step has to know of its begin.
+void Stepping::begin() {
+  const std::vector<ActiveContact>& active = scene_.active();
+  const bool alone = !scene_.joints().act();
+  free_ = !scene_.touching() && alone;
+  // Of controlled steps alone, which end where a clamp begins or ends.
+  held_ = (settings_.dt == 0 || fine()) && alone && !active.empty() &&
+          std::all_of(active.begin(), active.end(),
+                      [](const ActiveContact& one) { return one.clamped; });
+  detection_.begin(scene_);
+  events_.begin();
+}
+
+void Stepping::close_loss(State& at) const {
+  if (held_) at.ledger.damping = state_.ledger.damping + last_.elastic - scene_.powers().elastic;
+}
+
 // Forgets the history of step lengths: the right-hand side is another one from here on.
 void Stepping::restart() {
   scene_.evaluate(state_.q, state_.v, state_.z, true);
   last_ = scene_.powers();
   scene_.accept(state_.z);
-  free_ = !scene_.touching() && !scene_.joints().act();
-  detection_.begin(scene_);
-  events_.begin();
+  begin();
   proposal_ = kFirstStep;
   after_event_ = false;
   last_error_ = 1;
@@ -83,9 +98,7 @@ void Stepping::resume(const double* from) {
   scene_.restart();
   scene_.evaluate(state_.q, state_.v, state_.z, true);
   set_fine(from[7] != 0);
-  free_ = !scene_.touching() && !scene_.joints().act();
-  detection_.begin(scene_);
-  events_.begin();
+  begin();
   proposal_ = from[4], last_error_ = from[5];
   after_event_ = from[6] != 0;
   last_ = {from[8], from[9], from[10], from[11]};
@@ -99,6 +112,7 @@ Stepping::Tolerances Stepping::tolerances() const {
 
 // False where the motion was too long for collision detection: nothing has been changed then.
 bool Stepping::make_fixed(double end) {
+  held_ = false;
   chart_.begin(state_);
   active_->begin(chart_);
   active_->step(chart_, end - state_.t, next_);
@@ -195,6 +209,7 @@ Stepping::Made Stepping::make_controlled(double end) {
       if (active.slot >= 0 && scene_.is_new(active))
         next_.z.segment(3 * active.slot, 3 * scene_.pairs()[active.pair].friction.rings())
             .setZero();
+  close_loss(next_);
   // PI control (Gustafsson 1991).
   double factor = 0.9 * std::pow(std::max(error, 1e-10), -0.7 / order) *
                   std::pow(std::max(last_error_, 1e-10), 0.4 / order);
@@ -321,9 +336,7 @@ void Stepping::accept() {
   last_ = now;
   scene_.accept(next_.z);
   std::swap(state_, next_);
-  free_ = !scene_.touching() && !scene_.joints().act();
-  detection_.begin(scene_);
-  events_.begin();
+  begin();
 }
 
 }  // namespace sphshell

@@ -50,6 +50,9 @@ class Stepping {
     active_->interpolate(share, dense_);
     chart_.finish(t, dense_, out);
   }
+  // Sets the loss of damping at a state within the step, at which the scene is evaluated, where the
+  // law's clamp holds every force at zero: it is all that was stored, whatever the quadrature says.
+  void close_loss(State& at) const;
   // Whether the controlled step that was made ends at an event.
   bool at_event() const { return after_event_; }
   // Steps of the fixed length are replaced by controlled ones where a sphere moves too far.
@@ -73,6 +76,7 @@ class Stepping {
   double weighted(const VectorX& change, const VectorX& y) const;
   double first_step();
   double predicted_step(double h);
+  void begin();
   double step_to_event(double h, double left, bool is_met);
 
   const StepSettings settings_;
@@ -90,6 +94,7 @@ class Stepping {
   double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one
   bool after_event_ = false;              // the last step ended at one
   bool free_ = false;                     // nothing touches at the state
+  bool held_ = false;                     // a clamp holds the force of all that touches at zero
   long rejected_ = 0, event_steps_ = 0;
 };
 
