@@ -154,3 +154,12 @@ def test_without_matplotlib_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingExtra, match=r"sphshell-pin\[view\]"):
         plot.plot_result(without_contact())
+
+
+def test_potential_energy_is_shown_from_where_it_started():
+    result = without_contact()
+    result.energy.potential = np.linspace(1000.0, 1001.0, 5)
+    line = next(
+        line for line in plot.plot_energy(result).axes[0].lines if "potential" in line.get_label()
+    )
+    assert line.get_ydata()[0] == 0.0

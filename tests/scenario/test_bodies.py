@@ -75,36 +75,20 @@ def test_locking_keeps_the_other_joints_values(tmp_path):
     assert max(g.parentJoint for g in visual.geometryObjects) == reduced.njoints - 1
 
 
+FINGER = "robot.three_link_finger"
+TAKEN = '"three_link_finger"\nlabel = "three_link_finger"'
+MOUNT = 'name = "ball"\nframe = "three_link_finger/tpi"'
 FAULTS = {
-    "unknown joint": (
-        "knuckle = 0.3",
-        "nuckle = 0.3",
-        'robot.three_link_finger.start."nuckle"',
-        "knuckle",
-    ),
-    "unknown joint in speed": (
-        "knuckle = 1.5",
-        "x = 1",
-        'robot.three_link_finger.speed."x"',
-        "knuckle",
-    ),
-    "unknown joint to lock": (
-        '["middle_joint"]',
-        '["x"]',
-        "robot.three_link_finger.lock[0]",
-        "distal_joint",
-    ),
-    "number for a free-flyer": ("[1, 2, 3, 0, 0, 0.6, 0.8]", "1", "robot.ball.start", "list of 7"),
-    "short list": ("[1, 2, 3, 4, 5, 6]", "[1, 2]", 'robot.ball.speed."root_joint"', "6 numbers"),
+    # What is put in: old text, new text, how the key begins, words that are told.
+    "unknown joint": ("knuckle = 0.3", "nuckle = 0.3", f'{FINGER}.start."nuckle"', "knuckle"),
+    "unknown joint in speed": ("knuckle = 1.5", "x = 1", f'{FINGER}.speed."x"', "knuckle"),
+    "unknown joint to lock": ('["middle_joint"]', '["x"]', f"{FINGER}.lock[0]", "distal_joint"),
+    "number for seven": ("[1, 2, 3, 0, 0, 0.6, 0.8]", "1", "robot.ball.start", "list of 7"),
+    "short list": ("3, 4, 5, 6]", "3]", 'robot.ball.speed."root_joint"', "6 numbers"),
     "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot.ball.start", "its length is"),
-    "unknown mount": (
-        'name = "ball"',
-        'name = "ball"\nframe = "three_link_finger/tpi"',
-        "robot.ball.frame",
-        "three_link_finger/tip",
-    ),
+    "unknown mount": ('name = "ball"', MOUNT, "robot.ball.frame", "three_link_finger/tip"),
     "unknown robot": ('"ball"', '"bal"', "robot.bal", "ball"),
-    "same label": ('"ball"', '"three_link_finger"\nlabel = "three_link_finger"', "robot[1]", ""),
+    "same label": ('"ball"', TAKEN, "robot[1]", ""),
     "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such file"),
 }
 

@@ -93,39 +93,33 @@ duration = 1
 
 
 PD = '[controller]\ntype = "joint-pd"\nkp = {}\nkd = 1\nq_ref = {}\n[run]'
+IMPEDANCE = """[controller]
+type = "cartesian-impedance"
+frame = "x"
+path = [[0, 0, 0]]
+stiffness = 1
+damping = 1
+[run]"""
+SOURCE = """[[source]]
+name = "s"
+find = "a.py:b"
+frame_i = "ball"
+law.type = "adams"
+[run]"""
+BOX = 'primitive = { type = "box", size = [0.2, 0.2, 0.02] }'
 FAULTS = {
+    # What is put in: old text, new text, the key that is told, words that are told.
     "frame": ('frame = "ball"', 'frame = "bal"', "contact.ball-plate", "root_joint"),
     "shell": ('shell = "plate"', 'shell = "plaet"', "contact.ball-plate.shell", "plate"),
-    "shell's frame": ("placement =", 'frame = "x"\nplacement =', "contact.ball-plate", "universe"),
-    "surface": (
-        'primitive = { type = "box", size = [0.2, 0.2, 0.02] }',
-        'file = "none.stl"',
-        "shell.plate",
-        "none.stl",
-    ),
-    "flat box": (
-        "[0.2, 0.2, 0.02]",
-        "[0.2, 0.2, -0.02]",
-        "shell.plate.primitive.size[2]",
-        "greater",
-    ),
+    "shell's frame": ("placement", 'frame = "x"\nplacement', "contact.ball-plate", "universe"),
+    "surface": (BOX, 'file = "none.stl"', "shell.plate", "none.stl"),
+    "flat box": ("0.2, 0.02]", "0.2, -0.02]", "shell.plate.primitive.size[2]", "greater"),
     "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "(6,)"),
     "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "(7,)"),
-    "controller's frame": (
-        "[run]",
-        '[controller]\ntype = "cartesian-impedance"\nframe = "x"\npath = [[0, 0, 0]]\n'
-        "stiffness = 1\ndamping = 1\n[run]",
-        "controller",
-        "no frame 'x'",
-    ),
+    "controller's frame": ("[run]", IMPEDANCE, "controller", "no frame 'x'"),
     "kp's joint": ("[run]", PD.format("{ x = 1 }", "{}"), "controller.kp", "root_joint"),
     "own figure": ("[run]", '[figures]\nx = "a.py:b"\n[run]', "figures.x", "no such file"),
-    "source": (
-        "[run]",
-        '[[source]]\nname = "s"\nfind = "a.py:b"\nframe_i = "ball"\nlaw.type = "adams"\n[run]',
-        "source.s.find",
-        "no such file",
-    ),
+    "source": ("[run]", SOURCE, "source.s.find", "no such file"),
 }
 
 

@@ -214,3 +214,11 @@ def test_patches_are_computed_when_they_are_wanted(ball) -> None:
     ball.record_patches(False)
     ball.advance(0.01)
     assert ball.patches is None
+
+
+def test_a_parameter_of_the_posture_takes_the_place_of_its_target(tmp_path) -> None:
+    live = LiveRun(build(write_arm(tmp_path, PD + "q_ref = { elbow = 0.2 }\n")))
+    live.aim("elbow", -1.0)
+    live.aim("shoulder", 0.1)
+    live.change("controller.q_ref.elbow", 0.3)
+    assert [one.value for one in live.targets] == [0.1, 0.3]

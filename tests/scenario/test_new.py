@@ -272,3 +272,9 @@ def test_the_command(tmp_path, monkeypatch):
         wrong = call("new", "--robot", "ball", "--radius", radius)
         assert wrong.exit_code == 2
         assert said in wrong.output
+
+
+@pytest.mark.parametrize(("out", "match"), [("a.txt", r"\.toml"), ("no/a.toml", "does not exist")])
+def test_a_place_that_cannot_be_written(out, match, tmp_path):
+    with pytest.raises(ScenarioError, match=match):
+        new_scenario("ball", out=tmp_path / out)

@@ -120,3 +120,16 @@ def test_the_suite_of_the_page(suite: pytest.Pytester) -> None:
     suite.makepyfile(test_contact=block)
     result = suite.runpytest_inprocess(*PLUGIN, "--sphshell-robot=turntable", "test_contact.py")
     result.assert_outcomes(passed=2)
+
+
+def test_a_parametrisation_of_ones_own_goes_first(suite: pytest.Pytester) -> None:
+    suite.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.parametrize("sphshell_robot, times", [("ball", 1), ("turntable", 2)])
+        def test_own(sphshell_robot, times):
+            assert sphshell_robot in ("ball", "turntable")
+        """
+    )
+    suite.runpytest_inprocess(*PLUGIN, "--sphshell-robot", "a1").assert_outcomes(passed=2)

@@ -192,3 +192,12 @@ def test_a_contact_that_jumps_starts_another_piece():
     for path, drawn in easel.browser.objects.items():
         if "/trail/" in path:
             assert np.ptp(attribute(drawn)[:, 0]) < 0.1
+
+
+def test_arrows_can_be_magnified():
+    easel = Easel(BallPlayer())
+    easel.draw()
+    found = easel.picture.arrow_scale.meters_per_newton
+    easel.picture.magnify_arrows(2.0)
+    easel.draw()
+    assert easel.picture.arrow_scale.meters_per_newton == pytest.approx(2.0 * found)
