@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from sphshell_pin import robots
-from sphshell_pin.scenario.drafting.fingertips import every_finger, find_tips
+from sphshell_pin.scenario.drafting import new
+from sphshell_pin.scenario.drafting.fingertips import every_finger, find_tips, other_end
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, gripper_joints
 from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.drafting.pose_search import find_working
+from sphshell_pin.scenario.drafting.refusals import CannotReach
 from sphshell_pin.scenario.format.reach import Reach
 
 
@@ -147,6 +150,30 @@ def test_a_drone_touches_with_its_body_or_its_feet(tmp_path: Path, feet: int) ->
     assert len(tips) == (feet or 1)
     carriers = [robot.model.frames[robot.model.getFrameId(one.frame)] for one in tips]
     assert {int(one.parentJoint) for one in carriers} == {1}
+
+
+def test_where_one_limb_does_not_come_to_the_part_another_does(tmp_path: Path, monkeypatch) -> None:
+    """As the thumb of a hand, in whose way its palm may be."""
+    file = tmp_path / "body.urdf"
+    file.write_text(body("left", "right"))
+    model, tried = robots.load_file(file).model, list[str]()
+    (tip,) = find_tips(robots.load_file(file), shipped=None, frame=None, radius=None)
+
+    def search(asked, built, tips, draft):
+        tried.append(tips[0].frame)
+        if len(tried) == 1:
+            raise CannotReach("link 'x' would be in the part; take another --place", tips[0].frame)
+        return find_working(asked, built, tips, draft)
+
+    monkeypatch.setattr(new, "find_working", search)
+    made = new_scenario(file, "box", out=tmp_path / "new.toml")
+    assert tried[0] == tip.frame != tried[1] == other_end(model, tip.frame)
+    assert made.why[0] == f"frame '{tried[1]}', as link 'x' would be in the part with '{tried[0]}'"
+    tried.clear()
+    with pytest.raises(CannotReach, match="--place"):
+        new_scenario(file, "box", frame=tip.frame, out=tmp_path / "new.toml", force=True)
+    file.write_text(arm(jaws=None, tool="tcp"))
+    assert other_end(robots.load_file(file).model, "tcp") is None
 
 
 @pytest.mark.parametrize("tilts", [False, True])

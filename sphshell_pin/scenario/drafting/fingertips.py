@@ -66,6 +66,18 @@ def find_tips(
     return found
 
 
+def other_end(model: pin.Model, frame: str) -> str | None:
+    """Return the frame at the end of another limb than that of `frame`; None if there is none."""
+    held, own = gripper_joints(model), _joint_of(model, frame)
+    if not _leaves(model, held) - {own}:
+        return None
+    limbs = {joint for joint in range(1, model.njoints) if joint not in {own, *held}}
+    try:
+        return _ends(model, held, limbs)[0][0]
+    except SphshellError:
+        return None
+
+
 def only_turns(model: pin.Model) -> bool:
     """Whether what its body carries only turns, without end: rotors or wheels, and what tilts them.
 

@@ -20,14 +20,14 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, S
 from sphshell_pin.robots import floats, is_path
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
-from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
+from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns, other_end
 from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand, with_part
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.pose_search import find_working, sphere_centers
 from sphshell_pin.scenario.drafting.poses import joints_aside
-from sphshell_pin.scenario.drafting.refusals import CannotStand
+from sphshell_pin.scenario.drafting.refusals import CannotReach, CannotStand
 from sphshell_pin.scenario.drafting.touch_points import widest_room
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import check_masses
@@ -150,6 +150,15 @@ def new_scenario(
     asked = Asked.checked(**locals())
     try:
         return _written(asked)
+    except CannotReach as error:
+        if error.other is None or frame is not None:
+            raise
+        note = f"frame '{error.other}', as {str(error).partition(';')[0]} with '{error.frame}'"
+        try:
+            other = _written(replace(asked, frame=error.other))
+        except SphshellError:
+            raise error from None
+        return replace(other, why=(note, *other.why))
     except CannotStand as error:
         if base is not None:
             raise
@@ -201,6 +210,8 @@ def _written(asked: Asked) -> NewScenario:
     except CannotStand:
         raise
     except SphshellError as error:
+        if isinstance(error, CannotReach):
+            error.other = other_end(bare.assembly.model, error.frame)
         if shaped != "fixed" or in_hand:
             raise
         raise SphshellError(f"{error}; or let it float, --base floating") from None
