@@ -78,6 +78,18 @@ def test_without_a_tool_frame_the_wrist_carries_it(tmp_path: Path) -> None:
     assert model.names[model.frames[model.getFrameId(tip.frame)].parentJoint] == "b"
 
 
+def test_a_gripper_by_itself_touches_with_a_jaw(tmp_path: Path) -> None:
+    file, out = tmp_path / "gripper.urdf", link("palm", ".1 .1 .05")
+    for name, y, mimic in (("left", ".03", ""), ("right", "-.03", '<mimic joint="left_j"/>')):
+        out += link(name, ".02 .01 .04") + joint(
+            f"{name}_j", "palm", name, "prismatic", f"0 {y} .05", f"0 {y} 0", mimic
+        )
+    file.write_text(f'<robot name="gripper">{out}</robot>')
+    (tip,) = find_tips(robots.load_file(file, mimic=True), shipped=None, frame=None, radius=None)
+    assert tip.frame == "left"
+    assert tip.source.startswith("one of 2 ends that move together")
+
+
 def test_what_spins_beside_sliding_jaws_is_held_with_them(tmp_path: Path) -> None:
     file, spin = tmp_path / "arm.urdf", link("spin", ".01 .01 .01")
     spin += joint("spin_joint", "wrist", "spin", "continuous", "0 0 .02", "0 0 1")

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
@@ -243,6 +244,8 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
         if found:
             return [(name, f"an end of the robot called '{word}'") for name in found]
     last = max(sorted(leaves), key=lambda j: len(model.supports[j]))
+    if names and {model.names[j] for j in leaves} <= set(group_of(model, model.names[last])):
+        return [(names[0], f"one of {len(leaves)} ends that move together")]
     if free or len(model.supports[last]) <= 2:
         raise SphshellError(
             "the robot has several ends: state which frame carries the sphere with --frame, for "
