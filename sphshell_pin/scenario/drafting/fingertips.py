@@ -136,7 +136,7 @@ def _at_end(
     if before or (asked and radius):
         still = None if radius else np.zeros(3)
         return replace(end, offset=np.zeros(3), source=source, ahead=still)
-    return replace(end, source=f"{source}; {end.source}")
+    return end if asked else replace(end, source=f"{source}; {end.source}")
 
 
 def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
