@@ -67,16 +67,20 @@ def find_tips(
     return found
 
 
-def other_end(model: pin.Model, frame: str) -> str | None:
-    """Return the frame at the end of another limb than that of `frame`; None if there is none."""
-    held, own = gripper_joints(model), _joint_of(model, frame)
-    if not _leaves(model, held) - {own}:
-        return None
-    limbs = {joint for joint in range(1, model.njoints) if joint not in {own, *held}}
-    try:
-        return _ends(model, held, limbs)[0][0]
-    except SphshellError:
-        return None
+def other_ends(model: pin.Model, frame: str) -> list[str]:
+    """Return the frames at the ends of other limbs than that of `frame`, the likeliest first."""
+    held, used, found = gripper_joints(model), {_joint_of(model, frame)}, list[str]()
+    while _leaves(model, held) - used:
+        limbs = set(range(1, model.njoints)) - used - held
+        try:
+            name = _ends(model, held, limbs)[0][0]
+        except SphshellError:
+            break
+        if _joint_of(model, name) in used:
+            break
+        used.add(_joint_of(model, name))
+        found.append(name)
+    return found
 
 
 def only_turns(model: pin.Model) -> bool:

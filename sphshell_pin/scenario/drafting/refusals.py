@@ -40,8 +40,8 @@ class CannotReach(SphshellError):
     def __init__(self, said: str, frame: str) -> None:
         super().__init__(said)
         self.frame = frame
-        self.other: str | None = None
-        """Frame of another limb's tip."""
+        self.others: list[str] = []
+        """Frames at the ends of other limbs."""
 
 
 @dataclass
