@@ -188,6 +188,19 @@ def test_where_one_limb_does_not_come_to_the_part_another_does(tmp_path: Path, m
     assert other_ends(robots.load_file(file).model, "tcp") == []
 
 
+def test_a_humanoid_without_feet_stands_on_its_ankles(tmp_path: Path) -> None:
+    file, out = tmp_path / "humanoid.urdf", link("pelvis", ".2 .3 .2")
+    for side, y in (("left", ".1"), ("right", "-.1")):
+        for name, parent in (("thigh", "pelvis"), ("ankle", f"{side}_thigh"), ("hand", "pelvis")):
+            out += link(f"{side}_{name}", ".05 .05 .3", "0 0 -.2")
+            at = f"0 {y} -.3"
+            out += joint(f"{side}_{name}_j", parent, f"{side}_{name}", "revolute", at, "0 1 0")
+    file.write_text(f'<robot name="humanoid">{out}</robot>')
+    robot = robots.load_file(file, free_flyer=True)
+    tips = find_tips(robot, shipped=None, frame=None, radius=None)
+    assert {tip.frame for tip in tips} == {"left_ankle", "right_ankle"}
+
+
 @pytest.mark.parametrize("tilts", [False, True])
 def test_what_carries_rotors_alone_falls_on_its_body(tmp_path: Path, tilts: bool) -> None:
     """The turn of a rotor moves no sphere across a part; its body does not stand on one either."""

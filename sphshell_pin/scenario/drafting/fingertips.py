@@ -22,7 +22,7 @@ _ASKED = "as it was asked for"
 # Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at
 # the end of a limb.
 _TOOL_WORDS = ("tcp", "tool", "ee", "eef", "effector", "grasp", "grip", "flange")
-_END_WORDS = ("tip", "tcp", "tool", "foot", "feet")
+_END_WORDS = ("tip", "tcp", "tool", "foot", "feet", "ankle")
 
 
 def find_tips(
