@@ -127,6 +127,10 @@ def _advised(reason: str, file: Path) -> str:
     """Return a reason with the arguments that may be to blame."""
     if re.search("there is no package|Undefined sub", reason) or not file.is_file():
         return reason
+    if re.search("Invalid parameter|Undefined parameters", reason):
+        return (
+            f"{reason}: the file that calls the macro fits another version of the one that has it"
+        )
     text = read_bytes(file, MOST_TEXT).decode(errors="replace")
     stated = [
         f"{name} ({usual})" if usual and "$" not in usual else name

@@ -209,6 +209,10 @@ def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
         ("$(nix)", r"expand it: Unknown substitution command \[nix\]\. Valid [^.]*$"),
         ("$(eval nix + 1)", "not a xacro file that can be read: .* it: name 'nix' is not defined$"),
         ("<link name='a'>", "xacro cannot expand it"),
+        (
+            "<xacro:macro name='m'/><xacro:m sim='1'/>",
+            'Invalid parameter "sim": .* another version',
+        ),
         ("<xacro:macro name='m'><xacro:m/></xacro:macro><xacro:m/>", "nested too deeply"),
     ):
         with pytest.raises(robots.RobotError, match=words):

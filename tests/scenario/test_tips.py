@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from sphshell_pin import robots
-from sphshell_pin.scenario.drafting.fingertips import every_finger, find_tips
+from sphshell_pin.scenario.drafting import new
+from sphshell_pin.scenario.drafting.fingertips import every_finger, find_tips, other_ends
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, gripper_joints
 from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.drafting.pose_search import find_working
+from sphshell_pin.scenario.drafting.refusals import CannotReach
 from sphshell_pin.scenario.format.reach import Reach
 
 
@@ -75,6 +78,13 @@ def test_without_a_tool_frame_the_wrist_carries_it(tmp_path: Path) -> None:
     assert model.names[model.frames[model.getFrameId(tip.frame)].parentJoint] == "b"
 
 
+def test_what_spins_beside_sliding_jaws_is_held_with_them(tmp_path: Path) -> None:
+    file, spin = tmp_path / "arm.urdf", link("spin", ".01 .01 .01")
+    spin += joint("spin_joint", "wrist", "spin", "continuous", "0 0 .02", "0 0 1")
+    file.write_text(arm(jaws="prismatic", tool="ee").replace("</robot>", f"{spin}</robot>"))
+    assert gripper_joints(robots.load_file(file).model) == {3, 4, 5}
+
+
 def test_every_finger_gets_a_ball_at_the_end_of_its_mesh(tmp_path: Path) -> None:
     file = tmp_path / "hand.urdf"
     file.write_text(arm(jaws="revolute", tool=None))
@@ -134,6 +144,43 @@ def test_a_drone_touches_with_its_body_or_its_feet(tmp_path: Path, feet: int) ->
     assert len(tips) == (feet or 1)
     carriers = [robot.model.frames[robot.model.getFrameId(one.frame)] for one in tips]
     assert {int(one.parentJoint) for one in carriers} == {1}
+
+
+def test_where_one_limb_does_not_come_to_the_part_another_does(tmp_path: Path, monkeypatch) -> None:
+    """As the thumb of a hand, in whose way its palm may be."""
+    file = tmp_path / "body.urdf"
+    file.write_text(body("left", "right"))
+    model, tried = robots.load_file(file).model, list[str]()
+    (tip,) = find_tips(robots.load_file(file), shipped=None, frame=None, radius=None)
+
+    def search(asked, built, tips, draft):
+        tried.append(tips[0].frame)
+        if len(tried) == 1:
+            raise CannotReach("link 'x' would be in the part; take another --place", tips[0].frame)
+        return find_working(asked, built, tips, draft)
+
+    monkeypatch.setattr(new, "find_working", search)
+    made = new_scenario(file, "box", out=tmp_path / "new.toml")
+    assert tried[0] == tip.frame != tried[1] == other_ends(model, tip.frame)[0]
+    assert made.why[0] == f"frame '{tried[1]}', as with '{tried[0]}' link 'x' would be in the part"
+    tried.clear()
+    with pytest.raises(CannotReach, match="--place"):
+        new_scenario(file, "box", frame=tip.frame, out=tmp_path / "new.toml", force=True)
+    file.write_text(arm(jaws=None, tool="tcp"))
+    assert other_ends(robots.load_file(file).model, "tcp") == []
+
+
+def test_a_humanoid_without_feet_stands_on_its_ankles(tmp_path: Path) -> None:
+    file, out = tmp_path / "humanoid.urdf", link("pelvis", ".2 .3 .2")
+    for side, y in (("left", ".1"), ("right", "-.1")):
+        for name, parent in (("thigh", "pelvis"), ("ankle", f"{side}_thigh"), ("hand", "pelvis")):
+            out += link(f"{side}_{name}", ".05 .05 .3", "0 0 -.2")
+            at = f"0 {y} -.3"
+            out += joint(f"{side}_{name}_j", parent, f"{side}_{name}", "revolute", at, "0 1 0")
+    file.write_text(f'<robot name="humanoid">{out}</robot>')
+    robot = robots.load_file(file, free_flyer=True)
+    tips = find_tips(robot, shipped=None, frame=None, radius=None)
+    assert {tip.frame for tip in tips} == {"left_ankle", "right_ankle"}
 
 
 @pytest.mark.parametrize("tilts", [False, True])

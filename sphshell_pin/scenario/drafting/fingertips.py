@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
@@ -21,7 +22,7 @@ _ASKED = "as it was asked for"
 # Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at
 # the end of a limb.
 _TOOL_WORDS = ("tcp", "tool", "ee", "eef", "effector", "grasp", "grip", "flange")
-_END_WORDS = ("tip", "tcp", "tool", "foot", "feet")
+_END_WORDS = ("tip", "tcp", "tool", "foot", "feet", "ankle")
 
 
 def find_tips(
@@ -63,6 +64,22 @@ def find_tips(
     # The sphere of a shipped robot is where it belongs, whatever size is asked for.
     for one in found if shipped is None or offset is not None else ():
         _check_outside(robot, one)
+    return found
+
+
+def other_ends(model: pin.Model, frame: str) -> list[str]:
+    """Return the frames at the ends of other limbs than that of `frame`, the likeliest first."""
+    held, used, found = gripper_joints(model), {_joint_of(model, frame)}, list[str]()
+    while _leaves(model, held) - used:
+        limbs = set(range(1, model.njoints)) - used - held
+        try:
+            name = _ends(model, held, limbs)[0][0]
+        except SphshellError:
+            break
+        if _joint_of(model, name) in used:
+            break
+        used.add(_joint_of(model, name))
+        found.append(name)
     return found
 
 
@@ -123,7 +140,7 @@ def _at_end(
     if before or (asked and radius):
         still = None if radius else np.zeros(3)
         return replace(end, offset=np.zeros(3), source=source, ahead=still)
-    return replace(end, source=f"{source}; {end.source}")
+    return end if asked else replace(end, source=f"{source}; {end.source}")
 
 
 def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
@@ -231,6 +248,8 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
         if found:
             return [(name, f"an end of the robot called '{word}'") for name in found]
     last = max(sorted(leaves), key=lambda j: len(model.supports[j]))
+    if names and {model.names[j] for j in leaves} <= set(group_of(model, model.names[last])):
+        return [(names[0], f"one of {len(leaves)} ends that move together")]
     if free or len(model.supports[last]) <= 2:
         raise SphshellError(
             "the robot has several ends: state which frame carries the sphere with --frame, for "

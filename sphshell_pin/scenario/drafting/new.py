@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -20,14 +21,14 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, S
 from sphshell_pin.robots import floats, is_path
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
-from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
+from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns, other_ends
 from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand, with_part
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.pose_search import find_working, sphere_centers
 from sphshell_pin.scenario.drafting.poses import joints_aside
-from sphshell_pin.scenario.drafting.refusals import CannotStand
+from sphshell_pin.scenario.drafting.refusals import CannotReach, CannotStand
 from sphshell_pin.scenario.drafting.touch_points import widest_room
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import check_masses
@@ -46,6 +47,8 @@ WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 # Half the size of a surface that needs no file, in radii of the sphere; radius of a ball whose size
 # is free, as a part of the part's middle width, and of the room on its widest face.
 _SIZE, _BALL, _OF_ROOM = 15.0, 0.1, 0.5
+# Ends of other limbs that are tried where one does not come to the part.
+_MOST_ENDS = 2
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
 
 
@@ -150,6 +153,14 @@ def new_scenario(
     asked = Asked.checked(**locals())
     try:
         return _written(asked)
+    except CannotReach as error:
+        said = str(error).partition(";")[0]
+        for other in error.others[:_MOST_ENDS] if frame is None else ():
+            with suppress(SphshellError):
+                made = _written(replace(asked, frame=other))
+                note = f"frame '{other}', as with '{error.frame}' {said}"
+                return replace(made, why=(note, *made.why))
+        raise
     except CannotStand as error:
         if base is not None:
             raise
@@ -201,6 +212,8 @@ def _written(asked: Asked) -> NewScenario:
     except CannotStand:
         raise
     except SphshellError as error:
+        if isinstance(error, CannotReach):
+            error.others = other_ends(bare.assembly.model, error.frame)
         if shaped != "fixed" or in_hand:
             raise
         raise SphshellError(f"{error}; or let it float, --base floating") from None

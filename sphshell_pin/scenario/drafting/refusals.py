@@ -34,6 +34,16 @@ class CannotStand(SphshellError):
         self.reason = reason
 
 
+class CannotReach(SphshellError):
+    """The links of a limb would be in the part wherever its tip, on `frame`, touches that."""
+
+    def __init__(self, said: str, frame: str) -> None:
+        super().__init__(said)
+        self.frame = frame
+        self.others: list[str] = []
+        """Frames at the ends of other limbs."""
+
+
 @dataclass
 class Tried(Searched):
     """What a search came across, for the sentence that refuses."""
@@ -78,9 +88,10 @@ def refusal(frame: str, asked: Asked, tried: Tried) -> SphshellError:
     if tried.blocked:
         ((link, _),) = Counter(tried.blocked).most_common(1)
         advice = _ADVICE_BOWL if asked.inside else _ADVICE["links"]
-        return SphshellError(
+        return CannotReach(
             f"link '{link}' would be in the part, or another one: in each of "
             f"{counted(tried.postures, 'posture')} and {counted(tried.places, 'place')} on the "
-            f"part that were tried; {advice}"
+            f"part that were tried; {advice}",
+            frame,
         )
     return SphshellError("the surface has no point to touch")
