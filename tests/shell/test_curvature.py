@@ -204,3 +204,15 @@ def test_reasons_and_normals_set_aside_are_counted_by_element():
     text = str(shell.health)
     assert "2 elements: straightened" in text
     assert "2 given normals" in text
+
+
+def test_needles_along_a_bend_are_nothing_to_look_at():
+    """Their bulge is larger than their height, but they turn by little."""
+    angle = np.linspace(0, np.pi / 8, 2)
+    z = np.arange(4) * 1e-4
+    vertices = np.array([[np.cos(a), np.sin(a), h] for a in angle for h in z])
+    quads = [[k, 4 + k, 5 + k, 1 + k] for k in range(3)]
+    normals = vertices * [1, 1, 0]
+    report = sp.Shell(vertices, quads, normals).curvature_report()
+    assert report.of_height > 1.0
+    assert not report.problems
