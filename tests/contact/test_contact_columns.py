@@ -60,28 +60,3 @@ def test_contacts_that_nobody_has_read_are_copied_and_pickled(shell, gradient, a
     others = copy.copy(found), copy.deepcopy(found), pickle.loads(pickle.dumps(found))
     for other in others:
         np.testing.assert_equal(columns_of(other), columns_of(found))
-
-
-@pytest.mark.parametrize(
-    ("center", "radius"),
-    [
-        ([0.0, 0.0, np.nan], RADIUS),
-        (np.array([0.0, 0.0, np.inf]), RADIUS),
-        (np.zeros(4), RADIUS),
-        (np.zeros((1, 3)), RADIUS),
-        (np.zeros(3, dtype=complex), RADIUS),
-        (np.ma.masked_array(np.zeros(3), [True, False, False]), RADIUS),
-        (np.zeros(3), 0.0),
-        (np.zeros(3), -1.0),
-        (np.zeros(3), np.nan),
-        (np.zeros(3), np.inf),
-        (np.zeros(3), True),
-    ],
-)
-def test_what_is_no_sphere_is_refused(shell, center, radius) -> None:
-    named = "center" if radius is RADIUS else "radius"
-    for method in ("smooth", "facets"):
-        with pytest.raises(sp.InvalidParameter, match=named):
-            shell.contacts(center, radius, method)
-    with pytest.raises(sp.InvalidParameter, match=named.replace("center", "offset")):
-        sp.Sphere(radius, "tip", center)

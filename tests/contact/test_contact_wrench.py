@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin import CoulombFriction, HuntCrossleyLaw, ImpactLaw, contact_wrench
-from sphshell_pin.errors import InvalidParameter
 from tests.oracle import laws
 from tests.oracle.mechanics import force_on_i
 
@@ -66,21 +65,3 @@ def test_no_touch_no_force() -> None:
         for depth in (0.0, -1e-3):
             for wrench in contact_wrench(*args, depth, zero, zero, law, FRICTION):
                 assert not wrench.vector.any()
-
-
-@pytest.mark.parametrize(
-    ("point", "normal", "depth", "name"),
-    [
-        ([0, 0], [0, 0, 1], 1e-3, "point"),
-        ([0, 0, float("nan")], [0, 0, 1], 1e-3, "point"),
-        ([0, 0, 0], [0, 0, 2], 1e-3, "normal"),
-        ([0, 0, 0], [0, 0, 0], 1e-3, "normal"),
-        ([0, 0, 0], [0, 0, 1], float("nan"), "depth"),
-    ],
-)
-def test_bad_arguments_are_named(point, normal, depth, name: str) -> None:
-    zero = pin.Motion.Zero()
-    with pytest.raises(InvalidParameter, match=name):
-        contact_wrench(
-            np.array(point, float), np.array(normal, float), depth, zero, zero, LAW, None
-        )

@@ -5,7 +5,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sphshell_pin import CoulombFriction
-from sphshell_pin.errors import InvalidParameter
 from tests.oracle import laws as oracle
 
 DEFAULTS = CoulombFriction(mu_static=0.3, mu_dynamic=0.1, v_static=0.1, v_dynamic=1.0)
@@ -25,12 +24,3 @@ def test_table(slip_mm: float, mu: float) -> None:
 def test_both_printed_forms_agree(slip: float) -> None:
     expected = oracle.coulomb(slip, 0.3, 0.1, 0.1, 1.0)
     assert DEFAULTS.coefficient(slip) == pytest.approx(expected, abs=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("values", "name"), [((0.1, 0.3, 0.1, 1.0), "mu_dynamic"), ((0.3, 0.1, 0.1, 0.1), "v_dynamic")]
-)
-def test_values_that_do_not_fit_together_are_refused(values, name: str) -> None:
-    with pytest.raises(InvalidParameter) as caught:
-        CoulombFriction(*values)
-    assert caught.value.name == name

@@ -97,11 +97,7 @@ def test_what_does_not_vanish_at_rest_is_warned_of() -> None:
         models.on_plate(models.ball(), TWIN, constant)
 
 
-def test_where_it_cannot_be() -> None:
-    with pytest.raises(errors.InvalidParameter, match="beside a FoundationLaw take a Coulomb"):
-        models.on_plate(models.ball(), sp.FoundationLaw(1e6, 5e-3), OWN)
-    with pytest.raises(errors.InvalidParameter, match="parameters = 'text' must be names"):
-        sp.FunctionFriction(OWN.function, {"text": 1.0})
+def test_only_one_of_python_is_pickled() -> None:
     with pytest.raises(errors.NotPicklable, match="a FunctionFriction of a C function"):
         pickle.dumps(OWN)
     again = pickle.loads(pickle.dumps(python_friction()))

@@ -195,35 +195,6 @@ def test_a_scene_that_is_changed_during_its_run_has_no_result() -> None:
         sp.Simulation(scene).run([0.0499], None, 0.02, controller=controller)
 
 
-OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ((3.0,), "function = 3.0 must be a C function pointer"),
-        ((0,), "function = 0 must not be null"),
-        ((FORCE(),), "function = .* must not be null"),
-        ((OTHER(abs),), r"must be a double f\(double, double, const double\*"),
-        ((C_LAW.function, FORCE(force)), r"energy = .* must be a double f\(double, const"),
-        ((C_LAW.function, None, {"k": math.nan}), r"parameters\['k'\] = nan must be finite"),
-        ((C_LAW.function, None, {"text": 1.0}), "parameters = 'text' must be names"),
-        ((C_LAW.function, None, {"a b": 1.0}), "parameters = 'a b' must be names"),
-        ((C_LAW.function, None, {"function": 1.0}), "parameters = 'function' must be names"),
-        ((C_LAW.function, None, {"parameters": 1.0}), "parameters = 'parameters' must be names"),
-        ((C_LAW.function, None, {"_energy": 1.0}), "parameters = '_energy' must be names"),
-    ],
-)
-def test_wrong_arguments_are_refused(arguments, said) -> None:
-    with pytest.raises(errors.InvalidParameter, match=said):
-        sp.FunctionLaw(*arguments)
-
-
-def test_what_is_no_law_is_told_of_it() -> None:
-    with pytest.raises(errors.InvalidParameter, match=r"FunctionLaw\(function\).*docs/laws.md"):
-        models.on_plate(models.ball(), force)
-
-
 def test_copies_and_pickles() -> None:
     assert copy.deepcopy(C_LAW) == copy.copy(C_LAW) == C_LAW
     assert hash(copy.copy(C_LAW)) == hash(C_LAW)

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sphshell_pin import HuntCrossleyLaw, ImpactLaw
-from sphshell_pin.errors import InvalidParameter
 from tests.oracle import laws as oracle
 from tests.validation.restitution import hunt_crossley_restitution
 
@@ -46,8 +45,6 @@ def test_adams_units() -> None:
     assert DEFAULTS.damping == pytest.approx(1e4, rel=1e-15)
     assert DEFAULTS.full_damping_depth == pytest.approx(1e-4, rel=1e-15)
     assert DEFAULTS.stiffness / 1e8 == pytest.approx(3981.0717, rel=1e-7)
-    with pytest.raises(InvalidParameter, match="units"):
-        ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="furlong")
 
 
 @settings(derandomize=True, deadline=None)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter, ScenarioError
+from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
 from sphshell_pin.testing import assert_derivatives
 from tests import models
@@ -141,18 +141,3 @@ def test_a_wrong_file_is_refused_in_one_sentence(rows, said, tmp_path) -> None:
         build(write(tmp_path, text))
     assert caught.value.key == "contact.ball-plate"
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("depth", "force", "name"),
-    [
-        ([0, 1], [0, 1, 2], "force"),
-        ("01", [0, 1], "depth"),
-        ([[0, 1]], [0, 1], "depth"),
-        (1.0, [0, 1], "depth"),
-        ([0, 1], [0, None], "force"),
-    ],
-)
-def test_wrong_columns_are_named(depth, force, name) -> None:
-    with pytest.raises(InvalidParameter, match=name):
-        sp.TableLaw(depth, force)

@@ -120,3 +120,28 @@ def test_energy_forces_task_and_derivatives_use_the_same_mass(seed: int) -> None
         expected = pin.computeKineticEnergy(tree.free, tree.free.createData(), *moved)
         assert kinetic == pytest.approx(expected, rel=1e-9)
     assert abs(run.energy.residual).max() <= 1e-6 * max(run.energy.exchanged, 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_explain_calls_effective_mass_is_that_of_newton_euler(seed: int) -> None:
+    rng = np.random.default_rng([5, seed])
+    tree = random_tree(rng)
+    model = tree.model
+    tip = list(model.names)[-1].replace("j", "tip")
+    scene = sp.Scene(model)
+    plate = sp.Shell(*meshes.grid_plate(2, 2, 20.0))
+    scene.add_contact(sp.Sphere(0.02, tip), plate, law=sp.ImpactLaw(1e5, 1.5))
+    q = rng.uniform(-1, 1, model.nv)
+    q_all, _, matrix = tree.expanded(q, np.zeros(model.nv))
+    data = tree.free.createData()
+    columns = np.stack(
+        [pin.rnea(tree.free, data, q_all, 0 * q_all, one) for one in np.eye(len(q_all))], axis=1
+    )
+    columns -= pin.rnea(tree.free, data, q_all, 0 * q_all, 0 * q_all)[:, None]
+    jacobian = pin.computeFrameJacobian(
+        tree.free, data, q_all, tree.free.getFrameId(tip), pin.LOCAL_WORLD_ALIGNED
+    )[2]
+    row = jacobian @ matrix
+    expected = 1.0 / (row @ np.linalg.solve(matrix.T @ columns @ matrix, row))
+    found = scene.explain(q).pairs[0].effective_mass
+    assert found == pytest.approx(expected, rel=1e-7)

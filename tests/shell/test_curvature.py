@@ -170,3 +170,49 @@ def test_explain_shows_the_report():
         text = str(found)
         assert ("off the flat ones by up to" in text) == shown
         assert any("14 curved elements bend" in one for one in found.warnings) == shown
+
+
+class Core:
+    """A compiled surface with codes of its own about how it bends."""
+
+    def __init__(self, core, **codes):
+        self._core = core
+        self.__dict__.update(codes)
+
+    def __getattr__(self, name):
+        return getattr(self._core, name)
+
+
+def test_reasons_and_normals_set_aside_are_counted_by_element():
+    points, quads = plate(3)
+    shell = sp.Shell(points, quads, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    shell._smooth = Core(
+        shell.core_for("smooth"),
+        # Two triangles to an element: one that is curved makes it curved.
+        bending=np.array([1, 1, 2, 2, 2, 2, 0, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1], np.uint8),
+        normals_set_aside=np.isin(np.arange(54), (40, 41)).reshape(18, 3),
+    )
+    report = shell.curvature_report()
+    assert (report.elements, report.curved, report.flat) == (9, 1, 8)
+    whys, counts = zip(*report.flat_because, strict=True)
+    assert counts == (6, 2)
+    assert "turns" in whys[0]
+    assert "straightened" in whys[1]
+    assert report.normals_set_aside == 2
+    corner = shell.vertices[shell.triangles.ravel()[40]]
+    assert report.set_aside_at == tuple(corner)
+    text = str(shell.health)
+    assert "2 elements: straightened" in text
+    assert "2 given normals" in text
+
+
+def test_needles_along_a_bend_are_nothing_to_look_at():
+    """Their bulge is larger than their height, but they turn by little."""
+    angle = np.linspace(0, np.pi / 8, 2)
+    z = np.arange(4) * 1e-4
+    vertices = np.array([[np.cos(a), np.sin(a), h] for a in angle for h in z])
+    quads = [[k, 4 + k, 5 + k, 1 + k] for k in range(3)]
+    normals = vertices * [1, 1, 0]
+    report = sp.Shell(vertices, quads, normals).curvature_report()
+    assert report.of_height > 1.0
+    assert not report.problems

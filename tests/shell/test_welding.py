@@ -117,3 +117,11 @@ def test_nothing_left_is_an_error():
         clean(points, [[0, 1, 2], [1, 2, 3]])
     with pytest.raises(InvalidShell, match="one place"):
         clean(np.ones((3, 3)), [[0, 1, 2]])
+
+
+def test_first_position_is_kept_exactly():
+    points = np.array([[0.1, 0.2, 0.3], [1, 0, 0], [0, 1, 0], [0.1, 0.2, 0.3 + 1e-8], [1, 1, 0]])
+    surface = clean(points, [[0, 1, 2], [3, 1, 4]])
+    assert surface.health.welded_vertices == 1
+    assert surface.health.weld_distance == pytest.approx(1e-8, rel=1e-6)
+    assert (surface.vertices == points[0]).all(axis=1).any()
