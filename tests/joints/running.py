@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
-
 import sphshell_pin as sp
 from tests.joints.boxes import BOXES
 from tests.joints.solid_walk import judge_solid, read_step, spheres_of
@@ -49,8 +47,8 @@ def walk_outline(
     """Walk over a part that is judged by its outline."""
     solid = part.solid()
     if stl:
-        size = 2 * max(np.abs(piece.begin).max() for piece in part.profile.pieces)
-        shell = sp.Shell.from_file(write_stl(solid, folder / "part.stl", CHORD * size), unit="mm")
+        mesh = write_stl(solid, folder / "part.stl", CHORD * part.size)
+        shell = sp.Shell.from_file(mesh, unit="mm")
     else:
         shell = sp.Shell.from_file(write_step(solid, folder / "part.step"))
     asked, digits = spheres(part, count, rng), DIGITS[stl] * shell.size

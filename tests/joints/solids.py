@@ -43,6 +43,11 @@ class Part:
     def turned(self) -> bool:
         return self.height == 0.0
 
+    @property
+    def size(self) -> float:
+        """Its largest extent, about [mm]."""
+        return 2 * max(float(np.abs(piece.begin).max()) for piece in self.profile.pieces)
+
     def solid(self) -> Solid:
         """The solid [mm]."""
         wire = BRepBuilderAPI_MakeWire()

@@ -77,6 +77,32 @@ def test_none_is_on_meshes_of_single_precision(part, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("part", "height"),
+    [(pocket(56.0, 5.1, 0.068), 28.368), (disc(35.0, 0.14, -3.4e-4), 19.86)],
+    ids=lambda it: getattr(it, "name", None),
+)
+def test_none_is_between_faces_that_are_tangent_but_for_rounding(part, height, tmp_path):
+    """They cross at 1e-5 rad: a center is beside one of them, or else over their joint."""
+    path, rng = tmp_path / "part.stl", np.random.default_rng(0)
+    shell = sp.Shell.from_file(write_stl(part.solid(), path, 3e-4 * part.size), unit="mm")
+    radius = max(piece.begin[0] for piece in part.profile.pieces)
+    away, turn = rng.uniform(1.0, 12.0, 20_000), rng.uniform(0, 2 * np.pi, 20_000)
+    level = height + rng.choice([-1, 1], 20_000) * 10 ** rng.uniform(-6, -3, 20_000)
+    off = radius + away
+    centers = np.stack([off * np.cos(turn), off * np.sin(turn), level], axis=1)
+    depths, _ = shell.contacts_batch(centers * MM, (away + 0.01) * MM)
+    assert depths.min() > 0
+
+
+@pytest.mark.parametrize("part", [shaft(6.3, 0.38, 1.9e-3), shaft(9.2, 0.51)])
+def test_a_chamfer_is_a_cone_whatever_its_triangles(part, tmp_path):
+    """A single strip whose two rims have unequal steps: the axis is that of the shaft beside it."""
+    path = write_stl(part.solid(), tmp_path / "part.stl", 3e-4 * part.size)
+    kinds = sorted(face.kind for face in sp.Shell.from_file(path, unit="mm").faces)
+    assert kinds == ["cone", "cylinder", "cylinder", "plane", "plane", "plane", "torus", "torus"]
+
+
+@pytest.mark.parametrize(
     "family", ["rounded_box", "mitre", "unequal_mitre", "sharp_tray", "slots", "tee"]
 )
 def test_no_contact_is_lost_or_made_up_at_corners(family, tmp_path):

@@ -197,7 +197,11 @@ def test_the_closest_point_of_a_rim_from_far_away():
 
 @pytest.mark.parametrize(("step", "bends"), [(1e-6, 4), (4e-6, 0)])
 def test_what_rounding_tilts_facets_by_is_no_bend(step: float, bends: int) -> None:
-    """Strips of 0.77 mm at round corners lean by 3.75 degrees: 4 um tilt them by a tenth of it."""
+    """Strips of 0.77 mm at round corners lean by 3.75 degrees: 4 um tilt them by a tenth of it.
+
+    Rounded to 3 um all vertices of a corner happen to lie within 0.9 um, as micrometers allow, of a
+    cylinder 0.06 mm larger: that is 1.3 um off, where flat elements are 13 um off.
+    """
     radius, angle = 5.885e-3, np.linspace(0, np.pi / 2, 13) + np.pi / 2 * np.arange(4)[:, None]
     out = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     middle = np.array([[14.115, 6.115], [-14.115, 6.115], [-14.115, -6.115], [14.115, -6.115]])

@@ -294,11 +294,24 @@ void CurvedQuery::add_edge(const Task<Probe>& task, int f, int k) {
   if (!probe.reaches(point)) return;
   // `in` points from the side into an element, tangential to it: the distance falls that way where
   // the center is ahead. By gap() the regions of features overlap, so that none is lost between
-  // two.
+  // two. A joint itself says which centers its faces have: where those are nearly tangent, their
+  // normals at one point of it say another.
   const auto rises = [&, &shell = shell, &probe = probe](int h) {
-    const bool same = shell.facets()[triangle_of(h)].corner[side_of(h)] == facet.corner[k];
+    const CurvedShell& surface = *shell.curved();
+    const int g = triangle_of(h), l = side_of(h);
+    const double overlap = probe.tolerance + surface.gap();
+    if constexpr (std::is_same_v<Probe, Sphere>)
+      if (!surface.face_cells().empty() && is_on_border(surface, g, l)) {
+        const FaceCell& cell = surface.face_cells()[g];
+        const Faces& faces = surface.faces();
+        Vec3 away;
+        return cell.turn[l] * faces.joints[cell.joint[l]].divide(faces.shapes, cell.face,
+                                                                 probe.center, away) <=
+               overlap;
+      }
+    const bool same = shell.facets()[g].corner[l] == facet.corner[k];
     const Vec3 in = inward(shell, h, same ? foot.t : 1 - foot.t, point, along);
-    return probe.pull(point).dot(in) <= probe.tolerance + shell.curved()->gap();
+    return probe.pull(point).dot(in) <= overlap;
   };
   const int code = shell.curved()->facets()[f].owned.twin[k];
   if (!rises(3 * f + k) || (code >= 0 && !rises(code))) return;

@@ -84,12 +84,15 @@ Boxes boxes_of_facets(const Shell& shell, const CurvedShell& surface) {
 
 }  // namespace
 
-bool is_on_joint(const CurvedShell& surface, int f, int k) {
+bool is_on_border(const CurvedShell& surface, int f, int k) {
   const FaceCell& cell = surface.face_cells()[f];
-  const int twin = surface.facets()[f].owned.twin[k];
-  return cell.closed && twin >= 0 && cell.side[k] == FaceCell::Side::Border &&
-         surface.face_cells()[triangle_of(twin)].closed &&
+  return cell.closed && cell.side[k] == FaceCell::Side::Border &&
          surface.faces().joints[cell.joint[k]].kind != FaceJoint::Kind::Crossing;
+}
+
+bool is_on_joint(const CurvedShell& surface, int f, int k) {
+  const int twin = surface.facets()[f].owned.twin[k];
+  return is_on_border(surface, f, k) && twin >= 0 && surface.face_cells()[triangle_of(twin)].closed;
 }
 
 BoxTree::BoxTree(const Boxes& boxes) {

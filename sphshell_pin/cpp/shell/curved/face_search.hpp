@@ -61,7 +61,10 @@ struct FaceSearch {
   std::size_t bytes() const;
 };
 
-// Whether a side that a facet owns is part of a joint that is a line or a circle.
+// Whether a side is part of a joint that is a line or a circle.
+bool is_on_border(const CurvedShell& surface, int facet, int side);
+
+// Whether, moreover, the facet owns it and both faces there are exact.
 bool is_on_joint(const CurvedShell& surface, int facet, int side);
 
 }  // namespace sphshell

@@ -179,8 +179,8 @@ bool Recognizer::recognize_from(int seed) {
   return false;
 }
 
-// Rounded rims share the axis of a face beside them, whose long facets tell it better than theirs:
-// they are guessed about it.
+// Rounded and chamfered rims share the axis of a face beside them, whose long facets tell it better
+// than theirs: they are guessed about it.
 void Recognizer::recognize_rims(int face) {
   const Primitive about = faces_[face].shape;
   if (about.kind == FaceKind::Sphere) return;
@@ -201,13 +201,14 @@ void Recognizer::recognize_rims(int face) {
         points.push_back(point(v));
       if (points.size() < kFewVertices) continue;
       if (is_fruitless()) return;
-      Primitive guess = with_axis(FaceKind::Torus, about.point, about.axis, points);
       Growth best;
       double score = 0;
       const std::size_t before = visits_;
-      if (!(fit_primitive(points, tolerance_, guess) && try_shape(seed, guess, best, score) &&
-            take(std::move(best))))
-        fruitless_ += visits_ - before;
+      for (const FaceKind kind : {FaceKind::Cylinder, FaceKind::Cone, FaceKind::Torus}) {
+        Primitive guess = with_axis(kind, about.point, about.axis, points);
+        if (fit_primitive(points, tolerance_, guess)) try_shape(seed, guess, best, score);
+      }
+      if (!take(std::move(best))) fruitless_ += visits_ - before;
     }
 }
 
