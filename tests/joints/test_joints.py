@@ -6,6 +6,7 @@ from scipy import ndimage, sparse
 
 import sphshell_pin as sp
 from tests.joints.boxes import mitred
+from tests.joints.plates import PLATES
 from tests.joints.running import walk_outline, walk_part
 from tests.joints.solids import (
     Part,
@@ -18,6 +19,7 @@ from tests.joints.solids import (
     ring,
     shaft,
     slot,
+    write_step,
     write_stl,
 )
 from tests.joints.trimmed import TrimmedSolid
@@ -120,6 +122,20 @@ def test_none_is_lost_where_a_mitre_ends_in_a_plane(radii, tmp_path):
         away = np.c_[rng.uniform(-near, near, (500, 2)), rng.choice([0.03, 0.3, 3.0], 500)]
         depths, _ = shell.contacts_batch(([*radii, 20.0] + away) * MM, (away[:, 2] + 0.01) * MM)
         assert depths.min() > 0
+
+
+@pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
+def test_one_face_has_a_sphere_where_two_fillets_begin_to_cross(plate, tmp_path):
+    """A plate is convex: one contact, and the distance is that of its rounded sides."""
+    shell = sp.Shell.from_file(write_step(plate.solid(), tmp_path / "part.step"))
+    rng = np.random.default_rng(0)
+    centers, far = plate.spheres(300, rng)
+    radii = far * (1 + 10 ** rng.uniform(-5, -0.5, len(far)))
+    for center, distance, radius in zip(centers, far, radii, strict=True):
+        terms = shell.contacts(center * MM, radius * MM).terms
+        assert terms.weight.sum() == 1
+        off = abs(terms.depth.max() / MM - (radius - distance))
+        assert off < 1e-10 * radius + 2e-12 * shell.size / MM
 
 
 @pytest.mark.parametrize(

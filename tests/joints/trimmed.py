@@ -190,7 +190,7 @@ class TrimmedSolid:
                 self._on_face(number, centers, radii, found)
         for edge in self.edges:
             self._on_edge(edge, centers, radii, found, passes)
-        self._on_vertices(centers, radii, found)
+        self._on_vertices(centers, radii, found, passes)
         out = []
         for rows, saddles, r in zip(found, passes, radii.tolist(), strict=True):
             rows.sort(key=lambda one: -one[1])
@@ -198,7 +198,7 @@ class TrimmedSolid:
             depths = np.array([row[1] for row in rows], float)
             sure, plane = (np.array([row[k] for row in rows], bool) for k in (2, 3))
             if saddles and len(rows):
-                # As deep as a place on an edge: it ends there, or merges with another minimum.
+                # As deep as a place on an edge, or a corner: it ends there, or merges with another.
                 apart = np.abs(depths[:, None] - np.array(saddles)[:, 0]).min(axis=1)
                 sure &= (apart > PERSISTENCE * r) | (depths == depths.max())
             off = max([row[4] for row in rows] + [miss for _, miss in saddles], default=0.0)
@@ -285,7 +285,7 @@ class TrimmedSolid:
         points, tangents = edge.at(at)
         return rows, points, tangents, inside
 
-    def _on_vertices(self, centers: Array, radii: Array, found: Any) -> None:
+    def _on_vertices(self, centers: Array, radii: Array, found: Any, passes: Any) -> None:
         leave: list[list[Array]] = [[] for _ in self.vertices]
         off = np.zeros(len(self.vertices))
         for edge in self.edges:
@@ -299,8 +299,9 @@ class TrimmedSolid:
             distance = np.linalg.norm(away, axis=1)
             for row in np.flatnonzero(distance < radii).tolist():
                 rise = np.array(ways).reshape(-1, 3) @ away[row] / distance[row]
+                depth = radii[row] - distance[row]
+                passes[row].append((depth, 0.0))
                 if rise.min(initial=0.0) > -1e-6:
-                    depth = radii[row] - distance[row]
                     # Between two edges the distance may fall where they turn by more than half.
                     found[row].append((vertex, depth, False, False, off[k]))
 

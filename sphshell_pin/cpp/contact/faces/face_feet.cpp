@@ -16,10 +16,7 @@ namespace {
 constexpr double kOnAxis = 1e-12;
 constexpr int kMostRepeats = 20;
 // Faces that cross at less than this (sine) overlap as if it were this.
-constexpr double kLeastSlope = 1e-4;
-// A crossing of faces that are tangent at its end is followed from this share of the size beside
-// it: nearer, rounding decides where it goes.
-constexpr double kBesideEnd = 1e-7;
+constexpr double kLeastSlope = 1e-7;
 
 }  // namespace
 
@@ -143,8 +140,7 @@ bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tol
     const FaceJoint& joint = surface.faces().joints[cell.joint[k]];
     const bool crossing = joint.kind == FaceJoint::Kind::Crossing;
     Vec3 towards;
-    const double away =
-        joint.divide(surface.faces().shapes, cell.face, crossing ? at.point : at.center, towards);
+    const double away = joint.divide(cell.face, crossing ? at.point : at.center, towards);
     // The overlap is along the face: where both are nearly tangent the other one hardly falls
     // there.
     const double slope = crossing ? std::max(towards.cross(at.outward).norm(), kLeastSlope) : 1.0;
@@ -224,28 +220,27 @@ bool nearest_on_line(const Shell& shell, int f, int k, const Probe& probe, SideF
   return true;
 }
 
-// On the crossing of two faces, whose points follow in closed form from those of the chord along
-// the rulings of one; from the cubic's closest point on. False where they do not follow.
+// On the crossing of two faces, whose points are found one by one from those of the chord; from the
+// cubic's closest point on. False where it is not followed so.
 template <class Probe>
 bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, SideFoot& out) {
   const CurvedShell& surface = *shell.curved();
   const Faces& faces = surface.faces();
   const FaceJoint& joint = faces.joints[surface.face_cells()[f].joint[k]];
-  if (joint.ruled() < 0) return false;
-  const Primitive& shape = faces.shapes[joint.face[joint.ruled()]];
+  if (!joint.followed()) return false;
   const Vec3 &p = shell.facets()[f].corner[k], &q = shell.facets()[f].corner[next_corner(k)];
-  const double turn = shape.axis.cross(p - shape.point).dot(q - p) < 0 ? -1 : 1;
   const auto pull = [&](double t) {
-    out.t = t, out.point = shape.onto(p + t * (q - p));
-    out.tangent = turn * joint.tangent_on_ruling(faces.shapes, out.point);
+    out.t = t, out.tangent = joint.tangent_at(faces.shapes, p, q, t, out.point);
     return probe.pull(out.point).dot(out.tangent);
   };
-  // From an end, but where both faces are tangent: from so near to that there is a direction.
-  const double beside = std::clamp(kBesideEnd * shell.size() / (q - p).norm(), 1e-6, 0.1);
-  const auto from_end = [&](const Vec3& x) {
-    return joint.ends_tangent && !(joint.at(faces.shapes, x).sine > kLeastAngle) ? beside : 0;
+  // From an end, or from where its parabola ends.
+  const double length = (q - p).norm();
+  const FaceJoint::End* const ends[2] = {joint.end_near(p, surface.gap()),
+                                         joint.end_near(q, surface.gap())};
+  const auto beside = [&](const FaceJoint::End* end) {
+    return end ? std::clamp(end->least / length, 1e-6, 0.1) : 0;
   };
-  const double least = from_end(p), most = 1 - from_end(q);
+  const double least = beside(ends[0]), most = 1 - beside(ends[1]);
   const double t = std::clamp(out.t, least, most), middle = pull(t);
   const bool ahead = middle > 0;
   const double end = ahead ? most : least;
@@ -257,18 +252,23 @@ bool nearest_on_crossing(const Shell& shell, int f, int k, const Probe& probe, S
     next = pull(to);
   }
   if (next != 0 && (next > 0) == ahead) {
-    // From there to the vertex the curve is straight. Regions of features overlap by the gap: no
-    // center is between two of them.
-    const Vec3 &x = ahead ? q : p, d = out.point - x;
-    const double back = end == 0 || end == 1 ? 0.0 : probe.pull(x).dot(d) / d.norm();
-    if (std::abs(next) < surface.gap()) {
-      out.t = std::clamp(out.t, 1e-6, 1 - 1e-6);
-    } else if (back > 0) {
-      out.point = x + std::min(back / d.norm(), 1.0) * d;
-      out.tangent = ahead ? Vec3(-d) : d;
-    } else {
-      out.t = ahead ? 1 : 0, out.point = x;
+    const Vec3& x = ahead ? q : p;
+    const FaceJoint::End* parabola = ends[ahead ? 1 : 0];
+    // Regions of features overlap by the gap: no center is between two of them.
+    if (!parabola || !(probe.pull(x).dot(parabola->along) > -surface.gap())) {
+      if (parabola || !(std::abs(next) < surface.gap()))
+        out.t = ahead ? 1 : 0, out.point = x;
+      else
+        out.t = std::clamp(out.t, 1e-6, 1 - 1e-6);
+      return true;
     }
+    const Vec3 from_end = probe.pull(x);
+    const double slope = std::max(from_end.dot(parabola->along), 0.0),
+                 far = beside(parabola) * length;
+    const double bend = Probe::kMetric - from_end.dot(parabola->curvature);
+    const double s = bend * far > slope ? slope / bend : far;
+    out.point = x + s * (parabola->along + s / 2 * parabola->curvature);
+    out.tangent = (ahead ? -1 : 1) * (parabola->along + s * parabola->curvature).normalized();
   } else if (ahead && next < 0) {
     find_rest(pull, from, to, last, next);
   } else if (next > 0) {

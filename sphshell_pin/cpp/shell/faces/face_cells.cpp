@@ -232,9 +232,8 @@ class CellMaker {
     std::optional<FaceJoint> found = find_joint(faces_.shapes, a, b, p, q, gap_);
     if (!found) {
       // Where both hold at the ends, in which they may be tangent, and cut each other between.
-      for (const Vec3& end : {p, q})
-        if (!(std::abs(one.distance(end)) <= gap_ && std::abs(two.distance(end)) <= gap_))
-          return -1;
+      for (const Vec3& x : {p, q})
+        if (!(std::max(std::abs(one.distance(x)), std::abs(two.distance(x))) <= gap_)) return -1;
       const CubicCurve side = facets_[f].side(facet, k);
       std::vector<Vec3> points{p};
       for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85}) {
@@ -244,16 +243,14 @@ class CellMaker {
       points.push_back(q);
       found.emplace();
       found->face[0] = a, found->face[1] = b, found->across[0] = two, found->across[1] = one;
-      find_branches(faces_.shapes, points, *found);
+      find_branches(faces_.shapes, points, shell_.size(), *found);
     }
     std::vector<int>& known = joints_[{a, b}];
     for (const int j : known) {
       const FaceJoint& it = faces_.joints[j];
       if (it.kind != found->kind) continue;
-      if (it.kind == FaceJoint::Kind::Crossing
-              ? it.ends_tangent == found->ends_tangent &&
-                    std::equal(it.branch, it.branch + 2, found->branch)
-              : is_one(it, *found, p, q))
+      if (it.kind == FaceJoint::Kind::Crossing ? it.branches_as(*found, gap_)
+                                               : is_one(it, *found, p, q))
         return j;
     }
     known.push_back(static_cast<int>(faces_.joints.size()));
@@ -301,7 +298,7 @@ class CellMaker {
         const int face = out_.of[f].face;
         Vec3 n, away;
         faces_.shapes[face].distance(on, n);
-        joint.divide(faces_.shapes, face, on, away);
+        joint.divide(face, on, away);
         outward[i] = out_.of[f].sign * n;
         turn[i] = outward[i].cross(q - p).dot(away) < 0 ? -1 : 1;
       }

@@ -230,78 +230,7 @@ std::optional<FaceJoint> mitre(const Primitive& one, const Primitive& two, const
   return joint;
 }
 
-bool is_ruled(const Primitive& shape) {
-  return shape.kind == FaceKind::Cylinder || shape.kind == FaceKind::Cone;
-}
-
-// The unit direction of the straight line through a point of a cylinder or cone.
-Vec3 ruling_at(const Primitive& shape, const Vec3& x) {
-  if (shape.kind == FaceKind::Cylinder) return shape.axis;
-  const Vec3 y = x - shape.point, out = y - y.dot(shape.axis) * shape.axis;
-  return std::sin(shape.second) * out.normalized() + std::cos(shape.second) * shape.axis;
-}
-
-// How far from x a line meets a cylinder, cone or sphere: by the quadratic equation
-// a s^2 + 2 b s + c = 0. Where the line passes it, its point nearest to it.
-double meet_quadric(const Primitive& shape, const Vec3& x, const Vec3& line, int branch) {
-  const Vec3 y = x - shape.point, axis = is_ruled(shape) ? shape.axis : Vec3(Vec3::Zero());
-  const double widens = shape.kind == FaceKind::Cone ? std::tan(shape.second) : 0;
-  const double h = y.dot(axis), dh = line.dot(axis), radius = shape.radius + widens * h;
-  const Vec3 u = y - h * axis, v = line - dh * axis;
-  const double a = v.squaredNorm() - widens * dh * widens * dh;
-  const double b = u.dot(v) - widens * dh * radius, c = u.squaredNorm() - radius * radius;
-  const double square = b * b - a * c;
-  if (!(square > 0)) return -b / a;
-  // Without cancellation: one root by the sum, the other by the product of both.
-  const double sum = b > 0 ? -b - std::sqrt(square) : -b + std::sqrt(square);
-  return (b > 0) == (branch < 0) ? sum / a : c / sum;
-}
-
 }  // namespace
-
-double FaceJoint::divide(const std::vector<Primitive>& shapes, int of_face, const Vec3& x,
-                         Vec3& away) const {
-  const int i = which(of_face);
-  // Where two branches cross, the distance of the other face is zero on both of them.
-  if (!ends_tangent || branch[i] == 0) return across_of(of_face).distance(x, away);
-  away = ruling_at(shapes[face[i]], x);
-  return -meet_quadric(across[i], x, away, branch[i]);
-}
-
-Vec3 FaceJoint::tangent_on_ruling(const std::vector<Primitive>& shapes, Vec3& x) const {
-  const int i = ruled();
-  const Primitive& shape = shapes[face[i]];
-  const Vec3 line = ruling_at(shape, x);
-  x += meet_quadric(across[i], x, line, branch[i]) * line;
-  Vec3 n;
-  across[i].distance(x, n);
-  const Vec3 around = shape.axis.cross(x - shape.point);
-  return (around - n.dot(around) / n.dot(line) * line).normalized();
-}
-
-void find_branches(const std::vector<Primitive>& shapes, const std::vector<Vec3>& points,
-                   FaceJoint& joint) {
-  for (int i = 0; i < 2; ++i) {
-    const Primitive &shape = shapes[joint.face[i]], &next = joint.across[i];
-    if (!is_ruled(shape) || !(is_ruled(next) || next.kind == FaceKind::Sphere)) continue;
-    int branch = 0;
-    for (std::size_t j = 0; j < points.size(); ++j) {
-      const Vec3& x = points[j];
-      Vec3 n, m;
-      shape.distance(x, n), next.distance(x, m);
-      const double sine = n.cross(m).norm();
-      if (j == 0 || j + 1 == points.size()) {
-        joint.ends_tangent = joint.ends_tangent || sine < kLeastAngle;
-        continue;
-      }
-      // The curve must lead across the rulings, always on the same side of the other face.
-      const double along = m.dot(ruling_at(shape, x));
-      const int here = std::abs(along) < 0.2 * sine ? 0 : along < 0 ? -1 : 1;
-      branch = j == 1 || branch == here ? here : 0;
-    }
-    joint.branch[i] = static_cast<std::int8_t>(branch);
-  }
-}
 
 bool FaceJoint::has_one_nearest(const Vec3& x) const {
   constexpr double kNearAxis = 1e-6;  // of the radius: nearer to the axis nothing has a direction
@@ -316,7 +245,12 @@ Vec3 FaceJoint::nearest(const Vec3& x) const {
 }
 
 Intersection FaceJoint::at(const std::vector<Primitive>& shapes, const Vec3& x) const {
-  if (kind == Kind::Crossing) return intersection_at(shapes[face[0]], across[0], x);
+  if (kind == Kind::Crossing) {
+    for (int i = 0; i < num_ends; ++i)
+      if (const End& end = ends[i]; (x - end.at).norm() < end.least)
+        return {end.along, end.curvature, end.at - x, 0};
+    return intersection_at(shapes[face[0]], across[0], x);
+  }
   const Vec3 on = nearest(x);
   if (kind == Kind::Line) return {axis, Vec3::Zero(), on - x, 1};
   const Vec3 inward = (point - on) / radius;
