@@ -305,8 +305,7 @@ void CurvedQuery::add_edge(const Task<Probe>& task, int f, int k) {
         const FaceCell& cell = surface.face_cells()[g];
         const Faces& faces = surface.faces();
         Vec3 away;
-        return cell.turn[l] * faces.joints[cell.joint[l]].divide(faces.shapes, cell.face,
-                                                                 probe.center, away) <=
+        return cell.turn[l] * faces.joints[cell.joint[l]].divide(cell.face, probe.center, away) <=
                overlap;
       }
     const bool same = shell.facets()[g].corner[l] == facet.corner[k];
