@@ -97,6 +97,65 @@ def test_values_are_those_of_the_scene():
     np.testing.assert_allclose(v_next, run.v[-1], rtol=1e-12, atol=1e-14)
 
 
+def test_a_nonlinear_program_finds_the_torques_that_hold_a_press():
+    """Of all postures in which an arm presses with 3 N, the one with the least torques."""
+    model = pin.Model()
+    joint = 0
+    for k in range(2):
+        at = pin.SE3(np.eye(3), np.array([0.3 if k else 0.0, 0.0, 0.0]))
+        joint = model.addJoint(joint, pin.JointModelRY(), at, f"arm{k}")
+        half = pin.SE3(np.eye(3), np.array([0.15, 0.0, 0.0]))
+        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, 0.03), half)
+    tip = pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))
+    model.addFrame(pin.Frame("tip", joint, tip, pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    law = sp.ImpactLaw(2e5, 1.5)
+    table = sp.Shell([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
+    below = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.2]))
+    scene.add_contact(sp.Sphere(0.02, "tip"), table, placement=below, law=law, name="touch")
+    depth = law.depth_at(3.0)
+    f = ForwardDynamics(scene)
+    q, tau = casadi.MX.sym("q", 2), casadi.MX.sym("tau", 2)
+    height = -0.3 * casadi.sin(q[0]) - 0.3 * casadi.sin(q[0] + q[1])
+    problem = {
+        "x": casadi.vertcat(q, tau),
+        "f": casadi.sumsqr(tau),
+        "g": casadi.vertcat(f(q, np.zeros(2), tau), height),
+    }
+    quiet = {
+        "print_time": False,
+        "ipopt": {"print_level": 0, "hessian_approximation": "limited-memory", "tol": 1e-10},
+    }
+    solver = casadi.nlpsol("press", "ipopt", problem, quiet)
+    wanted = [0.0, 0.0, -0.2 + 0.02 - depth]
+    first = np.array([0.0, 0.6, -1.0, 0.0])
+    found = flat(solver(x0=first, lbg=wanted, ubg=wanted)["x"])
+    assert solver.stats()["success"]
+    contacts = scene.contacts(found[:2])
+    assert contacts.normal_force.sum() == pytest.approx(3.0, rel=1e-6)
+    # Held by gravity and the press alone, by Pinocchio.
+    data = model.createData()
+    weight = pin.computeGeneralizedGravity(model, data, found[:2])
+    jacobian = pin.computeFrameJacobian(
+        model, data, found[:2], model.getFrameId("tip"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    )
+    np.testing.assert_allclose(found[2:], weight - 3.0 * jacobian[2], atol=1e-5)
+    # No posture nearby that holds the same height takes less.
+    least = found[2:] @ found[2:]
+    along = np.array([-jacobian[2, 1], jacobian[2, 0]])
+    for e in (-1e-2, 1e-2):
+        other = found[:2] + e * along
+        for _ in range(20):  # back to the height
+            pin.framesForwardKinematics(model, data, other)
+            off = data.oMf[model.getFrameId("tip")].translation[2] - wanted[2]
+            slope = pin.computeFrameJacobian(
+                model, data, other, model.getFrameId("tip"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )[2]
+            other = other - off * slope / (slope @ slope)
+        torque = pin.computeGeneralizedGravity(model, data, other) - 3.0 * slope
+        assert torque @ torque > least
+
+
 def test_wrong_arguments_get_a_sentence():
     scene, _ = free_ball()
     with pytest.raises(NameNotFound, match=r"touch\.law\.stiffness"):

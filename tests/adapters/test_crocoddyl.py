@@ -294,6 +294,49 @@ def test_its_steps_are_those_of_a_simulation(integrator, wrap):
     np.testing.assert_allclose(x, [*result.q[-1], *result.v[-1]], rtol=0, atol=1e-12)
 
 
+def test_a_solver_presses_with_a_force_within_bounds_of_its_motor():
+    """SolverBoxFDDP brings a ball on a slide to 5 N; the law says at which depth."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, 0.02), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    law = sp.ImpactLaw(2e5, 1.5, damping=30.0, full_damping_depth=1e-4)
+    scene.add_contact(sp.Sphere(0.02, "ball"), plate(), law=law, name="touch")
+    state, actuation, _ = bare(scene)
+    x0, dt, steps = np.array([0.02 + 1e-4, 0.0]), 1e-3, 60
+
+    def node(last):
+        costs = crocoddyl.CostModelSum(state)
+        force = ContactForceResidual(scene, state, "touch", 5.0)
+        costs.addCost("force", crocoddyl.CostModelResidual(state, force), 1e3 if last else 1e-2)
+        place = FrameResidual(scene, state, "ball", [0.0, 0.0, 0.02 - law.depth_at(5.0)])
+        costs.addCost("place", crocoddyl.CostModelResidual(state, place), 1e6 if last else 1e2)
+        rest = crocoddyl.ActivationModelWeightedQuad(np.array([0.0, 1e3 if last else 1e-2]))
+        still = crocoddyl.ResidualModelState(state)
+        costs.addCost("rest", crocoddyl.CostModelResidual(state, rest, still), 1.0)
+        if not last:
+            control = crocoddyl.ResidualModelControl(state)
+            costs.addCost("effort", crocoddyl.CostModelResidual(state, control), 1e-6)
+        made = crocoddyl.IntegratedActionModelEuler(
+            ContactDynamics(scene, state, actuation, costs), 0.0 if last else dt
+        )
+        made.u_lb, made.u_ub = np.array([-6.0]), np.array([6.0])
+        return made
+
+    problem = crocoddyl.ShootingProblem(x0, [node(False)] * steps, node(True))
+    solver = crocoddyl.SolverBoxFDDP(problem)
+    weight = np.array([9.81 * 0.5])
+    solver.solve([x0] * (steps + 1), [weight] * steps, 100)
+    us = np.array(solver.us)
+    assert np.abs(us).max() <= 6.0 + 1e-12
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(
+        x0[:1], x0[1:], steps * dt, lambda t, q, v, c: us[min(round(t / dt), steps - 1)]
+    )
+    contacts = scene.contacts(result.q[-1], result.v[-1])
+    assert contacts.normal_force.sum() == pytest.approx(5.0, rel=0.01)
+
+
 def test_a_step_has_the_costs_of_its_start():
     """dt times them, and without controls them, as of a last node; it then stays."""
     scene, x = arm_on_moving_plate()

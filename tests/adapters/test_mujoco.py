@@ -9,7 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, SetupWarning
 from sphshell_pin.scenario import build
-from tests import models
+from tests import meshes, models
 from tests.shell.test_faces import torus
 
 mujoco = pytest.importorskip("mujoco")
@@ -108,6 +108,23 @@ def test_steps_are_those_of_a_simulation(friction):
         assert log.t[0] < 1e-3
         assert np.all(np.diff(log.t) >= 0)
         assert len(log.t) > 20
+
+
+def test_energy_of_a_ball_that_swings_in_a_bowl():
+    xml = ball(0.05, 0.2, options='timestep="1e-4" integrator="RK4"')
+    model, data = model_of(xml)
+    shell = sp.Shell(*meshes.bowl(24, 1.0, 2.0), name="bowl")
+    law = sp.HuntCrossleyLaw(1e6, 1.5)
+    data.qpos[:3] = 0.2, 0.1, 0.08
+    with attach(model, shell, ["ball"], law=law) as contacts:
+        # It is let fall from a hair above the bowl, and bounces.
+        energies = []
+        for _ in range(10000):
+            mujoco.mj_step(model, data)
+            if not len(contacts.contacts(data).depth):
+                energies.append(0.1 * data.qvel[:3] @ data.qvel[:3] + 0.2 * 9.81 * data.qpos[2])
+    assert len(energies) > 100
+    assert np.ptp(energies) < 1e-5 * abs(energies[0])
 
 
 def test_models_and_threads_do_not_disturb_each_other():

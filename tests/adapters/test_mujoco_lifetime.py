@@ -192,9 +192,38 @@ while any(one.is_alive() for one in workers):
 print("done")
 """
 
+# A mark may be given once: a copy outlives the contacts of its model.
+MARKS = """
+import copy, mujoco, sys
+import numpy as np
+from tests.adapters.mujoco_models import on_slab, slab
+told = []
+sys.unraisablehook = lambda fault: told.append(str(fault.exc_value))
+def force(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return bool(np.any(data.qfrc_passive))
+old, new = (mujoco.MjModel.from_xml_string(slab(1)) for _ in range(2))
+contacts = on_slab(old, "ball0")
+flags = old.opt.enableflags
+copied = copy.deepcopy(old)
+assert force(copied) and not told
+contacts.detach()
+for k in range(33000):
+    contacts._core.attach(new._address)
+    assert new.opt.enableflags != flags
+    assert force(new) and not force(copied) if k % 1000 == 0 or k > 32760 else True
+    contacts._core.detach()
+assert len(told) == 1
+contacts._core.attach(new._address)
+assert force(new) and not force(copy.deepcopy(new))
+assert "more than 32766 models" in told[1]
+print("done")
+"""
 
-@pytest.mark.parametrize("program", [REFUSED, AT_ONCE], ids=["refused", "at once"])
-def test_programs_that_crashed_or_hung(program):
+
+@pytest.mark.parametrize("program", [REFUSED, AT_ONCE, MARKS], ids=["refused", "at once", "marks"])
+def test_programs_that_crashed_hung_or_pushed_strangers(program):
     done = python(program)
     assert done.stdout == "done\n", done.stderr
 

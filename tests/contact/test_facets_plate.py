@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
+from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
 from tests.contact.helpers import force_sum, shell_of
 
@@ -57,6 +58,17 @@ def test_one_exact_contact(kind: str, how: str, count: int) -> None:
             assert len(contacts) == 1, (center, contacts.point)
             worst = np.maximum(worst, errors(contacts, sign * up))
     assert worst.max() <= 1e-12
+
+
+def test_inner_edges_and_vertices_are_face_contacts() -> None:
+    vertices, triangles = meshes.grid_plate(4, 4)
+    shell = Shell(vertices, triangles)
+    for x, y in [(0.0, 0.0), (0.25, 0.0), (0.125, 0.125), (0.1, 0.25), (-0.25, 0.25)]:
+        contacts = shell.contacts([x, y, 0.09], RADIUS, method="facets")
+        assert len(contacts) == 1
+        assert contacts.feature[0] == Feature.FACE
+        assert np.array_equal(contacts.point[0], [x, y, 0.0])
+        assert np.array_equal(contacts.normal[0], [0.0, 0.0, 1.0])
 
 
 def test_centre_on_the_surface_gives_a_finite_unit_normal() -> None:

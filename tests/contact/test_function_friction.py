@@ -1,7 +1,6 @@
 """Friction of one's own does what the friction does whose formula it states."""
 
 import math
-import pickle
 
 import numpy as np
 import pytest
@@ -81,6 +80,18 @@ def test_derivatives_are_those_of_the_twin(law, moves) -> None:
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-7 * np.abs(theirs).max())
 
 
+def test_a_run_is_that_of_the_twin_and_keeps_its_energy() -> None:
+    runs = [
+        sp.Simulation(models.on_plate(models.ball(), TWIN, one), sp.Adaptive(1e-10)).run(
+            BALL, MOVES, 0.05, record_dt=1e-3
+        )
+        for one in (OWN, SMOOTH)
+    ]
+    np.testing.assert_allclose(runs[0].q, runs[1].q, rtol=0, atol=1e-8)
+    assert np.abs(runs[0].energy.residual).max() < 1e-8
+    assert runs[0].energy.friction_loss[-1] > 1e-4
+
+
 def test_what_is_negative_counts_as_none_and_no_number_is_refused() -> None:
     scene = models.on_plate(models.ball(), TWIN, sp.FunctionFriction(FORCE(lambda s, n, p: -n)))
     assert not scene.contacts(BALL, MOVES).friction_force_world.any()
@@ -97,11 +108,10 @@ def test_what_does_not_vanish_at_rest_is_warned_of() -> None:
         models.on_plate(models.ball(), TWIN, constant)
 
 
-def test_only_one_of_python_is_pickled() -> None:
-    with pytest.raises(errors.NotPicklable, match="a FunctionFriction of a C function"):
-        pickle.dumps(OWN)
-    again = pickle.loads(pickle.dumps(python_friction()))
-    assert again.coefficient(0.05) == SMOOTH.coefficient(0.05)
+def test_pinocchios_constraints_take_its_largest_coefficient() -> None:
+    scene = models.on_plate(models.ball(), TWIN, OWN)
+    (made,) = scene.constraints(BALL).models
+    np.testing.assert_allclose(made.getFriction(), OWN.largest_coefficient)
 
 
 def test_a_scenario_names_it(tmp_path) -> None:
@@ -119,9 +129,3 @@ def test_a_scenario_names_it(tmp_path) -> None:
     mu = {"ball-plate.friction.mu": [0.1, 0.5]}
     runs = built.simulation.rollout(starts, speeds, 0.02, vary=mu)
     assert runs[0].v[-1][0] > runs[1].v[-1][0]
-
-
-def test_pinocchios_constraints_take_its_largest_coefficient() -> None:
-    scene = models.on_plate(models.ball(), TWIN, OWN)
-    (made,) = scene.constraints(BALL).models
-    np.testing.assert_allclose(made.getFriction(), OWN.largest_coefficient)

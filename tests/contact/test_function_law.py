@@ -5,6 +5,7 @@ import ctypes
 import gc
 import math
 import pickle
+import random
 import weakref
 
 import numpy as np
@@ -128,6 +129,17 @@ def test_derivatives_are_those_of_the_twin(friction) -> None:
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-8 * np.abs(theirs).max())
 
 
+def test_a_run_is_that_of_the_twin_and_keeps_its_energy() -> None:
+    own, twin = (
+        sp.Simulation(models.on_plate(models.slider(), law), sp.Adaptive(1e-10)).run(
+            [0.051], [-0.1], 0.2, record_dt=1e-3
+        )
+        for law in (C_LAW, TWIN)
+    )
+    np.testing.assert_allclose(own.q, twin.q, rtol=0, atol=1e-9)
+    assert np.abs(own.energy.residual).max() < 1e-8
+
+
 @pytest.mark.parametrize("make", [lambda: C_LAW, python_law], ids=["C", "python"])
 def test_rollouts_vary_its_numbers_over_threads(make) -> None:
     stiff = [5e5, 1e6, 2e6, 4e6]
@@ -183,6 +195,17 @@ def test_a_law_that_cannot_carry_the_load_is_refused_at_once() -> None:
     assert len(calls) < 3000
 
 
+def test_the_energy_of_noise_takes_no_longer_than_that_of_jumps() -> None:
+    rng, calls = random.Random(1), []
+
+    def noise(depth, rate, p):
+        calls.append(depth)
+        return rng.random()
+
+    assert python_law(noise, {}).energy(1e-3) == pytest.approx(0.5e-3, rel=0.2)
+    assert len(calls) < 100_000
+
+
 def test_a_scene_that_is_changed_during_its_run_has_no_result() -> None:
     def controller(t, q, v, contacts):
         if t > 0.005 and len(scene.pairs) == 1:
@@ -193,6 +216,9 @@ def test_a_scene_that_is_changed_during_its_run_has_no_result() -> None:
     scene = models.on_plate(models.slider(), TWIN)
     with pytest.raises(errors.SphshellError, match="contacts were changed during the run"):
         sp.Simulation(scene).run([0.0499], None, 0.02, controller=controller)
+
+
+OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
 
 
 def test_copies_and_pickles() -> None:

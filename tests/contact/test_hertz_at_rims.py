@@ -110,6 +110,13 @@ def test_the_force_is_continuous_where_a_border_is_met_edge_on():
     assert np.abs(np.diff(forces, axis=0)).max() < 1e-3 * size.max()
 
 
+def test_where_nothing_touches_derivatives_of_forces_are_empty():
+    several = scene(SHELLS["cylinder"]())
+    none = several.contact_force_derivatives(np.array([1.0, 0.0, 0.0]), np.zeros(3))
+    assert none.by_q.shape == none.by_v.shape == (0, 3, 3)
+    assert none.depth_by_q.shape == (0, 3)
+
+
 @pytest.mark.parametrize("off", [0.0, 1e-6, 1e-4, 3e-4, 6e-4])
 def test_derivatives_hold_at_the_tip_of_a_cone(off):
     """On the tip, and at this distance from its axis on the side, normal to it."""
@@ -130,3 +137,17 @@ def test_derivatives_hold_at_the_tip_of_a_cone(off):
             force = [several.external_forces(x, np.zeros(3))[1].linear for x in moved]
             by_q = np.stack([(force[2 * i] - force[2 * i + 1]) / (2 * step) for i in range(3)], -1)
             assert np.abs(found[0] - by_q).max() < 1e-5 * np.abs(by_q).max()
+
+
+def test_the_energy_does_not_jump_from_the_side_of_a_cone_to_its_tip():
+    half_angle, several = np.arctan(0.3), scene(SHELLS["cone"]())
+    simulation = sp.Simulation(several, sp.SemiImplicitEuler(1e-12))
+    tip, slope = np.array([0, 0, 0.05]), np.array([np.cos(half_angle), 0, np.sin(half_angle)])
+    energies, forces = [], []
+    for off in np.linspace(-1e-6, 1e-6, 9):
+        # Along the side through the cone's plane, and on round the tip.
+        center = tip + (RADIUS - 1e-4) * slope + off * np.array([slope[2], 0, -slope[0]])
+        energies.append(simulation.run(center, np.zeros(3), 1e-12).energy.elastic[0])
+        forces.append(several.external_forces(center, np.zeros(3))[1].linear)
+    assert np.ptp(energies) < 3e-3 * max(energies)
+    assert np.abs(np.diff(forces, axis=0)).max() < 3e-3 * np.abs(forces).max()

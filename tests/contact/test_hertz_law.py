@@ -158,6 +158,59 @@ def test_without_normals_the_surface_is_nearly_met(name) -> None:
     assert np.abs(errors).max() < 3e-3
 
 
+@pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid"])
+def test_energy_closes_where_the_curvature_changes_along_the_path(name) -> None:
+    surface = SURFACES[name]
+    u, v = (0.5 * (a + b) for a, b in surface.spans)
+    x, n = surface.point(u, v), surface.normal(u, v)
+    along = np.cross(n, [0.3, 0.2, 1.0])
+    scene = ball_scene(surface.shell(), 0.3, LAW, gravity=-50 * n)
+    start = np.array([*(x + 0.297 * n), 0, 0, 0, 1])
+    speed = np.array([*(1.5 * along / np.linalg.norm(along)), 0, 0, 0])
+    result = sp.Simulation(scene, sp.Adaptive(rtol=1e-10, atol=1e-12)).run(start, speed, 0.1)
+    energy = result.energy
+    total = energy.kinetic + energy.potential + energy.elastic
+    assert len(result.contacts) > 100
+    assert np.ptp(total) < 1e-6 * np.ptp(energy.elastic)
+
+
+def test_force_is_continuous_over_the_edge_of_a_half_cylinder() -> None:
+    # A half cylinder on its flat side: from the bend over the edge on to the end face.
+    angle = np.linspace(0, np.pi, 13)
+    ring = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], -1)
+    vertices = np.concatenate([ring, ring + [0, 2, 0], [[0, 0, 0], [0, 2, 0]]])
+    sides = [[[k, k + 1, k + 14], [k, k + 14, k + 13]] for k in range(12)]
+    caps = [[[26, k + 1, k], [27, k + 13, k + 14]] for k in range(12)]
+    triangles = np.array([*np.concatenate(sides), *np.concatenate(caps)])[:, ::-1]
+    shell = sp.Shell(vertices, triangles)
+    scene = ball_scene(shell, 0.2, LAW)
+    edge = np.array([np.cos(1.3), 0, np.sin(1.3)])
+    turns = np.linspace(-0.3, np.pi / 2 + 0.3, 2001)
+    up = edge / np.linalg.norm(edge)
+    forces = []
+    for turn in turns:
+        away = np.clip(turn, 0, np.pi / 2)
+        direction = np.cos(away) * up - np.sin(away) * np.array([0, 1.0, 0])
+        foot = edge + np.array([0, max(-turn, 0), 0]) - max(turn - np.pi / 2, 0) * up
+        forces.append(force_on(scene, foot + 0.195 * direction).linear)
+    sizes = np.linalg.norm(forces, axis=1)
+    assert np.abs(np.diff(sizes)).max() < 2e-3 * sizes.max()
+    assert sizes[-1] > 1.01 * sizes[0]  # the flat end is stiffer than the bend
+    assert np.all(np.diff(sizes[300:-300]) >= -1e-9 * sizes.max())
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.9])
+def test_restitution_is_that_stated(restitution) -> None:
+    surface = SURFACES["ellipsoid"]
+    law = sp.HertzLaw(YOUNG, POISSON, restitution=restitution, speed=1.0)
+    u, v = (0.5 * (a + b) for a, b in surface.spans)
+    x, n = surface.point(u, v), surface.normal(u, v)
+    scene = ball_scene(surface.shell(), 0.3, law)
+    start = np.array([*(x + 0.3001 * n), 0, 0, 0, 1])
+    result = sp.Simulation(scene).run(start, np.array([*-n, 0, 0, 0]), 0.05)
+    assert np.isclose(result.v[-1][:3] @ n, restitution, rtol=2e-3)
+
+
 def test_a_loss_tangent_is_that_of_a_small_oscillation() -> None:
     # About a depth the loss in a cycle over 2 pi times the energy at its peak.
     tangent, frequency = 0.1, 200.0
@@ -183,6 +236,9 @@ def test_a_socket_of_nearly_the_ball_s_radius_is_beyond_hertz() -> None:
         start = np.array([*(x + (radius - 1e-4 * radius) * n), 0, 0, 0, 1])
         result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(start, np.zeros(6), 1e-4)
         assert {e.kind for e in result.events} - {"touch", "lift_off", "deep"} == kinds
+
+
+TWICE = {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0}
 
 
 def test_a_vertex_is_like_what_is_beside_it() -> None:
@@ -238,5 +294,9 @@ def test_names_of_materials_stand_for_their_values() -> None:
     assert sp.CoulombFriction.of("rubber", "steel") == sp.CoulombFriction(*coefficients)
     bristle = sp.BristleFriction.of("rubber", "steel", stiffness=1e4)
     assert bristle == sp.BristleFriction(*coefficients, 1e4)
+    with pytest.raises(sp.InvalidParameter, match="young = 'rubber' must be a number"):
+        sp.HertzLaw("rubber", "steel")
+    with pytest.raises(sp.SphshellError, match="no material 'gum'; the table has: steel, "):
+        sp.CoulombFriction.of("steel", "gum")
     mindlin = sp.MindlinFriction.of("rubber", "steel")
     assert mindlin == sp.MindlinFriction(*coefficients, *numbers)

@@ -147,6 +147,16 @@ def test_no_work_is_done_by_a_foundation_on_facets(name: str, shells) -> None:
     assert worst_loop(shells(name, "faces"), radius, law, 1, "facets") < 1e-6
 
 
+@pytest.mark.study
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", SURFACES)
+def test_no_work_is_done_around_many_loops(name: str, kind: str, law: str, shells) -> None:
+    radius = SURFACES[name][1]
+    worst = worst_loop(shells(name, kind), radius, LAWS[law](radius), 30)
+    assert worst < 1e-3
+
+
 @pytest.mark.parametrize("law", ["impact", "hunt-crossley", "table", "function", "foundation"])
 @pytest.mark.parametrize("name", ["seat.obj", "bottle.obj"])
 def test_no_work_is_done_by_a_plane(name: str, law: str, shells) -> None:

@@ -69,3 +69,18 @@ def test_triangles_of_coarse_coordinates(triangles, center) -> None:
         }
         why = oracle.mismatch(SimpleNamespace(**others), expected, 1e-11)
         assert not why, why
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(surfaces, place, st.floats(0.1, 0.5), st.floats(0.0, 0.5))
+def test_a_larger_sphere_keeps_every_contact(mesh, center, radius: float, more: float) -> None:
+    """A local minimum of the distance does not hang on the radius."""
+    shell = Shell(*mesh)
+    small = shell.contacts(center, radius, method="facets")
+    large = shell.contacts(center, radius + more, method="facets")
+    assert len(large) >= len(small)
+    for k, point in enumerate(small.point):
+        gaps = np.abs(large.point - point).max(axis=1)
+        assert gaps.min() == 0.0
+        grown = large.depth[gaps.argmin()] - small.depth[k]
+        assert abs(grown - more) < 1e-14

@@ -81,6 +81,17 @@ def test_it_reproduces_the_spring_that_it_was_taken_from() -> None:
         assert question(TABLE) == pytest.approx(question(SPRING), rel=1e-5)
 
 
+def bounce(law: sp.TableLaw | sp.ImpactLaw) -> sp.Result:
+    scene = models.on_plate(models.slider(), law)
+    return sp.Simulation(scene, sp.Adaptive(1e-10)).run([0.051], [-0.1], 0.3, record_dt=1e-3)
+
+
+def test_a_run_is_that_of_the_spring_and_keeps_its_energy() -> None:
+    table, spring = bounce(TABLE), bounce(SPRING)
+    np.testing.assert_allclose(table.q, spring.q, atol=1e-6)
+    assert np.abs(table.energy.residual).max() < 1e-8
+
+
 def test_derivatives_rollout_explain_and_pickle() -> None:
     scene = models.on_plate(models.ball(), TABLE, models.FRICTION)
     q = models.free_q([0.01, 0.02, 0.0492])

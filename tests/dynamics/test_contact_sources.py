@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin import CoulombFriction, RungeKutta4, Scene, SemiImplicitEuler, Simulation
+from sphshell_pin.dynamics.scene.sides import SourceSide, SphereSide
 from sphshell_pin.errors import SphshellError
 from tests.models import add_body, ball, empty, free_q, linear_law, on_plate
 
@@ -75,6 +76,18 @@ def test_source_between_two_moving_bodies() -> None:
     contacts = scene.contacts(q, v)
     assert contacts.point_world == pytest.approx(np.stack([point, -point]), abs=1e-14)
     assert contacts.normal_force == pytest.approx([10.0, 20.0])
+
+
+def test_source_beside_a_shell() -> None:
+    """Both kinds of pairs in one scene: forces add."""
+    q, v = free_q([0.0, 0.0, RADIUS - 0.002]), np.array([0.5, 0.0, -0.1, 0.0, 5.0, 0.0])
+    shell, source = on_plate(ball(), LAW, FRICTION), by_source(ball())
+    both = on_plate(ball(), LAW, FRICTION)
+    both.add_contact_source(plate_points, "ball", "universe", LAW, FRICTION, name="mine")
+    one, two, sum_ = (s.external_forces(q, v)[1].vector for s in (shell, source, both))
+    assert one == pytest.approx(two, abs=1e-10)
+    assert sum_ == pytest.approx(one + two, abs=1e-10)
+    assert [type(p.side_i) for p in both.pairs] == [SphereSide, SourceSide]
 
 
 def test_an_error_in_the_callable_comes_through() -> None:

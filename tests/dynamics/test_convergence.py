@@ -39,3 +39,38 @@ def test_energy_residual_falls_at_the_order(integrator, order, friction, damping
     finest = audits[-1]
     assert (finest.damping_loss[-1] > 1e-3) == (damping > 0)
     assert (finest.friction_loss[-1] > 1e-3) == (friction is not None)
+
+
+@pytest.mark.parametrize(
+    ("law", "depth_mm"),
+    [
+        (sp.ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s"), 0.0150671588506),
+        (sp.ImpactLaw(1e8, 2.2, 150.0, 1e-4), 0.652221338485),
+    ],
+)
+def test_resting_depth(law: sp.ImpactLaw, depth_mm: float) -> None:
+    """1 kg let go a little above its rest settles at (m g / k)^(1/e)."""
+    scene = models.on_plate(models.slider(), law, radius=RADIUS)
+    q0 = np.array([RADIUS - 0.9 * depth_mm * MM])
+    slow = depth_mm > 0.1
+    dt, duration = (2e-5, 0.6) if slow else (1e-5, 0.15)
+    result = sp.Simulation(scene, sp.RungeKutta4(dt=dt)).run(q0, np.zeros(1), duration)
+    assert (RADIUS - result.q[-1, 0]) / MM == pytest.approx(depth_mm, rel=1e-9)
+    assert abs(result.v[-1, 0]) < 1e-10
+    assert scene.contacts(result.q[-1], result.v[-1]).normal_force == pytest.approx(
+        [9.81], rel=1e-8
+    )
+
+
+@pytest.mark.parametrize(
+    ("speed_mm", "restitution", "deepest_mm"), [(100, 0.2074, 0.04295), (1000, 0.0874, 0.13032)]
+)
+def test_restitution_of_impact(speed_mm: float, restitution: float, deepest_mm: float) -> None:
+    """1 kg against a fixed plane with ADAMS's defaults, no gravity."""
+    law = sp.ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s")
+    scene = models.on_plate(models.slider(gravity=0.0), law, radius=RADIUS)
+    v0 = np.array([-speed_mm * MM])
+    result = sp.Simulation(scene, sp.RungeKutta4(dt=1e-6)).run(np.array([RADIUS + 1e-6]), v0, 4e-3)
+    assert result.v[-1, 0] / (speed_mm * MM) == pytest.approx(restitution, abs=1e-4)
+    deepest = result.stats.pairs["ball-plate"].max_depth
+    assert deepest / MM == pytest.approx(deepest_mm, abs=1e-5)

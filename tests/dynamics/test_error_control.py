@@ -7,8 +7,11 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.errors import ScenarioError
+from sphshell_pin.scenario.format.build import build
 from tests import meshes, models
 from tests.programs import python
+from tests.scenario import files
 
 R = 0.05
 ROOT = Path(__file__).parents[2]
@@ -158,6 +161,28 @@ def test_a_start_in_touch_and_at_rest(integrator) -> None:
     assert [(e.t, e.kind) for e in rows.events] == [(0.0, "touch")]
     assert rows.q[-1] == pytest.approx(q, abs=1e-9)
     assert rows.stats.steps < 3000
+
+
+def scenario(run_keys: str, friction: str = "") -> str:
+    text = files.DROP.replace("dt = 1e-4\n", run_keys)
+    return text.replace("\n[run]", f"{friction}\n[run]")
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ('integrator = "adaptive"\ndt = 1e-4\n', "adaptive takes rtol and atol, not dt"),
+        ('integrator = "implicit"\ndt = 1e-4\n', "implicit takes rtol and atol, not dt"),
+        ("dt = 1e-4\nrtol = 1e-4\n", "semi-implicit-euler takes dt, not rtol and atol"),
+        ('integrator = "adaptive"\nrtol = 1\n', "rtol"),
+        ('integrator = "adaptive"\nrtol = -1e-3\n', "rtol"),
+        ('integrator = "adaptiv"\n', "adaptive"),
+    ],
+)
+def test_scenario_refuses(tmp_path: Path, keys: str, said: str) -> None:
+    with pytest.raises(ScenarioError, match=said) as caught:
+        build(files.write(tmp_path, scenario(keys)))
+    assert len(str(caught.value).splitlines()) <= 2
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 1.0), (0.5, 0, 0), (0, 1.5, 0.3)])

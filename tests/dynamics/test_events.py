@@ -137,3 +137,10 @@ def test_the_peak_of_a_stop_lies_between_steps() -> None:
     figures = result.stats.joints["ball_joint"]
     assert figures.peak_stop_force == pytest.approx(0.6 * np.sqrt(1e4), rel=1e-3)
     assert figures.max_stop_depth == pytest.approx(0.6 / np.sqrt(1e4), rel=1e-3)
+
+
+def test_fixed_steps_take_peaks_at_their_ends() -> None:
+    result = thrown(sp.RungeKutta4(1e-4), LAWS["hertz"], 0.02)
+    figures = result.stats.pairs["ball-plate"]
+    assert figures.peak_force == result.contacts.normal_force.max()
+    assert figures.peak_force_time in result.t

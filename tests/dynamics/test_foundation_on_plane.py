@@ -237,6 +237,45 @@ def test_a_disc_spins_down_with_the_published_exponents(power: float, exponent: 
     assert own or fitted[1] == pytest.approx(end, rel=0.02)
 
 
+@pytest.mark.parametrize("slope", [0.3, 0.45])
+def test_a_block_on_a_slope_slides_above_the_angle_of_friction_alone(slope: float) -> None:
+    mu = 0.4
+    friction = sp.BristleFriction(mu, mu, 1e5, 30.0)
+    scene = thrown(box(), BOX, sp.FoundationLaw(5e5, 1e-3, 10.0), friction, slope)
+    turn = pin.utils.rotate("y", slope)
+    q = np.r_[turn @ [0, 0, 0.02], pin.Quaternion(turn).coeffs()]
+    result = sp.Simulation(scene, sp.Implicit(1e-6, 1e-9)).run(q, np.zeros(6), 0.3)
+    moved = (result.v @ np.eye(6, 3))[:, 0]  # down the slope, in the box's frame
+    if slope < np.arctan(mu):
+        assert np.abs(result.v[-1]).max() < 1e-6
+    else:
+        late = result.t > 0.2
+        found = np.polyfit(result.t[late], moved[late], 1)[0]
+        expected = 9.81 * (np.sin(slope) - mu * np.cos(slope))
+        assert found == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_tall_block_tips_where_its_corner_says() -> None:
+    """Between sides in the ratio of the slope's tangent it falls over, else it stands."""
+    slope, stands = 0.2, []
+    for width in (0.9, 1.1):
+        height = 0.06
+        sides = (width * height * np.tan(slope), 0.05, height)
+        scene = thrown(
+            box(sides),
+            pin.Inertia.FromBox(0.2, *sides),
+            sp.FoundationLaw(5e7, 1e-3, 1.0),
+            sp.CoulombFriction(0.9, 0.9, 0.001, 0.1),
+            slope,
+        )
+        turn = pin.utils.rotate("y", slope)
+        q = np.r_[turn @ [0, 0, height / 2], pin.Quaternion(turn).coeffs()]
+        result = sp.Simulation(scene, sp.Implicit(1e-6, 1e-9)).run(q, np.zeros(6), 0.5)
+        lean = turn.T @ pin.Quaternion(result.q[-1, 3:]).matrix()
+        stands.append(bool(lean[2, 2] > 0.99))
+    assert stands == [False, True]
+
+
 def test_laws_and_friction_that_need_a_radius_are_refused() -> None:
     with pytest.raises(InvalidParameter, match=r"take law.on_plane\(radius\), or a FoundationLaw"):
         scene_of(box(), sp.HertzLaw(1e9, 0.3))

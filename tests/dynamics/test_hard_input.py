@@ -26,6 +26,18 @@ def test_a_ball_that_fills_a_faceted_socket_touches_every_facet() -> None:
     assert len(np.unique(inner.element)) == len(elements)
 
 
+@pytest.mark.parametrize("spin", [1.0, 100.0])
+def test_a_free_planar_body_keeps_its_momentum(spin: float) -> None:
+    model = ball_model(pin.JointModelPlanar())
+    model.gravity.linear = np.zeros(3)
+    start = np.array([0.0, 0.0, 1.0, 0.0])
+    result = sp.Simulation(sp.Scene(model), sp.SemiImplicitEuler(1e-3)).run(
+        start, [1.0, 0.0, spin], 1.0
+    )
+    assert np.linalg.norm(result.v[-1, :2]) == pytest.approx(1.0, abs=1e-12)
+    assert result.q[-1, :2] == pytest.approx([1.0, 0.0], abs=1e-12)
+
+
 def test_an_interrupted_source_leaves_a_consistent_record(tmp_path) -> None:
     """The pair before it has been evaluated when the source throws; its contacts have no row."""
     calls = 0
@@ -58,6 +70,15 @@ def test_a_joint_that_moves_no_mass_is_named() -> None:
         sp.Simulation(scene).run(pin.neutral(scene.model), None, 0.01)
     with pytest.raises(InvalidParameter, match="moves no mass"):
         scene.explain()
+
+
+def test_times_that_cannot_be_counted_are_refused() -> None:
+    scene = sp.Scene(ball_model())
+    q = pin.neutral(scene.model)
+    with pytest.raises(InvalidParameter, match="t0"):
+        sp.Simulation(scene).run(q, None, 0.01, t0=1e13)
+    rows = sp.Simulation(scene).run(q, None, 0.01, record_dt=1e9)
+    assert rows.t.tolist() == [0.0, 0.01]
 
 
 def test_normals_of_needles_do_not_depend_on_the_first_corner() -> None:

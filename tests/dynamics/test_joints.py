@@ -1,6 +1,7 @@
 """Stops, damping, dry friction, armature and limits of joints, against closed forms."""
 
 import math
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -120,6 +121,18 @@ def test_dry_friction_slides_at_101_percent(integrator: sp.Adaptive | sp.Implici
     acceleration = np.diff(result.v[-2:, 0]) / np.diff(result.t[-2:])
     assert acceleration[0] == pytest.approx(-9.81 * (1 - 1 / 1.01), rel=1e-6)
     assert residual(result) < 1e-7
+
+
+def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
+    joints = sp.JointComponents(friction={"hinge": sp.JointFriction(0.3)})
+    result = sp.Simulation(sp.Scene(link(9.81), joints=joints), sp.Adaptive(1e-8, 1e-10)).run(
+        [0.8], None, 6.0
+    )
+    # Three half swings of a pendulum lose four fifths of its height.
+    assert abs(result.v[-1, 0]) < 1e-4
+    assert residual(result) < 1e-6
+    stored = result.energy.potential[0] - result.energy.potential[-1]
+    assert result.energy.friction_loss[-1] == pytest.approx(stored, rel=1e-3)
 
 
 @pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)])
@@ -301,6 +314,18 @@ def test_an_open_run_takes_over_new_numbers_of_joints() -> None:
     after = run.advance(0.2)
     assert after.v[-1, 0] == pytest.approx(math.exp(-2.0 * 0.2 / INERTIA), rel=1e-4)
     assert not run.change(sp.Scene(link()))
+
+
+def test_results_with_joints_are_saved_and_loaded(tmp_path: Path) -> None:
+    scene = sp.Scene(link(), joints=stops(sp.ImpactLaw(STIFFNESS, 1.0)))
+    result = sp.Simulation(scene, sp.Adaptive(1e-6)).run([0.0], [2.0], 0.5)
+    loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
+    assert loaded.stats.joints == result.stats.joints
+    assert loaded.events == result.events
+    again = sp.Simulation(pickle.loads(pickle.dumps(scene)), sp.Adaptive(1e-6)).run(
+        [0.0], [2.0], 0.5
+    )
+    np.testing.assert_array_equal(again.q, result.q)
 
 
 @pytest.mark.parametrize(

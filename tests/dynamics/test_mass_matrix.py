@@ -93,6 +93,15 @@ def test_accelerations_of_random_trees_are_those_of_recursive_newton_euler(seed:
     assert check(random_tree(rng), rng) < 1e-9
 
 
+@pytest.mark.study
+def test_accelerations_of_1500_random_trees() -> None:
+    worst = 0.0
+    for seed in range(1500):
+        rng = np.random.default_rng([7, seed])
+        worst = max(worst, check(random_tree(rng), rng))
+    assert worst < 1e-9
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_energy_forces_task_and_derivatives_use_the_same_mass(seed: int) -> None:
     rng = np.random.default_rng([3, seed])

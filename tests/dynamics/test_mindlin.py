@@ -11,7 +11,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter
-from tests import models
+from tests import meshes, models
 
 R = 0.02
 RUBBER, STEEL = (4e6, 0.48), (2.1e11, 0.3)
@@ -46,6 +46,30 @@ def test_stiffness_of_equal_bodies() -> None:
         )
     assert STICKS.tangential_stiffness(0.01) == pytest.approx(8 * G_STAR * 0.01, rel=1e-14)
     assert STICKS.torsional_stiffness(0.01) == pytest.approx(16 / 3 * G_TWIST * 1e-6, rel=1e-14)
+
+
+def after(depth: float, motion: pin.Motion, time: float) -> tuple[pin.Force, pin.Force]:
+    """Wrenches after a motion at constant depth, from a touch that carries nothing."""
+    state, still = sp.BristleState(R), pin.Motion.Zero()
+    point = np.zeros(3)
+    state.advance(point, UP, depth, still, still, LAW, STICKS, dt=0.0)
+    for _ in range(10):
+        state.advance(point, UP, depth, motion, still, LAW, STICKS, dt=time / 10)
+    return sp.contact_wrench(point, UP, depth, still, still, LAW, STICKS, state)
+
+
+@pytest.mark.parametrize("depth", [1e-8, 1e-5, 1e-3])
+def test_slope_of_load_and_displacement(depth: float) -> None:
+    shift = 1e-3 * depth
+    on_i, on_j = after(depth, pin.Motion(shift / 0.1 * ALONG, np.zeros(3)), 0.1)
+    assert -on_i.linear[0] / shift == pytest.approx(8 * G_STAR * disc(depth), rel=1e-12)
+    assert on_i.linear + on_j.linear == pytest.approx(np.zeros(3), abs=0)
+
+
+@pytest.mark.parametrize("depth", [1e-8, 1e-5, 1e-3])
+def test_slope_of_torque_and_twist(depth: float) -> None:
+    on_i, _ = after(depth, pin.Motion(np.zeros(3), 1e-2 * UP), 0.1)
+    assert -on_i.angular[2] / 1e-3 == pytest.approx(16 / 3 * G_TWIST * disc(depth) ** 3, rel=1e-12)
 
 
 def held_ball(joint: pin.JointModel, depth: float, friction, inertia: pin.Inertia) -> sp.Scene:
@@ -179,6 +203,30 @@ def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
+@pytest.mark.parametrize(
+    "integrator",
+    [sp.SemiImplicitEuler(1e-4), sp.RungeKutta4(1e-4), sp.LinearlyImplicitEuler(1e-3),
+     sp.Adaptive(), sp.Implicit()],
+    ids=str,
+)  # fmt: skip
+def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyped-def]
+    angle = math.radians(10)
+    model = models.empty()
+    model.gravity.linear = 9.81 * np.array([math.sin(angle), 0.0, -math.cos(angle)])
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    law = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT, restitution=0.1, speed=0.1)
+    friction = sp.MindlinFriction(0.5, 0.4, *SOFT, damping_time=0.01)
+    scene = models.on_plate(model, law, friction)
+    start = [0.0, 0.0, 0.05 - law.depth_at(9.81 * math.cos(angle))]
+    run = sp.Simulation(scene, integrator).run(start, duration=4.0, record_dt=1.0)
+    assert np.abs(run.v[-1]).max() < 1e-8
+    force = run.contacts.friction_force_world[-1]
+    assert force[0] == pytest.approx(-9.81 * math.sin(angle), rel=1e-5)
+    depth = law.depth_at(9.81 * math.cos(angle))
+    stretch = 9.81 * math.sin(angle) / friction.tangential_stiffness(math.sqrt(0.05 * depth))
+    assert run.q[-1, 0] == pytest.approx(stretch, rel=1e-3)
+
+
 @pytest.mark.parametrize("rings", [1, 4])
 def test_a_spin_dies_out_at_the_moment_limit(rings: int) -> None:
     """M = 3 pi / 16 mu N a."""
@@ -227,6 +275,31 @@ class TestRolling:
         roots = np.roots([-0.5, 0.0, 1.5, -0.5])
         share = float(roots[(roots > 0) & (roots < 1)][0].real)
         assert run.q[-1, 0] - run.q[-2, 0] == pytest.approx(0.1 * share * 0.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("rings", [1, 3])
+def test_friction_is_continuous_over_a_groove(rings: int) -> None:
+    """Where contacts split and merge; and friction gives nothing back."""
+    shell = sp.Shell(*meshes.v_groove(math.radians(5), size=2.0, cells=6))
+    scene = sp.Scene(models.ball(radius=0.1))
+    law = sp.HuntCrossleyLaw(3e5, 1.5, 0.5)
+    friction = sp.MindlinFriction(
+        0.4, 0.3, 1e6, 0.4, torsional=True, damping_time=1e-4, rings=rings
+    )
+    scene.add_contact(sp.Sphere(0.1, "ball"), shell, law=law, friction=friction)
+    height = 0.1 / math.cos(math.radians(5)) + 0.02 * math.tan(math.radians(5)) - 5e-4
+    jumps = []
+    for record_dt in (2e-4, 2.5e-5):
+        run = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
+            models.free_q([-0.02, 0.1, height]), [0.4, 0.03, -0.035, 0, 2, 5.0], 0.1,
+            record_dt=record_dt,
+        )  # fmt: skip
+        assert np.bincount(run.contacts.row).max() > 1
+        force = np.zeros((len(run.t), 3))
+        np.add.at(force, run.contacts.row, run.contacts.friction_force_world)
+        jumps.append(np.linalg.norm(np.diff(force[5:], axis=0), axis=1).max())
+        assert np.abs(run.energy.residual).max() < 1e-6 * run.energy.exchanged
+    assert jumps[1] < 0.4 * jumps[0]
 
 
 def test_a_source_has_no_radius() -> None:

@@ -216,3 +216,12 @@ def test_round_the_rim_after_having_been_pushed_past() -> None:
     assert back.any()
     assert np.array_equal(log.normal_world[back, 2], np.ones(back.sum()))
     assert log.depth[back].max() <= R
+
+
+def test_sliding_fast_after_a_hit_goes_back_to_fixed_steps() -> None:
+    """A step of a quarter of the radius is made as it is: 0.2 mm a step here."""
+    friction = sp.BristleFriction(0.05, 0.05, 1e4, 50.0)
+    law = models.linear_law(1e4, 100.0)
+    scene = scene_of(point_mass(gravity=9.81), sheet(20.0), law, friction=friction)
+    down = run(scene, sp.SemiImplicitEuler(1e-3), [0.0, 0.0, 3 * R], [0.2, 0.0, -2.0], 1.0)
+    assert down.stats.evaluations < 3000

@@ -65,6 +65,17 @@ def test_rings_against_the_theory(rings: int) -> None:
         assert np.diff(energy.friction_loss).min() > -1e-8 * energy.exchanged
 
 
+def test_rings_converge_to_micro_slip() -> None:
+    """The rms of v_t' / v_t against Maw et al.'s theory."""
+    psi = KAPPA * np.tan(np.radians([2.0, 5, 10, 15, 20, 25, 30, 40, 60, 80])) / MU
+    exact = oblique.micro_slip(psi, KAPPA, steps=20_000)
+    errors = [
+        2 / 7 * (oblique.rings(psi, KAPPA, n, steps=20_000) - exact) / psi for n in (1, 2, 4, 8)
+    ]
+    rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
+    assert rms == pytest.approx([0.0581, 0.0333, 0.0158, 0.0073], abs=1e-4)
+
+
 @pytest.mark.parametrize("restitution", [1.0, 0.98])
 @pytest.mark.parametrize("degrees", [35, 50, 70, 85])
 def test_gross_sliding(degrees: float, restitution: float) -> None:

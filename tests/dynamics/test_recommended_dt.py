@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.scene.explain import relaxation_time, weakness
+from sphshell_pin.dynamics.scene.explain import _round_down, relaxation_time, weakness
 from sphshell_pin.errors import SetupWarning
 from tests import models
 from tests.dynamics.scenes import in_touch, two_spheres
@@ -307,6 +307,13 @@ def test_what_does_not_move_at_all_has_no_mass() -> None:
 def test_what_is_heavier_than_a_mountain_does_not_move(mass: float, moves: bool) -> None:
     pair = models.on_plate(models.slider(0.0, mass), ELASTIC["linear"]).explain([RADIUS]).pairs[0]
     assert math.isfinite(pair.effective_mass) == moves
+
+
+def test_rounding_forgives_rounding() -> None:
+    for digit, below in ((1.0, 0.5), (2.0, 1.0), (5.0, 2.0)):
+        assert _round_down(digit * (1 - 0.75e-12)) == digit
+        assert _round_down(digit * (1 - 1.5e-12)) == below
+        assert _round_down(digit) == digit
 
 
 def source(points: list, depths: list, friction: sp.BristleFriction | None = None) -> sp.Scene:

@@ -152,6 +152,20 @@ def test_a_failed_run_is_noted_and_the_rest_kept() -> None:
     assert np.isnan(rollout.figures[f"{PAIR}.peak_force"][3])
 
 
+def test_controllers_are_checked_before_anything_runs() -> None:
+    asked: list[float] = []
+
+    def ask(t, q, v, contacts):  # type: ignore[no-untyped-def]
+        asked.append(t)
+        return np.zeros(1)
+
+    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
+    controllers = [ask] * 199 + [sp.JointPD(-1.0, 1.0)]
+    with pytest.raises(errors.InvalidParameter, match="controller of run 199"):
+        simulation.rollout(np.full((200, 1), 0.1), None, 0.01, threads=1, controller=controllers)
+    assert not asked
+
+
 def test_what_a_routine_raised_is_told_whole() -> None:
     class Silent(Exception):
         pass
@@ -191,6 +205,17 @@ def test_contact_sources_over_threads(friction) -> None:
     for run in (0, 2, 3, 5):
         alone = simulation.run(q0s[run], v0s[run], 0.02, record_dt=5e-3)
         assert_same_bits(rollout[run], alone)
+
+
+def test_frictions_of_all_kinds_side_by_side() -> None:
+    q0s, v0s = starts(3)
+    kinds = [None, models.FRICTION, BRISTLES]
+    rollout = sp.Simulation(ball_on_plate(), sp.Implicit()).rollout(
+        q0s, v0s, 0.05, threads=3, vary={f"{PAIR}.friction": kinds}, record_dt=1e-2
+    )
+    for run, friction in enumerate(kinds):
+        alone = sp.Simulation(ball_on_plate(friction), sp.Implicit())
+        assert_same_bits(rollout[run], alone.run(q0s[run], v0s[run], 0.05, record_dt=1e-2))
 
 
 def test_deep_starts_in_a_solid_are_seen_as_run_sees_them() -> None:

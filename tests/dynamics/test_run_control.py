@@ -123,6 +123,30 @@ def test_deep_start() -> None:
     assert caught.value.radius == RADIUS
 
 
+def test_a_failed_run_leaves_the_simulation_usable() -> None:
+    sim = bouncing()
+    before = sim.run(*START, 0.05)
+    with pytest.raises(errors.InvalidParameter):
+        sim.run(np.zeros(3), np.zeros(6), 0.1)
+    with pytest.raises(errors.DeepStart):
+        sim.run(models.free_q([0, 0, 0.01]), np.zeros(6), 0.1)
+    assert np.array_equal(sim.run(*START, 0.05).q, before.q)
+
+
+def test_a_python_controller_sees_contacts() -> None:
+    seen = []
+
+    def controller(t, q, v, contacts):
+        seen.append(float(contacts.normal_force.sum()))
+        return np.zeros(1)
+
+    scene = models.on_plate(models.slider(), models.linear_law(4000.0))
+    rest = np.array([RADIUS - 9.81 / 4000.0])
+    sim = sp.Simulation(scene, sp.SemiImplicitEuler(dt=1e-3))
+    sim.run(rest, np.zeros(1), 0.01, controller, control_dt=2e-3)
+    assert seen == pytest.approx([9.81] * 5, rel=1e-9)
+
+
 def test_a_python_controller_equals_the_built_in_one() -> None:
     """Joint PD without gravity compensation, evaluated at every step."""
     kp, kd = np.array([40.0, 40.0, 20.0]), np.array([2.0, 2.0, 1.0])

@@ -74,6 +74,17 @@ def test_the_own_loop_moves_as_a_run(free: bool, torsional: bool, speed: float) 
     assert contacts.friction_force_world == pytest.approx(row.friction_force_world, abs=1e-3)
 
 
+def test_a_block_on_a_slope_stays_only_with_a_state() -> None:
+    scene = on_slope()
+    q, v = start(scene)
+    settled, _, _ = own_loop(scene, q, v, 5000)
+    later, _, _ = own_loop(scene, q, v, 20000)
+    assert later == pytest.approx(settled, abs=1e-9)
+    assert np.linalg.norm(later - q) < 3 * G / K
+    slid, _, _ = own_loop(scene, q, v, 5000, remember=False)
+    assert np.linalg.norm(slid - q) > 1e-3
+
+
 def test_evaluations_change_nothing_and_copies_are_independent() -> None:
     scene = on_slope()
     q, v, state = own_loop(scene, *start(scene), 500)

@@ -150,6 +150,11 @@ def test_two_spheres_that_collide() -> None:
     assert np.abs(one + two).max() <= 1e-6 * np.abs(one).max()
 
 
+def sampled(t: float, q: Array, v: Array, contacts: object) -> Array:
+    """A controller without a memory, whose torques follow the state."""
+    return -30.0 * (q - 0.06) - 2.0 * v + 10.0
+
+
 @pytest.mark.parametrize(
     ("control_dt", "integrator"),
     mostly_studies(
@@ -181,6 +186,13 @@ def test_a_controller_of_the_package(control_dt: float | None, integrator: str) 
     assert len(result.contacts.t) >= 3
 
 
+@pytest.mark.parametrize("integrator", ["adaptive", "runge-kutta"])
+def test_a_controller_of_the_users_own(integrator: str) -> None:
+    case = drop(HUNT, INTEGRATORS[integrator], duration=0.05)
+    case.options |= {"controller": sampled, "control_dt": 1e-3}
+    case.check([f"{PAIR}.law.stiffness", "v0"])
+
+
 @pytest.mark.parametrize("integrator", ["adaptive", "implicit"])
 def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     """The acceleration jumps there; so do the derivatives of v."""
@@ -192,6 +204,32 @@ def test_torques_that_jump_at_the_touch(integrator: str) -> None:
 
     case = Case(scene, [R + 0.004], [-0.3], 0.06, INTEGRATORS[integrator], controller=tau)
     case.check(["q0", "v0", "ball.law.stiffness", "ball.sphere.radius"], bounces=1)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-9)], ids=str)
+def test_the_panda_on_the_blade(integrator: object) -> None:
+    """The scenario's impedance controller, 50 ms from before the touch."""
+    pytest.importorskip("example_robot_data")
+    from sphshell_pin.scenario import build
+
+    built = build("fingertip_on_blade")
+    pair = built.scene.pairs[0].name
+    case = Case(
+        built.scene,
+        built.q0,
+        built.v0,
+        0.05,
+        integrator,
+        controller=built.controller,
+        control_dt=1e-3,
+        record_dt=0.01,
+    )
+    names = ["law.stiffness", "law.damping", "friction.mu_static", "sphere.radius", "placement"]
+    # The controller's torques are differenced; its decoupling solves for an inertia of 6 by 6.
+    columns = [f"{pair}.{name}" for name in names] + ["v0"]
+    result = case.check(columns, depth=1e-4, tolerance=3e-5)
+    assert len(result.contacts.t)
 
 
 def test_a_joint_that_meets_its_stop() -> None:

@@ -106,3 +106,10 @@ def damaged(file, name, change):
 def test_a_damaged_file_is_refused(file, name, change, said):
     with pytest.raises(ResultError, match=said):
         sp.Result.load(damaged(file, name, change))
+
+
+def test_they_count_as_memory(bounced, file):
+    rows = bounced.sensitivities
+    needed = sum(a.nbytes for a in (rows.q, rows.v, rows.force_world, rows.normal_force))
+    with pytest.raises(ResultError, match="max_size"):
+        sp.Result.load(file, max_size=needed)

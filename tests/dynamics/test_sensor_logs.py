@@ -68,3 +68,12 @@ def test_readings_are_columns(tmp_path):
     frame = result.sensors["torque"].to_dataframe()
     assert list(frame) == ["t [s]", "sampled [s]", "force [N]"]
     assert frame["force [N]"].tolist() == result.sensors["torque"].values[:, 0].tolist()
+
+
+def test_readings_are_drawn():
+    figure = two_sensors().plot("sensors")
+    titles = [axis.get_title(loc="left") for axis in figure.axes]
+    assert titles == ["wrist", "wrist", "torque"]
+    assert [len(axis.lines) for axis in figure.axes] == [3, 3, 1]
+    empty = slider(sp.Adaptive(), []).run([0.0], None, 0.1).plot("sensors")
+    assert empty.axes[0].texts[0].get_text() == "no sensors"

@@ -6,7 +6,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import robots
-from tests.dynamics.test_sensor_wrench import arm, read, sensor, weight
+from tests.dynamics.test_sensor_wrench import URDF, arm, read, sensor, weight
 from tests.models import pose_of
 
 
@@ -83,3 +83,16 @@ def test_robots_that_were_joined(lock):
         result = read(scene, left, sp.GravityCompensation(), [sensor(frame)])
         seen = result.sensors["wrist"].values[0]
         assert np.abs(seen - weight(one, posture)).max() < 1e-10
+
+
+def test_nothing_holds_a_floating_base():
+    base = """<link name="base"><inertial><mass value="3"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+    urdf = URDF.replace('<link name="base"/>', base)
+    model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+    q = np.array([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0, 0.4, -0.7])
+    sensors = [sensor("mount"), sp.ForceTorqueSensor(name="root", frame="base")]
+    simulation = sp.Simulation(sp.Scene(model), sp.Adaptive(), sensors)
+    result = simulation.run(q, np.linspace(-1, 1, model.nv), 0.1)
+    assert np.abs(result.sensors["root"].values).max() < 1e-12
+    assert np.abs(result.sensors["wrist"].values).max() > 0.1

@@ -102,6 +102,14 @@ def test_they_are_saved_and_known_to_rollouts_and_open_runs(tmp_path):
     assert open_run.snapshot().torque.shape == (1, 3)
 
 
+def test_a_start_that_was_recorded_before_has_none():
+    open_run = OpenRun(simulation(), Q0, controller=pd(), record_dt=1e-3)
+    open_run.record_torques()
+    rows = open_run.advance(2e-3)
+    assert np.isnan(rows.torque[0]).all()
+    assert np.isfinite(rows.torque[1:]).all()
+
+
 def test_another_name_is_refused():
     with pytest.raises(InvalidParameter, match="must be 'patch' or 'torque'"):
         simulation().run(Q0, duration=0.01, record=["force"])

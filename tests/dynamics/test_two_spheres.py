@@ -228,6 +228,19 @@ def test_a_deep_start_is_refused_by_the_smaller_radius() -> None:
     sp.Simulation(scene, sp.Adaptive(1e-6)).run(q, v, 1e-4)
 
 
+def test_radius_and_offset_of_the_other_sphere_vary() -> None:
+    scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
+    q, _ = in_touch(7)
+    results = sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).rollout(
+        np.stack([q, q]),
+        np.zeros((2, 12)),
+        1e-5,
+        vary={"balls.other_sphere.radius": [OTHER, OTHER + 1e-3]},
+    )
+    depths = [float(result.contacts.depth[0]) for result in results]
+    assert np.isclose(depths[1] - depths[0], 1e-3)
+
+
 def test_spheres_of_a_geometry_model_collide() -> None:
     model = two_bodies()
     geometry = pin.GeometryModel()

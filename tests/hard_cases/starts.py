@@ -1,6 +1,7 @@
 """Starts and postures on the verge.
 
-A start in overlap, a path that overlaps by 1e-12 m, a joint at its limit.
+A start in overlap, a path that overlaps by 1e-12 m, a finger that presses along its own length, a
+joint at its limit.
 """
 
 import math
@@ -15,6 +16,8 @@ from tests import models
 from tests.hard_cases.verdict import Verdict, Verdicts, at_most, case, compare
 
 RADIUS, MASS = 0.01, 0.1
+# Audit of a run: energy from nowhere, of the energy exchanged.
+AUDIT = 1e-4
 
 
 def leaving_speed(depth: float, exponent: float, integrator: Any) -> tuple[float, float]:
@@ -91,6 +94,61 @@ def grazing() -> Verdicts:
             slowed = abs(1 - along - mu * away)
             law = "slowed by mu of that"
             yield at_most("graze", tried, law, slowed, 0.1 * form + 1e-14)
+
+
+def finger_scene(press: float, friction: Any = None) -> sp.Scene:
+    """Return a straight finger along z, its tip `press` [m] deep in a level wall over it."""
+    model = robots.load("three_link_finger").model
+    tip = models.pose_of(model, np.zeros(3), "tip").translation
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Sphere(RADIUS, "tip"),
+        models.plate(0.3),
+        placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, tip[2] + RADIUS - press])),
+        law=sp.HuntCrossleyLaw(1e5, 1.0, 1.0),
+        friction=friction,
+        name="tip-wall",
+    )
+    return scene
+
+
+def stretched(integrator: Any, start: float, friction: Any) -> tuple[float, float]:
+    """Press a finger that is bent by `start` [rad] a joint along its length on a wall.
+
+    Return the residual of the energy, of what is exchanged and stored, and the largest joint angle
+    at the end. At zero the
+    press is in the singular direction: no torque answers it, and the mass along it has no bound.
+    """
+    scene = finger_scene(1e-4, friction)
+    controller = sp.CartesianImpedance(
+        "tip", [[0.0, 0.0, 0.2]], stiffness=100.0, damping=1.0, joint_damping=0.01
+    )
+    q = np.full(3, start)
+    result = sp.Simulation(scene, integrator).run(
+        q, duration=0.5, controller=controller, record_dt=1e-3
+    )
+    finite = np.isfinite(result.q).all() and np.isfinite(result.v).all()
+    energy = result.energy
+    residual = np.abs(energy.residual).max() / (energy.exchanged + energy.elastic.max())
+    return float(residual) if finite else math.nan, float(np.abs(result.q[-1]).max())
+
+
+@case("finger that presses along its own length", slow=True)
+def singular() -> Verdicts:
+    friction = sp.CoulombFriction(0.3, 0.25, 0.005, 0.05)
+    for integrator, bound in (
+        (sp.Adaptive(), AUDIT),
+        (sp.Implicit(), AUDIT),
+        (sp.RungeKutta4(1e-5), AUDIT),
+        (sp.SemiImplicitEuler(1e-5), 1e-2),
+    ):
+        for start in (0.0, 1e-6, 0.05):
+            residual, angle = stretched(integrator, start, friction)
+            tried = f"{type(integrator).__name__}, joints bent by {start:g} rad"
+            law = "energy audit, of what is exchanged and stored"
+            yield at_most("singular posture", tried, law, residual, bound)
+            law = "stays within a turn [rad]"
+            yield at_most("singular posture", tried, law, angle, math.pi)
 
 
 @case("joint driven past its limit")

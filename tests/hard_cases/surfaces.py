@@ -11,7 +11,8 @@ import numpy as np
 
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.study.report.surfaces import Mesh
+from sphshell_pin.study.report.surfaces import Mesh, icosphere
+from sphshell_pin.study.report.swing import any_turn
 from tests import meshes
 from tests.contact.smooth import surfaces as unit
 from tests.hard_cases.balls import RADIUS
@@ -49,6 +50,39 @@ def grid(
 def count(length: float, side: float) -> int:
     """Return the rows of cells over `length` [m] whose triangles have sides of about side * r."""
     return math.ceil(1.15 * length / (side * RADIUS))
+
+
+def sphere(radius: float, side: float = SIDE) -> Shell:
+    """Closed sphere about the origin: a bowl from inside, a dome from outside."""
+    level = max(0, round(math.log2(1.16 * radius / (side * RADIUS))))
+    mesh, turn = icosphere(level, radius), any_turn()
+    return shell_of(Mesh(mesh.vertices @ turn.T, mesh.triangles, mesh.normals @ turn.T))
+
+
+CYLINDER = unit.TUBE * RADIUS
+
+
+def cylinder(side: float = SIDE) -> Shell:
+    """Open cylinder of radius CYLINDER round z, as long as wide."""
+    vertices, triangles, normals = unit.cylinder_mesh(side)
+    return shell_of(Mesh(vertices * RADIUS, triangles, normals))
+
+
+def cone(half_angle: float, low: float, high: float, side: float = SIDE) -> Shell:
+    """Cone round z, apex at the origin, open upward; between the heights `low` and `high`."""
+    sine, cosine = math.sin(half_angle), math.cos(half_angle)
+
+    def place(z: Array, angle: Array) -> tuple[Array, Array]:
+        out = np.stack([np.cos(angle), np.sin(angle), np.zeros(angle.size)], axis=1)
+        points = (z * math.tan(half_angle))[:, None] * out
+        points[:, 2] = z
+        normals = -cosine * out
+        normals[:, 2] = sine
+        return points, normals
+
+    rows = count((high - low) / cosine, side)
+    columns = count(2 * math.pi * 0.5 * (low + high) * math.tan(half_angle), side)
+    return grid(place, (low, high), (0.0, 2 * math.pi), rows, columns, ring=True)
 
 
 def plate(size: float = 2.0) -> Shell:

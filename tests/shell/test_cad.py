@@ -20,6 +20,7 @@ from sphshell_pin.errors import (
     UnusableExtra,
 )
 from tests.parts.occ import area_and_volume
+from tests.programs import python
 from tests.shell import cad_shapes as shapes
 
 
@@ -230,6 +231,19 @@ def test_a_library_of_the_system_that_is_absent_is_named(reason, told, tmp_path,
     with pytest.raises(UnusableExtra, match="installed but cannot be loaded: .*" + told) as caught:
         Shell.from_file(path, "mm")
     assert caught.value.reason == reason
+
+
+def test_the_library_is_never_imported(tmp_path):
+    """So does reading a CAD file: another process imports it."""
+    path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
+    code = f"""
+import sys, sphshell_pin
+print(len(sphshell_pin.Shell.from_file({str(path)!r}, "mm").face_names))
+print(any(m.split(".")[0] == "OCP" for m in sys.modules))
+"""
+    done = python(code, check=True)
+    assert done.stdout.split() == ["6", "False"]
+    assert done.stderr == ""
 
 
 def test_a_scenario_takes_a_body_of_a_cad_file_without_a_unit(tmp_path):

@@ -9,7 +9,8 @@ import pytest
 pytest.importorskip("OCP")
 
 from sphshell_pin import Shell
-from sphshell_pin.shell.cad import require_kernel
+from sphshell_pin.shell.cad import require_kernel, tessellation
+from sphshell_pin.shell.curvature import curved_mesh
 from tests.oracle.cad import ExactShape, curved_places, deviation
 from tests.parts.occ import faces as occ_faces
 from tests.shell import cad_shapes as shapes
@@ -129,6 +130,22 @@ def test_long_elements_beside_nearly_tangent_joints(turns, scale, tmp_path):
     )
 
 
+def test_curved_elements_do_not_overshoot_at_narrow_bends():
+    """This blade has bends of 12 degrees within a millimeter.
+
+    A flat element may end in one and be near all along; curved to the normal there it is not.
+    """
+    shell, exact = real("bladex_upper.iges")
+    points, _, _ = curved_mesh(shell, 2)
+    corners = shell.vertices[shell.triangles]
+    off = points.reshape(len(corners), -1, 3) - corners[:, :1]
+    bulge = np.abs(np.einsum("tkx,tx->tk", off, shell.triangle_normals)).max(axis=1)
+    largest = np.argsort(-bulge)[:40]
+    places = points.reshape(len(corners), -1, 3)[largest].reshape(-1, 3)
+    stated, _, _ = stated_and_measured(shell)
+    assert exact.distances(places).max() <= 0.5 * stated
+
+
 @pytest.mark.parametrize("name", KNOWN)
 def test_smooth_forces_are_or_converge_to_those_on_the_exact_surface(name, tmp_path):
     known = KNOWN[name]
@@ -143,3 +160,20 @@ def test_smooth_forces_are_or_converge_to_those_on_the_exact_surface(name, tmp_p
         return
     assert order((rms(found[0]), rms(found[1])), tuple(chords)) >= 2.9
     assert found[1].max() < 4e-4
+
+
+def test_a_face_that_gets_no_triangles_is_meshed_more_finely(monkeypatch):
+    """OpenCASCADE finds none for some faces of real files until its deflection is smaller."""
+    shape = shapes.drilled_plate()
+    found = tuple(occ_faces(shape))
+    lay, count, laid = tessellation._lay, tessellation.count_laid, []
+    monkeypatch.setattr(tessellation, "_lay", lambda *of: (laid.append(of[1]), lay(*of)))
+    monkeypatch.setattr(
+        tessellation,
+        "count_laid",
+        lambda face: 0 if face is found[0] and laid[-1] > 1e-2 else count(face),
+    )
+    made = tessellation.tessellate(shape, found, 50.0, 5e-2, 1e-3)
+    assert None not in made.meshes
+    assert laid[-1] < 1e-2
+    assert made.error <= 5e-2

@@ -91,6 +91,18 @@ def test_quads_stay_quads_between_meshes(tmp_path):
     assert Shell.from_file(tmp_path / "a.shl").size == pytest.approx(0.01 * 2**0.5)
 
 
+def test_a_body_is_converted_alone(tmp_path):
+    path = shapes.write_step(
+        tmp_path / "two.step", ("plate", shapes.box()), ("pin", shapes.cylinder())
+    )
+    done = convert(path, tmp_path / "pin.iges", bodies=["pin"])
+    assert done.target.count == 3
+    assert Shell.from_file(tmp_path / "pin.iges").is_closed
+    assert convert(path, tmp_path / "side.step", faces=[7]).target.count == 1
+    again = convert(path, tmp_path / "both.step").target.path
+    assert np.allclose(Shell.from_file(again, bodies=["pin"]).box[0, 0], 0.095, atol=1e-4)
+
+
 def test_a_failed_conversion_leaves_the_old_file_and_nothing_else(plate, tmp_path, monkeypatch):
     convert(plate, tmp_path / "mesh.stl")
     for name in ("out.stl", "out.iges"):
@@ -143,15 +155,3 @@ def test_the_command_prints_what_it_measured(plate, tmp_path):
     told = call("convert", target, tmp_path / "out.obj")
     assert told.exit_code == 2
     assert "--unit-in mm" in told.output
-
-
-def test_a_body_is_converted_alone(tmp_path):
-    path = shapes.write_step(
-        tmp_path / "two.step", ("plate", shapes.box()), ("pin", shapes.cylinder())
-    )
-    done = convert(path, tmp_path / "pin.iges", bodies=["pin"])
-    assert done.target.count == 3
-    assert Shell.from_file(tmp_path / "pin.iges").is_closed
-    assert convert(path, tmp_path / "side.step", faces=[7]).target.count == 1
-    again = convert(path, tmp_path / "both.step").target.path
-    assert np.allclose(Shell.from_file(again, bodies=["pin"]).box[0, 0], 0.095, atol=1e-4)

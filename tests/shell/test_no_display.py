@@ -47,3 +47,14 @@ def test_a_step_file_is_read_without_them(without_display: list[str]) -> None:
         check=False,
     )
     assert (read.returncode, read.stdout, read.stderr) == (0, "27\n", "")
+
+
+def test_the_demo_runs_without_them(without_display: list[str], tmp_path: Path) -> None:
+    """What `make demo` runs when it has built; the job demo of CI builds too."""
+    program = Path(sys.executable).with_name("sphshell-pin")
+    run = [program, "run", "fingertip_on_blade", "--out", tmp_path / "r"]
+    done = subprocess.run([*without_display, *run], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "as expected" in done.stdout
+    assert "missed" not in done.stdout
+    assert (tmp_path / "r" / "recording.html").exists()

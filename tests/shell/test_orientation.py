@@ -54,6 +54,13 @@ def test_nested_components_alternate():
     assert any("cavity" in sentence for sentence in health.repairs)
 
 
+def test_a_cavity_wound_as_such_is_left_alone():
+    cavity = (0.5 * CUBE + 0.25, [q[::-1] for q in CUBE_QUADS])
+    surface = clean(*joined((CUBE, CUBE_QUADS), cavity))
+    assert surface.health.flipped_elements == 0
+    assert surface.health.volume == pytest.approx(1 - 0.125)
+
+
 def test_two_cubes_with_a_common_edge_are_both_closed():
     surface = clean(*joined((CUBE, CUBE_QUADS), (CUBE + np.array([1.0, 1.0, 0.0]), CUBE_QUADS)))
     health = surface.health
@@ -89,6 +96,13 @@ def test_a_missing_half_of_a_face_is_a_hole():
     assert (health.holes, health.hole_edges) == (1, 3)
     assert health.largest_hole_area == pytest.approx(0.5)
     assert any("wrong number of corners" in sentence for sentence in health.problems)
+
+
+def test_a_sheet_is_no_hole():
+    for n in (1, 2, 7):
+        health = clean(*plate(n)).health
+        assert health.ok
+        assert (health.holes, health.boundary_loops, health.boundary_edges) == (0, 1, 4 * n)
 
 
 @given(st.randoms(use_true_random=False), st.integers(0, 2**32 - 1))

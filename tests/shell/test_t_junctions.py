@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sphshell_pin.shell import Shell, clean
 
-from .surfaces import areas
+from .surfaces import CUBE, CUBE_QUADS, areas, plate
 
 
 def halves(cuts, gap=0.0):
@@ -62,6 +62,16 @@ def test_dropping_a_filler_opens_a_crack_that_is_closed_again():
     assert surface.health.t_junctions == 1
     assert surface.health.boundary_edges == 4
     assert surface.health.components == 1
+
+
+def test_a_closed_cube_with_a_finer_face_is_closed():
+    vertices, quads = plate(4, height=1.0)
+    points = np.concatenate([CUBE, vertices])
+    elements = [q for q in CUBE_QUADS if q != [1, 5, 7, 3]] + (quads + 8).tolist()
+    health = clean(points, elements).health
+    assert health.is_closed
+    assert health.volume == pytest.approx(1.0, rel=1e-12)
+    assert health.t_junctions == 12
 
 
 def test_corner_normals_are_interpolated():

@@ -9,6 +9,8 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.units import (
     ADAMS_UNITS,
     METERS_PER_UNIT,
+    adams_damping_to_si,
+    adams_length_to_si,
     adams_stiffness_from_si,
     adams_stiffness_to_si,
     length_to_meters,
@@ -28,6 +30,14 @@ def test_lengths():
             meters_per_unit(wrong)
 
 
+def test_default_stiffness_of_adams_is_not_1e8():
+    assert adams_stiffness_to_si(1e5, 2.2) == pytest.approx(1e5 * 1000**2.2)
+    assert adams_stiffness_to_si(1e5, 1.0) == pytest.approx(1e8)
+    assert adams_damping_to_si(10.0) == pytest.approx(1e4)
+    assert adams_length_to_si(0.1) == pytest.approx(1e-4)
+    assert adams_stiffness_to_si(7.0, 1.5, "m-N-s") == 7.0
+
+
 @given(st.sampled_from(sorted(ADAMS_UNITS)), st.floats(1.0, 3.0), st.floats(1e-3, 1e3))
 def test_the_force_does_not_depend_on_the_unit(units, exponent, depth):
     length, force = ADAMS_UNITS[units]
@@ -36,6 +46,11 @@ def test_the_force_does_not_depend_on_the_unit(units, exponent, depth):
         force * 3.0 * depth**exponent, rel=1e-12
     )
     assert adams_stiffness_from_si(stiffness, exponent, units) == pytest.approx(3.0)
+
+
+def test_unknown_system():
+    with pytest.raises(InvalidParameter, match="mm-N-s, m-N-s"):
+        adams_damping_to_si(1.0, "furlong-N-s")
 
 
 def test_size_warning():

@@ -12,6 +12,15 @@ from sphshell_pin.shell import clean
 from .surfaces import CUBE, CUBE_QUADS, areas, by_place, joined, plate, tetrahedron
 
 
+def test_soup_becomes_one_surface():
+    vertices, quads = plate(6)
+    surface = clean(vertices[quads].reshape(-1, 3), np.arange(4 * len(quads)).reshape(-1, 4))
+    assert len(surface.vertices) == 49
+    assert surface.health.welded_vertices == 4 * 36 - 49
+    assert surface.health.boundary_edges == 24
+    assert "merged" in surface.health.repairs[0]
+
+
 @pytest.mark.parametrize(("factor", "merged"), [(0.99, True), (1.01, False)])
 def test_tolerance_is_a_share_of_the_box(factor, merged):
     vertices, quads = plate(2)
@@ -43,6 +52,29 @@ def test_grid_finds_what_all_pairs_find(seed, count, spread):
     found, distance = _core.mend_weld(points, tolerance)
     assert found.tolist() == group.tolist()
     assert distance == pytest.approx(np.linalg.norm(points - points[group], axis=1).max())
+
+
+def test_first_position_is_kept_exactly():
+    points = np.array([[0.1, 0.2, 0.3], [1, 0, 0], [0, 1, 0], [0.1, 0.2, 0.3 + 1e-8], [1, 1, 0]])
+    surface = clean(points, [[0, 1, 2], [3, 1, 4]])
+    assert surface.health.welded_vertices == 1
+    assert surface.health.weld_distance == pytest.approx(1e-8, rel=1e-6)
+    assert (surface.vertices == points[0]).all(axis=1).any()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.randoms(use_true_random=False), st.integers(0, 2**32 - 1))
+def test_groups_do_not_depend_on_the_order(random, seed):
+    rng = np.random.default_rng(seed)
+    vertices, quads = plate(3)
+    # Chains of near vertices, some across the cells of the welding grid.
+    soup = vertices[quads].reshape(-1, 3) + rng.uniform(-6e-8, 6e-8, (36, 3))
+    order = list(range(len(soup)))
+    random.shuffle(order)
+    place = np.argsort(order)
+    one = clean(soup, np.arange(36).reshape(-1, 4))
+    two = clean(soup[order], place[np.arange(36).reshape(-1, 4)])
+    assert one.health.welded_vertices == two.health.welded_vertices
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-12, 1e3])
@@ -81,6 +113,11 @@ def test_limit_of_area_is_against_the_longest_edge(height, kept):
     assert surface.health.degenerate_elements == (0 if kept else 1)
 
 
+def test_small_but_well_shaped_elements_survive():
+    vertices, triangles = joined(tetrahedron(), tetrahedron(1e-5, (2.0, 0, 0)))
+    assert clean(vertices, triangles).health.elements == 8
+
+
 def test_duplicates_of_both_windings_are_dropped():
     extra = [[3, 2, 0, 1], [2, 3, 1, 0], [0, 4, 5, 1]]
     health = clean(CUBE, CUBE_QUADS + extra).health
@@ -117,11 +154,3 @@ def test_nothing_left_is_an_error():
         clean(points, [[0, 1, 2], [1, 2, 3]])
     with pytest.raises(InvalidShell, match="one place"):
         clean(np.ones((3, 3)), [[0, 1, 2]])
-
-
-def test_first_position_is_kept_exactly():
-    points = np.array([[0.1, 0.2, 0.3], [1, 0, 0], [0, 1, 0], [0.1, 0.2, 0.3 + 1e-8], [1, 1, 0]])
-    surface = clean(points, [[0, 1, 2], [3, 1, 4]])
-    assert surface.health.welded_vertices == 1
-    assert surface.health.weld_distance == pytest.approx(1e-8, rel=1e-6)
-    assert (surface.vertices == points[0]).all(axis=1).any()

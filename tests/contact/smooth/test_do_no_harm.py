@@ -17,6 +17,7 @@ from tests.contact.smooth.parts import (
     fillet,
     random_extruded,
     random_turned,
+    turned,
 )
 from tests.contact.smooth.surfaces import SURFACES, mean_edge, shell_of
 
@@ -32,6 +33,17 @@ def test_random_parts(make, averaged: bool) -> None:
     normals = [averaged_normals(p.vertices, p.elements) if averaged else None for p in parts]
     worse = [seed for seed in range(COUNT) if parts[seed].is_worse_than_flat(normals[seed])]
     assert len(worse) <= 0.02 * COUNT, worse
+
+
+@pytest.mark.parametrize("sides", [16, 32, 48])
+@pytest.mark.parametrize("length", [5.0, 20.0])
+def test_shaft_with_a_cone(sides: int, length: float) -> None:
+    """Off the cylinder by less than the flat triangles are, whatever the cone's angle."""
+    rng = np.random.default_rng(0)
+    for lean in (5, 10, 15, 20, 28):
+        profile = np.array([[1, 0], [1, length], [1 + 2 * np.tan(np.radians(lean)), length + 2]])
+        curved, flat = turned(profile, sides, rng).errors()
+        assert curved <= flat, (lean, curved, flat)
 
 
 def fillet_part(chords: int, turn: float, wall: float, rows: int) -> Part:

@@ -6,10 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sphshell_pin import _core
+from sphshell_pin import Shell, _core
 from tests.contact.smooth.surfaces import shell_of
 from tests.contact.smooth.sweeps import LIMIT, UP, WIDTH, segment
-from tests.contact.smooth.test_sweeps_edges import EDGED, along_edges, edged
+from tests.contact.smooth.test_sweeps_edges import EDGED, along_edges, edged, over_vertex, star
+from tests.contact.smooth.test_sweeps_folds import KINDS, fold, fold_paths
 from tests.contact.smooth.test_sweeps_smooth import SMOOTH, rolled
 from tests.contact.walks import steepest
 
@@ -42,6 +43,23 @@ def test_smooth_joints(name: str, depth: float) -> None:
 def test_edges(kind: str, exact: bool) -> None:
     for depth in DEPTHS:
         assert_no_jump(edged(kind, exact), along_edges(edged(kind, exact), depth, 5), depth)
+
+
+@pytest.mark.parametrize("angle", [2, 20, 60, 150, 170])
+@pytest.mark.parametrize("kind", KINDS)
+def test_creases(kind: str, angle: float) -> None:
+    shell = fold(kind, angle, 0.5)
+    for depth in DEPTHS:
+        for where in ("across", "end"):
+            assert_no_jump(shell, fold_paths(kind, angle, depth, where), depth)
+
+
+@pytest.mark.parametrize("slope", [2, 10, 40])
+@pytest.mark.parametrize("kind", ["tip", "pit", "saddle"])
+def test_vertices(kind: str, slope: float) -> None:
+    for facets in (4, 12):
+        shell = Shell(*star(kind, facets, slope), crease_angle=np.radians(0.3))
+        assert_no_jump(shell, over_vertex(shell, 0.04), 0.04)
 
 
 def test_edge_on_a_sheet_gives_way() -> None:

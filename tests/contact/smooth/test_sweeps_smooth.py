@@ -55,6 +55,22 @@ every_surface = pytest.mark.parametrize(
 
 
 @every_surface
+def test_steps_across_smooth_joints(name: str, exact: bool) -> None:
+    """Over steps of 1e-5 the force changes by hundred thousandths; what it turns by at a joint
+    falls with refinement."""
+    change, jump = joints(name, exact, 0.3, 1e-5).T
+    assert change.max() <= 6e-5
+    assert change.mean() <= 2e-5
+    assert jump.max() <= 3e-5
+    assert jump.mean() <= 7e-6
+    turns = [joints(name, exact, h, 1e-3)[:, 1] for h in (0.6, 0.3, 0.15)]
+    assert turns[1].max() <= 1.5e-3
+    assert turns[1].mean() <= 3e-4
+    assert turns[1].mean() <= turns[0].mean() / 2
+    assert turns[2].mean() <= turns[0].mean() / 4
+
+
+@every_surface
 def test_smooth_joints(name: str, exact: bool) -> None:
     for h, count in ((0.6, 6), (0.3, 6), (0.15, 2)):
         for depth in DEPTHS:
