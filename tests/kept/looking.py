@@ -104,7 +104,7 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     def live() -> None:
         """End the page a second after it is there, as Ctrl-C does."""
         signal.signal(signal.SIGALRM, signal.default_int_handler)
-        page = importlib.import_module("sphshell_pin.cli.view")
+        page = importlib.import_module("sphshell_pin.cli.common")
         page.echo = lambda _: signal.setitimer(signal.ITIMER_REAL, 1.0)
         command("view", "run", "--no-open")()
 

@@ -17,6 +17,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import text
+from sphshell_pin.shell.readers.text import read_bytes, read_text
 
 STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 """A triangle of a binary .stl file."""
@@ -27,7 +28,7 @@ _END_OF_FACET = re.compile(rb"(?i)\bendfacet\b")
 
 def read_stl(path: Path) -> RawSurface:
     """Read a binary or text .stl file: a soup of triangles."""
-    vertices, notes = stl_corners(path, text.read_bytes(path))
+    vertices, notes = stl_corners(path, read_bytes(path))
     offsets, corners = text.pack_polygons(np.full(len(vertices) // 3, 3), np.arange(len(vertices)))
     return text.finish(path, vertices.astype(np.float64), offsets, corners, notes=notes)
 
@@ -72,7 +73,7 @@ def read_obj(path: Path) -> RawSurface:
     corners: list[int] = []
     corner_normals: list[int] = []
     pending = ""
-    for number, row in enumerate(text.read_text(path).splitlines(), start=1):
+    for number, row in enumerate(read_text(path).splitlines(), start=1):
         if row.endswith("\\"):
             pending += row[:-1] + " "
             continue
@@ -150,7 +151,7 @@ def read_off(path: Path) -> RawSurface:
     Line ends do not matter in the format, except that colors may follow the corners of a face up
     to the end of its line: they are tried where the plain reading does not come out even.
     """
-    lines = enumerate(text.read_text(path).splitlines(), start=1)
+    lines = enumerate(read_text(path).splitlines(), start=1)
     rows = [(number, row.split("#", 1)[0].split()) for number, row in lines]
     rows = [(number, row) for number, row in rows if row]
     if not rows or not rows[0][1][0].upper().endswith("OFF"):

@@ -15,6 +15,7 @@ from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import LARGEST_COUNT, RawSurface
 from sphshell_pin.shell.readers import text
+from sphshell_pin.shell.readers.text import read_bytes
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -51,7 +52,7 @@ _Values = npt.NDArray[Any]  # of the types that the header names
 
 def read_ply(path: Path) -> RawSurface:
     """Read a .ply file, see `parse_ply`."""
-    return parse_ply(path, text.read_bytes(path))
+    return parse_ply(path, read_bytes(path))
 
 
 def parse_ply(path: Path, data: bytes) -> RawSurface:
