@@ -8,7 +8,7 @@ import io
 import json
 import resource
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from sphshell_pin.base.limits import limit_memory
@@ -69,27 +69,33 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     try:
         install(xacro, substitution_args)
         document = xacro.process_file(str(file), mappings=dict(arguments))
-    except MemoryError:
-        raise
-    except RecursionError:
-        raise ValueError("its files, macros or elements are nested too deeply") from None
     except Exception as error:  # of the package xacro, which raises what happens to come up
-        if isinstance(error.__cause__ or error.__context__, MemoryError):
+        causes = list(_causes(error))
+        if any(isinstance(one, MemoryError) for one in causes):
             raise MemoryError from None
-        reason = _reason(error) or type(error).__name__
+        if any(isinstance(one, RecursionError) for one in causes):
+            raise ValueError("its files, macros or elements are nested too deeply") from None
+        reason = _reason(error, causes) or type(error).__name__
         where = Path((xacro.filestack or [file])[-1]).name
         of = f" (in {where})" if where != file.name else ""
         raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
     return str(document.toxml())
 
 
-def _reason(error: Exception) -> str:
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    """Return an error, and what it was raised for: xacro wraps errors of nested properties."""
+    while error is not None:
+        yield error
+        error = getattr(error, "exc", None) or error.__cause__ or error.__context__
+
+
+def _reason(error: Exception, causes: Sequence[BaseException]) -> str:
     """Return what the package xacro says of an error: once, and without Python's classes."""
     said = " ".join(str(error).split())
-    cause = getattr(error, "exc", None)
-    told = " ".join(str(cause).split())
-    if isinstance(cause, OSError):  # its text follows xacro's own sentence
-        said = said.replace(f" {told}", "")
-    said = said.replace(f"{type(cause)}: {told} ", "")
+    for cause in causes:
+        told = " ".join(str(cause).split())
+        if isinstance(cause, OSError):  # its text follows xacro's own sentence
+            said = said.replace(f" {told}", "")
+        said = said.replace(f"{type(cause)}: {told} ", "")
     # xacro says so of all that a substitution may fail for.
     return said.replace("Undefined substitution argument there is", "there is")

@@ -214,6 +214,10 @@ def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
             'Invalid parameter "sim": .* another version',
         ),
         ("<xacro:macro name='m'><xacro:m/></xacro:macro><xacro:m/>", "nested too deeply"),
+        (
+            "<xacro:property name='a' value='${sorted(range(10**9))}'/><link name='${a}'/>",
+            "more than 1 GB of memory",
+        ),
     ):
         with pytest.raises(robots.RobotError, match=words):
             robots.load_file(xacro(tmp_path, inside))
