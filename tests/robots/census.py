@@ -1,11 +1,11 @@
 """What strangers' robot files come to: those of clones of repositories, loaded and checked.
 
-    python -m tests.robots.census CLONES --most 4 --write
+    python -m tests.robots.census CLONES --most 4 --pairs 40 --write
 
 Each folder in CLONES is a repository (a link is another name of one). Up to `--most` of its files
 of a whole robot (URDF, xacro, MJCF) are loaded and go through check-robot, in a process with a time
-limit, first without options, then with those that the refusals name. `--kept` are rows of earlier
-runs: files in it are not asked again.
+limit, first without options, then with those that the refusals name. `--pairs` of them are asked
+for a scenario, too. `--kept` are rows of earlier runs: files in it are not asked again.
 """
 
 import argparse
@@ -15,6 +15,8 @@ import re
 import resource
 import signal
 import sys
+import tempfile
+import time
 import warnings
 import xml.etree.ElementTree as ET
 from collections import Counter
@@ -30,8 +32,10 @@ from benchmarks.measured import Measured, write
 from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.packages import Folders
+from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.study.robot_check import QUICK, check_robot
 
+PARTS = Path(__file__).parents[1] / "data" / "corpus"
 LIMIT = 60
 """Of the processor, for a file [s]."""
 
@@ -86,6 +90,9 @@ class Row:
     """What refusals said to add."""
     load: str | None = None
     check: str | None = None
+    new: str | None = None
+    seconds: float = 0.0
+    """Of the processor, for `new`."""
 
     @property
     def came_to(self) -> str:
@@ -121,8 +128,8 @@ def _makes_links(element: ET.Element) -> bool:
     return ("xacro" in space and name not in _BUILT_IN) if space else name == "joint"
 
 
-def ask(file: Path, row: Row) -> Row:
-    """Load and check, each until a refusal names no option that was not tried."""
+def ask(file: Path, part: Path | None, row: Row) -> Row:
+    """Load, check and draft, each until a refusal names no option that was not tried."""
 
     def load(row: Row) -> str:
         robots.load_file(file, **{"mimic": True, **row.options})
@@ -138,9 +145,23 @@ def ask(file: Path, row: Row) -> Row:
         report = check_robot(file, sizes=QUICK, **row.options)
         return "" if report.verdict == "pass" else "; ".join(report.remarks)
 
+    def new(row: Row) -> str:
+        options = dict(row.options)
+        base = "floating" if options.pop("free_flyer", False) else None
+        unit = None if part is None or part.suffix.lower() in (".step", ".iges") else "mm"
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "made.toml"
+            new_scenario(file, str(part), unit=unit, base=base, out=out, **options)
+        return ""
+
     warnings.simplefilter("ignore")
     row = _advised(row, "load", load, value)
-    return row if row.load else _advised(row, "check", check, value)
+    if not row.load:
+        row = _advised(row, "check", check, value)
+        began = time.process_time()
+        row = row if part is None else _advised(row, "new", new, value)
+        row.seconds = time.process_time() - began
+    return row
 
 
 def _advised(
@@ -169,16 +190,16 @@ def _advised(
         row = replace(row, options=row.options | more)
 
 
-def _child(pipe: Connection, file: Path, row: Row) -> None:
+def _child(pipe: Connection, file: Path, part: Path | None, row: Row) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT + 5))
-    pipe.send(ask(file, row))
+    pipe.send(ask(file, part, row))
 
 
-def _asked(file: Path, row: Row) -> Row:
+def _asked(file: Path, part: Path | None, row: Row) -> Row:
     """Ask in a process of its own."""
     context = multiprocessing.get_context("fork")
     here, there = context.Pipe(duplex=False)
-    child = context.Process(target=_child, args=(there, file, row))
+    child = context.Process(target=_child, args=(there, file, part, row))
     child.start()
     there.close()
     try:
@@ -196,6 +217,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.robots.census", description=__doc__)
     parser.add_argument("clones", type=Path)
     parser.add_argument("--most", type=int, default=4, help="files of a repository")
+    parser.add_argument("--pairs", type=int, default=0, help="files that `new` is asked for")
     parser.add_argument("--only", default="", help="a regular expression of repositories' names")
     parser.add_argument("--kept", type=Path, help="a file of rows, which are not asked again")
     parser.add_argument("--write", action="store_true", help="write docs/measured/census.json")
@@ -208,16 +230,17 @@ def main() -> int:
             files = list(robot_files(repository))
             chosen = np.linspace(0, len(files) - 1, min(asked.most, len(files))).astype(int)
             questions += [(rank, repository, files[k]) for rank, k in enumerate(chosen)]
+    parts = [one for one in sorted(PARTS.iterdir()) if one.suffix.lower() in (".step", ".stl")]
+    drafted = set(np.linspace(0, len(questions) - 1, asked.pairs).astype(int))
     old = json.loads(asked.kept.read_text()) if asked.kept and asked.kept.exists() else []
-    known = Row.__dataclass_fields__
-    old = [Row(**{name: value for name, value in one.items() if name in known}) for one in old]
-    kept = {(one.repository, one.file): one for one in old}
+    kept = {(one["repository"], one["file"]): Row(**one) for one in old}
     rows = []
-    for _, repository, file in sorted(questions):
+    for k, (_, repository, file) in enumerate(sorted(questions)):
         row = Row(repository.name.replace("+", "/"), str(file.relative_to(repository)))
+        part = parts[k % len(parts)] if k in drafted else None
         found = kept.get((row.repository, row.file))
-        if found is None:
-            found = kept[row.repository, row.file] = _asked(file, row)
+        if found is None or (part is not None and found.new is None and not found.load):
+            found = kept[row.repository, row.file] = _asked(file, part, row)
             print(found, flush=True)
         if "but there is no such link" not in (
             found.load or ""
@@ -230,26 +253,35 @@ def main() -> int:
         print(section.text, *(" | ".join(one) for one in section.table), sep="\n")
     if asked.write:
         command = f"python -m tests.robots.census CLONES --most {asked.most}"
+        command += f" --pairs {asked.pairs}" if asked.pairs else ""
         command += f" --only '{asked.only}'" if asked.only else ""
         command += " --kept rows.json --write" if asked.kept else " --write"
         print(f"wrote {write('census', command, sections)}")
-    return 1 if any("FOREIGN" in f"{row.load}{row.check}" for row in rows) else 0
+    return 1 if any("FOREIGN" in f"{row.load}{row.check}{row.new}" for row in rows) else 0
 
 
 def tables(rows: Sequence[Row]) -> list[Measured]:
     """Return what the site shows: counts by repository, and the reasons of what fell."""
+    drafts = [row for row in rows if row.new is not None]
     count = Counter(row.came_to for row in rows)
-    loaded = len(rows) - count["not loaded"]
+    loaded, times = len(rows) - count["not loaded"], [row.seconds for row in drafts]
     text = (
         f"{len(rows)} files: {loaded} load ({loaded / len(rows):.0%}), {count['right']} pass "
         f"check-robot ({count['right'] / len(rows):.0%}), {sum(bool(row.options) for row in rows)} "
         "with options that refusals named."
     )
+    if drafts:
+        text += (
+            f" Of {len(drafts)} scenarios that `new` was asked for it wrote "
+            f"{sum(not row.new for row in drafts)}; seconds of the processor: median "
+            f"{np.median(times):.1f}, most {max(times):.1f}."
+        )
     table = [["repository", "files", "load", "pass check-robot"]]
     for name in dict.fromkeys(row.repository for row in rows):
         of = Counter(row.came_to for row in rows if row.repository == name)
         table.append([name, *map(str, (of.total(), of.total() - of["not loaded"], of["right"]))])
     fell = Counter((row.came_to, _kind(row.load or row.check or "")) for row in rows)
+    fell.update(("no scenario", _kind(row.new)) for row in drafts if row.new)
     reasons = [[*what, str(number)] for what, number in fell.most_common() if what[0] != "right"]
     return [
         Measured(text=text, table=table),
