@@ -47,7 +47,7 @@ def read(built, tmp_path):
 def test_units_empty_cells_and_comments(read):
     found = read(
         "\ufeff# of Monday\n"
-        f" t [ms] ,{HEIGHT} [mm],pairs.tip.normal_force [kN],pairs.tip.normal_force.sigma [N]\n"
+        f" t[ms] ,{HEIGHT} [mm],pairs.tip.normal_force [kN],pairs.tip.normal_force.sigma [N]\n"
         "\n0,17,,\n1,16.5,0.001,2\n# pause\n2,,0.002,3\n"
     )
     assert found.name == "data"

@@ -232,7 +232,8 @@ def _read_csv(path: Path) -> _Table:
         raise DataError(source, reason, first)
     if all(_number(one) is not None for one in head):
         raise DataError(source, f"the first line must be a header, as '{_EXAMPLE}'", first)
-    if len({one.strip() for one in head}) < len(head):
+    head = [re.sub(r"\s*(\[[^\[\]]*\])$", r" \1", one.strip()) for one in head]  # t[s] is t [s]
+    if len(set(head)) < len(head):
         raise DataError(source, "two columns are called the same", first)
     values = np.full((len(rows), len(head)), math.nan)
     for k, (number, row) in enumerate(zip(numbers, rows, strict=True)):
@@ -242,8 +243,8 @@ def _read_csv(path: Path) -> _Table:
         for i, (cell, title) in enumerate(zip(row, head, strict=True)):
             found = _number(cell) if cell.strip() else math.nan
             if found is None:
-                reason = f"'{cell.strip()}' in column '{title.strip()}' is not a finite number"
-                timed = quantity_of(title.strip())[0] == TIME
+                reason = f"'{cell.strip()}' in column '{title}' is not a finite number"
+                timed = quantity_of(title)[0] == TIME
                 hint = "" if timed else "; leave the cell empty where nothing was measured"
                 raise DataError(source, reason + hint, number)
             values[k, i] = found
