@@ -134,7 +134,7 @@ def run_settings(
             (t0, duration),
             f"must be small enough to count steps of {dt or 1e-6!r} s",
         )
-    checks.check_moved_mass(scene.model)
+    scene._check_moved_mass()
     recorded = check_record(record)
     every = 0.0
     if record_dt is not None:
