@@ -116,8 +116,8 @@ class Minima:
 
     `sure` says which are so beyond rounding: not within rounding of a border or of another one.
     `off` is how far the file's curve of an edge, or a vertex, is off its faces, at most: that of a
-    minimum, or of a line or circle that the sphere reaches; or how far the ends of edges are apart
-    at a vertex next to which a minimum is.
+    minimum, or of a line or circle that the sphere reaches; or how far the ends of edges are apart,
+    or off their faces, at a vertex next to which a minimum is.
     """
 
     points: Array
@@ -309,9 +309,11 @@ class TrimmedSolid:
                 if rise.min(initial=0.0) > -1e-6:
                     # Between two edges the distance may fall where they turn by more than half.
                     found[row].append((vertex, depth, False, False, off[k]))
-                # Edges that end apart from each other leave open where the faces beside them do.
-                if any(np.linalg.norm(one[0] - vertex) < 2 * spread[k] for one in found[row]):
-                    passes[row].append((depth, spread[k]))
+                # Edges that end apart from each other, or off a face that is tangent there, leave
+                # open where the faces beside them end.
+                near = 2 * spread[k] + np.sqrt(2 * off[k] * radii[row])
+                if any(np.linalg.norm(one[0] - vertex) < near for one in found[row]):
+                    passes[row].append((depth, max(off[k], spread[k])))
 
 
 def _number(places: list[Any], vertex: Any) -> int:

@@ -15,7 +15,8 @@ namespace {
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
 constexpr int kMostRepeats = 20;
-// Faces that cross at less than this (sine) overlap as if it were this.
+// Faces that cross at less than this (sine) overlap as if it were this: the gap times it is the
+// rounding of a distance, below which its sign says nothing.
 constexpr double kLeastSlope = 1e-7;
 
 }  // namespace
