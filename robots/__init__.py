@@ -185,10 +185,9 @@ def load_file(
     Raises
     ------
     RobotError
-        The file is missing, it or one of its collision meshes cannot be read, or the robot is too
-        large: a chain of more than 1000 links, or more degrees of freedom than 2 GB of memory hold
-        (315). The floating root link has no mass. With `mimic`: a kinematic loop, or a joint that
-        mimics none that is there.
+        The file is missing or cannot be read, or the robot is too large: a chain of more than 1000
+        links, or more degrees of freedom than 2 GB of memory hold (315). The floating root link has
+        no mass. With `mimic`: a kinematic loop, or a joint that mimics none that is there.
     NameNotFound
         There is no pose of that name.
     MissingExtra

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import os
 import re
@@ -192,21 +193,18 @@ def build_model(
 def build_geometry(
     description: Description, model: pin.Model, kind: pin.GeometryType, *, drawn: bool = True
 ) -> tuple[pin.GeometryModel, list[str]]:
-    """Return the geometry of a kind, and the meshes that are missing, or visual and broken.
+    """Return the geometry of a kind, and the meshes that are missing or broken.
 
     Collada meshes are in meters, but for visual ones that are `drawn`: who draws them applies their
-    unit. Raises RobotError for a collision mesh that cannot be read.
+    unit.
     """
     visual = kind == pin.GeometryType.VISUAL
     if description.mjcf is not None:
         return _geometry_of_mjcf(description, description.mjcf, model, visual=visual)
     root, missing = _with_meshes(description, visual=visual, meters=not (visual and drawn))
-    try:
+    with contextlib.suppress(RobotError):
         return _geometry(description, root, model, kind), missing
-    except RobotError:
-        if not visual:
-            raise
-    missing += _without_broken(root, model)
+    missing += _without_broken(root, model, kind)
     return _geometry(description, root, model, kind), missing
 
 
@@ -245,16 +243,16 @@ def _geometry_of_mjcf(
         raise _cannot_load(description, _line(error)) from None
 
 
-def _without_broken(root: ET.Element, model: pin.Model) -> list[str]:
-    """Take the visual meshes that cannot be read out of a URDF; return their files."""
+def _without_broken(root: ET.Element, model: pin.Model, kind: pin.GeometryType) -> list[str]:
+    """Take the meshes of a kind that cannot be read out of a URDF; return their files."""
     broken = []
     for link in root.findall("link"):
-        for shape in link.findall("visual"):
+        for shape in link.findall(kind.name.lower()):
             alone = ET.Element("robot", name="one")
             ET.SubElement(alone, "link", name=link.get("name", "")).append(shape)
             text = ET.tostring(alone, encoding="unicode")
             try:
-                pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL)
+                pin.buildGeomFromUrdfString(model, text, kind)
             except (ValueError, RuntimeError):
                 link.remove(shape)
                 broken += [one.get("filename", "") for one in shape.iter("mesh")]
@@ -304,17 +302,14 @@ def _with_meshes(
                 continue
             uri = mesh.get("filename", "")
             found = description.folders.find(uri)
-            reason = "" if found is None else mesh_fault(found)
-            if found is not None and not reason:
+            if found is not None and not mesh_fault(found):
                 mesh.set("filename", str(found.absolute()))
                 if meters and found.suffix.lower() == ".dae":
                     scale = [number_of(x) for x in mesh.get("scale", "1 1 1").split()]
                     mesh.set("scale", " ".join(str(x * collada_unit(found)) for x in scale))
-            elif visual or found is None:
+            else:
                 missing[uri] = None
                 link.remove(part)
-            else:
-                raise _cannot_load(description, reason)
     return root, list(missing)
 
 

@@ -17,6 +17,7 @@ from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.robots.description import Description
 from sphshell_pin.robots.files import build_geometry, build_model, keep_geometry_of
+from sphshell_pin.robots.mesh_faults import mesh_fault
 from sphshell_pin.shell.shell import Shell
 
 # Of a link whose geometry keeps a place, at most that part of the heaviest link's mass.
@@ -86,11 +87,26 @@ def mass_fault(
     if not solid:
         names = _list([str(one.get("name")) for one in empty])
         return f"{said}: {names} have neither a mass nor geometry: write their <inertial>"
+    said += f", as the file states none of {_list(solid)}"
+    if not any(_has_geometry(one, description) for one in empty):
+        return (
+            f"{said}, whose meshes are missing or broken: give the folder above their package with "
+            "--package-dir and their --density, or write their <inertial>"
+        )
     return (
-        f"{said}, as the file states none of {_list(solid)}: take them from the meshes with "
+        f"{said}: take them from the meshes with "
         "--density 2700 [kg/m^3] (density = 2700 in a scenario), or write such a file with "
         "check-robot FILE --density 2700 --mend OUT.urdf"
     )
+
+
+def _has_geometry(link: ET.Element, description: Description) -> bool:
+    """Return whether a link of a URDF has a shape, or a mesh that can be read."""
+    for shape in link.iterfind(".//geometry/*"):
+        found = description.folders.find(shape.get("filename", "")) if shape.tag == "mesh" else None
+        if shape.tag != "mesh" or (found is not None and not mesh_fault(found)):
+            return True
+    return False
 
 
 def _mass(link: ET.Element) -> float:

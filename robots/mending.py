@@ -24,7 +24,7 @@ def mended(
 
     Links without a mass get that of their geometry at `density` [kg/m^3]; prefixes are declared;
     continuous joints that mimic by a part of their turn become revolute; meshes are named by
-    absolute paths, and visual ones that are missing or broken are left out. Raises RobotError as
+    absolute paths, and those that are missing or broken are left out. Raises RobotError as
     `robots.load_file` does, and for an MJCF.
     """
     stated = read(path, package_dirs, xacro_args)
@@ -35,7 +35,8 @@ def mended(
     straight, wound = unwound(filled)
     root = copy.deepcopy(straight.root)
     model = build_model(stated)
-    _, missing = build_geometry(stated, model, pin.GeometryType.VISUAL)
+    kinds = (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
+    missing = [uri for kind in kinds for uri in build_geometry(stated, model, kind)[1]]
 
     def note(parent: ET.Element, at: int, text: str) -> None:
         parent.insert(at, ET.Comment(f" {text.replace('--', '- -')} "))
@@ -47,7 +48,7 @@ def mended(
             for shape in link.findall(kind):
                 mesh = shape.find("geometry/mesh")
                 uri = "" if mesh is None else mesh.get("filename", "")
-                if kind == "visual" and uri in missing:
+                if uri in missing:
                     at = list(link).index(shape)
                     link.remove(shape)
                     note(link, at, f"link {name}: without the mesh {uri}, missing or broken")

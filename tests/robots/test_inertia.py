@@ -87,6 +87,9 @@ def test_without_masses_one_sentence_lists_the_links(tmp_path: Path) -> None:
         assert "--density 2700" in said
     with pytest.raises(InvalidParameter, match="density"):
         robots.load_file(file, density=-1.0)
+    file = arm(tmp_path, '<mesh filename="lost.stl"/>')
+    done = call("new", "--robot", str(file), "--density", "2700", "--out", str(tmp_path / "a.toml"))
+    assert "whose meshes are missing or broken" in " ".join(done.output.split())
 
 
 def test_a_mended_file_needs_no_options(tmp_path: Path) -> None:

@@ -119,6 +119,16 @@ def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(tmp_pa
     assert held(built, result) == pytest.approx(built.scenario.controller.normal_force, rel=0.05)
 
 
+def test_a_body_without_joints_is_not_advised_to_be_held(tmp_path):
+    """Nothing moves then: the fall that failed is what is told."""
+    body = '<link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0"'
+    body += ' ixz="0" iyz="0"/></inertial><collision><geometry><box size="2 2 0.1"/></geometry>'
+    file = tmp_path / "body.urdf"
+    file.write_text(f'<robot name="body">{body}</collision></link></robot>')
+    with pytest.raises(SphshellError, match=r"'b' is in the part .* can come down$"):
+        new_scenario(file, "bowl", radius=0.05, out=tmp_path / "a.toml")
+
+
 def test_efforts_that_do_not_carry_the_robot_are_left_out_and_said_so(tmp_path):
     file = tmp_path / "arm.urdf"
     file.write_text(FINGER.replace('effort="2"', 'effort="1e-3"'))

@@ -318,7 +318,7 @@ def _drop(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Work
         # What can stand has to stand.
         falls = fault.kind == "links" and (plan.control is None or len(plan.tips) < 3)
         if not falls or end < _SHORTEST or tried.runs >= _MOST_DROPS:
-            raise cannot_stand(tried)
+            raise cannot_stand(tried, has_joints=model.njoints > 2)
         note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the surface"
         plan = replace(plan, duration=end, why=(*plan.why, note))
 

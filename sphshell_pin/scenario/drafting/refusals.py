@@ -20,10 +20,7 @@ _ADVICE = {
     "figure": "take another --law or --radius",
 }
 _ADVICE_BOWL = "the bowl is a whole ball, which the limb would pass: take the file of an open one"
-_ADVICE_FLOATING = (
-    "hold it with --base fixed, or take a flatter or larger part, on which all spheres can come "
-    "down"
-)
+_ADVICE_FLOATING = "take a flatter or larger part, on which all spheres can come down"
 
 
 class CannotStand(SphshellError):
@@ -57,9 +54,12 @@ class Tried(Searched):
     """Why a path that was asked for could not be taken."""
 
 
-def cannot_stand(tried: Tried) -> CannotStand:
+def cannot_stand(tried: Tried, *, has_joints: bool) -> SphshellError:
     """Return the error of a robot that floats and was dropped in vain."""
-    return CannotStand(f"{_failed(tried)}; {_ADVICE_FLOATING}", tried.faults[-1].text)
+    said = f"{_failed(tried)}; {_ADVICE_FLOATING}"
+    if not has_joints:
+        return SphshellError(said)
+    return CannotStand(f"{said}, or hold it with --base fixed", tried.faults[-1].text)
 
 
 def _failed(tried: Tried) -> str:
