@@ -233,7 +233,9 @@ def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
 def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
     began = time.perf_counter()
     with pytest.raises(SphshellError, match=r"inside link 'link_5', .* mm deep") as caught:
-        new_scenario(PROBE, frame="link_5", radius=0.002, out=tmp_path / "a.toml")
+        new_scenario(
+            PROBE, frame="link_5", offset=[0, 0, 0.09], radius=0.002, out=tmp_path / "a.toml"
+        )
     assert time.perf_counter() - began < 2.0
     command = re.search(
         r"--frame (\S+) --offset (\S+) (\S+) (\S+) --radius (\S+)", str(caught.value)

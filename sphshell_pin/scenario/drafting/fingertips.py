@@ -57,6 +57,10 @@ def find_tips(
         known = [one for one in known if _joint_of(robot.model, one.frame) in limbs][:1]
     if known and offset is not None:
         known = [replace(known[0], offset=offset, source=_ASKED)]
+    # A smaller sphere than that of the collision geometry would be inside it.
+    smaller = [one for one in known if offset is None and radius and radius < one.radius]
+    if smaller and shipped is None:
+        known = [_at_end(robot, one.frame, _ASKED, radius, None, asked=False) for one in smaller]
     if not known:
         names = _ends(robot.model, held, limbs) if frame is None else [(frame, _ASKED)]
         known = [_at_end(robot, *one, radius, offset, asked=frame is not None) for one in names]
