@@ -234,7 +234,7 @@ def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
     began = time.perf_counter()
     with pytest.raises(SphshellError, match=r"inside link 'link_5', .* mm deep") as caught:
         new_scenario(
-            PROBE, frame="link_5", offset=[0, 0, 0.09], radius=0.002, out=tmp_path / "a.toml"
+            PROBE, frame="link_5", offset=[0, 0, 0.05], radius=0.002, out=tmp_path / "a.toml"
         )
     assert time.perf_counter() - began < 2.0
     command = re.search(
