@@ -50,7 +50,7 @@ def blocks_of(data: Data) -> dict[str, str]:
         "forces_orders": lambda rows: [
             [*row[:5], row[7]] for row in rows if "estimated" not in row[1]
         ],
-        "queries_sizes": lambda rows: pivot(rows, row=(0, 1), column=2, value=3),
+        "queries": lambda rows: pivot(rows, row=(0,), column=1, value=2),
         "integrators_costs": lambda rows: pivot(rows, row=(0,), column=1, value=3),
         "steps": lambda rows: [[row[0], row[1], row[4]] for row in rows],
     }
