@@ -123,7 +123,7 @@ def test_a_joint_that_is_held_stores_the_work_of_its_load() -> None:
 
 
 def test_the_order_of_joints_changes_no_step() -> None:
-    """What bounds the error of a joint's friction is its own: of two links, the first or last moves."""
+    """What bounds the error of a joint's friction is its own: either of two links moves."""
     model, friction = models.empty(9.81), {}
     for name in ("one", "other"):
         inertia = pin.Inertia(1.0, np.array([0.0, 0.0, -0.3]), 0.01 * np.eye(3))
