@@ -274,6 +274,12 @@ class Interrupted(_Stopped, KeyboardInterrupt):
         super().__init__(t, "", result)
 
 
+class RowsFillMemory(_Stopped, MemoryError):
+    """A run at time `t` [s] whose rows fill the memory; `result` holds all until then."""
+
+    _text = "the run stopped at t = {t:.6g} s: {why}; state a record_dt, or a longer one"
+
+
 class RunFailed(_Stopped, RuntimeError):
     """A user's routine that failed in a run at time `t` [s]; `result` holds all until then."""
 

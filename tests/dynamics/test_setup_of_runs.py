@@ -10,6 +10,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from sphshell_pin.dynamics.run import advance
 from sphshell_pin.dynamics.scene.explain import explain_pairs
 from sphshell_pin.dynamics.scene.sphere_arguments import seam_warning
 from tests import models
@@ -95,6 +96,24 @@ def test_more_than_a_million_rows_are_announced(integrator, record_dt, rows) -> 
         assert rows in told[0]
         assert "record_dt = 0.002 s" in told[0] or "record_dt = 0.001 s" in told[0]
         assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("limit", ["_MANY_ROWS", "_MANY_BYTES"])
+def test_rows_of_error_control_are_announced_once_seen(limit: str, monkeypatch) -> None:
+    monkeypatch.setattr(advance, limit, 5)
+    scene = sp.Scene(models.ball())
+    with pytest.warns(sp.errors.SetupWarning, match=r"rows by t = .*record_dt = 0.001 s") as caught:
+        sp.Simulation(scene, sp.Adaptive(1e-8)).run(scene.neutral, duration=10.0)
+    assert [one.filename for one in caught] == [__file__]
+
+
+def test_a_run_whose_rows_fill_the_memory_ends_with_its_result(monkeypatch) -> None:
+    sizes = iter((0.0, 0.0, 1e18))
+    monkeypatch.setattr(advance, "_peak_memory", lambda: next(sizes))
+    scene = sp.Scene(models.ball())
+    with pytest.raises(sp.errors.RowsFillMemory, match=r"rows fill 1e\+09 GB") as caught:
+        sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(scene.neutral, duration=60.0)
+    assert 0 < caught.value.result.t[-1] == caught.value.t < 60
 
 
 def test_shells_that_go_on_into_each_other_are_named() -> None:

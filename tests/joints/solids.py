@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -249,3 +250,21 @@ def _size(rng: Rng, low: float, high: float) -> float:
 def _miss(rng: Rng) -> float:
     """An angle by which a joint is off tangent [rad]."""
     return float(10 ** rng.uniform(-5, -2) * rng.choice([-1.0, 1.0]))
+
+
+def shift_planes(path: Path, by: float) -> None:
+    """Move the planes of a STEP file [mm] along their normals, and leave its edges where they are.
+
+    So CAD systems write borders that are off by the file's tolerance.
+    """
+    text, number = path.read_text(), r"\s*([-+0-9.E]+)\s*"
+    for placement in set(re.findall(r"= PLANE\('',(#\d+)\)", text)):
+        refers = rf"{placement} = AXIS2_PLACEMENT_3D\('',\s*(#\d+),\s*(#\d+)"
+        point, axis = re.findall(refers, text)[0]
+        row = rf"{axis} = DIRECTION\('',\s*\({number},{number},{number}\)\)"
+        normal = np.array(re.findall(row, text)[0], float)
+        row = rf"{point} = CARTESIAN_POINT\('',\s*\({number},{number},{number}\)\)"
+        place = np.array(re.findall(row, text)[0], float) + by * normal
+        moved = ",".join(f"{x:.17E}" for x in place)
+        text = re.sub(row, f"{point} = CARTESIAN_POINT('',({moved}))", text)
+    path.write_text(text)

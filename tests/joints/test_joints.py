@@ -5,9 +5,9 @@ import pytest
 from scipy import ndimage, sparse
 
 import sphshell_pin as sp
-from tests.joints.boxes import mitred
+from tests.joints.boxes import mitred, rounded_box
 from tests.joints.plates import PLATES
-from tests.joints.running import walk_outline, walk_part
+from tests.joints.running import walk_file, walk_outline, walk_part
 from tests.joints.solids import (
     Part,
     bar,
@@ -18,6 +18,7 @@ from tests.joints.solids import (
     pocket,
     ring,
     shaft,
+    shift_planes,
     slot,
     write_step,
     write_stl,
@@ -58,6 +59,14 @@ def assert_right(part: Part, tmp_path, stl: bool) -> None:
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
 def test_no_sphere_is_lost_or_counted_twice(part, tmp_path):
     assert_right(part, tmp_path, stl=False)
+
+
+@pytest.mark.parametrize("off", [-2e-7, 2e-7], ids=["cut", "apart"])
+def test_planes_of_a_file_may_miss_the_fillets_beside_them(off, tmp_path):
+    path = write_step(rounded_box(np.random.default_rng(0)), tmp_path / "box.step")
+    shift_planes(path, off)
+    verdict = walk_file(path, "box", 4000, np.random.default_rng(1))
+    assert verdict.found() == {}
 
 
 @pytest.mark.parametrize(

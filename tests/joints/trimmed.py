@@ -26,7 +26,7 @@ from tests.parts.occ import Solid, faces
 PERSISTENCE = 1e-5
 """A minimum that is deeper by less than that than a place on an edge counts little [radii]."""
 
-BESIDE_EDGE = 1e-3
+BESIDE_EDGE = 2e-2
 """Beside an edge its own curve decides what is inside [mm]."""
 
 SAMPLES = 129
@@ -116,7 +116,8 @@ class Minima:
 
     `sure` says which are so beyond rounding: not within rounding of a border or of another one.
     `off` is how far the file's curve of an edge, or a vertex, is off its faces, at most: that of a
-    minimum, or of a line or circle that the sphere reaches.
+    minimum, or of a line or circle that the sphere reaches; or how far the ends of edges are apart,
+    or off their faces, at a vertex next to which a minimum is.
     """
 
     points: Array
@@ -221,15 +222,16 @@ class TrimmedSolid:
     def _beside_edges(self, number: int, points: Array, states: Ints) -> None:
         """Decide by the edges themselves about points (n, 3) of a face that are beside one.
 
-        OpenCASCADE's answer is off by 1e-5 mm beside edges whose parameter curves are splines.
+        OpenCASCADE is off by up to 5e-3 mm beside edges whose parameter curves are splines.
         """
         nearest = np.full(len(points), np.inf)
-        for edge in self.edges:
-            if number not in edge.faces or not len(points):
-                continue
+        own = [edge for edge in self.edges if number in edge.faces]
+        # It is off within the tolerance of any edge, also beside the end of another one.
+        most = max([BESIDE_EDGE, *(10 * edge.tolerance for edge in own)])
+        for edge in own if len(points) else []:
             reach = np.linalg.norm(points[:, None] - edge.grid[1], axis=2).min(axis=1)
             step = np.linalg.norm(np.diff(edge.grid[1], axis=0), axis=1).max()
-            rows = np.flatnonzero(reach < step)
+            rows = np.flatnonzero(reach < step + most)
             if not len(rows):
                 continue
             which, on, tangents, inside = self._nearest(edge, points[rows])
@@ -238,8 +240,7 @@ class TrimmedSolid:
             off = np.linalg.norm(away, axis=1)
             into = self.inward(edge, edge.faces.index(number), on, tangents)
             within = np.einsum("nx,nx->n", away, into)
-            beside = off < max(BESIDE_EDGE, 10 * edge.tolerance)
-            for k in np.flatnonzero(beside & (off < nearest[rows])).tolist():
+            for k in np.flatnonzero((off < most) & (off < nearest[rows])).tolist():
                 if off[k] < nearest[rows[k]]:
                     nearest[rows[k]] = off[k]
                     # At an end of the edge it is another one that decides.
@@ -269,10 +270,11 @@ class TrimmedSolid:
         least = np.min(rise, axis=0) if rise else np.full(len(rows), -1.0)
         simple = edge.curve.GetType() in (GeomAbs_Line, GeomAbs_Circle)
         for k, row in enumerate(rows.tolist()):
-            if distance[k] < radii[row]:
-                off = max((float(abs(d[k])) for d in offs), default=0.0)
+            off = max((float(abs(d[k])) for d in offs), default=0.0)
+            # Where the faces cross may be nearer by that than the file's line or circle.
+            if distance[k] < radii[row] + (off if simple else 0.0):
                 passes[row].append((radii[row] - distance[k], off if simple else 0.0))
-                if least[k] > -1e-6:
+                if distance[k] < radii[row] and least[k] > -1e-6:
                     found[row].append(
                         (points[k], radii[row] - distance[k], bool(least[k] > 1e-6), False, off)
                     )
@@ -287,13 +289,16 @@ class TrimmedSolid:
 
     def _on_vertices(self, centers: Array, radii: Array, found: Any, passes: Any) -> None:
         leave: list[list[Array]] = [[] for _ in self.vertices]
-        off = np.zeros(len(self.vertices))
+        off, spread = np.zeros((2, len(self.vertices)))
         for edge in self.edges:
             for t, end, sign in zip(edge.span, edge.ends, (1.0, -1.0), strict=True):
-                leave[end].append(sign * edge.at(np.array([t]))[1][0])
+                at, along = edge.at(np.array([t]))
+                leave[end].append(sign * along[0])
+                apart = np.linalg.norm(at[0] - self.vertices[end])
+                spread[end] = max(spread[end], float(apart))
                 for surface in (self.surfaces[k] for k in edge.faces if self.surfaces[k].kind):
-                    apart = surface.closest(self.vertices[[end]])[0]
-                    off[end] = max(off[end], abs(float(apart[0])))
+                    miss = surface.closest(self.vertices[[end]])[0]
+                    off[end] = max(off[end], abs(float(miss[0])))
         for k, (vertex, ways) in enumerate(zip(self.vertices, leave, strict=True)):
             away = vertex - centers
             distance = np.linalg.norm(away, axis=1)
@@ -304,6 +309,11 @@ class TrimmedSolid:
                 if rise.min(initial=0.0) > -1e-6:
                     # Between two edges the distance may fall where they turn by more than half.
                     found[row].append((vertex, depth, False, False, off[k]))
+                # Edges that end apart from each other, or off a face that is tangent there, leave
+                # open where the faces beside them end.
+                near = 2 * spread[k] + np.sqrt(2 * off[k] * radii[row])
+                if any(np.linalg.norm(one[0] - vertex) < near for one in found[row]):
+                    passes[row].append((depth, max(off[k], spread[k])))
 
 
 def _number(places: list[Any], vertex: Any) -> int:

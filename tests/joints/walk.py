@@ -152,11 +152,10 @@ def judge(
             out.add(name, row, f"{found / radius} r instead of {deepest / radius} r")
             continue
         out.worst = max(out.worst, error / radius)
-        # A minimum and its saddle that the digits of the file bring to one depth are no component.
-        if (
-            min(weight[depth > beside + k * tolerances[row]].sum() for k in (0, 2, 4))
-            > most[beside][row]
-        ):
+        # A minimum and its saddle that the digits of the file bring to one depth are no component;
+        # saddles that are shallower than the chord error may join what they should.
+        levels = (0.0, *(beside + k * tolerances[row] for k in (0, 2, 4)))
+        if min(weight[depth > level].sum() for level in levels) > most[beside][row]:
             out.add("double", row, f"{weight.sum():g} instead of {most[beside][row]}")
             continue
         # The energy of a law whose force is three times the square of the depth.

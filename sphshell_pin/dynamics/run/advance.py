@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 import signal
 import threading
 import warnings
 from collections.abc import Callable, Collection
+from pathlib import Path
 from types import FrameType
 from typing import TypeAlias
 
@@ -38,6 +40,10 @@ GLANCE = 0.05
 _MOST_STEPS = 2.0**31 - 1
 # More rows than these are announced before a run.
 _MANY_ROWS = 1_000_000
+# Rows of more bytes than these are announced as soon as they are recorded.
+_MANY_BYTES = 1e9
+# A run ends where it has taken more than this share of the memory: its result needs as much again.
+_MOST_MEMORY = 0.4
 # The compiled loop gives up beyond this position [m or rad].
 _FARTHEST = 1e12
 
@@ -115,6 +121,67 @@ def many_rows(integrator: Integrator, duration: float, record_dt: object) -> str
     )
 
 
+class KeptRows:
+    """Watches the memory that the rows of a run under way fill.
+
+    How many rows an integrator with error control will record is known only as it goes.
+    """
+
+    def __init__(self, core: _core.Simulation, scene: Scene, record_dt: float | None) -> None:
+        """`record_dt` [s] as for the run; None: a row at every step."""
+        self._core, self._every, self._began = core, record_dt, core.time
+        self._row = 8 * (scene.model.nq + scene.model.nv + 7)  # without contacts [bytes]
+        self._before, self._most = _peak_memory(), _MOST_MEMORY * _all_memory()
+        self._said = False
+
+    def _rows(self) -> float:
+        steps = float(self._core.counts["steps"])
+        elapsed = self._core.time - self._began
+        return steps if self._every is None else min(steps, elapsed / self._every)
+
+    def warn(self, duration: float, *, announced: bool, stacklevel: int) -> None:
+        """Say once, unless it was announced, that very much is recorded in `duration` [s]."""
+        rows = self._rows()
+        size = rows * self._row
+        if self._said or announced or (rows <= _MANY_ROWS and size <= _MANY_BYTES):
+            return
+        self._said = True
+        text = (
+            f"the run has recorded {rows:.3g} rows by t = {self._core.time:.6g} s, "
+            f"{size / 1e9:.2g} GB without contacts, and keeps them in memory: "
+            f"record_dt = {duration / 1e4:.1g} s gives ten thousand"
+        )
+        warnings.warn(text, errors.SetupWarning, stacklevel=stacklevel + 1)
+
+    def full(self) -> str | None:
+        """Say so where the run fills the memory."""
+        taken = _peak_memory() - self._before
+        if taken <= self._most or self._rows() < 2:
+            return None
+        return f"its {self._rows():.3g} rows fill {taken / 1e9:.2g} GB of memory"
+
+
+def _peak_memory() -> float:
+    """Return the most memory that this process has had [bytes]; 0 where that is not known."""
+    try:
+        import resource  # not on Windows
+    except ImportError:
+        return 0.0
+    unit = 1 if os.uname().sysname == "Darwin" else 1024
+    return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+
+
+def _all_memory() -> float:
+    """Return the memory of this machine or its container [bytes]; infinite where not known."""
+    sizes = [math.inf]
+    try:
+        sizes.append(float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")))
+        sizes.append(float(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii")))
+    except (AttributeError, OSError, ValueError):  # no such number, or "max"
+        pass
+    return min(sizes)
+
+
 def run_settings(
     scene: Scene,
     integrator: Integrator,
@@ -134,7 +201,7 @@ def run_settings(
             (t0, duration),
             f"must be small enough to count steps of {dt or 1e-6!r} s",
         )
-    checks.check_moved_mass(scene.model)
+    scene._check_moved_mass()
     recorded = check_record(record)
     every = 0.0
     if record_dt is not None:

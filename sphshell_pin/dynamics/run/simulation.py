@@ -95,10 +95,11 @@ class Simulation(Summarized):
 
         A law that cannot stop its sphere earns a WeakLawWarning; a path off its shell, steps of
         SemiImplicitEuler that are longer than `Scene.explain` recommends, and more than a million
-        rows, a SetupWarning.
+        rows, or more than a gigabyte of them, a SetupWarning.
 
         Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
-        deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
+        deep inside, SimulationDiverged, RowsFillMemory and (on Ctrl-C) Interrupted, all with
+        `.result`.
         """
         sensors = SensorSet(self.sensors, self.scene)
         asked = None
@@ -119,8 +120,14 @@ class Simulation(Summarized):
             prepare=None if asked is None else asked.begin,
         )
         ctrl_c = advancing.CtrlC()
+        kept = advancing.KeptRows(core, self.scene, record_dt)
+        announced = advancing.many_rows(self.integrator, duration, record_dt) is not None
 
         def glance() -> None:
+            kept.warn(duration, announced=announced, stacklevel=4)
+            full = kept.full() if core.progress < 1 else None
+            if full is not None:
+                raise errors.RowsFillMemory(core.time, full, so_far())
             if progress is not None:
                 progress(core.progress)
             if asked:

@@ -14,7 +14,6 @@ import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
@@ -110,7 +109,7 @@ def _shown(pairs: tuple[PairExplanation, ...]) -> Iterator[tuple[PairExplanation
 def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explanation:
     """Work out the explanation of `scene` at q (nq,), v (nv,), for a step of `dt` [s]."""
     model = scene.model
-    check_moved_mass(model)
+    scene._check_moved_mass()
     gravity = float(np.linalg.norm(model.gravity.linear))
     pairs = tuple(map(_with_curvature, scene.pairs, explain_pairs(scene, q, v)))
     warnings = beyond_limits(model, q)

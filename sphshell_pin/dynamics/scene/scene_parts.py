@@ -16,7 +16,13 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import check_configuration, check_name, check_names, check_vector
+from sphshell_pin.base.checks import (
+    check_configuration,
+    check_moved_mass,
+    check_name,
+    check_names,
+    check_vector,
+)
 from sphshell_pin.base.summary import Detail, Fact, Summarized, names
 from sphshell_pin.contact import Friction, FunctionFriction, ImpactLaw, NormalLaw, Plane, Sphere
 from sphshell_pin.dynamics.compiled.robot import load_compiled
@@ -76,6 +82,7 @@ class SceneParts(Summarized):
         self._shown: pin.Model | None = None
         self._pairs: tuple[ContactPair, ...] = ()
         self._core: _core.Scene | None = None
+        self._moves_mass = False  # checked before the first run: the model stays as it is
         self._robot: _core.CompiledRobot | None = None
         self.compiled = compiled
         self._load_robot()
@@ -111,6 +118,12 @@ class SceneParts(Summarized):
             self._shown = pin.Model(self._model)
         self._check_unchanged()
         return self._shown
+
+    def _check_moved_mass(self) -> None:
+        """Raise InvalidParameter for a joint that moves no mass, as runs do."""
+        if not self._moves_mass:
+            check_moved_mass(self._model)
+            self._moves_mass = True
 
     @property
     def whole(self) -> tuple[pin.Model, Array]:

@@ -2,7 +2,7 @@
 
 Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
 triangles, forces, losses and figures of every pair included, against Pinocchio's ABA and integrate
-alone, in a compiled loop.
+alone, in a compiled loop. What components add is the difference to the scene without contact.
 """
 
 import time
@@ -16,10 +16,14 @@ from sphshell_pin import robots
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.study.report.contents import (
+    TIME_COLUMNS,
     Finding,
     Progress,
     Section,
+    Spread,
+    Table,
     about,
+    columns,
     times_table,
 )
 from sphshell_pin.study.report.surfaces import wavy_sheet
@@ -31,6 +35,7 @@ FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 START = np.array([0, 0.35, 0, -2.0, 0, 2.35, 0.8])
 PRESSED, AWAY = 5e-4, -1.0  # of the sheet above the height at which it just touches [m]
 LAW = sp.ImpactLaw(1e4, 1.5, 50.0, 1e-4)
+UNDAMPED = sp.ImpactLaw(1e4, 1.5)
 FRICTION = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
 
 
@@ -106,8 +111,57 @@ CONTROL_FREE, CONTROL_TOUCHING = "joint PD + gravity, no contact", "joint PD + g
 WHOLE = (BARE, FREE, FAR, TOUCHING, CONTROL_FREE, CONTROL_TOUCHING)
 
 
+PYTHON = "... and a Python controller"
+ADDED = (
+    "fingers not locked, no contact",
+    "far sphere, no damping, no friction",
+    "touching, no damping, no friction",
+    "... and damping",
+    "... and friction",
+    "... and a far second sphere",
+    "... and a touching second sphere",
+    PYTHON,
+)
+
+
+def components(shell: sp.Shell) -> dict[str, Callable[[], float]]:
+    """Return the runs of ADDED, of a fingertip on a sheet."""
+
+    def on_sheet(law: sp.ImpactLaw, friction: sp.CoulombFriction | None, *rises: float) -> sp.Scene:
+        scene = panda()
+        for rise in rises or (PRESSED,):
+            with_sheet(scene, shell, rise, law, friction)
+        return scene
+
+    def zero(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
+        return np.zeros_like(v)
+
+    scenes = (
+        panda(lock=()),
+        on_sheet(UNDAMPED, None, AWAY),
+        on_sheet(UNDAMPED, None),
+        on_sheet(LAW, None),
+        on_sheet(UNDAMPED, FRICTION),
+        on_sheet(UNDAMPED, None, PRESSED, AWAY),
+        on_sheet(UNDAMPED, None, PRESSED, PRESSED),
+    )
+    runs = {name: runner(scene) for name, scene in zip(ADDED, scenes, strict=False)}
+    return {**runs, PYTHON: runner(on_sheet(UNDAMPED, None), zero)}
+
+
+def components_table(steps: Times) -> Table:
+    """Return what components add to the step of the scene without contact."""
+    rows = [
+        (name, *Spread.of(steps[name]), float(np.median(steps[name] - steps[FREE])))
+        for name in ADDED
+    ]
+    caption = "What components add to a step; a scene without them does not pay."
+    heads = columns("scene", TIME_COLUMNS, "added_s: added [us]")
+    return Table("steps_components", caption, heads, rows)
+
+
 def measure(rounds: int, progress: Progress = silent) -> Times:
-    """Return the times of a step [s] of WHOLE."""
+    """Return the times of a step [s] of WHOLE and of ADDED."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
     pd = sp.JointPD(100.0, 10.0)
     runs = {
@@ -117,6 +171,7 @@ def measure(rounds: int, progress: Progress = silent) -> Times:
         TOUCHING: runner(with_sheet(panda(), shell, PRESSED)),
         CONTROL_FREE: runner(panda(), pd),
         CONTROL_TOUCHING: runner(with_sheet(panda(), shell, PRESSED), pd),
+        **components(shell),
     }
     return take_turns(runs, rounds, progress)
 
@@ -147,5 +202,6 @@ def assemble(steps: Times, imports: Times) -> Section:
         ratio("import", importing, imported, aim=1.2),
     ]
     caption, over = "Whole steps, in turn in one process.", "over_bare: over ABA + integrate"
-    table = times_table("steps", caption, "scene", steps, BARE, over)
-    return Section(KEY, TITLE, TEXT, findings, tables=[table])
+    whole = {name: steps[name] for name in WHOLE}
+    tables = [times_table("steps", caption, "scene", whole, BARE, over), components_table(steps)]
+    return Section(KEY, TITLE, TEXT, findings, tables=tables)

@@ -15,7 +15,8 @@ namespace {
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
 constexpr int kMostRepeats = 20;
-// Faces that cross at less than this (sine) overlap as if it were this.
+// Faces that cross at less than this (sine) overlap as if it were this: the gap times it is the
+// rounding of a distance, below which its sign says nothing.
 constexpr double kLeastSlope = 1e-7;
 
 }  // namespace
@@ -161,6 +162,17 @@ bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
   if (!(at.outward.dot(Vec3(cell.upright[0], cell.upright[1], cell.upright[2])) > 0)) return false;
   for (int k = 0; k < 3; ++k)
     if (!is_inside(shell, f, k, at, tolerance)) return false;
+  // Beyond the corner of a needle both of its lines may be nearer than the tolerance.
+  if (surface.faces().shapes[cell.face].kind == FaceKind::Plane)
+    for (int k = 0; k < 3; ++k) {
+      const Vec3* corner = shell.facets()[f].corner;
+      const int before = previous_corner(k);
+      if (cell.side[k] != FaceCell::Side::Inner || cell.side[before] != FaceCell::Side::Inner)
+        continue;
+      const Vec3 into = (corner[next_corner(k)] - corner[k]).normalized() +
+                        (corner[before] - corner[k]).normalized();
+      if ((at.point - corner[k]).dot(into) < -tolerance) return false;
+    }
   // Borders of facets beside this one that bulge into it count along their own chord.
   for (int i = cell.intruder; i >= 0; i = surface.intruders()[i].second) {
     const int g = triangle_of(surface.intruders()[i].first);

@@ -11,8 +11,11 @@
 namespace sphshell {
 namespace {
 
-constexpr double kFineTolerance = 1e-6;  // of the steps that replace a fixed one
-constexpr double kFirstStep = 1e-5;      // of a run, and after a change [s]
+constexpr double kFineTolerance = 1e-7;  // of the steps that replace a fixed one
+// A contact that faces and edges share moves this far in a fixed step at most, as a share of the
+// shell's size.
+constexpr double kMostWandering = 3e-3;
+constexpr double kFirstStep = 1e-5;  // of a run, and after a change [s]
 // A step ends behind its event by this share of its length at most, and of rtol; where it is aimed
 // at, as a share of that.
 constexpr double kEventShare = 1e-3, kBehind = 0.02;
@@ -63,6 +66,26 @@ void Stepping::begin() {
                       [](const ActiveContact& one) { return one.clamped; });
   detection_.begin(scene_);
   events_.begin();
+  places_.clear();
+  for (const ActiveContact& one : active)
+    if (const PlaneBelow* plane = std::get_if<PlaneBelow>(&scene_.pair_of(one).geometry);
+        plane && plane->flats().any())
+      places_.emplace_back(one.pair, one.contact.point);
+}
+
+// Whether a contact on a plane has moved from corner to corner since the step began: its shares
+// have kinks, which a step of high order must not pass. It moves by 1000 sizes a radian of tilt.
+bool Stepping::wanders() const {
+  if (active_->leaves_work() || active_->is_implicit()) return false;
+  for (const ActiveContact& one : scene_.active()) {
+    double least = kInfinity;
+    for (const auto& [pair, point] : places_)
+      if (pair == one.pair) least = std::min(least, (point - one.contact.point).norm());
+    if (least < kInfinity &&
+        least > kMostWandering * std::get<PlaneBelow>(scene_.pair_of(one).geometry).flats().size)
+      return true;
+  }
+  return false;
 }
 
 void Stepping::close_loss(State& at) const {
@@ -110,7 +133,8 @@ Stepping::Tolerances Stepping::tolerances() const {
   return {settings_.rtol, settings_.atol};
 }
 
-// False where the motion was too long for collision detection: nothing has been changed then.
+// False where the motion was too long for collision detection or the shares: nothing has been
+// changed then.
 bool Stepping::make_fixed(double end) {
   held_ = false;
   chart_.begin(state_);
@@ -119,7 +143,7 @@ bool Stepping::make_fixed(double end) {
   next_.t = end;
   active_->complete(chart_, next_);
   scene_.evaluate(next_.q, next_.v, next_.z);
-  if (detection_.allowed(scene_, state_, next_) >= 1) return true;
+  if (detection_.allowed(scene_, state_, next_) >= 1 && !wanders()) return true;
   scene_.restart();
   scene_.evaluate(state_.q, state_.v, state_.z);
   proposal_ = std::min(proposal_, 0.1 * (end - state_.t));

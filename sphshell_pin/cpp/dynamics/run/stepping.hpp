@@ -3,6 +3,8 @@
 
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "dynamics/run/events.hpp"
 #include "dynamics/run/continuous_detection.hpp"
@@ -77,6 +79,7 @@ class Stepping {
   double first_step();
   double predicted_step(double h);
   void begin();
+  bool wanders() const;
   double step_to_event(double h, double left, bool is_met);
 
   const StepSettings settings_;
@@ -89,6 +92,7 @@ class Stepping {
   Events events_;
   State state_, next_;
   Powers last_;
+  std::vector<std::pair<int, Vec3>> places_;  // of contacts on planes where the step begins
   VectorX probe_, rate_;
   mutable VectorX sizes_, dense_;
   double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one

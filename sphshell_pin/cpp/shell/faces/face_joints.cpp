@@ -78,9 +78,11 @@ bool trace_of(const Primitive& shape, const Section& in, double gap, Trace& out)
   return true;
 }
 
-// Where two traces meet next to x, or touch: then midway between their nearest points.
-bool meet(const Trace& one, const Trace& two, Planar& x, bool& tangent) {
-  if (!one.circle && two.circle) return meet(two, one, x, tangent);
+// Where two traces meet next to x, or touch: then midway between their nearest points. Of traces
+// that cross twice where they should touch, as borders of files are off, `gap` tells: where the
+// midway is as near to both, the place that is nearer to x.
+bool meet(const Trace& one, const Trace& two, double gap, Planar& x, bool& tangent) {
+  if (!one.circle && two.circle) return meet(two, one, gap, x, tangent);
   tangent = false;
   if (!one.circle) {
     const double sine = one.normal.x() * two.normal.y() - one.normal.y() * two.normal.x();
@@ -105,12 +107,11 @@ bool meet(const Trace& one, const Trace& two, Planar& x, bool& tangent) {
   const Planar crossing =
       one.center + along * normal + (aside.dot(x - one.center) < 0 ? -half : half) * aside;
   const Planar n = one.normal_at(crossing), m = two.normal_at(crossing);
-  tangent = !(std::abs(n.x() * m.y() - n.y() * m.x()) > kTangent);
-  x = crossing;
-  if (tangent) {
-    x = one.center + (along < 0 ? -one.radius : one.radius) * normal;
-    x = (x + two.onto(x)) / 2;
-  }
+  const Planar touching = one.center + (along < 0 ? -one.radius : one.radius) * normal;
+  const Planar beyond = two.onto(touching), midway = (touching + beyond) / 2;
+  tangent = !(std::abs(n.x() * m.y() - n.y() * m.x()) > kTangent) ||
+            ((beyond - touching).norm() <= gap && (x - midway).norm() < (x - crossing).norm());
+  x = tangent ? midway : crossing;
   return x.allFinite();
 }
 
@@ -294,7 +295,7 @@ std::optional<FaceJoint> find_joint(const std::vector<Primitive>& shapes, int a,
     if (in.turned) x = (in.of(p) + in.of(q)) / 2;
     bool tangent = false;
     if (!trace_of(one, in, gap, first) || !trace_of(two, in, gap, second)) continue;
-    if (!meet(first, second, x, tangent)) {
+    if (!meet(first, second, gap, x, tangent)) {
       // Planes that are nearly one meet along their border's own line.
       if (first.circle || second.circle || in.turned) continue;
       x = in.of(p), tangent = true;
