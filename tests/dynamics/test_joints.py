@@ -111,6 +111,31 @@ def test_dry_friction_holds_99_percent_for_a_minute_without_creep(integrator):
     assert np.ptp(result.q[1:, 0]) < 1e-10
 
 
+def test_a_joint_that_is_held_stores_the_work_of_its_load() -> None:
+    """Of the work F x the spring x = F / k holds a half; its damping took the other."""
+    model, weight, stiffness = slider(), 2.0 * 9.81, 1e3
+    friction = sp.JointFriction(2 * weight, stiffness, 20.0)
+    scene = sp.Scene(model, joints=sp.JointComponents(friction={joint_of(model): friction}))
+    result = sp.Simulation(scene, sp.Adaptive(1e-9, 1e-11)).run([0.0], None, 3.0)
+    assert result.q[-1, 0] == pytest.approx(-weight / stiffness, rel=1e-6)
+    assert result.energy.friction_loss[-1] == pytest.approx(0.5 * weight**2 / stiffness, rel=1e-5)
+    assert residual(result) < 1e-6
+
+
+def test_the_order_of_joints_changes_no_step() -> None:
+    """What bounds the error of a joint's friction is its own: either of two links moves."""
+    model, friction = models.empty(9.81), {}
+    for name in ("one", "other"):
+        inertia = pin.Inertia(1.0, np.array([0.0, 0.0, -0.3]), 0.01 * np.eye(3))
+        models.add_body(model, name, pin.JointModelRY(), inertia=inertia)
+        friction[str(model.names[-1])] = sp.JointFriction(0.3)
+    scene = sp.Scene(model, joints=sp.JointComponents(friction=friction))
+    simulation = sp.Simulation(scene, sp.Adaptive(1e-6, 1e-8))
+    runs = [simulation.run(start, None, 1.0) for start in ([0.8, 0.0], [0.0, 0.8])]
+    assert runs[0].stats.evaluations == runs[1].stats.evaluations
+    assert runs[0].q[-1, 0] == pytest.approx(runs[1].q[-1, 1], rel=1e-9)
+
+
 @pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)])
 def test_dry_friction_slides_at_101_percent(integrator: sp.Adaptive | sp.Implicit) -> None:
     model = slider()

@@ -122,13 +122,17 @@ def test_shells_that_go_on_into_each_other_are_named() -> None:
     model = models.empty()
     models.add_body(model, "tip", pin.JointModelTranslation())
     plate = sp.Shell([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]], name="plate")
-    for rotation, smooth in ((np.eye(3), True), (turn, False)):
+    for rotation, radius, smooth in (
+        (np.eye(3), 0.01, True),
+        (turn, 0.01, False),
+        (np.eye(3), 0.02, False),  # of another sphere
+    ):
         scene = sp.Scene(model)
         for name, place in (
             ("left", pin.SE3.Identity()),
             ("right", pin.SE3(rotation, np.array([1.0, 0.0, 0.0]))),
         ):
-            ball = sp.Sphere(0.01, "tip")
+            ball = sp.Sphere(0.01 if name == "left" else radius, "tip")
             scene.add_contact(ball, plate, placement=place, law=LAW, friction=None, name=name)
         said = seam_warning(*scene.pairs)
         assert (said is not None) == smooth

@@ -1,15 +1,19 @@
 """What is drafted for a tip that presses, against Hertz's law."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.plan import press_force
 from sphshell_pin.scenario.drafting.tip_contact import sticking
 
+PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 RADIUS = 0.01
 MATERIALS = find_material("rubber"), find_material("steel")
 
@@ -28,6 +32,22 @@ def test_bristles_are_as_stiff_as_the_contact_and_damped_by_a_tenth():
     # Both are rounded to what one reads.
     assert stiffness == pytest.approx(slope, rel=0.05)
     assert damping / (2 * np.sqrt(stiffness * mass)) == pytest.approx(0.1, rel=0.1)
+
+
+def test_a_tip_that_is_led_is_damped_by_seven_tenths(tmp_path):
+    """Of critical, with the geometric mean of its masses along the normal and where it slides."""
+    built = new_scenario(PROBE, "plane", out=tmp_path / "a.toml").built
+    control, model, tip = built.controller, built.scene.model, built.scene.pairs[0].spheres[0]
+    frame = model.getFrameId(tip.frame)
+    data = model.createData()
+    jacobian = pin.computeFrameJacobian(model, data, built.q0, frame, pin.LOCAL_WORLD_ALIGNED)
+    arm = data.oMf[frame].rotation @ np.array(tip.sphere.offset)
+    jacobian = jacobian[:3] - pin.skew(arm) @ jacobian[3:]
+    mobility = jacobian @ np.linalg.solve(pin.crba(model, data, built.q0), jacobian.T)
+    slide = np.linalg.eigvalsh(mobility[:2, :2])[-1]
+    mass = 1 / np.sqrt(mobility[2, 2] * slide)
+    ratio = control.damping / (2 * np.sqrt(control.stiffness * mass))
+    assert ratio == pytest.approx(0.7, rel=0.1)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.49, 0.51, 0.79])

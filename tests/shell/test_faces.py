@@ -1,8 +1,10 @@
 """Faces recognized in meshes, as `Shell.faces` lists them."""
 
 import pickle
+import sysconfig
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import coal
 import numpy as np
@@ -242,3 +244,22 @@ def test_of_two_kinds_that_fit_the_simpler_one_is_taken(taper):
     ]
     (face,) = sp.Shell(np.round(np.array(points) @ turn.T, 3), cells).faces
     assert face.kind == ("cone" if taper > 5 else "cylinder")
+
+
+def test_a_face_does_not_give_way_to_one_that_shares_half_of_it():
+    """A real head, whose flat sides end in bends: its many triangles in one plane are a plane."""
+    prefix = Path(sysconfig.get_path("purelib")) / "cmeel.prefix/share/example-robot-data/robots"
+    path = prefix / "tiago_description/meshes/head/head_1.stl"
+    if not path.exists():
+        pytest.skip("the meshes of example-robot-data are not installed")
+    shell = sp.Shell.from_file(path, "mm")
+    corners = shell.vertices[shell.elements[:, :3]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    heights = np.sum(normals * corners[:, 0], axis=1) / shell.size
+    places = np.round(np.column_stack([normals, heights]), 3) + 0.0
+    _, group, counts = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+    wide = [set(np.flatnonzero(group.ravel() == k)) for k in np.flatnonzero(counts >= 8)]
+    assert len(wide) == 4
+    planes = [set(face.elements) for face in shell.faces if face.kind == "plane"]
+    assert all(any(one <= plane for plane in planes) for one in wide)

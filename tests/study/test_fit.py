@@ -19,6 +19,7 @@ from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
 HEIGHT = "q.root_joint.2"
+SPEED = "v.root_joint.2"
 FORCE = "pairs.tip.normal_force"
 
 
@@ -68,6 +69,23 @@ def test_given_deviations_weight_the_data(bounce):
     assert one.value == pytest.approx(np.sum(slope * y / sigma**2) / information, rel=1e-6)
     half = stats.t.ppf(0.975, 40) / math.sqrt(information)
     assert one.high - one.value == pytest.approx(half, rel=1e-4)
+
+
+def test_the_noise_of_each_column_is_its_own(bounce):
+    """Height to 1e-4 m, speed to 1e-2 m/s: the interval is that of regression weighted by both."""
+    t, rng = np.linspace(0.0, 0.005, 41), np.random.default_rng(5)
+    slopes = {HEIGHT: -0.5 * t**2, SPEED: -t}
+    noise = {HEIGHT: 1e-4, SPEED: 1e-2}
+    rests = {HEIGHT: 0.017 - 0.5 * t, SPEED: np.full(41, -0.5)}
+    data = {"t [s]": t} | {
+        f"{name} [{unit}]": rests[name] + 9.81 * slopes[name] + noise[name] * rng.normal(size=41)
+        for name, unit in ((HEIGHT, "m"), (SPEED, "m/s"))
+    }
+    one = sp.fit(bounce, data, ["gravity.2"])["gravity.2"]
+    half = stats.t.ppf(0.975, 81) / math.sqrt(
+        sum(np.sum((slopes[name] / noise[name]) ** 2) for name in slopes)
+    )
+    assert one.high - one.value == pytest.approx(half, rel=0.25)
 
 
 def test_exact_data_give_back_the_values(bounce):
