@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
@@ -15,10 +16,16 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Transform,
 )
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeBox,
+    BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakePrism,
+    BRepPrimAPI_MakeRevol,
+    BRepPrimAPI_MakeTorus,
+)
 from OCP.BRepTools import BRepTools
 from OCP.GC import GC_MakeArcOfCircle
-from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.Message import Message
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from OCP.StlAPI import StlAPI_Writer
@@ -250,6 +257,20 @@ def _size(rng: Rng, low: float, high: float) -> float:
 def _miss(rng: Rng) -> float:
     """An angle by which a joint is off tangent [rad]."""
     return float(10 ** rng.uniform(-5, -2) * rng.choice([-1.0, 1.0]))
+
+
+def tube_on_equator(inner: float, tube: float, other: float) -> Solid:
+    """Return half a torus whose hole of radius `inner` goes on as the bore of another torus.
+
+    The first lies about z with a tube of radius `tube` [mm]; the bore bends on a radius `other`.
+    """
+    ring = BRepPrimAPI_MakeTorus(inner + tube, tube).Shape()
+    below = BRepPrimAPI_MakeBox(gp_Pnt(-500.0, -500.0, -500.0), gp_Pnt(500.0, 500.0, 0.0)).Shape()
+    block = BRepPrimAPI_MakeCylinder(inner + 2 * tube, 0.4 * other).Shape()
+    about = gp_Ax2(gp_Pnt(0.0, other, 0.0), gp_Dir(1.0, 0.0, 0.0))
+    bent = BRepPrimAPI_MakeTorus(about, other, inner).Shape()
+    half = BRepAlgoAPI_Common(ring, below).Shape()
+    return checked(BRepAlgoAPI_Fuse(half, BRepAlgoAPI_Cut(block, bent).Shape()).Shape())
 
 
 def shift_planes(path: Path, by: float) -> None:

@@ -20,6 +20,7 @@ from tests.joints.solids import (
     shaft,
     shift_planes,
     slot,
+    tube_on_equator,
     write_step,
     write_stl,
 )
@@ -59,6 +60,12 @@ def assert_right(part: Part, tmp_path, stl: bool) -> None:
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
 def test_no_sphere_is_lost_or_counted_twice(part, tmp_path):
     assert_right(part, tmp_path, stl=False)
+
+
+def test_a_tube_goes_on_from_the_equator_of_a_torus(tmp_path):
+    path = write_step(tube_on_equator(1.2, 0.8, 4.0), tmp_path / "tube.step")
+    verdict = walk_file(path, "tube", 3000, np.random.default_rng(0))
+    assert verdict.found() == {}
 
 
 @pytest.mark.parametrize("off", [-2e-7, 2e-7], ids=["cut", "apart"])

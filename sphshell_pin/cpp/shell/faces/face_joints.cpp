@@ -171,14 +171,15 @@ std::vector<Section> sections(const Primitive& one, const Primitive& two, const 
   return out;
 }
 
-// Where a tube ends: the circle across it, on a torus and on what goes on from there.
+// Where a tube ends: the circle across it, on a torus and on what goes on from there: along the
+// tube or, a plane, a cylinder and a torus at its equator, `around` the axis of the circle.
 std::optional<FaceJoint> end_of_tube(const Primitive& torus, const Primitive& next, const Vec3& p,
-                                     bool swapped) {
+                                     double gap, bool swapped, bool around) {
   const Vec3 between = next.point - torus.point;
   Vec3 out = between - between.dot(torus.axis) * torus.axis;  // towards the end of the tube
-  if (next.kind == FaceKind::Cylinder || next.kind == FaceKind::Plane)
+  if (around)
     out = next.axis.cross(torus.axis);
-  if (next.kind == FaceKind::Torus && next.axis.cross(torus.axis).norm() > kParallel)
+  else if (next.kind == FaceKind::Torus && next.axis.cross(torus.axis).norm() > kParallel)
     out = torus.axis.cross(next.axis).cross(torus.axis);
   if (next.kind == FaceKind::Cone || !(out.norm() > 0)) return std::nullopt;
   out.normalize();
@@ -188,6 +189,8 @@ std::optional<FaceJoint> end_of_tube(const Primitive& torus, const Primitive& ne
   joint.tangent = next.kind != FaceKind::Plane;
   joint.point = torus.point + torus.radius * out;
   joint.axis = torus.axis.cross(out), joint.radius = torus.second;
+  if (around && next.kind == FaceKind::Torus && !((next.point - joint.point).norm() <= gap))
+    return std::nullopt;
   const Primitive level{FaceKind::Plane, joint.point, joint.axis, 0, 0};
   joint.across[0] = joint.across[1] = level;
   if (!joint.tangent)
@@ -306,8 +309,10 @@ std::optional<FaceJoint> find_joint(const std::vector<Primitive>& shapes, int a,
   const auto add = [&](const std::optional<FaceJoint>& joint) {
     if (joint) found.push_back(*joint);
   };
-  if (one.kind == FaceKind::Torus) add(end_of_tube(one, two, p, false));
-  if (two.kind == FaceKind::Torus) add(end_of_tube(two, one, p, true));
+  for (const bool around : {false, true}) {
+    if (one.kind == FaceKind::Torus) add(end_of_tube(one, two, p, gap, false, around));
+    if (two.kind == FaceKind::Torus) add(end_of_tube(two, one, p, gap, true, around));
+  }
   if (one.kind == FaceKind::Cone) add(ruling(one, two, (p + q) / 2));
   if (two.kind == FaceKind::Cone) add(ruling(two, one, (p + q) / 2));
   add(mitre(one, two, (p + q) / 2, gap));
