@@ -8,7 +8,6 @@ import signal
 import threading
 import warnings
 from collections.abc import Callable, Collection
-from pathlib import Path
 from types import FrameType
 from typing import TypeAlias
 
@@ -18,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin import _core, errors
 from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.dynamics.control import controllers
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import RunState, check_record
@@ -176,7 +176,7 @@ def _all_memory() -> float:
     sizes = [math.inf]
     try:
         sizes.append(float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")))
-        sizes.append(float(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii")))
+        sizes.append(float(read_text("/sys/fs/cgroup/memory.max")))
     except (AttributeError, OSError, ValueError):  # no such number, or "max"
         pass
     return min(sizes)
