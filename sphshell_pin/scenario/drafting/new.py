@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import floats, is_path
-from sphshell_pin.scenario.drafting.asked import Asked
+from sphshell_pin.scenario.drafting.asked import WORDS, Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns, other_ends
 from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand, with_part
@@ -40,9 +39,6 @@ from sphshell_pin.scenario.format.sliders import check_knobs
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.explain import Explanation
-
-WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
-"""Surfaces that need no file."""
 
 # Half the size of a surface that needs no file, in radii of the sphere; radius of a ball whose size
 # is free, as a part of the part's middle width, and of the room on its widest face.
@@ -66,79 +62,12 @@ class NewScenario:
 
 
 def new_scenario(
-    robot: str | PathLike[str],
-    surface: str | PathLike[str] = "plane",
-    *,
-    frame: str | None = None,
-    radius: float | None = None,
-    offset: npt.ArrayLike | None = None,
-    unit: str | None = None,
-    bodies: Sequence[str] | None = None,
-    faces: Sequence[str | int] | None = None,
-    material: str | None = None,
-    against: str = "steel",
-    press: float | None = None,
-    place: str | None = None,
-    at: npt.ArrayLike | str | None = None,
-    path: npt.ArrayLike | str | None = None,
-    length: float | None = None,
-    tips: Literal["one", "all"] = "one",
-    base: Literal["fixed", "floating"] | None = None,
-    package_dirs: Sequence[str | PathLike[str]] = (),
-    xacro_args: Mapping[str, str] | None = None,
-    density: float | None = None,
-    mimic: bool = True,
-    out: str | PathLike[str] | None = None,
-    force: bool = False,
-    tell: Callable[[str], None] | None = None,
+    robot: str | PathLike[str], surface: str | PathLike[str] = "plane", **options: Any
 ) -> NewScenario:
     """Write a scenario in which `robot` touches `surface`, with values that work for its size.
 
     Drafts are run; the first is written that touches, holds its force within 5 %, and keeps the
-    robot's links out of the part.
-
-    Parameters
-    ----------
-    robot
-        Name of a shipped robot, or path of a URDF, xacro (`xacro_args`: its arguments) or MJCF file
-        (`package_dirs`: folders above the packages of its meshes).
-    density
-        Of the links of a URDF that state no mass [kg/m^3]: they get that of their geometry.
-    mimic
-        Whether joints that mimic others do so exactly; else they move freely.
-    base
-        "fixed" or "floating"; by default as its file states it, but a single limb on a free base is
-        an arm, which is fixed, and so is a robot that cannot stand on the surface.
-    surface
-        A surface file, its `unit` where the format has none, or a word of WORDS.
-    bodies, faces
-        Of a CAD file: those to take, by name or number; by default all of it.
-    frame, radius, offset
-        Of the sphere: the frame that carries it, its radius [m], and its center (3,) [m] in the
-        frame, by default the origin; without a frame it is a known fingertip or foot.
-    material, against
-        What the sphere and the surface are made of, names of MATERIALS; by default a free body is
-        of steel, any other sphere of rubber, or of plastic where rubber is too soft.
-    press
-        Normal force [N] of a robot with a fixed base.
-    place
-        Where the surface stands as seen from its tip, a key of PLACES; by default below, where the
-        joints allow it.
-    at
-        Where on the surface to touch: a point (3,) [m] in its own coordinates, or a kind of its
-        faces, with a radius where there are several ("cylinder 5.5 mm").
-    path, length
-        Of the tip: points (k, 3) [m] on the surface in its own coordinates, or "line", "circle" or
-        "raster" from the place that is touched, over `length` [m].
-    tips
-        "all": all fingertips of a hand hold the surface, which then is a free part, of `against`
-        all through; its URDF is written beside the scenario, as NAME_part.urdf.
-    out
-        The file to write, by default ROBOT_on_SURFACE.toml here; an existing one is replaced with
-        `force` only, and only when all went well.
-
-    tell
-        Called with a sentence for each draft that failed, while others are tried.
+    robot's links out of the part. `options` are the fields of `Asked`.
 
     Raises
     ------
@@ -150,19 +79,19 @@ def new_scenario(
         What cannot be found out and is not given, a file that cannot be read or written, or that no
         draft works: the text says what fails in it and what to change.
     """
-    asked = Asked.checked(**locals())
+    asked = Asked(robot, surface, **options)
     try:
         return _written(asked)
     except CannotReach as error:
         said = str(error).partition(";")[0]
-        for other in error.others[:_MOST_ENDS] if frame is None else ():
+        for other in error.others[:_MOST_ENDS] if asked.frame is None else ():
             with suppress(SphshellError):
                 made = _written(replace(asked, frame=other))
                 note = f"frame '{other}', as with '{error.frame}' {said}"
                 return replace(made, why=(note, *made.why))
         raise
     except CannotStand as error:
-        if base is not None:
+        if asked.base is not None:
             raise
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
     fixed = _written(replace(asked, base="fixed"))
@@ -220,8 +149,8 @@ def _written(asked: Asked) -> NewScenario:
     if made.part:
         part = file.with_name(part_file(file.stem))
         _check_free(part, force=asked.force)
-        _write(part, made.part)
-    _write(file, made.text)
+        write_whole(part, made.part.encode())
+    write_whole(file, made.text.encode())
     why = (*made.why, *filter(None, (loaded.assumed,)))
     if shaped is not None and not in_hand:
         why = (f"the base is {shaped}, by the robot's shape: or --base", *why)
@@ -372,12 +301,3 @@ def _round_up(x: float) -> float:
     """Round to the next higher number of two digits."""
     rounded = float(f"{x:.2g}")
     return rounded if rounded >= x else float(f"{1.05 * x:.2g}")
-
-
-def _write(path: Path, text: str) -> None:
-    """Put `text` in place of the file at `path`, whole or not at all."""
-    try:
-        with atomic_file(path) as file:
-            file.write(text.encode())
-    except OSError as error:
-        raise ScenarioError(path, "", f"cannot be written: {error.strerror}") from None
