@@ -159,7 +159,7 @@ def test_links_in_a_part_are_found():
         place = pin.SE3(np.eye(3), np.array([x, 0, 0.5]))
         inside = links.within(q, place)
         assert (inside is not None) == found
-        assert not found or inside.link == "link_2"
+        assert not found or inside == "link_2"
     # The sphere itself, and what of its own link is near it, may touch; the rest of the link not.
     top = 1.0 + 0.08
     for z, found in ((top + 0.049, False), (top + 0.05 - 0.0201, True)):

@@ -19,23 +19,20 @@ from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import floats, is_path
 from sphshell_pin.scenario.drafting.asked import WORDS, Asked
-from sphshell_pin.scenario.drafting.draft_text import draft_text
-from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns, other_ends
-from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand, with_part
+from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
+from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
+from sphshell_pin.scenario.drafting.hand import HoldSearch, every_tip
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
-from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
-from sphshell_pin.scenario.drafting.pose_search import find_working, sphere_centers
+from sphshell_pin.scenario.drafting.pose_search import PressSearch
 from sphshell_pin.scenario.drafting.poses import joints_aside
-from sphshell_pin.scenario.drafting.refusals import CannotReach, CannotStand
+from sphshell_pin.scenario.drafting.searching import CannotReach, CannotStand, Search
 from sphshell_pin.scenario.drafting.touch_points import widest_room
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import check_masses
 from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
-from sphshell_pin.scenario.format.reading import parse_scenario
 from sphshell_pin.scenario.format.schema import RobotSection, RunSection, Scenario, ShellSection
 from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, HalfSpace, Primitive
-from sphshell_pin.scenario.format.sliders import check_knobs
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.explain import Explanation
@@ -45,7 +42,6 @@ if TYPE_CHECKING:
 _SIZE, _BALL, _OF_ROOM = 15.0, 0.1, 0.5
 # Ends of other limbs that are tried where one does not come to the part.
 _MOST_ENDS = 2
-_DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
 
 
 @dataclass(frozen=True)
@@ -99,7 +95,7 @@ def new_scenario(
 
 
 def _written(asked: Asked) -> NewScenario:
-    """Write the scenario that is asked for; CannotStand as `find_working` raises it."""
+    """Write the scenario that is asked for; CannotStand as DropSearch raises it."""
     file = _free_path(asked)
     section = _robot_section(asked, file)
     bare = _build_bare(section, file)
@@ -124,25 +120,13 @@ def _written(asked: Asked) -> NewScenario:
     built = _sided(built, tips, inside=asked.inside)
     (shell,) = built.scenario.shell
 
-    def draft(section: RobotSection, plan: Plan) -> tuple[str, Built]:
-        does = "holds" if plan.part else _DOES[type(plan.control)]
-        title = f"{loaded.name} {does} {shell.name}"
-        if loaded.assumed:
-            title += f", its masses from its geometry at {section.density:g} kg/m^3"
-        text = draft_text(file.stem, title, section, shell, plan)
-        scenario = parse_scenario(text, file)
-        check_knobs(scenario, file, ranges=True)
-        reuse = with_part(built, plan.part, file.stem) if plan.part else built
-        return text, build_scenario(scenario, file, reuse)
-
     # What is written is what was built, and tried.
+    search: type[Search] = DropSearch if floats(built.assembly.model) else PressSearch
     try:
-        made = (hold_in_hand if in_hand else find_working)(asked, built, tips, draft)
+        made = (HoldSearch if in_hand else search)(asked, built, tips, file).find()
     except CannotStand:
         raise
     except SphshellError as error:
-        if isinstance(error, CannotReach):
-            error.others = other_ends(bare.assembly.model, error.frame)
         if shaped != "fixed" or in_hand:
             raise
         raise SphshellError(f"{error}; or let it float, --base floating") from None

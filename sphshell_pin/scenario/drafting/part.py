@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,8 @@ from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, load_file
 from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
+from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.scenario.format.schema import RobotSection
 from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, Primitive
 from sphshell_pin.shell.shell import Shell
 
@@ -67,6 +69,13 @@ class Part:
             file = Path(folder) / "part.urdf"
             file.write_text(self.urdf())
             return load_file(file, free_flyer=True, mimic=True, name="part")
+
+    def beside(self, built: Built, name: str) -> Built:
+        """Return `built` with it as a second robot, so that neither is read from files."""
+        loaded = (built.assembly.loaded[0], self.loaded())
+        section = RobotSection(urdf=part_file(name), free_flyer=True, label="part")
+        scenario = built.scenario.model_copy(update={"robot": [*built.scenario.robot, section]})
+        return replace(built, scenario=scenario, assembly=replace(built.assembly, loaded=loaded))
 
     def weight(self, placement: pin.SE3) -> Array:
         """Return its weight at `placement` (6,): force [N], torque about the world's origin."""

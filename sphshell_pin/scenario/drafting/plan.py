@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
@@ -23,18 +22,11 @@ from sphshell_pin.scenario.drafting.tip_contact import (
     bearable,
     contact_of,
     hertz_stiffness,
-    sticking,
 )
-from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
 from sphshell_pin.scenario.drafting.wording import axis_name, listed, mm, rounded
-from sphshell_pin.shell import Shell
 
-UP = np.array([0.0, 0.0, 1.0])
-
-# Gap of a tip at the start, as a part of its radius; of a body that falls, and of feet.
-TIP_GAP, FALL_GAP, FOOT_GAP = 0.02, 2.0, 0.1
-# How far from the middle a body falls, as a part of the surface's box.
-FALL_BESIDE = 0.1
+# Gap of a tip at the start, as a part of its radius.
+TIP_GAP = 0.02
 # How far friction and force may turn a tip that is to keep its orientation [rad].
 TIP_TURN = 0.02
 # Largest normal force by default [N], and in weights of the tip's effective mass.
@@ -55,8 +47,6 @@ WEAK = (
     "the effort limits that the robot's file states for its joints are not modeled, because they "
     "do not bear its own weight, friction and this motion"
 )
-# Sag of a standing robot's joints under its weight [rad].
-SAG = 0.05
 
 
 @dataclass(frozen=True)
@@ -121,7 +111,7 @@ class Hold:
 
     kp: float
     kd: float
-    sag: float = SAG
+    sag: float
     """How far the load draws the springs, about [rad]."""
     drawn: Mapping[str, object] = field(default_factory=dict)
     """Where the springs of fingers would take them, by joint."""
@@ -255,68 +245,6 @@ def press_plan(
     return Plan((tip,), contact, control, duration, gap, place.placement, None, tuple(why))
 
 
-def plan_fall(
-    shell: Shell,
-    tip: Tip,
-    center: Array,
-    root: Array,
-    materials: tuple[Material, Material],
-    *,
-    inside: bool = False,
-) -> Plan:
-    """Plan a scenario in which a free body falls on the surface, which is placed as in its file.
-
-    `center` (3,) [m] is the sphere's in the world when the root is at `root` (7,).
-    """
-    gap = FALL_GAP * tip.radius
-    # Beside the middle: a ball in a bowl rolls then.
-    beside = FALL_BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
-    touch = find_touch_point(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
-    start = root.copy()
-    start[:3] += touch.center - center
-    speed = math.sqrt(2 * GRAVITY * gap)
-    why = (
-        f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
-        f"it falls {mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
-    )
-    contact = contact_of(materials, speed, 0.005)
-    return Plan((tip,), contact, None, 1.0, gap, pin.SE3.Identity(), start, why)
-
-
-def plan_stand(
-    shell: Shell,
-    tips: tuple[Tip, ...],
-    centers: Array,
-    mass: float,
-    joint_inertia: Array,
-    leg: float,
-    materials: tuple[Material, Material],
-) -> Plan:
-    """Plan a scenario in which a floating robot of `mass` [kg] stands on spheres.
-
-    `centers` (k, 3) [m] are those of the `tips` in the world, `joint_inertia` [kg m^2] the
-    diagonal of the mass matrix of its motors, `leg` [m] the distance of its root from the tips.
-    """
-    gap = FOOT_GAP * min(tip.radius for tip in tips)
-    place = _under(shell, centers, np.array([tip.radius for tip in tips]), gap)
-    load = mass * GRAVITY / len(tips)
-    kp = load * 0.5 * leg / SAG
-    # A leg turns the body above it as much as itself.
-    inertia = float(np.median(joint_inertia)) + mass / len(tips) * (0.5 * leg) ** 2
-    speed, share = math.sqrt(2 * GRAVITY * gap), mass / len(tips)
-    contact = sticking(materials, tips[0].radius, speed, load, share)
-    why = [
-        f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}"
-        for tip in tips
-    ]
-    why.append(f"the robot floats, {mm(gap)} above the surface, and its joints hold the posture")
-    if len(tips) < 3:
-        why.append("it will fall over: nothing but its sphere touches")
-    why.append("friction sticks, so that it can stand")
-    control = Hold(rounded(kp), rounded(1.4 * math.sqrt(kp * inertia)))
-    return Plan(tips, contact, control, 2.0, gap, place, None, tuple(why))
-
-
 def _direction(direction: Array) -> str:
     return axis_name(direction) or listed(direction, ".2f")
 
@@ -324,24 +252,3 @@ def _direction(direction: Array) -> str:
 def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Material]) -> float:
     weights = MOST_WEIGHTS * stance.mass * GRAVITY
     return min(MOST_FORCE, 0.1 * stance.force, weights, bearable(radius, *materials))
-
-
-def _under(shell: Shell, centers: Array, radii: Array, gap: float) -> pin.SE3:
-    """Return the placement of the shell so that the nearest of the spheres has the `gap` [m] to it.
-
-    Its center is under the center of the spheres; if none of them would then land on it, under the
-    first one.
-    """
-    touch = find_touch_point(shell, float(radii[0]), gap, toward=UP)
-    for anchor in (centers.mean(axis=0), centers[0]):
-        aside = anchor - touch.point
-        heights = []
-        for center, radius in zip(centers, radii, strict=True):
-            above = center - aside
-            above[2] = shell.box[1, 2] + 2 * (radius + gap)
-            down = come_down(shell, above, -UP, float(radius), gap).center[2]
-            if down > shell.box[0, 2] - radius:
-                heights.append(center[2] - down)
-        if heights:
-            return pin.SE3(np.eye(3), np.array([aside[0], aside[1], min(heights)]))
-    raise SphshellError("no sphere lands on the surface: it is too small")

@@ -93,7 +93,7 @@ def _link_fault(built: Built, plan: Plan, result: Result, links: Links) -> Fault
         whole = whole_posture(built, q, links.model)
         found = links.within(whole, placement, whole=k == 0)
         if found is not None:
-            return Fault("links", f"link '{found.link}' is in the part", float(t), found.link)
+            return Fault("links", f"link '{found}' is in the part", float(t), found)
     return None
 
 
