@@ -13,13 +13,15 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.fingertips import find_tips
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
-from sphshell_pin.scenario.drafting.plan import Plan, Press
+from sphshell_pin.scenario.drafting.paths import Way
+from sphshell_pin.scenario.drafting.plan import Press
 from sphshell_pin.scenario.drafting.pose_search import repaired
 from sphshell_pin.scenario.drafting.trial import Fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
@@ -245,33 +247,41 @@ def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
     new_scenario(PROBE, frame=frame, offset=offset, radius=float(radius), out=tmp_path / "a.toml")
 
 
-def pressing(points, posture=0.0):
-    """A tip that is pressed along a path of these points."""
-    values = dict.fromkeys(list(Press.__dataclass_fields__)[:11], 1.0)
-    values |= {"path": np.array(points), "even": True, "joint_damping": ()}
-    return Press(**values, posture_stiffness=(posture,))
+def pressing(points, **changes):
+    """A tip of radius 0.1 m that is pressed along a path of these points, at 0.3 m/s."""
+    tip, ones = (
+        Tip("tip", 0.1, np.zeros(3), ""),
+        dict.fromkeys(("mass", "slide_mass", "fastest"), 1),
+    )
+    stance = SimpleNamespace(tip=tip, **ones, inertia=0.0, joints=4, joint_inertia=np.ones(4))
+    pair = find_material("rubber"), find_material("steel")
+    place = SimpleNamespace(stance=stance)
+    return Press(place, Way(np.array(points)), pair, 1.0, 1e-3, **changes)
 
 
 PATH = [[0.0, 0.0, 0.0], [0.3, 0.1, 0.0]]
 
 
 @pytest.mark.parametrize(
-    ("kind", "before", "press", "repair"),
+    ("kind", "before", "path", "repair"),
     [
-        ("force", "", pressing(PATH, 1.0), "calmed"),
-        ("force", "calmed", pressing(PATH), None),
-        ("path", "", pressing(PATH[:1], 1.0), None),
-        ("path", "", pressing([[0.1 * k, 0.0, 0.0] for k in range(5)]), "cut"),
-        ("path", "cut", pressing(PATH, 1.0), None),
-        ("force", "", None, None),  # nothing is pressed
+        ("force", "", PATH, "calmed"),
+        ("force", "calmed", PATH, None),
+        ("path", "", PATH[:1], None),
+        ("path", "", [[0.1 * k, 0.0, 0.0] for k in range(5)], "cut"),
+        ("path", "cut", PATH, None),
     ],
 )
-def test_what_failed_decides_what_is_tried_next(kind, before, press, repair):
-    tip = Tip("tip", 0.1, np.zeros(3), "")
-    plan = Plan((tip,), None, press, 2.0, 0.0, pin.SE3.Identity(), None, repair=before)
-    found = repaired(plan, Fault(kind, "", 1.35))
-    if repair == "cut":  # four fifths of the 35 cm that the target has come in 0.35 s
-        assert (len(found.control.path), found.duration) == (3, pytest.approx(1.8))
+def test_what_failed_decides_what_is_tried_next(kind, before, path, repair):
+    press = pressing(path, repair=before)
+    found = repaired(press, Fault(kind, "it fails", press.lead_in + 0.35 / 0.3))
+    if repair == "cut":  # four fifths of the 35 cm that the target has come
+        assert found.way.length == pytest.approx(0.2)
+        assert found.way.why == "it fails"
+    if repair == "calmed":
+        assert found.damping == pytest.approx(4 * press.damping, rel=0.02)
+        assert any(press.posture_stiffness)
+        assert not found.posture_stiffness
     assert (None if found is None else found.repair) == repair
 
 

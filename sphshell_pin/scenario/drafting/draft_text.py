@@ -68,10 +68,10 @@ def draft_text(name: str, title: str, robot: RobotSection, shell: ShellSection, 
         path = _rounded(control.path, digits)
         offset = _rounded(plan.tips[0].offset, digits)
         moves = "follows a path on the surface and presses on it"
-        told = f"The tip {moves if len(path) > 1 else 'presses on one place of the surface'}."
+        told = f"The tip {moves if control.slides else 'presses on one place of the surface'}."
         values = {"offset": offset, "path": path, "told": told, "brakes": brakes}
         text += _fill("press", tip=tips[0], shell=shell, press=control, **values)
-        if control.even:
+        if control.way.even:
             # Over the time of contact; while the force comes on, half of it on average.
             full = plan.duration - 0.5 * control.force_rise
             mean = control.force * full / (plan.duration - control.first_touch)
@@ -131,7 +131,7 @@ def _parameters(plan: Plan, at: str) -> dict[str, dict[str, float]]:
     contact, control = plan.contact, plan.control
     keys = [] if control is None else ["kp", "kd"]
     if isinstance(control, Press):
-        speed = ["speed"] if len(control.path) > 1 else []
+        speed = ["speed"] if control.slides else []
         keys = ["normal_force", *speed, "stiffness", "damping"]
     return {
         f"{at}.law.young": {},

@@ -16,8 +16,8 @@ from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.searching import CannotStand, Search, Working
 from sphshell_pin.scenario.drafting.tip_contact import (
     GRAVITY,
+    Contact,
     chosen_materials,
-    contact_of,
     sticking,
 )
 from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
@@ -91,7 +91,7 @@ class DropSearch(Search):
             f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
             f"it falls {mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
         )
-        contact = contact_of(chosen_materials(self.asked, self.tips, 0.0), speed, 0.005)
+        contact = Contact(chosen_materials(self.asked, self.tips, 0.0), speed)
         return Plan((tip,), contact, None, 1.0, gap, pin.SE3.Identity(), root, why)
 
     def _stand(self) -> Plan:

@@ -33,14 +33,20 @@ _STROKES, _AROUND = 5, 24
 
 @dataclass(frozen=True)
 class Way:
-    """A path of the tip on the surface; why it is none, where it is a single point."""
+    """A path of the tip on the surface, or a single point."""
 
     points: Array
     """(k, 3) [m] in the shell's frame."""
     smooth: bool = True
     why: str = ""
+    """Why it is not longer."""
     even: bool = True
     """Whether the sphere touches one face all along."""
+
+    @property
+    def slides(self) -> bool:
+        """Whether it is more than a single point."""
+        return len(self.points) > 1
 
     @property
     def length(self) -> float:

@@ -3,13 +3,10 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.contact.materials import Material
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
@@ -17,26 +14,22 @@ from sphshell_pin.scenario.drafting.asked import PLACES, Asked
 from sphshell_pin.scenario.drafting.asked_places import asked_touches
 from sphshell_pin.scenario.drafting.fingertips import other_ends
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, Way, find_way
+from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, find_way
 from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
 from sphshell_pin.scenario.drafting.plan import (
     TIP_GAP,
-    WEAK,
-    Plan,
     Press,
     press_force,
     press_gap,
-    press_plan,
 )
-from sphshell_pin.scenario.drafting.poses import NO_LIMIT, approaches, joints_aside
+from sphshell_pin.scenario.drafting.poses import approaches, joints_aside
 from sphshell_pin.scenario.drafting.searching import CannotReach, Search, Working
 from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
 from sphshell_pin.scenario.drafting.trial import Fault
-from sphshell_pin.scenario.drafting.wording import counted, mm, rounded
+from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
-from sphshell_pin.scenario.format.schema import RobotSection
 
 # Drafts that are run, in all and before a path is given up.
 _MOST_RUNS, _MOST_SLIDES = 10, 6
@@ -59,42 +52,30 @@ _ADVICE = {
 _ADVICE_BOWL = "the bowl is a whole ball, which the limb would pass: take the file of an open one"
 
 
-def repaired(one: Plan, fault: Fault) -> Plan | None:
+def repaired(one: Press, fault: Fault) -> Press | None:
     """Return what to try in place of a draft that failed; None: nothing."""
-    press = one.control
-    if not isinstance(press, Press) or one.repair in ("stays", "cut"):
+    if one.repair in ("stays", "cut"):
         return None
     if fault.kind == "force" and not one.repair:
-        return replace(one, control=press.calmed(), repair="calmed")
+        return replace(one, calm=True, repair="calmed")
     # Up to where it failed the path will do.
-    along = np.cumsum([0.0, *np.linalg.norm(np.diff(press.path, axis=0), axis=1)])
-    count = int((along < _CUT * press.speed * (fault.t - press.lead_in)).sum())
-    if not press.slides or along[max(count - 1, 0)] < SHORTEST_PATH * one.tips[0].radius:
+    along = np.cumsum([0.0, *np.linalg.norm(np.diff(one.path, axis=0), axis=1)])
+    count = int((along < _CUT * one.speed * (fault.t - one.lead_in)).sum())
+    if along[max(count - 1, 0)] < SHORTEST_PATH * one.place.stance.tip.radius:
         return None
-    length = along[count - 1]
-    return replace(
-        one,
-        control=replace(press, path=press.path[:count]),
-        duration=rounded(one.duration - (along[-1] - length) / press.speed, 3),
-        why=(*_still_true(one), f"the tip slides over {mm(length)}: farther {fault.text}"),
-        repair="cut",
-    )
+    return replace(one, way=replace(one.way, points=one.path[:count], why=fault.text), repair="cut")
 
 
-def _still_true(plan: Plan) -> tuple[str, ...]:
-    return tuple(one for one in plan.why if not one.startswith("the tip slides"))
+def _still(one: Press, fault: Fault) -> list[Press]:
+    """Return what presses in one place, which a path may have failed.
 
-
-class Candidate(NamedTuple):
-    """A place with what a plan needs to press there."""
-
-    place: Place
-    way: Way
-    materials: tuple[Material, Material]
-    force: float
-    gap: float
-    weak: bool
-    """Whether the efforts that its file states do not carry the robot."""
+    It is tried if no path works anywhere.
+    """
+    if fault.kind == "links" and fault.t < one.lead_in:
+        return []
+    why = f"with a path {fault.text}" if one.slides else one.way.why
+    way = replace(one.way, points=one.path[:1], why=why)
+    return [replace(one, way=way, lead_in=_CALM_LEAD_IN, repair="stays")]
 
 
 class PressSearch(Search):
@@ -114,25 +95,25 @@ class PressSearch(Search):
         self.room = _ROOM * tip.radius
         self.bench = Bench(self.held, tip, q, 2 * TIP_GAP * tip.radius)
         self.errors: list[SphshellError] = []
-        self.stays: list[tuple[RobotSection, Plan]] = []
-        """Plans that press in one place, where a path failed."""
+        self.stays: list[Press] = []
+        """What presses in one place, where a path failed."""
         self.ways: list[str] = []
         """Why a path that was asked for could not be taken."""
 
     def find(self) -> Working:
         """Return the first draft that works; SphshellError if none does."""
-        for section, plan in self._plans():
-            found = self._repaired(section, plan)
+        for one in self._presses():
+            found = self._repaired(one)
             if found is not None:
                 return found
         raise self._refusal()
 
-    def _plans(self) -> Iterator[tuple[RobotSection, Plan]]:
+    def _presses(self) -> Iterator[Press]:
         """Yield what is tried: paths, then one place of those that failed, then other places."""
-        still: list[Candidate] = []
-        for one in self._candidates():
-            if not one.way.why:
-                yield self._planned(one)
+        still: list[Press] = []
+        for one in self._everywhere():
+            if one.slides:
+                yield one
                 if len(self.faults) >= _MOST_SLIDES:
                     break
                 continue
@@ -144,29 +125,23 @@ class PressSearch(Search):
             self.ways += [one.way.why for one in still]
             still = []
         yield from self.stays
-        yield from map(self._planned, still)
+        yield from still
 
-    def _candidates(self) -> Iterator[Candidate]:
-        asked, tip = self.asked, self.tip
+    def _everywhere(self) -> Iterator[Press]:
+        """Yield what presses in each place, with the longest path there."""
+        asked, radius = self.asked, self.tip.radius
         for found in self._places():
             stance = found.stance
-            pair = chosen_materials(asked, [tip], stance.mass)
-            weak = not stance.force
-            stance = replace(stance, force=NO_LIMIT) if weak else stance
+            pair = chosen_materials(asked, [self.tip], stance.mass)
             try:
-                force = press_force(stance, tip, pair, asked.press)
+                force = press_force(stance, pair, asked.press)
             except SphshellError as error:  # of this posture: another one may do
                 self.errors.append(error)
                 continue
-            gap = press_gap(tip.radius, force, stance.mass, pair)
+            gap = press_gap(radius, force, stance.mass, pair)
             place = found.with_gap(gap)
-            way = find_way(asked, place, self.held, tip.radius, gap, self.room)
-            yield Candidate(place, way, pair, force, gap, weak)
-
-    def _planned(self, one: Candidate) -> tuple[RobotSection, Plan]:
-        stance = one.place.stance
-        section = self.locked(stance.lock, start=_changed_joints(self.model, self.q0, stance.q))
-        return _modeled(section, effort=not one.weak), press_plan(self.tip, *one)
+            way = find_way(asked, place, self.held, radius, gap, self.room)
+            yield Press(place, way, pair, force, gap, weak=not stance.force)
 
     def _places(self) -> Iterator[Place]:
         """Yield places of the part before the tip, those on the floor of the robot's base first.
@@ -196,22 +171,34 @@ class PressSearch(Search):
                             side, some, approach, on_floor=on_floor, room=room
                         )
 
-    def _repaired(self, section: RobotSection, plan: Plan) -> Working | None:
+    def _repaired(self, press: Press) -> Working | None:
         """Run a draft, and those that repair it; return the first that works."""
-        one: Plan | None = plan
+        one: Press | None = press
+        lock, start = press.place.stance.lock, self._changed_joints(press.place.stance.q)
         while one is not None and len(self.faults) < _MOST_RUNS:
-            found = self.run(section, one, self.held)
+            section = self.locked(lock, "effort" if one.weak else "", start=start)
+            found = self.run(section, one.plan(), self.held)
             if found is not None:
                 return found
             fault = self.faults[-1]
-            if one.repair == "" and len(self.stays) < _MOST_STILL and not self.asked.slides:
-                self.stays += [(section, other) for other in _still(one, fault)]
-            if fault.cut and "effort" in section.joints:
-                section, one = _modeled(section, effort=False), replace(plan, why=(*plan.why, WEAK))
+            if not one.repair and len(self.stays) < _MOST_STILL and not self.asked.slides:
+                self.stays += _still(one, fault)
+            if fault.cut and not one.weak:
+                one = replace(press, weak=True)
                 continue
             one = repaired(one, fault)
             one = None if one and self.asked.slides and one.repair == "cut" else one
         return None
+
+    def _changed_joints(self, q: Array) -> dict[str, float | list[float]]:
+        """Return the coordinates of joints that are not as at the start, as a scenario does."""
+        start: dict[str, float | list[float]] = {}
+        for name in list(self.model.names)[1:]:
+            span, _ = joint_spans(self.model, name)
+            if not np.array_equal(q[span], self.q0[span]):
+                values = [round(float(one), 9) for one in q[span]]
+                start[name] = values[0] if len(values) == 1 else values
+        return start
 
     def _refusal(self) -> SphshellError:
         """Return the error that says why no draft works, and what to change."""
@@ -238,36 +225,3 @@ class PressSearch(Search):
             frame,
             other_ends(self.model, frame),
         )
-
-
-def _modeled(section: RobotSection, *, effort: bool) -> RobotSection:
-    """Return the robot's table with or without the effort limits that its file states."""
-    kinds = [kind for kind in section.joints if effort or kind != "effort"]
-    return section.model_copy(update={"joints": kinds})
-
-
-def _still(plan: Plan, fault: Fault) -> list[Plan]:
-    """Return the plan that presses in one place, which a path may have failed.
-
-    It is tried if no path works anywhere.
-    """
-    control, why = plan.control, plan.why
-    if not isinstance(control, Press) or (fault.kind == "links" and fault.t < control.lead_in):
-        return []
-    if control.slides:
-        why = (
-            *_still_true(plan),
-            f"the tip presses in one place and does not slide: with a path {fault.text}",
-        )
-    stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
-    return [replace(plan, control=stays, duration=_CALM_LEAD_IN + 0.5, repair="stays", why=why)]
-
-
-def _changed_joints(model: pin.Model, q0: Array, q: Array) -> dict[str, float | list[float]]:
-    start: dict[str, float | list[float]] = {}
-    for name in list(model.names)[1:]:
-        span, _ = joint_spans(model, name)
-        if not np.array_equal(q[span], q0[span]):
-            values = [round(float(one), 9) for one in q[span]]
-            start[name] = values[0] if len(values) == 1 else values
-    return start

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -33,45 +32,93 @@ _AT_EASE = 0.2
 _HEIGHT, _ASTRAY, _TURNED, _FASTEST = 1e-4, 0.1, 0.02, 6.0
 
 
-@dataclass(frozen=True)
 class Stance:
-    """A robot at the start, seen from its tip; vectors and points in the world."""
+    """A robot at the start, seen from its tip; vectors and points in the world.
 
-    reach_of: Reach
-    """Which moves the joints that move the tip."""
-    tip: Tip
-    q: Array
-    """Configuration of the whole robot (nq,)."""
-    lock: tuple[str, ...]
-    """Joints that do not move the tip."""
-    center: Array
-    """Center of the tip's sphere (3,) [m]."""
-    approach: Array
-    """Unit (3,): where the tip presses."""
-    slide: Array | None
-    """Unit (3,) across the approach: where the tip moves best; None where it cannot."""
-    mass: float
-    """Effective mass along the approach [kg]."""
-    slide_mass: float
-    """Effective mass along the slide [kg]; that along the approach where there is none."""
-    inertia: float
-    """Mean effective inertia about the tip [kg m^2]; 0 where no joint is left to turn it."""
-    joint_inertia: Array
-    """Diagonal of the mass matrix (k,), of the joints that move."""
-    force: float
-    """Largest push along the approach that the joints' effort limits allow [N].
+    Attributes
+    ----------
+    reach_of
+        Which moves the joints that move the `tip`.
+    q
+        Configuration of the whole robot (nq,).
+    lock
+        Joints that do not move the tip.
+    center
+        Center of the tip's sphere (3,) [m].
+    approach
+        Unit (3,): where the tip presses.
+    slide
+        Unit (3,) across the approach: where the tip moves best; None where it cannot.
+    mass, slide_mass
+        Effective masses along the approach and the slide [kg]; both that along the approach where
+        there is no slide.
+    inertia
+        Mean effective inertia about the tip [kg m^2]; 0 where no joint is left to turn it.
+    joint_inertia
+        Diagonal of the mass matrix (k,), of the joints that move.
+    force
+        Largest push along the approach that the joints' effort limits allow [N]: 0 where they do
+        not carry the robot's own weight, NO_LIMIT where none is stated.
+    fastest
+        Speed along the slide [m/s] at which damping takes half of some motor's effort.
+    reach
+        From the tip to the farthest joint that moves it [m].
+    mobility
+        Along the approach, and across it where the tip slides, as a part of the best one.
+    dexterity
+        The least motion that joints make, turns of the tip included, as a part of the largest.
+    ahead
+        Cosine between the approach and the limb that carries the tip; below 0 it is in the way.
+    """
 
-    0 where they do not carry the robot's own weight, NO_LIMIT where none is stated."""
-    fastest: float
-    """Speed along the slide [m/s] at which damping takes half of some motor's effort."""
-    reach: float
-    """From the tip to the farthest joint that moves it [m]."""
-    mobility: float
-    """Along the approach, and across it where the tip slides, as a part of the best one."""
-    dexterity: float
-    """The least motion that joints make, turns of the tip included, as a part of the largest."""
-    ahead: float
-    """Cosine between the approach and the limb that carries the tip; below 0 it is in the way."""
+    def __init__(
+        self, reach: Reach, q: Array, lock: tuple[str, ...], approach: Array, tip: Tip
+    ) -> None:
+        self.reach_of, self.tip, self.q, self.lock, self.approach = reach, tip, q, lock, approach
+        model, columns = reach.model, reach.columns
+        jacobian = reach.jacobian(q)
+        linear, angular = jacobian[:3], jacobian[3:]
+        self.center = reach.data.oMf[reach.frame].act(reach.offset)
+        away = [self.center - reach.data.oMi[j].translation for j in _chain(reach)]
+        self.reach = max((float(np.linalg.norm(one)) for one in away), default=0.0)
+        scaled = jacobian / np.repeat([max(self.reach, 1e-9), 1.0], 3)[:, None]
+        values = np.linalg.svd(scaled, compute_uv=False)
+        self.dexterity = float(values[-1] / values[0]) if values[0] > 0 else 0.0
+        ahead = float(_limb(reach, tip) @ approach)
+        self.ahead = ahead if len(columns) > 1 else abs(ahead)
+        mass = mass_matrix(model, q)[np.ix_(columns, columns)]
+        self.joint_inertia = np.diag(mass).copy()
+        response = np.linalg.solve(mass, jacobian.T)
+        mobility = linear @ response[:, :3]
+        top = max(float(np.linalg.eigvalsh(mobility)[-1]), 1e-300)
+        along = float(approach @ mobility @ approach)
+        across = np.eye(3) - np.outer(approach, approach)
+        sideways, slides = np.linalg.eigh(across @ mobility @ across)
+        easiest = float(sideways[-1])
+        self.slide = _upright(slides[:, -1]) if easiest > _MOBILE * top else None
+        self.mass = 1 / max(along, 1e-9)
+        self.slide_mass = self.mass if self.slide is None else 1 / max(easiest, 1e-9)
+        # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
+        self.mobility = (min(along, easiest) if len(columns) > 1 else along) / top
+        turning = float(np.trace(angular @ response[:, 3:]))
+        turns = int(np.linalg.matrix_rank(angular, tol=1e-6))
+        spare = len(columns) - int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max()))
+        self.inertia = turns / turning if spare and turning > 1e-9 else 0.0
+        efforts, dry = model.upperEffortLimit[columns], model.upperDryFrictionLimit[columns]
+        stated = (efforts < NO_LIMIT) & (efforts > 0)
+        # Motors bear the friction of their joints, too, and the weight of the links.
+        limits = efforts - np.where(dry < NO_LIMIT, dry, 0.0)
+        weight = pin.computeGeneralizedGravity(model, model.createData(), q)[columns]
+        pushes = linear.T @ approach
+        limited = stated & (np.abs(pushes) > 1e-9)
+        room = (limits - np.sign(pushes) * weight)[limited] / np.abs(pushes[limited])
+        carried = bool((np.abs(weight) <= limits)[stated].all())
+        self.force = carried * float(np.clip(room, 0, NO_LIMIT).min(initial=NO_LIMIT))
+        # Joint speeds by that of the tip along the slide, with the least kinetic energy.
+        along_slide = np.zeros(3) if self.slide is None else self.slide
+        rates = np.abs(response[:, :3] @ along_slide) / max(easiest, 1e-300)
+        taken = np.where(stated, model.damping[columns] * rates / np.maximum(limits, 1e-9), 0.0)
+        self.fastest = 0.5 / max(float(taken.max(initial=0.0)), 1e-9)
 
     @property
     def joints(self) -> int:
@@ -84,7 +131,7 @@ class Stance:
             return self
         held = self._held_rotation()
         q, off = self.reach_of.solve(self.q, center, turn=held if self.joints >= 6 else None)
-        found = _stance(self.reach_of, q, self.lock, self.approach, self.tip)
+        found = Stance(self.reach_of, q, self.lock, self.approach, self.tip)
         return None if off > _HEIGHT * self.reach or found.mobility < _MOBILE else found
 
     def follows(self, centers: Array, free: Callable[[Array], bool]) -> tuple[int, str]:
@@ -171,7 +218,7 @@ def stances(
     for k in range(_SEEDS):
         seed = reach.seed(start, rng) if k else start
         at, off = reach.solve(seed, place, rows=rows, turn=along)
-        one = _stance(reach, at, lock, approach, tip)
+        one = Stance(reach, at, lock, approach, tip)
         if off > _HEIGHT * one.reach or one.mobility < least or one.ahead <= _BESIDE:
             continue
         if any(np.abs(pin.difference(model, other.q, at)).max() < _APART for _, other in found):
@@ -200,66 +247,6 @@ def joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
         one for j in list(model.supports[parent])[1:] for one in group_of(model, model.names[j])
     }
     return tuple(name for name in list(model.names)[1:] if name not in moving)
-
-
-def _stance(reach: Reach, q: Array, lock: tuple[str, ...], approach: Array, tip: Tip) -> Stance:
-    """Return the stance at q, with its mobility along the approach as a part of the best one."""
-    model, columns = reach.model, reach.columns
-    jacobian = reach.jacobian(q)
-    center = reach.data.oMf[reach.frame].act(reach.offset)
-    limb = _limb(reach, tip)
-    joints = [reach.data.oMi[j].translation for j in _chain(reach)]
-    linear, angular = jacobian[:3], jacobian[3:]
-    reach_length = max((float(np.linalg.norm(center - one)) for one in joints), default=0.0)
-    scaled = jacobian / np.repeat([max(reach_length, 1e-9), 1.0], 3)[:, None]
-    values = np.linalg.svd(scaled, compute_uv=False)
-    mass = mass_matrix(model, q)[np.ix_(columns, columns)]
-    response = np.linalg.solve(mass, jacobian.T)
-    mobility = linear @ response[:, :3]
-    top = max(float(np.linalg.eigvalsh(mobility)[-1]), 1e-300)
-    along = float(approach @ mobility @ approach)
-    across = np.eye(3) - np.outer(approach, approach)
-    sideways, slides = np.linalg.eigh(across @ mobility @ across)
-    slide = _upright(slides[:, -1]) if sideways[-1] > _MOBILE * top else None
-    pushes = linear.T @ approach
-    efforts, dry = model.upperEffortLimit[columns], model.upperDryFrictionLimit[columns]
-    stated = (efforts < NO_LIMIT) & (efforts > 0)
-    # Motors bear the friction of their joints, too.
-    limits = efforts - np.where(dry < NO_LIMIT, dry, 0.0)
-    # What the weight of the links leaves of the efforts.
-    weight = pin.computeGeneralizedGravity(model, model.createData(), q)[columns]
-    limited = stated & (np.abs(pushes) > 1e-9)
-    room = (limits - np.sign(pushes) * weight)[limited]
-    carried = bool((np.abs(weight) <= limits)[stated].all())
-    # Joint speeds by that of the tip along the slide, with the least kinetic energy.
-    along_slide = np.zeros(3) if slide is None else slide
-    rates = np.abs(response[:, :3] @ along_slide) / max(float(sideways[-1]), 1e-300)
-    taken = np.where(stated, model.damping[columns] * rates / np.maximum(limits, 1e-9), 0.0)
-    turning = float(np.trace(angular @ response[:, 3:]))
-    turns = int(np.linalg.matrix_rank(angular, tol=1e-6))
-    spare = len(columns) - int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max()))
-    # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
-    usable = min(along, float(sideways[-1])) if len(columns) > 1 else along
-    return Stance(
-        reach_of=reach,
-        tip=tip,
-        q=q,
-        lock=lock,
-        center=center,
-        approach=approach,
-        slide=slide,
-        mass=1 / max(along, 1e-9),
-        slide_mass=1 / max(float(sideways[-1]) if slide is not None else along, 1e-9),
-        inertia=turns / turning if spare and turning > 1e-9 else 0.0,
-        joint_inertia=np.diag(mass).copy(),
-        force=carried
-        * float(np.clip(room / np.abs(pushes[limited]), 0, NO_LIMIT).min(initial=NO_LIMIT)),
-        fastest=0.5 / max(float(taken.max(initial=0.0)), 1e-9),
-        reach=reach_length,
-        mobility=usable / top,
-        dexterity=float(values[-1] / values[0]) if values[0] > 0 else 0.0,
-        ahead=float(limb @ approach) if len(columns) > 1 else abs(float(limb @ approach)),
-    )
 
 
 def _limb(reach: Reach, tip: Tip) -> Array:

@@ -78,12 +78,13 @@ class Search(ABC):
         geometry = self.built.assembly.loaded[0].collision_model
         return Links(self.model, geometry, self.shell, tips, lock, q)
 
-    def locked(self, lock: Sequence[str], **stated: object) -> RobotSection:
+    def locked(self, lock: Sequence[str], leave: str = "", **stated: object) -> RobotSection:
         """Return the robot's table with joints locked, and what else is stated.
 
-        All that the model states of the joints that move is modeled.
+        What the model states of the joints that move is modeled, without a kind to `leave` out.
         """
-        kinds = list(JointComponents.from_model(self.model).without(lock).kinds())
+        found = JointComponents.from_model(self.model).without(lock).kinds()
+        kinds = [kind for kind in found if kind != leave]
         update = {"lock": list(lock), "joints": kinds, **stated}
         return self.section.model_copy(update=update)
 

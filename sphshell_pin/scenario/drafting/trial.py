@@ -100,7 +100,7 @@ def _link_fault(built: Built, plan: Plan, result: Result, links: Links) -> Fault
 def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     """Say where the tip is behind the end of its path, if it is."""
     control = plan.control
-    if not isinstance(control, Press) or len(control.path) < 2:
+    if not isinstance(control, Press) or not control.slides:
         return None
     (tip,), (pair,) = plan.tips, built.scene.pairs
     reach = Reach(built.scene.model, tip.frame, tip.offset)
@@ -108,7 +108,7 @@ def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     behind = math.sqrt(max(float(away @ away) - tip.radius**2, 0.0))
     if behind < _BEHIND * tip.radius:
         return None
-    reached = float(np.linalg.norm(np.diff(control.path, axis=0), axis=1).sum()) - behind
+    reached = control.way.length - behind
     said = f"the tip stays {1e3 * behind:.2g} mm behind the end of its path"
     return Fault("path", said, control.lead_in + reached / control.speed)
 
@@ -147,7 +147,7 @@ def _force_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
             "force", f"{what}: the surface bears {held[k]:.3g} N at t = {when:.3g} s", when
         )
     # A hard tip may do no better.
-    if peak > _PEAK * force and isinstance(control, Press) and not plan.repair:
+    if peak > _PEAK * force and isinstance(control, Press) and not control.repair:
         return Fault("force", f"{what}: it rises to {peak:.3g} N")
     return None
 
