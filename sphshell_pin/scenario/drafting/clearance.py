@@ -69,23 +69,21 @@ class Links:
     @cached_property
     def floor(self) -> float:
         """Height [m] under what of the robot is fixed to the world, 0 at most."""
-        lowest = 0.0
+        lowest = [0.0]
         for one in self._geometry.geometryObjects:
             if not one.parentJoint:
-                box = one.geometry.aabb_local
-                corners = np.array(np.meshgrid(*zip(box.min_, box.max_, strict=True)))
-                heights = one.placement.rotation[2] @ corners.reshape(3, -1)
-                lowest = min(lowest, float(heights.min() + one.placement.translation[2]))
-        return lowest
+                box, turn = one.geometry.aabb_local, np.abs(one.placement.rotation)
+                middle = one.placement.act(one.geometry.aabb_center)
+                lowest.append((middle - 0.5 * turn @ (box.max_ - box.min_))[2])
+        return float(min(lowest))
 
     def lowest(self, q: Array) -> float:
         """Return the height [m] of the lowest joint or middle of a link that moves, at q (nq,)."""
         self._place(q)
-        heights = [joint.translation[2] for joint in list(self._data.oMi)[1:]]
-        for one, pose in zip(self._geometry.geometryObjects, self._geometry_data.oMg, strict=True):
-            if one.parentJoint:
-                heights.append(pose.act(one.geometry.aabb_center)[2])
-        return float(min(heights))
+        objects = zip(self._geometry.geometryObjects, self._geometry_data.oMg, strict=True)
+        middles = [pose.act(a.geometry.aabb_center) for a, pose in objects if a.parentJoint]
+        joints = [joint.translation for joint in list(self._data.oMi)[1:]]
+        return float(np.array([*middles, *joints])[:, 2].min())
 
     def _place(self, q: Array) -> None:
         geometry = self._geometry, self._geometry_data

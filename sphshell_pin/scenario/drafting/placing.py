@@ -14,6 +14,7 @@ from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.poses import Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
+from sphshell_pin.scenario.drafting.vectors import nearest_axis, turned_to
 from sphshell_pin.scenario.drafting.wording import axis_name
 
 # Turns of the part about the approach, tried in this order [rad].
@@ -111,8 +112,11 @@ class Bench:
             self.postures += 1
             offered = 0
             for spot in spots:
-                on_face = bool(spot.normal @ side > _STEEP) and touches_once(
-                    self._shell, spot, spot.point[None], self._tip.radius, self._depth
+                on_face = bool(
+                    spot.normal @ side > _STEEP
+                    and touches_once(
+                        self._shell, spot, spot.point[None], self._tip.radius, self._depth
+                    )
                 )
                 z = height(spot)
                 at = posture.center if z is None else np.array([*posture.center[:2], z])
@@ -173,20 +177,5 @@ def nearer(placement: pin.SE3, way: Array) -> pin.SE3:
 
 def nearest_side(normal: Array) -> Array:
     """Return the axis (3,) nearest to `normal` (3,), or the normal itself if that is oblique."""
-    k = int(np.argmax(np.abs(normal)))
-    axis: Array = np.sign(normal[k]) * np.eye(3)[k]
-    return axis if abs(normal[k]) > _STEEP else normal
-
-
-def turned_to(side: Array, target: Array) -> Array:
-    """Return the rotation (3, 3) that turns `side` to `target` by the shortest way, upright ones.
-
-    Those that are opposite to each other are turned about a horizontal axis across them, or z.
-    """
-    if side @ target < -0.999:
-        about = np.array([0.0, 0.0, 1.0]) if abs(side[2]) < 0.5 else np.array([1.0, 0.0, 0.0])
-        rotation: Array = 2.0 * np.outer(about, about) - np.eye(3)
-        return rotation
-    rotation = pin.Quaternion.FromTwoVectors(side, target).toRotationMatrix()
-    rounded = np.round(rotation)
-    return rounded + 0.0 if np.abs(rotation - rounded).max() < 1e-9 else rotation
+    axis = nearest_axis(normal)
+    return axis if axis @ normal > _STEEP else normal

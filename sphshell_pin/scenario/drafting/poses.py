@@ -11,6 +11,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.vectors import nearest_axis, unit
 from sphshell_pin.scenario.format.reach import Reach, turn_between
 
 # Mobility along the approach and across it, as a part of the best one: below the first a posture is
@@ -173,16 +174,15 @@ def approaches(
     reach = Reach(model, tip.frame, tip.offset, joints_aside(model, tip))
     axis = reach.jacobian(q)[3:]
     limb = _limb(reach, tip)
-    k = int(np.argmax(np.abs(limb)))
-    home = tuple(np.sign(limb[k]) * np.eye(3)[k] + 0.0)
+    home = tuple(nearest_axis(limb))
     found = [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
     if axis.shape[1] > 1:
         return found
     if not axis.any():
         return [limb, -limb]
-    normal = axis[:, 0] / np.linalg.norm(axis)
+    normal = unit(axis[:, 0])
     flat = [one - normal * (normal @ one) for one in found]
-    return [one / np.linalg.norm(one) for one in flat if np.linalg.norm(one) > 0.5]
+    return [unit(one) for one in flat if np.linalg.norm(one) > 0.5]
 
 
 def stances(
@@ -258,18 +258,15 @@ def _limb(reach: Reach, tip: Tip) -> Array:
     """
     pose, motion = reach.data.oMf[reach.frame], reach.moves
     if motion.shape[1] == 1 and motion.any():
-        only: Array = motion[:, 0]
-        return only / np.linalg.norm(only)
+        return unit(motion[:, 0])
     # A small ball on a flat end may be far beside the frame.
     way = tip.offset if tip.ahead is None else tip.ahead
     if way.any():
-        ahead: Array = pose.rotation @ way
-        return ahead / np.linalg.norm(ahead)
+        return unit(pose.rotation @ way)
     for joint in reversed(_chain(reach)):
-        limb: Array = pose.translation - reach.data.oMi[joint].translation
-        length = float(np.linalg.norm(limb))
-        if length > tip.radius:
-            return limb / length
+        limb = pose.translation - reach.data.oMi[joint].translation
+        if np.linalg.norm(limb) > tip.radius:
+            return unit(limb)
     return np.array([0.0, 0.0, -1.0])
 
 
@@ -281,6 +278,5 @@ def _chain(reach: Reach) -> list[int]:
 
 def _upright(axis: Array) -> Array:
     """Return `axis` along the nearest coordinate axis, where it nearly is one, in its +."""
-    k = int(np.argmax(np.abs(axis)))
-    upright: Array = np.eye(3)[k] if abs(axis[k]) > 0.97 else axis * np.sign(axis[k])
-    return upright
+    nearest = nearest_axis(axis)
+    return np.abs(nearest) if nearest @ axis > 0.97 else axis * nearest.sum()
