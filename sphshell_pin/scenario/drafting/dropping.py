@@ -13,7 +13,7 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import joints_aside
-from sphshell_pin.scenario.drafting.searching import CannotStand, Search, Working
+from sphshell_pin.scenario.drafting.searching import CannotStand, NewScenario, Search
 from sphshell_pin.scenario.drafting.tip_contact import (
     GRAVITY,
     Contact,
@@ -39,7 +39,7 @@ _MOST_RUNS, _BEFORE, _SHORTEST = 3, 0.9, 0.2
 class DropSearch(Search):
     """The search for a run in which a robot that floats comes down on the surface."""
 
-    def find(self) -> Working:
+    def find(self) -> NewScenario:
         """Return the first draft that works; SphshellError if none does."""
         asked, model = self.asked, self.model
         if any(one is not None for one in (asked.press, asked.place, asked.at, asked.path)):
@@ -50,7 +50,7 @@ class DropSearch(Search):
             raise SphshellError(f"{said}--place, --at and --path{hold}")
         lock = tuple[str, ...]()
         if int(model.frames[find_frame(model, self.tips[0].frame)].parentJoint) == 1:
-            lock = joints_aside(model, self.tips[0])
+            lock = joints_aside(model, self.tips[:1])
             plan = self._fall()
         elif asked.inside:
             raise SphshellError("a robot cannot stand in a bowl: take another --surface")

@@ -12,6 +12,7 @@ from sphshell_pin.dynamics.scene.mimic import leader_of, mimics
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.vectors import moved, unit
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.shell.shell import Shell
@@ -74,7 +75,7 @@ class Hand:
         moving = {leader_of(rules, name) for name in set.union(*chains)}
         self.joints = tuple(sorted(int(model.getJointId(name)) for name in moving))
         """Joints that move a tip, without those that mimic them."""
-        self.lock = tuple(n for n in list(model.names)[1:] if leader_of(rules, n) not in moving)
+        self.lock = joints_aside(model, tips)
         self.reaches = [Reach(model, tip.frame, tip.offset, self.lock) for tip in tips]
         self.ranks = []
         """The coordinates that move each tip alone, from the tip on."""

@@ -20,10 +20,9 @@ from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT
-from sphshell_pin.scenario.drafting.searching import Search, Working
+from sphshell_pin.scenario.drafting.searching import NewScenario, Search, coordinates
 from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, bearable, hertz_stiffness, sticking
 from sphshell_pin.scenario.drafting.wording import mm, rounded
-from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.shell.shell import Shell
 
 GAP, DURATION = 1e-4, 1.5
@@ -62,7 +61,7 @@ class HoldSearch(Search):
     Where all tips cannot, those do without the fingers of the fewest joints, three at least.
     """
 
-    def find(self) -> Working:
+    def find(self) -> NewScenario:
         """Return the first draft that holds the part; SphshellError if none does."""
         if floats(self.model):
             raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
@@ -77,11 +76,11 @@ class HoldSearch(Search):
                 continue
             if refused:
                 note = f"{count} of {len(tips)} fingertips hold it: {refused.partition(';')[0]}"
-                found = found._replace(why=(note, *found.why))
+                found = replace(found, why=(note, *found.why))
             return found
         raise last
 
-    def _held(self, tips: Sequence[Tip]) -> Working:
+    def _held(self, tips: Sequence[Tip]) -> NewScenario:
         """Return a scenario in which all of the `tips` hold the part; CannotHold if none works."""
         press, shell = self.asked.press, self.shell
         materials = (
@@ -110,7 +109,7 @@ class HoldSearch(Search):
             if isinstance(plan, str):
                 said = plan
                 continue
-            section = self.locked(hand.lock, label="hand", start=_angles(hand, grasp.q, ""))
+            section = self.locked(hand.lock, label="hand", start=_angles(hand, grasp.q))
             works = self.run(section, plan, links)
             if works is not None:
                 return works
@@ -168,11 +167,10 @@ def _planned(
     )
 
 
-def _angles(hand: Hand, q: Array, prefix: str) -> dict[str, object]:
+def _angles(hand: Hand, q: Array, prefix: str = "") -> dict[str, object]:
     """Return the coordinates of the joints that move the tips."""
-    names = [hand.model.names[j] for j in hand.joints]
-    at = {prefix + name: q[joint_spans(hand.model, name)[0]].round(6).tolist() for name in names}
-    return {name: one[0] if len(one) == 1 else one for name, one in at.items()}
+    found, names = coordinates(hand.model, q), [hand.model.names[j] for j in hand.joints]
+    return {prefix + name: found[name] for name in names}
 
 
 def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> CannotHold:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -23,38 +23,24 @@ from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
 from sphshell_pin.scenario.drafting.hand import HoldSearch, every_tip
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.part import part_file, word_primitive
+from sphshell_pin.scenario.drafting.part import part_file
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
 from sphshell_pin.scenario.drafting.poses import joints_aside
-from sphshell_pin.scenario.drafting.searching import CannotReach, CannotStand, Search
+from sphshell_pin.scenario.drafting.searching import CannotReach, CannotStand, NewScenario, Search
 from sphshell_pin.scenario.drafting.touch_points import widest_room
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.scenario.format.bodies import check_masses
-from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
+from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.schema import RobotSection, RunSection, Scenario, ShellSection
 from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, HalfSpace, Primitive
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.scene.explain import Explanation
 
 # Half the size of a surface that needs no file, in radii of the sphere; radius of a ball whose size
 # is free, as a part of the part's middle width, and of the room on its widest face.
 _SIZE, _BALL, _OF_ROOM = 15.0, 0.1, 0.5
+# Such surfaces that a hand can hold; half their width there, in radii of a fingertip.
+HELD_WORDS, _IN_HAND = ("sphere", "cylinder", "box"), 2.5
 # Ends of other limbs that are tried where one does not come to the part.
 _MOST_ENDS = 2
-
-
-@dataclass(frozen=True)
-class NewScenario:
-    """A scenario that was written, and why it is as it is."""
-
-    path: Path
-    text: str
-    built: Built
-    explanation: Explanation
-    """Explanation of the start, see Scene.explain."""
-    why: tuple[str, ...]
-    """One sentence for each choice that was made for the user."""
 
 
 def new_scenario(
@@ -112,14 +98,11 @@ def _written(asked: Asked) -> NewScenario:
         tips = find_tips(
             loaded, shipped=section.name, frame=asked.frame, radius=radius, offset=asked.offset
         )
-    aside = [set(joints_aside(bare.assembly.model, tip)) for tip in tips]
-    check_masses(bare.assembly, set.intersection(*aside))
+    check_masses(bare.assembly, joints_aside(bare.assembly.model, tips))
     shell = _shell_section(asked, file, bare, tips)
     built = _build_bare(section, file, shell, reuse=bare)
     tips = _sized_to(built, tips, asked)
     built = _sided(built, tips, inside=asked.inside)
-    (shell,) = built.scenario.shell
-
     # What is written is what was built, and tried.
     search: type[Search] = DropSearch if floats(built.assembly.model) else PressSearch
     try:
@@ -135,10 +118,9 @@ def _written(asked: Asked) -> NewScenario:
         _check_free(part, force=asked.force)
         write_whole(part, made.part.encode())
     write_whole(file, made.text.encode())
-    why = (*made.why, *filter(None, (loaded.assumed,)))
-    if shaped is not None and not in_hand:
-        why = (f"the base is {shaped}, by the robot's shape: or --base", *why)
-    return NewScenario(file, made.text, made.built, explain_built(made.built), why)
+    shape = shaped and not in_hand and f"the base is {shaped}, by the robot's shape: or --base"
+    why = tuple(one for one in (shape, *made.why, loaded.assumed) if one)
+    return replace(made, why=why)
 
 
 def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
@@ -265,18 +247,21 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
         raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in meters")
     if parts != (None, None):
         raise SphshellError(f"bodies and faces belong to a CAD file, not to the {word}")
+    if asked.tips == "all" and word not in HELD_WORDS:
+        said = f"a hand cannot hold a {word}: --tips all takes {', '.join(HELD_WORDS)}"
+        raise SphshellError(said)
     largest = max(tip.radius for tip in tips)
-    if asked.tips == "all":
-        return ShellSection(name=word, primitive=word_primitive(word, largest))
-    spread = float(np.linalg.norm(np.ptp(sphere_centers(built, tips), axis=0)))
-    size = _round_up(max(_SIZE * largest, spread))
-    ball = Ball(size)
+    half, length = _IN_HAND * largest, 4 * _IN_HAND * largest
+    if asked.tips == "one":
+        spread = float(np.linalg.norm(np.ptp(sphere_centers(built, tips), axis=0)))
+        half = _round_up(max(_SIZE * largest, spread))
+        length = (0.4 if word == "box" else 2.0) * half
     primitives: dict[str, Primitive] = {
-        "plane": HalfSpace(2 * size),
-        "box": Box([2 * size, 2 * size, 0.4 * size]),
-        "sphere": ball,
-        "bowl": ball,
-        "cylinder": Cylinder(radius=size, length=2 * size),
+        "plane": HalfSpace(2 * half),
+        "box": Box([2 * half, 2 * half, length]),
+        "sphere": Ball(half),
+        "bowl": Ball(half),
+        "cylinder": Cylinder(radius=half, length=length),
     }
     return ShellSection(name=word, primitive=primitives[word])
 

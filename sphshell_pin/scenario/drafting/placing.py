@@ -11,8 +11,7 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario.drafting.clearance import Links
-from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.poses import Stance, stances
+from sphshell_pin.scenario.drafting.poses import Limb, Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, turned_to
 from sphshell_pin.scenario.drafting.wording import axis_name
@@ -73,14 +72,14 @@ class Place:
 
 
 class Bench:
-    """A robot and a part that is put before its `tip`, on the floor of the robot's base.
+    """A robot and a part that is put before the tip of a `limb`, on the floor of the robot's base.
 
     `links` are held against the part; q (nq,) is the posture to start from; the sphere may come
     into the part by `depth` [m].
     """
 
-    def __init__(self, links: Links, tip: Tip, q: Array, depth: float) -> None:
-        self.q, self._tip, self._links, self._shell = q, tip, links, links.shell
+    def __init__(self, links: Links, limb: Limb, q: Array, depth: float) -> None:
+        self.q, self._limb, self._links, self._shell = q, limb, links, links.shell
         self._depth = depth
         self._found: dict[tuple[float | None, ...], list[Stance]] = {}
         # What was come across: postures, places that were tried, and links that were in the part.
@@ -115,7 +114,7 @@ class Bench:
                 on_face = bool(
                     spot.normal @ side > _STEEP
                     and touches_once(
-                        self._shell, spot, spot.point[None], self._tip.radius, self._depth
+                        self._shell, spot, spot.point[None], self._limb.tip.radius, self._depth
                     )
                 )
                 z = height(spot)
@@ -154,12 +153,7 @@ class Bench:
         if key not in self._found:
             limit = None if height is None else self._links.floor
             self._found[key] = stances(
-                self._links.model,
-                self.q,
-                self._tip,
-                approach,
-                height,
-                lambda q: self._usable(q, limit),
+                self._limb, self.q, approach, height, lambda q: self._usable(q, limit)
             )
         return self._found[key]
 

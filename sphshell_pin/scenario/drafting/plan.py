@@ -113,14 +113,14 @@ class Press:
     def plan(self) -> Plan:
         """Return the scenario."""
         place, way, stance, tip = self.place, self.way, self.place.stance, self.place.stance.tip
-        farther = f": farther {way.why}" if way.why else ""
+        lock, farther = stance.limb.lock, f": farther {way.why}" if way.why else ""
         why = (
             f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
             f"the surface is {mm(self.gap)} in front of the sphere, which presses along "
             f"{_direction(stance.approach)}",
             "the joints are bent to a posture in which the tip moves well and can press",
             place.told,
-            stance.lock and f"joints that do not move the tip are locked: {len(stance.lock)}",
+            lock and f"joints that do not move the tip are locked: {len(lock)}",
             f"normal force {self.force:g} N, for an effective mass of {stance.mass:.3g} kg at the "
             "tip",
             self.weak and WEAK,

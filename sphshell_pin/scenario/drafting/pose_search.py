@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
@@ -22,13 +21,12 @@ from sphshell_pin.scenario.drafting.plan import (
     press_force,
     press_gap,
 )
-from sphshell_pin.scenario.drafting.poses import approaches, joints_aside
-from sphshell_pin.scenario.drafting.searching import CannotReach, Search, Working
+from sphshell_pin.scenario.drafting.poses import Limb, approaches
+from sphshell_pin.scenario.drafting.searching import CannotReach, NewScenario, Search, coordinates
 from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
 from sphshell_pin.scenario.drafting.trial import Fault
 from sphshell_pin.scenario.drafting.wording import counted
-from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built
 
 # Drafts that are run, in all and before a path is given up.
@@ -91,16 +89,17 @@ class PressSearch(Search):
             )
         known = WORKING.get(self.section.name or "", ())
         q = np.array(known) if len(known) == self.model.nq else self.q0
-        self.held = self.links(tips, joints_aside(self.model, tip), q)
+        self.limb = Limb(self.model, tip)
+        self.held = self.links(tips, self.limb.lock, q)
         self.room = _ROOM * tip.radius
-        self.bench = Bench(self.held, tip, q, 2 * TIP_GAP * tip.radius)
+        self.bench = Bench(self.held, self.limb, q, 2 * TIP_GAP * tip.radius)
         self.errors: list[SphshellError] = []
         self.stays: list[Press] = []
         """What presses in one place, where a path failed."""
         self.ways: list[str] = []
         """Why a path that was asked for could not be taken."""
 
-    def find(self) -> Working:
+    def find(self) -> NewScenario:
         """Return the first draft that works; SphshellError if none does."""
         for one in self._presses():
             found = self._repaired(one)
@@ -151,7 +150,7 @@ class PressSearch(Search):
         asked, shell, tip = self.asked, self.shell, self.tip
         gap = TIP_GAP * tip.radius
         directions = [PLACES[asked.place]] if asked.place else list(PLACES.values())
-        pressed = approaches(self.model, self.bench.q, tip, directions)
+        pressed = approaches(self.limb, self.bench.q, directions)
         if asked.fixed:
             spots = asked_touches(asked, shell, tip.radius, gap)
             choices = [(nearest_side(spots[0].normal), spots)]
@@ -171,12 +170,14 @@ class PressSearch(Search):
                             side, some, approach, on_floor=on_floor, room=room
                         )
 
-    def _repaired(self, press: Press) -> Working | None:
+    def _repaired(self, press: Press) -> NewScenario | None:
         """Run a draft, and those that repair it; return the first that works."""
         one: Press | None = press
-        lock, start = press.place.stance.lock, self._changed_joints(press.place.stance.q)
+        q = press.place.stance.q
+        home = coordinates(self.model, self.q0)
+        start = {k: at for k, at in coordinates(self.model, q).items() if at != home[k]}
         while one is not None and len(self.faults) < _MOST_RUNS:
-            section = self.locked(lock, "effort" if one.weak else "", start=start)
+            section = self.locked(self.limb.lock, "effort" if one.weak else "", start=start)
             found = self.run(section, one.plan(), self.held)
             if found is not None:
                 return found
@@ -189,16 +190,6 @@ class PressSearch(Search):
             one = repaired(one, fault)
             one = None if one and self.asked.slides and one.repair == "cut" else one
         return None
-
-    def _changed_joints(self, q: Array) -> dict[str, float | list[float]]:
-        """Return the coordinates of joints that are not as at the start, as a scenario does."""
-        start: dict[str, float | list[float]] = {}
-        for name in list(self.model.names)[1:]:
-            span, _ = joint_spans(self.model, name)
-            if not np.array_equal(q[span], self.q0[span]):
-                values = [round(float(one), 9) for one in q[span]]
-                start[name] = values[0] if len(values) == 1 else values
-        return start
 
     def _refusal(self) -> SphshellError:
         """Return the error that says why no draft works, and what to change."""

@@ -33,17 +33,54 @@ _AT_EASE = 0.2
 _HEIGHT, _ASTRAY, _TURNED, _FASTEST = 1e-4, 0.1, 0.02, 6.0
 
 
+def joints_aside(model: pin.Model, tips: Sequence[Tip]) -> tuple[str, ...]:
+    """Return the joints that move none of the `tips`."""
+    ends = [int(model.frames[find_frame(model, tip.frame)].parentJoint) for tip in tips]
+    # A joint that is held holds those that mimic it, and what it mimics.
+    on_way = {model.names[j] for end in ends for j in list(model.supports[end])[1:]}
+    moving = {one for name in on_way for one in group_of(model, name)}
+    return tuple(name for name in list(model.names)[1:] if name not in moving)
+
+
+class Limb(Reach):
+    """The joints that move a `tip`: the `chain` of them from the root, `lock` are all others."""
+
+    def __init__(self, model: pin.Model, tip: Tip) -> None:
+        self.tip, self.lock = tip, joints_aside(model, [tip])
+        super().__init__(model, tip.frame, tip.offset, self.lock)
+        self.chain = list(model.supports[model.frames[self.frame].parentJoint])[1:]
+
+    def direction(self) -> Array:
+        """Return the unit vector (3,) along the limb to the tip, from what is in `data`.
+
+        To a sphere before its frame as the frame points, else the frame would be dragged beside it;
+        to any other along the line from the last joint that is not inside it. Of a tip with a
+        single coordinate it is the direction of its motion: pressed along another one it jams by
+        friction.
+        """
+        pose, motion = self.data.oMf[self.frame], self.moves
+        if motion.shape[1] == 1 and motion.any():
+            return unit(motion[:, 0])
+        # A small ball on a flat end may be far beside the frame.
+        way = self.tip.offset if self.tip.ahead is None else self.tip.ahead
+        if way.any():
+            return unit(pose.rotation @ way)
+        for joint in reversed(self.chain):
+            away = pose.translation - self.data.oMi[joint].translation
+            if np.linalg.norm(away) > self.tip.radius:
+                return unit(away)
+        return np.array([0.0, 0.0, -1.0])
+
+
 class Stance:
     """A robot at the start, seen from its tip; vectors and points in the world.
 
     Attributes
     ----------
-    reach_of
-        Which moves the joints that move the `tip`.
+    limb, tip
+        The joints that move the tip.
     q
         Configuration of the whole robot (nq,).
-    lock
-        Joints that do not move the tip.
     center
         Center of the tip's sphere (3,) [m].
     approach
@@ -72,20 +109,17 @@ class Stance:
         Cosine between the approach and the limb that carries the tip; below 0 it is in the way.
     """
 
-    def __init__(
-        self, reach: Reach, q: Array, lock: tuple[str, ...], approach: Array, tip: Tip
-    ) -> None:
-        self.reach_of, self.tip, self.q, self.lock, self.approach = reach, tip, q, lock, approach
-        model, columns = reach.model, reach.columns
-        jacobian = reach.jacobian(q)
+    def __init__(self, limb: Limb, q: Array, approach: Array) -> None:
+        self.limb, self.tip, self.q, self.approach = limb, limb.tip, q, approach
+        model, columns, jacobian = limb.model, limb.columns, limb.jacobian(q)
         linear, angular = jacobian[:3], jacobian[3:]
-        self.center = reach.data.oMf[reach.frame].act(reach.offset)
-        away = [self.center - reach.data.oMi[j].translation for j in _chain(reach)]
+        self.center = limb.data.oMf[limb.frame].act(limb.offset)
+        away = [self.center - limb.data.oMi[j].translation for j in limb.chain]
         self.reach = max((float(np.linalg.norm(one)) for one in away), default=0.0)
         scaled = jacobian / np.repeat([max(self.reach, 1e-9), 1.0], 3)[:, None]
         values = np.linalg.svd(scaled, compute_uv=False)
         self.dexterity = float(values[-1] / values[0]) if values[0] > 0 else 0.0
-        ahead = float(_limb(reach, tip) @ approach)
+        ahead = float(limb.direction() @ approach)
         self.ahead = ahead if len(columns) > 1 else abs(ahead)
         mass = mass_matrix(model, q)[np.ix_(columns, columns)]
         self.joint_inertia = np.diag(mass).copy()
@@ -124,15 +158,15 @@ class Stance:
     @property
     def joints(self) -> int:
         """How many coordinates move the tip."""
-        return len(self.reach_of.columns)
+        return len(self.limb.columns)
 
     def at(self, center: Array) -> Stance | None:
         """Return the stance nearby with the sphere's center at `center` (3,); None if it cannot."""
         if abs(center - self.center).max() < 1e-12:
             return self
         held = self._held_rotation()
-        q, off = self.reach_of.solve(self.q, center, turn=held if self.joints >= 6 else None)
-        found = Stance(self.reach_of, q, self.lock, self.approach, self.tip)
+        q, off = self.limb.solve(self.q, center, turn=held if self.joints >= 6 else None)
+        found = Stance(self.limb, q, self.approach)
         return None if off > _HEIGHT * self.reach or found.mobility < _MOBILE else found
 
     def follows(self, centers: Array, free: Callable[[Array], bool]) -> tuple[int, str]:
@@ -141,12 +175,12 @@ class Stance:
         It ends before a limit of a joint, a singular posture, one that is not `free`, and, unless
         the tip's orientation follows from its place, before that changes.
         """
-        reach, q = self.reach_of, self.q
+        limb, q = self.limb, self.q
         held = self._held_rotation() if self.inertia else None
         for k in range(1, len(centers)):
             step = float(np.linalg.norm(centers[k] - centers[k - 1]))
-            to, off = reach.solve(q, centers[k], turn=held)
-            turn = float(np.abs(pin.difference(reach.model, q, to)).max())
+            to, off = limb.solve(q, centers[k], turn=held)
+            turn = float(np.abs(pin.difference(limb.model, q, to)).max())
             if held is not None and float(np.linalg.norm(held())) > _TURNED:
                 return k, "its joints cannot keep the tip from turning there"
             if off > _ASTRAY * step or turn > _FASTEST * step / self.reach + 1e-9:
@@ -157,41 +191,32 @@ class Stance:
         return len(centers), ""
 
     def _held_rotation(self) -> Callable[[], Array]:
-        reach = self.reach_of
-        reach.center(self.q)
-        start = reach.data.oMf[reach.frame].rotation.copy()
-        return lambda: np.asarray(pin.log3(start @ reach.data.oMf[reach.frame].rotation.T))
+        self.limb.center(self.q)
+        pose = self.limb.data.oMf[self.limb.frame]
+        start = pose.rotation.copy()
+        return lambda: np.asarray(pin.log3(start @ pose.rotation.T))
 
 
-def approaches(
-    model: pin.Model, q: Array, tip: Tip, directions: Sequence[Sequence[float]]
-) -> list[Array]:
+def approaches(limb: Limb, q: Array, directions: Sequence[Sequence[float]]) -> list[Array]:
     """Return where the tip may press, unit vectors (3,): the `directions` (k, 3) in turn.
 
     After the first one, the axis of the world along which the limb that carries the tip points at
     q. A tip of a single coordinate presses in the plane of its motion alone.
     """
-    reach = Reach(model, tip.frame, tip.offset, joints_aside(model, tip))
-    axis = reach.jacobian(q)[3:]
-    limb = _limb(reach, tip)
-    home = tuple(nearest_axis(limb))
+    axis, way = limb.jacobian(q)[3:], limb.direction()
+    home = tuple(nearest_axis(way))
     found = [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
     if axis.shape[1] > 1:
         return found
     if not axis.any():
-        return [limb, -limb]
+        return [way, -way]
     normal = unit(axis[:, 0])
     flat = [one - normal * (normal @ one) for one in found]
     return [unit(one) for one in flat if np.linalg.norm(one) > 0.5]
 
 
 def stances(
-    model: pin.Model,
-    q: Array,
-    tip: Tip,
-    approach: Array,
-    height: float | None,
-    usable: Callable[[Array], bool],
+    limb: Limb, q: Array, approach: Array, height: float | None, usable: Callable[[Array], bool]
 ) -> list[Stance]:
     """Return postures from which the tip can press along `approach` (3,), the best one first.
 
@@ -200,80 +225,40 @@ def stances(
     says whether links of the robot are free. The best is the one near q if it moves easily, else
     the one whose tip moves best with its joints away from their limits.
     """
-    lock = joints_aside(model, tip)
-    reach = Reach(model, tip.frame, tip.offset, lock)
     rng = np.random.default_rng(0)
     rows = np.eye(3)[2:] if height is not None else np.zeros((0, 3))
     place = np.array([0.0, 0.0, height or 0.0])
 
     def along() -> Array:
-        limb = _limb(reach, tip)
-        if len(reach.columns) == 1 and limb @ approach < 0:
-            limb = -limb
-        return turn_between(limb, approach)
+        way = limb.direction()
+        if len(limb.columns) == 1 and way @ approach < 0:
+            way = -way
+        return turn_between(way, approach)
 
-    least = _MOBILE if len(reach.columns) > 1 else _STRAIGHT
+    least = _MOBILE if len(limb.columns) > 1 else _STRAIGHT
     found: list[tuple[float, Stance]] = []
-    start = reach.into_limits(q)
+    start = limb.into_limits(q)
     for k in range(_SEEDS):
-        seed = reach.seed(start, rng) if k else start
-        at, off = reach.solve(seed, place, rows=rows, turn=along)
-        one = Stance(reach, at, lock, approach, tip)
+        seed = limb.seed(start, rng) if k else start
+        at, off = limb.solve(seed, place, rows=rows, turn=along)
+        one = Stance(limb, at, approach)
         if off > _HEIGHT * one.reach or one.mobility < least or one.ahead <= _BESIDE:
             continue
-        if any(np.abs(pin.difference(model, other.q, at)).max() < _APART for _, other in found):
+        away = [np.abs(pin.difference(limb.model, other.q, at)).max() for _, other in found]
+        if min(away, default=np.inf) < _APART or not usable(at):
             continue
-        if not usable(at):
-            continue
-        rank = one.mobility * one.ahead * _ease(reach, at) * one.dexterity
+        rank = one.mobility * one.ahead * _ease(limb, at) * one.dexterity
         rank += k == 0 and one.mobility > _EASY < one.dexterity
         found.append((rank * (one.force > 0), one))
     found.sort(key=lambda one: -one[0])
     return [one for _, one in found[:_MOST]]
 
 
-def _ease(reach: Reach, q: Array) -> float:
+def _ease(limb: Limb, q: Array) -> float:
     """Return 1 where all joints are away from their limits, less and less towards one."""
-    at = q[reach.bounded]
-    room = np.minimum(at - reach.low, reach.high - at) / (reach.high - reach.low)
+    at = q[limb.bounded]
+    room = np.minimum(at - limb.low, limb.high - at) / (limb.high - limb.low)
     return float(np.clip(room / _AT_EASE, 0.0, 1.0).min(initial=1.0))
-
-
-def joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
-    """Return the joints that do not move the tip."""
-    parent = int(model.frames[find_frame(model, tip.frame)].parentJoint)
-    # A joint that is held holds those that mimic it, and what it mimics.
-    moving = {
-        one for j in list(model.supports[parent])[1:] for one in group_of(model, model.names[j])
-    }
-    return tuple(name for name in list(model.names)[1:] if name not in moving)
-
-
-def _limb(reach: Reach, tip: Tip) -> Array:
-    """Return the unit vector (3,) along the limb to the tip, from what is in `reach`.
-
-    To a sphere before its frame as the frame points, else the frame would be dragged beside it; to
-    any other along the line from the last joint that is not inside it. Of a tip with a single
-    coordinate it is the direction of its motion: pressed along another one it jams by friction.
-    """
-    pose, motion = reach.data.oMf[reach.frame], reach.moves
-    if motion.shape[1] == 1 and motion.any():
-        return unit(motion[:, 0])
-    # A small ball on a flat end may be far beside the frame.
-    way = tip.offset if tip.ahead is None else tip.ahead
-    if way.any():
-        return unit(pose.rotation @ way)
-    for joint in reversed(_chain(reach)):
-        limb = pose.translation - reach.data.oMi[joint].translation
-        if np.linalg.norm(limb) > tip.radius:
-            return unit(limb)
-    return np.array([0.0, 0.0, -1.0])
-
-
-def _chain(reach: Reach) -> list[int]:
-    """Return the joints from the root to the tip."""
-    parent = reach.model.frames[reach.frame].parentJoint
-    return [int(j) for j in reach.model.supports[parent]][1:]
 
 
 def _upright(axis: Array) -> Array:

@@ -1,9 +1,14 @@
 """A search for a draft that works: one after the other is written and run, until one does."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING
+
+import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
@@ -15,23 +20,31 @@ from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.trial import Fault, try_out
 from sphshell_pin.scenario.drafting.wording import counted
-from sphshell_pin.scenario.format.build import Built, build_scenario
+from sphshell_pin.scenario.format.bodies import joint_spans
+from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.format.reading import parse_scenario
 from sphshell_pin.scenario.format.schema import RobotSection
 from sphshell_pin.scenario.format.sliders import check_knobs
 
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.scene.explain import Explanation
+
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
 
 
-class Working(NamedTuple):
-    """A scenario that works."""
+@dataclass(frozen=True)
+class NewScenario:
+    """A scenario that works, and why it is as it is."""
 
+    path: Path
     text: str
     built: Built
+    explanation: Explanation
+    """Explanation of the start, see Scene.explain."""
     why: tuple[str, ...]
     """One sentence for each choice that was made for the user."""
-    part: str = ""
-    """The URDF of a free part that it names."""
+    part: str
+    """The URDF of the free part that a hand holds, beside the scenario; "" without one."""
 
 
 class CannotStand(SphshellError):
@@ -64,7 +77,7 @@ class Search(ABC):
         """What failed in each draft that was run."""
 
     @abstractmethod
-    def find(self) -> Working:
+    def find(self) -> NewScenario:
         """Return the first draft that works.
 
         Raises
@@ -88,7 +101,7 @@ class Search(ABC):
         update = {"lock": list(lock), "joints": kinds, **stated}
         return self.section.model_copy(update=update)
 
-    def run(self, section: RobotSection, plan: Plan, links: Links) -> Working | None:
+    def run(self, section: RobotSection, plan: Plan, links: Links) -> NewScenario | None:
         """Write a draft and run it; None where it fails, as the last of the `faults` says."""
         loaded, (shell,) = self.built.assembly.loaded[0], self.built.scenario.shell
         does = "holds" if plan.part else _DOES[type(plan.control)]
@@ -102,8 +115,8 @@ class Search(ABC):
         built = build_scenario(scenario, self.file, known)
         fault = try_out(built, plan, links)
         if fault is None:
-            why = (*plan.why, plan.contact.note)
-            return Working(text, built, why, plan.part.urdf() if plan.part else "")
+            why, part = (*plan.why, plan.contact.note), plan.part.urdf() if plan.part else ""
+            return NewScenario(self.file, text, built, explain_built(built), why, part)
         self.faults.append(fault)
         if self.asked.tell is not None:
             self.asked.tell(f"tried, run {len(self.faults)}: {fault.text}")
@@ -114,3 +127,12 @@ class Search(ABC):
         fault = self.faults[-1]
         when = f" at t = {fault.t:.2g} s" if fault.link else ""
         return f"no draft works ({counted(len(self.faults), 'run')}): {fault.text}{when}"
+
+
+def coordinates(model: pin.Model, q: Array) -> dict[str, float | list[float]]:
+    """Return the coordinates of each joint, from q (nq,), as a scenario states them."""
+    found: dict[str, float | list[float]] = {}
+    for name in list(model.names)[1:]:
+        values = [round(float(one), 9) for one in q[joint_spans(model, name)[0]]]
+        found[name] = values[0] if len(values) == 1 else values
+    return found
