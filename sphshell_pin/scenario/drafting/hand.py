@@ -21,8 +21,8 @@ from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT
 from sphshell_pin.scenario.drafting.searching import NewScenario, Search, coordinates
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, bearable, hertz_stiffness, sticking
-from sphshell_pin.scenario.drafting.wording import mm, rounded
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, hertz_stiffness, sticking, too_deep
+from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
 
 GAP, DURATION = 1e-4, 1.5
@@ -132,11 +132,8 @@ def _planned(
     over = np.flatnonzero(stated & (np.abs(torques + weight) > limits))
     if len(over):
         return f"the effort limit of {limits[over[0]]:g} N m allows no press of {press:.3g} N"
-    if press > bearable(radius, *materials) * 7.5**1.5:
-        return (
-            f"{press:.3g} N would press a {materials[0].name} sphere of radius {mm(radius)} in by "
-            "more than half of it"
-        )
+    if said := too_deep(press, radius, materials):
+        return said
     kp = rounded(float(np.abs(torques).max()) / _DRAWN)
     inertia = np.diag(mass_matrix(model, grasp.q))[hand.reaches[0].columns]
     kd = rounded(1.4 * math.sqrt(kp * float(np.median(inertia))))

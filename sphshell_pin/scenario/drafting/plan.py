@@ -22,6 +22,7 @@ from sphshell_pin.scenario.drafting.tip_contact import (
     Contact,
     bearable,
     hertz_stiffness,
+    too_deep,
 )
 from sphshell_pin.scenario.drafting.wording import axis_name, listed, mm, rounded
 
@@ -182,11 +183,8 @@ def press_force(stance: Stance, materials: tuple[Material, Material], press: flo
             f"the joints' effort limits allow a push of {rounded(most, 3):g} N along "
             f"{_direction(stance.approach)}, not {press:g} N"
         )
-    if press > hertz_stiffness(radius, *materials) * (0.5 * radius) ** 1.5:
-        raise SphshellError(
-            f"{press:g} N would press a {materials[0].name} sphere of radius {mm(radius)} in by "
-            "more than half of it: a smaller --press, a larger --radius, or a harder --law"
-        )
+    if said := too_deep(press, radius, materials):
+        raise SphshellError(f"{said}: a smaller --press, a larger --radius, or a harder --law")
     return press
 
 

@@ -11,7 +11,7 @@ from sphshell_pin.contact.materials import (
 )
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.wording import rounded
+from sphshell_pin.scenario.drafting.wording import mm, rounded
 
 GRAVITY = 9.81
 
@@ -35,6 +35,7 @@ class Contact:
         self.restitution = restitution_between(*materials)
         self.mu_static, self.mu_dynamic = (round(mu, 3) for mu in friction_between(*materials))
         self.speed, self.v_static, self.bristle = rounded(speed), rounded(v_static), bristle
+        self.v_dynamic = rounded(10 * self.v_static)
 
     @property
     def note(self) -> str:
@@ -65,6 +66,14 @@ def hertz_stiffness(radius: float, one: Material, other: Material) -> float:
 def bearable(radius: float, one: Material, other: Material) -> float:
     """Return the load [N] that presses a sphere of `radius` [m] in by a fifteenth of it."""
     return float(hertz_stiffness(radius, one, other) * (radius / 15) ** 1.5)
+
+
+def too_deep(force: float, radius: float, materials: tuple[Material, Material]) -> str:
+    """Say that a `force` [N] presses a sphere of `radius` [m] too far in; "" if it does not."""
+    if force <= hertz_stiffness(radius, *materials) * (0.5 * radius) ** 1.5:
+        return ""
+    ball = f"a {materials[0].name} sphere of radius {mm(radius)}"
+    return f"{force:.3g} N would press {ball} in by more than half of it"
 
 
 def sticking(

@@ -103,9 +103,7 @@ def _roomy_places(shell: Shell, toward: Array) -> tuple[list[Array], float]:
     The best is the farthest from where the surface ends, or turns sharply: so far [m].
     """
     corners, rng = shell.vertices[shell.triangles], np.random.default_rng(0)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    normals = normals / np.maximum(areas, 1e-300)[:, None]
+    normals, areas = shell.triangle_normals, facet_areas(shell)
     facing = np.flatnonzero(normals @ toward > _FACING)
     if not len(facing):
         return [], 0.0
@@ -193,17 +191,21 @@ def _walk(shell: Shell, place: TouchPoint, direction: Array, steps: int, spacing
     return np.array(points[: max(1, len(points) - _SPARE)])
 
 
+def facet_areas(shell: Shell) -> Array:
+    """Return the areas (n,) [m2] of the triangles."""
+    a, b, c = np.moveaxis(shell.vertices[shell.triangles], 1, 0)
+    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+
+
 def _bulge(shell: Shell) -> Array | None:
     """Return the mean normal (3,) of an open sheet on the side where it bulges, of a flat one up.
 
     None of a body, be it with holes: its normals do not agree.
     """
-    corners = shell.vertices[shell.triangles]
-    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    mean, total = areas.sum(axis=0), float(np.linalg.norm(areas, axis=1).sum())
-    if shell.is_closed or float(np.linalg.norm(mean)) <= _SHEET * total:
+    mean = np.average(shell.triangle_normals, axis=0, weights=facet_areas(shell))
+    if shell.is_closed or np.linalg.norm(mean) <= _SHEET:
         return None
-    normal = unit(mean / total)
+    normal = unit(mean)
     heights = shell.vertices @ normal
     middle = shell.closest_points(shell.box.mean(axis=0)[None]).points[0] @ normal
     # The box of a dome is around its hollow.
