@@ -23,7 +23,7 @@ from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.plan import Press
 from sphshell_pin.scenario.drafting.pose_search import repaired
-from sphshell_pin.scenario.drafting.trial import Fault, _path_fault
+from sphshell_pin.scenario.drafting.trial import Fault, _force_fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
 from tests import models
 from tests.scenario.files import center_of, run_well
@@ -283,6 +283,23 @@ def test_what_failed_decides_what_is_tried_next(kind, before, path, repair):
         assert any(press.posture_stiffness)
         assert not found.posture_stiffness
     assert (None if found is None else found.repair) == repair
+
+
+@pytest.mark.parametrize("repair", ["", "calmed"])
+@pytest.mark.parametrize(("at", "told"), [(0.1, True), (0.8, True), (None, False)])
+def test_a_force_may_not_rise_by_half_again_while_the_tip_slides(at, told, repair):
+    """Nor at the first touch, but of a draft that was calmed: a hard tip may do no better."""
+    press, t = pressing(PATH, repair=repair), np.linspace(0.0, 1.0, 101)
+    rises = np.zeros(len(t), bool) if at is None else np.abs(t - at) < 0.015
+    log = SimpleNamespace(
+        row=np.arange(len(t)),
+        normal_force=np.where(rises, 1.6, 1.0),
+        normal_world=np.tile([0.0, 0.0, 1.0], (len(t), 1)),
+        friction_force_world=np.zeros((len(t), 3)),
+    )
+    fault = _force_fault(None, SimpleNamespace(control=press), SimpleNamespace(t=t, contacts=log))
+    assert (fault is not None) == (told and not (repair and at < press.lead_in))
+    assert fault is None or (fault.kind == "force" and fault.t == pytest.approx(at, abs=0.02))
 
 
 @pytest.mark.parametrize(("aside", "told"), [(0.55, False), (0.66, True)])

@@ -136,19 +136,19 @@ def _force_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     else:
         return None
     forces = _forces(result)
-    held, peak = forces[after], float(forces.max())
+    held, times = forces[after], t[after]
     off, mean = np.abs(held / force - 1), float(held.mean())
     if abs(mean / force - 1) > HELD:
         return Fault("force", f"{what}: the surface bears {mean:.3g} N on average")
     if (off > HELD).mean() > _SHAKEN or not held.all():
-        k = int(np.argmax(off))
-        when = float(t[after][k])
-        return Fault(
-            "force", f"{what}: the surface bears {held[k]:.3g} N at t = {when:.3g} s", when
-        )
-    # A hard tip may do no better.
-    if peak > _PEAK * force and isinstance(control, Press) and not control.repair:
-        return Fault("force", f"{what}: it rises to {peak:.3g} N")
+        when, worst = float(times[np.argmax(off)]), float(held[np.argmax(off)])
+        return Fault("force", f"{what}: the surface bears {worst:.3g} N at t = {when:.3g} s", when)
+    if isinstance(control, Press):
+        # When it first touches, a hard tip may do no better.
+        looked, times = (held, times) if control.repair else (forces, t)
+        peak, when = float(looked.max()), float(times[np.argmax(looked)])
+        if peak > _PEAK * force:
+            return Fault("force", f"{what}: it rises to {peak:.3g} N", when)
     return None
 
 
