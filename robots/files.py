@@ -202,10 +202,10 @@ def build_model(
 def build_geometry(
     description: Description, model: pin.Model, kind: pin.GeometryType, *, drawn: bool = True
 ) -> tuple[pin.GeometryModel, list[str]]:
-    """Return the geometry of a kind, and the meshes that are missing or broken.
+    """Return the geometry of a kind, and the meshes that are missing or, of a URDF, broken.
 
     Collada meshes are in meters, but for visual ones that are `drawn`: who draws them applies their
-    unit.
+    unit. Raises RobotError for other geometry that cannot be built, and for an MJCF's broken mesh.
     """
     visual = kind == pin.GeometryType.VISUAL
     if description.mjcf is not None:
@@ -253,10 +253,15 @@ def _geometry_of_mjcf(
 
 
 def _without_broken(root: ET.Element, model: pin.Model, kind: pin.GeometryType) -> list[str]:
-    """Take the meshes of a kind that cannot be read out of a URDF; return their files."""
+    """Take the meshes of a kind that cannot be read out of a URDF; return their files.
+
+    Other geometry stays: what is wrong with it is the error that Pinocchio states.
+    """
     broken = []
     for link in root.findall("link"):
         for shape in link.findall(kind.name.lower()):
+            if shape.find("geometry/mesh") is None:
+                continue
             alone = ET.Element("robot", name="one")
             ET.SubElement(alone, "link", name=link.get("name", "")).append(shape)
             text = ET.tostring(alone, encoding="unicode")

@@ -89,7 +89,7 @@ def test_other_names_of_meshes(tmp_path):
 
 
 def test_a_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
-    """Motion needs none; a collision mesh that is there and broken ends, as it would touch."""
+    """Motion needs none, nor one that is broken."""
     file = arm(tmp_path, visual=URI)
     text = file.read_text()
     part = f"<visual>{MESH.format(URI)}</visual>"

@@ -239,6 +239,15 @@ def test_a_ball_of_free_size_fits_the_part_and_stays_on_its_link(tmp_path: Path)
     assert asked.at_most(0.01) is asked
 
 
+def test_a_box_of_size_0_marks_a_place_and_is_no_geometry(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    text = arm(jaws=None, tool="tool0")
+    file.write_text(text.replace(link("tool0"), link("tool0", size="0 0 0")))
+    (tip,) = find_tips(robots.load_file(file), shipped=None, frame=None, radius=None)
+    assert tip.frame == "tool0"
+    assert tip.radius > 0
+
+
 def test_of_several_named_tips_the_one_that_stands_free_is_taken(tmp_path: Path) -> None:
     out = link("palm", ".1 .1 .02")
     for name, y in (("first", "0"), ("middle", ".02"), ("thumb", ".09"), ("ring", "-.02")):

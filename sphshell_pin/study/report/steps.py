@@ -145,7 +145,7 @@ def components(shell: sp.Shell) -> dict[str, Callable[[], float]]:
         on_sheet(UNDAMPED, None, PRESSED, AWAY),
         on_sheet(UNDAMPED, None, PRESSED, PRESSED),
     )
-    runs = {name: runner(scene) for name, scene in zip(ADDED, scenes, strict=False)}
+    runs = {name: runner(scene) for name, scene in zip(ADDED[:-1], scenes, strict=True)}
     return {**runs, PYTHON: runner(on_sheet(UNDAMPED, None), zero)}
 
 
