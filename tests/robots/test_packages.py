@@ -234,6 +234,21 @@ def test_an_argument_has_the_default_of_the_launch_file_that_names_the_robot(
         assert robots.load_file(file).model.existFrame("mk2")
 
 
+def test_colors_of_a_missing_package_are_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "arm.xacro"
+    head = '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><xacro:include filename='
+    link = '<link name="a"><visual><geometry><sphere radius="1"/></geometry>'
+    body = f"{link}<xacro:orange/></visual></link></robot>"
+    file.write_text(f'{head}"$(find far)/common_materials.xacro"/>{body}')
+    assert robots.load_file(file).visual_model.ngeoms == 1
+    assert "without colors: there is no package 'far'" in capsys.readouterr().err
+    file.write_text(f'{head}"$(find far)/arm_macro.xacro"/>{body}')
+    with pytest.raises(robots.RobotError, match="there is no package 'far'"):
+        robots.load_file(file)
+
+
 @pytest.mark.parametrize("name", ["part.xacro", "part.xml"])
 def test_a_part_of_a_robot_names_the_robot_that_includes_it(tmp_path: Path, name: str) -> None:
     part, whole = tmp_path / name, tmp_path / f"robot{Path(name).suffix}"
