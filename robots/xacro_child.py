@@ -71,7 +71,7 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     _without_missing_colors(xacro, folders)
     try:
         install(xacro, substitution_args)
-        document = xacro.process_file(str(file), mappings=dict(arguments))
+        document = _processed(xacro, file, arguments)
     except Exception as error:  # of the package xacro, which raises what happens to come up
         causes = list(_causes(error))
         if any(isinstance(one, MemoryError) for one in causes):
@@ -83,6 +83,23 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
         of = f" (in {where})" if where != file.name else ""
         raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
     return str(document.toxml())
+
+
+def _processed(xacro: Any, file: Path, arguments: Mapping[str, str]) -> Any:
+    """Return the document; older versions of xacro knew all properties of a file from its top."""
+    try:
+        return xacro.process_file(str(file), mappings=dict(arguments))
+    except xacro.XacroException as error:
+        if "is not defined" not in str(error):
+            raise
+        xacro.init_stacks(str(file))
+        document = xacro.parse(None, str(file))
+        root = document.documentElement
+        for one in reversed(root.getElementsByTagName("xacro:property")):
+            if one.parentNode is root:
+                root.insertBefore(one, root.firstChild)
+        xacro.process_doc(document, mappings=dict(arguments))
+        return document
 
 
 def _without_missing_colors(xacro: Any, folders: Folders) -> None:

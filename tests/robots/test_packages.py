@@ -249,6 +249,16 @@ def test_colors_of_a_missing_package_are_left_out(
         robots.load_file(file)
 
 
+def test_a_property_may_be_stated_below_what_uses_it(tmp_path: Path) -> None:
+    file = tmp_path / "arm.xacro"
+    file.write_text(
+        '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><link name="${root}"/>'
+        '<xacro:property name="root" value="${part}_link"/>'
+        '<xacro:property name="part" value="base"/></robot>'
+    )
+    assert robots.load_file(file).model.existFrame("base_link")
+
+
 @pytest.mark.parametrize("name", ["part.xacro", "part.xml"])
 def test_a_part_of_a_robot_names_the_robot_that_includes_it(tmp_path: Path, name: str) -> None:
     part, whole = tmp_path / name, tmp_path / f"robot{Path(name).suffix}"

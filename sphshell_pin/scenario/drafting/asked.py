@@ -41,7 +41,7 @@ class Asked:
     bodies: Sequence[str] | None
     faces: Sequence[str | int] | None
     material: str | None
-    against: str
+    against: str | None
     press: float | None
     place: str | None
     at: Array | str | None

@@ -43,6 +43,10 @@ class CannotHold(SphshellError):
     """No grasp of all fingertips that were asked for holds the part."""
 
 
+class TooHeavy(CannotHold):
+    """There are grasps, and none of them bears the part's weight."""
+
+
 def every_tip(robot: LoadedRobot, asked: Asked) -> list[Tip]:
     """Return all fingertips of `robot`.
 
@@ -93,7 +97,7 @@ def hold_in_hand(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) 
 
 def _held(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Working:
     """Return a scenario in which all of the `tips` hold the surface; CannotHold if none works."""
-    materials = find_material(asked.material or "rubber"), find_material(asked.against)
+    materials = find_material(asked.material or "rubber"), find_material(asked.against or "steel")
     model, q0, press = built.assembly.model, built.assembly.q0, asked.press
     (shell,) = built.shells.values()
     part, hand = Part.of(shell, materials[1]), Hand(model, tips)
@@ -132,7 +136,7 @@ def _held(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Work
         if fault is None:
             return Working(text, made, (*plan.why, plan.contact.note), part.urdf())
         said = fault.text
-    raise CannotHold(
+    raise TooHeavy(
         f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {said}; a lighter "
         "--against, another --press, or a smaller part"
     )

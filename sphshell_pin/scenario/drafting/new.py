@@ -19,10 +19,11 @@ from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import floats, is_path
+from sphshell_pin.robots.inertia import states_masses_alone
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.draft_text import draft_text
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns, other_ends
-from sphshell_pin.scenario.drafting.hand import every_tip, hold_in_hand, with_part
+from sphshell_pin.scenario.drafting.hand import TooHeavy, every_tip, hold_in_hand, with_part
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import part_file, word_primitive
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
@@ -47,6 +48,8 @@ WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 # Half the size of a surface that needs no file, in radii of the sphere; radius of a ball whose size
 # is free, as a part of the part's middle width, and of the room on its widest face.
 _SIZE, _BALL, _OF_ROOM = 15.0, 0.1, 0.5
+# Density that gives links with masses alone their moments of inertia [kg/m^3].
+_DENSITY = 2700.0
 # Ends of other limbs that are tried where one does not come to the part.
 _MOST_ENDS = 2
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
@@ -76,7 +79,7 @@ def new_scenario(
     bodies: Sequence[str] | None = None,
     faces: Sequence[str | int] | None = None,
     material: str | None = None,
-    against: str = "steel",
+    against: str | None = None,
     press: float | None = None,
     place: str | None = None,
     at: npt.ArrayLike | str | None = None,
@@ -118,7 +121,8 @@ def new_scenario(
         frame, by default the origin; without a frame it is a known fingertip or foot.
     material, against
         What the sphere and the surface are made of, names of MATERIALS; by default a free body is
-        of steel, any other sphere of rubber, or of plastic where rubber is too soft.
+        of steel, any other sphere of rubber, or of plastic where rubber is too soft; the surface of
+        steel, or of plastic where a hand cannot hold it.
     press
         Normal force [N] of a robot with a fixed base.
     place
@@ -161,6 +165,12 @@ def new_scenario(
                 note = f"frame '{other}', as with '{error.frame}' {said}"
                 return replace(made, why=(note, *made.why))
         raise
+    except TooHeavy as error:
+        if against is not None:
+            raise
+        made = _written(replace(asked, against="plastic"))
+        note = f"the part is of plastic, as with steel {str(error).partition(';')[0]}"
+        return replace(made, why=(note, *made.why))
     except CannotStand as error:
         if base is not None:
             raise
@@ -172,12 +182,7 @@ def new_scenario(
 def _written(asked: Asked) -> NewScenario:
     """Write the scenario that is asked for; CannotStand as `find_working` raises it."""
     file = _free_path(asked)
-    section = _robot_section(asked, file)
-    bare = _build_bare(section, file)
-    shaped = None if asked.base is not None else _base(bare.assembly.model)
-    if shaped is not None:
-        section = section.model_copy(update={"base": shaped})
-        bare = _build_bare(section, file)
+    section, bare, shaped = _bare(asked, file)
     loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
     if radius and (too_large := radius_fault(bare.assembly.model, radius)):
         raise InvalidParameter("radius", radius, too_large)
@@ -199,7 +204,7 @@ def _written(asked: Asked) -> NewScenario:
         does = "holds" if plan.part else _DOES[type(plan.control)]
         title = f"{loaded.name} {does} {shell.name}"
         if loaded.assumed:
-            title += f", its masses from its geometry at {section.density:g} kg/m^3"
+            title += f", its missing inertias from its geometry at {section.density:g} kg/m^3"
         text = draft_text(file.stem, title, section, shell, plan)
         scenario = parse_scenario(text, file)
         check_knobs(scenario, file, ranges=True)
@@ -226,6 +231,26 @@ def _written(asked: Asked) -> NewScenario:
     if shaped is not None and not in_hand:
         why = (f"the base is {shaped}, by the robot's shape: or --base", *why)
     return NewScenario(file, made.text, made.built, explain_built(made.built), why)
+
+
+def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
+    """Return the robot's table, the robot alone, and the base that its shape gives it if it does.
+
+    Links that state masses alone get moments of inertia.
+    """
+    section = _robot_section(asked, file)
+    bare = _build_bare(section, file)
+    description = bare.assembly.loaded[0].description
+    changed: dict[str, object] = {}
+    if not asked.density and description is not None and states_masses_alone(description):
+        changed["density"] = _DENSITY
+    shaped = None if asked.base is not None else _base(bare.assembly.model)
+    if shaped is not None:
+        changed["base"] = shaped
+    if changed:
+        section = section.model_copy(update=changed)
+        bare = _build_bare(section, file)
+    return section, bare, shaped
 
 
 def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
