@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,7 +22,26 @@ from sphshell_pin.robots.packages import Folders
 if TYPE_CHECKING:
     from sphshell_pin.robots.mjcf import MjcfRobot
 
+_ZEROS = re.compile(r"[\s.]*0[\s.0]*")
 INCLUDED = "name the file of the robot that includes this one"
+
+
+def frames_without_link(root: ET.Element) -> list[str]:
+    """Return the links that fixed joints place and a URDF with links does not have."""
+    links = {link.get("name") for link in root.findall("link")}
+    children = [one.find("child") for one in root.findall("joint[@type='fixed']")]
+    names = [one.get("link", "") for one in children if one is not None]
+    return [name for name in names if name and name not in links] if links else []
+
+
+def drop_empty_shapes(root: ET.Element) -> None:
+    """Take out shapes of size 0, which keep a place: nothing touches them."""
+    for link in root.iter("link"):
+        for part in [*link.findall("visual"), *link.findall("collision")]:
+            shape = part.find("geometry/*")
+            plain = shape is not None and shape.tag in ("box", "cylinder", "sphere")
+            if shape is not None and plain and _ZEROS.fullmatch(" ".join(shape.attrib.values())):
+                link.remove(part)
 
 
 def check_tree(root: ET.Element) -> None:
@@ -62,7 +81,7 @@ def check_tree(root: ET.Element) -> None:
 
 
 def add_limits(root: ET.Element) -> Iterator[str]:
-    """Give joints an empty <limit>, which states none, where urdfdom asks for one; say of which."""
+    """Set limits that urdfdom asks for, or that are negative, to 0, which states none; say so."""
     kinds = ("revolute", "prismatic")
     bare = [
         one for one in root.iter("joint") if one.get("type") in kinds and one.find("limit") is None
@@ -70,8 +89,20 @@ def add_limits(root: ET.Element) -> Iterator[str]:
     for joint in bare:
         ET.SubElement(joint, "limit", effort="0", velocity="0")
     if bare:
-        names = ", ".join(f"'{one.get('name')}'" for one in bare)
-        yield f"without limits of the joints {names}: they have no <limit>"
+        yield f"without limits of the joints {_names(bare)}: they have no <limit>"
+    for key in ("effort", "velocity"):
+        negative = []
+        for joint in root.iter("joint"):
+            for limit in joint.findall("limit"):
+                if limit.get(key, "").strip().startswith("-"):
+                    limit.set(key, "0")
+                    negative.append(joint)
+        if negative:
+            yield f"without the negative {key} limits of the joints {_names(negative)}"
+
+
+def _names(joints: Iterable[ET.Element]) -> str:
+    return ", ".join(f"'{one.get('name')}'" for one in joints)
 
 
 def mimics_of(root: ET.Element) -> Iterator[Mimic]:

@@ -27,6 +27,8 @@ from sphshell_pin.robots.description import (
     check_memory,
     check_size,
     check_tree,
+    drop_empty_shapes,
+    frames_without_link,
     mimics_of,
     parsed,
 )
@@ -89,12 +91,12 @@ def read(
     for folder in folders.given:
         if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
-    assumed = dict[str, object]()
+    assumed, others = dict[str, str](), ""
     try:
         if file.suffix.lower() == ".xacro":
             from sphshell_pin.robots.xacro_file import expand
 
-            text, assumed = expand(file, folders, xacro_args or {})
+            text, assumed, others = expand(file, folders, xacro_args or {})
         elif xacro_args:
             raise ValueError("arguments are for files that end in .xacro")
         else:
@@ -104,7 +106,7 @@ def read(
     found = described(text, folders, free_flyer=free_flyer)
     if assumed:
         values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
-        note = f"its arguments without a default are taken as {values}: or give others"
+        note = f"its arguments without a default are taken as {values}: or give others{others}"
         found = replace(found, notes=(*found.notes, note))
     return found
 
@@ -124,9 +126,16 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
             from sphshell_pin.robots.mjcf import read_mjcf
 
             return read_mjcf(root, folders, floats=free_flyer)
+        notes = list[str]()
+        frames = frames_without_link(root)
+        if frames and (folders.kept is not None or including(file) is None):
+            for name in frames:
+                ET.SubElement(root, "link", name=name)
+            notes.append(f"links that it does not have are frames: {', '.join(frames)}")
         check_tree(root)
-        notes = tuple(add_limits(root))
-        return Description(file, folders, root, tuple(mimics_of(root)), notes=notes)
+        drop_empty_shapes(root)
+        notes += add_limits(root)
+        return Description(file, folders, root, tuple(mimics_of(root)), notes=tuple(notes))
     except (ValueError, OSError, LookupError, RuntimeError) as error:  # the last: Pinocchio's
         if isinstance(error, SphshellError):
             raise

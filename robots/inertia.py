@@ -30,34 +30,60 @@ def with_density(description: Description, density: float) -> tuple[Description,
     """Return a URDF in which each link has an inertial that states none, and what was added.
 
     `density` [kg/m^3] is that of its collision geometry, or of its visual one if it has no other,
-    or but a speck that keeps a place; open meshes are taken for their convex hulls. Links without
-    geometry stay as they are.
+    or but a speck that keeps a place; open meshes are taken for their convex hulls. A link with a
+    mass and no moments of inertia keeps its mass. Links without geometry stay as they are.
     """
     check_positive("density", density, "kg/m^3")
     if description.is_mjcf:
         raise InvalidParameter("density", density, "is for URDF files: MJCF states its own")
-    root, added = copy.deepcopy(description.root), dict[str, float]()
+    root, added, turned = copy.deepcopy(description.root), dict[str, float](), list[str]()
     model = build_model(description)
     frames = {f.name: k for k, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
     for kind in ("collision", "visual"):
         speck = _SPECK * max(added.values(), default=0.0)
-        bare = [one for one in root.findall("link") if not _mass(one) > speck]
+        bare = [one for one in root.findall("link") if not (_mass(one) > speck and _turns(one))]
         part = copy.deepcopy(description)
         keep_geometry_of(part, {one.get("name", "") for one in bare}, kind)
         of = getattr(pin.GeometryType, kind.upper())
         geometry, _ = build_geometry(part, model, of, drawn=False)
         for link in bare:
-            inertia = _inertia(model, geometry, frames.get(link.get("name", "")), density)
-            if inertia.mass > _mass(link):
-                for stated in link.findall("inertial"):
-                    link.remove(stated)
-                link.insert(0, _element(inertia))
-                added[link.get("name", "")] = inertia.mass
-    note = (
-        f"the masses of {_list(list(added))} are those of their geometry at {density:g} kg/m^3, "
-        f"{sum(added.values()):.3g} kg in all, as the file states none"
-    )
-    return replace(description, root=root), note if added else ""
+            name, mass = link.get("name", ""), _mass(link)
+            inertia = _inertia(model, geometry, frames.get(name), density)
+            if mass > speck and not _turns(link) and inertia.mass > 0.0:
+                origin = link.find("inertial/origin")
+                at = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+                moments = mass / inertia.mass * inertia.inertia
+                inertia = pin.Inertia(mass, np.array(at.split(), dtype=float), moments)
+                turned.append(name)
+            elif inertia.mass > mass:
+                added[name] = inertia.mass
+            else:
+                continue
+            for stated in link.findall("inertial"):
+                link.remove(stated)
+            link.insert(0, _element(inertia))
+    said = "are those of their geometry"
+    notes = [
+        f"the masses of {_list(list(added))} {said} at {density:g} kg/m^3, "
+        f"{sum(added.values()):.3g} kg in all, as the file states none",
+        f"the moments of inertia of {_list(turned)} {said}, as those of the file are 0",
+    ]
+    told = [one for one, some in zip(notes, (added, turned), strict=True) if some]
+    return replace(description, root=root), "; ".join(told)
+
+
+def states_masses_alone(description: Description) -> bool:
+    """Whether a URDF states masses of links with meshes, and not one moment of inertia."""
+    links = [] if description.is_mjcf else description.root.findall("link")
+    stated = [one for one in links if _mass(one)]
+    return any(one.find(".//mesh") is not None for one in stated) and not any(map(_turns, stated))
+
+
+def _turns(link: ET.Element) -> bool:
+    """Whether a link of a URDF states a moment of inertia."""
+    inertia = link.find("inertial/inertia")
+    moments = [] if inertia is None else [inertia.get(name, "0") for name in ("ixx", "iyy", "izz")]
+    return any(number_of(one) for one in moments)
 
 
 def mass_fault(

@@ -289,8 +289,13 @@ def _name_all(spec: Any) -> None:
 
 
 def _set_base(spec: Any, *, floats: bool) -> None:
-    """Give the only body of the world a free joint, or take it; its keys lose what was of it."""
+    """Give the only body of the world a free joint, or take it; its keys lose what was of it.
+
+    The only body that is free is taken for it, beside others that are fixed or on joints.
+    """
     bodies = [body for body in spec.bodies[1:] if body.parent.name == "world"]
+    if not floats:
+        bodies = [one for one in bodies if any(int(j.type) == FREE for j in one.joints)] or bodies
     if len(bodies) != 1:
         raise ValueError(f"its world has {len(bodies)} bodies: state in it which of them are free")
     (body,) = bodies
@@ -302,9 +307,11 @@ def _set_base(spec: Any, *, floats: bool) -> None:
     drawn = spec.copy().compile()  # meshes that change cannot be compiled twice
     if floats:
         body.add_freejoint(name=f"{body.name}_free")
+    at = 0 if floats else int(drawn.joint(free[0].name).qposadr[0])
     for joint in free:
         spec.delete(joint)
     for key in spec.keys:
         if len(key.qpos):  # a key without is as drawn
             place = [*drawn.body_pos[1], *drawn.body_quat[1]]
-            key.qpos = [*place, *key.qpos] if floats else list(key.qpos)[7:]
+            stated = list(key.qpos)
+            key.qpos = [*place, *stated] if floats else [*stated[:at], *stated[at + 7 :]]

@@ -6,10 +6,12 @@ The answer is JSON: a xacro file is code, so nothing that comes from its process
 import contextlib
 import io
 import json
+import re
 import resource
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from sphshell_pin.base.limits import limit_memory
 from sphshell_pin.robots.packages import Folders
@@ -66,9 +68,10 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
 
     # xacro asks ament alone, which few machines have. $(eval find('name')) looks in the dictionary.
     substitution_args._eval_find = substitution_args._eval_dict["find"] = find
+    _without_missing_colors(xacro, folders)
     try:
         install(xacro, substitution_args)
-        document = xacro.process_file(str(file), mappings=dict(arguments))
+        document = _processed(xacro, file, arguments)
     except Exception as error:  # of the package xacro, which raises what happens to come up
         causes = list(_causes(error))
         if any(isinstance(one, MemoryError) for one in causes):
@@ -80,6 +83,50 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
         of = f" (in {where})" if where != file.name else ""
         raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
     return str(document.toxml())
+
+
+def _processed(xacro: Any, file: Path, arguments: Mapping[str, str]) -> Any:
+    """Return the document; older versions of xacro knew all properties of a file from its top."""
+    try:
+        return xacro.process_file(str(file), mappings=dict(arguments))
+    except xacro.XacroException as error:
+        if "is not defined" not in str(error):
+            raise
+        xacro.init_stacks(str(file))
+        document = xacro.parse(None, str(file))
+        root = document.documentElement
+        for one in reversed(root.getElementsByTagName("xacro:property")):
+            if one.parentNode is root:
+                root.insertBefore(one, root.firstChild)
+        xacro.process_doc(document, mappings=dict(arguments))
+        return document
+
+
+def _without_missing_colors(xacro: Any, folders: Folders) -> None:
+    """Let xacro leave out files and macros of colors, where their package is missing."""
+    included, call = xacro.get_include_files, xacro.handle_macro_call
+    missing = set[str]()
+
+    def include(name: str, symbols: object) -> Iterable[str]:
+        package = re.match(r"\$\(find ([\w-]+)\).*(?:colou?r|material)", name)
+        if package is None or folders.package(package[1]) is not None:
+            found: Iterable[str] = included(name, symbols)
+            return found
+        if package[1] not in missing:
+            missing.add(package[1])
+            xacro.warning(f"without colors: there is no package '{package[1]}' (see --package-dir)")
+        return ()
+
+    def handle(node: Any, macros: Any, symbols: object) -> object:
+        if missing and node.tagName.startswith("xacro:") and node.parentNode.tagName == "visual":
+            try:
+                xacro.resolve_macro(node.tagName[6:], macros, symbols)
+            except KeyError:
+                xacro.replace_node(node, by=None)
+                return True
+        return call(node, macros, symbols)
+
+    xacro.get_include_files, xacro.handle_macro_call = include, handle
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:

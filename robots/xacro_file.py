@@ -18,7 +18,7 @@ from sphshell_pin.base.limits import child_command, last_line
 from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
 from sphshell_pin.base.texts import visible
 from sphshell_pin.errors import MissingExtra
-from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.packages import Folders, workspaces
 
 TIME_LIMIT = 5.0
 """Time of the processor, to expand a file [s]; large robots take one or two."""
@@ -39,46 +39,88 @@ MEMORY_LIMIT = 1e9
 
 def expand(
     file: Path, folders: Folders, arguments: Mapping[str, object]
-) -> tuple[bytes, dict[str, object]]:
+) -> tuple[bytes, dict[str, str], str]:
     """Return the URDF that the xacro file makes with `arguments`, and with others it needs.
 
-    Those have no default in it: each has the value that another file of the package states, else
-    that of a condition is false, any other its own name. `$(find package)` is searched in
-    `folders`. Raises MissingExtra without the package xacro, and ValueError with the reason of a
-    file that cannot be expanded, or not within the limits.
+    Those have no default in it, or one that names a file that is not there: each has the value that
+    another file states, else the first for which the file is there, else that of a condition is
+    false, any other its own name. What else such an argument may be is said in a clause.
+    `$(find package)` is searched in `folders`. Raises MissingExtra without the package xacro, and
+    ValueError with the reason of a file that cannot be expanded, or not within the limits.
     """
     if importlib.util.find_spec("xacro") is None:
         raise MissingExtra("xacro", "robots", f"the xacro file {file}")
-    assumed = dict[str, object]()
+    assumed, others = dict[str, str](), ""
     while True:
         try:
-            return _expanded(file, folders, {**assumed, **arguments}), assumed
+            return _expanded(file, folders, {**assumed, **arguments}), assumed, others
         except ValueError as error:
             needed = re.search(r"Undefined substitution argument (\w+)", str(error))
-            if needed is None or needed[1] in assumed or len(assumed) == _LISTED:
-                raise
-            assumed[needed[1]] = _usual(needed[1], file)
+            if needed is not None and needed[1] not in assumed and len(assumed) < _LISTED:
+                assumed[needed[1]] = _usual(needed[1], file)
+                continue
+            name, choices = _choices(
+                str(error), {**dict(_stated_arguments(file)), **assumed, **arguments}
+            )
+            may = f"; {name} may be {', '.join(choices[:_LISTED])}" if choices else ""
+            if not choices or name in arguments:
+                raise ValueError(f"{error}{may}") from None
+            assumed[name], others = choices[0], others + may
+
+
+def _choices(said: str, values: Mapping[str, object]) -> tuple[str, list[str]]:
+    """Return the argument for whose value a file is missing, and the values for which one is there.
+
+    `said` is the error, `values` are those of all arguments.
+    """
+    found = re.search(r"No such file or directory: '?(/.+?)(?:'|; its arguments|$)", said)
+    parts = Path(found[1]).parts if found else ()
+    k = next((k for k in range(len(parts)) if not Path(*parts[: k + 1]).exists()), 0)
+    for name, value in values.items():
+        old = _text(value)
+        if not k or not old or old not in parts[k]:
+            continue
+        ahead, behind = parts[k].split(old, 1)
+        names = [one.name for one in sorted(Path(*parts[:k]).iterdir())]
+        new = [
+            one[len(ahead) : len(one) - len(behind)]
+            for one in names
+            if one.startswith(ahead) and one.endswith(behind)
+        ]
+        rest = parts[k:]
+        there = [
+            one
+            for one in new
+            if one and Path(*parts[:k], *(part.replace(old, one) for part in rest)).is_file()
+        ]
+        if there:
+            return name, there
+    return "", []
 
 
 def _usual(argument: str, file: Path) -> str:
-    """Return the value that a file of the package, or else of the folder, states."""
+    """Return the value that a file of the package or folder states, or one that names `file`."""
     stated = re.compile(
         rf'\b{argument}:=([\w./+-]+)|<arg\s+name="{argument}"\s+(?:default|value)="([\w./+-]+)"'
+        rf'|LaunchArgument\(\s*["\']{argument}["\'],\s*default_value=["\']([\w./+-]+)["\']'
     )
     tested = re.compile(rf'(?:if|unless)\s+value="[^"]*\b{argument}\b')
     is_tested = False
     above = file.absolute().parents
     package = next((one for one in above[:4] if (one / "package.xml").is_file()), None)
     files = above[0].glob("*") if package is None else package.rglob("*")
-    stating = (one for one in files if one.suffix in _STATING)
+    launch = workspaces(above[0])[-1].rglob("*launch*") if package else ()
+    stating = (one for one in itertools.chain(files, launch) if one.suffix in _STATING)
     for one in itertools.islice(stating, _MOST_FILES):
         try:
             text = read_bytes(one, MOST_TEXT).decode(errors="replace")
         except (OSError, ValueError):
             continue
+        if package is not None and package not in one.parents and file.name not in text:
+            continue
         found = stated.search(text)
         if found is not None:
-            return str(found[1] or found[2])
+            return str(next(filter(None, found.groups())))
         is_tested = is_tested or tested.search(text) is not None
     return "false" if is_tested else argument
 
@@ -131,13 +173,16 @@ def _advised(reason: str, file: Path) -> str:
         return (
             f"{reason}: the file that calls the macro fits another version of the one that has it"
         )
-    text = read_bytes(file, MOST_TEXT).decode(errors="replace")
-    stated = [
-        f"{name} ({usual})" if usual and "$" not in usual else name
-        for name, usual in re.findall(r'<xacro:arg\s+name="(\w+)"(?:\s+default="([^"]*)")?', text)
-    ]
+    stated = [f"{name} ({usual})" if usual else name for name, usual in _stated_arguments(file)]
     sets = "; its arguments, which --xacro-arg NAME=VALUE sets: "
     return reason + (sets + ", ".join(stated[:_LISTED]) if stated else "")
+
+
+def _stated_arguments(file: Path) -> list[tuple[str, str]]:
+    """Return the arguments that a file states, with their defaults, "" where it has none."""
+    text = read_bytes(file, MOST_TEXT).decode(errors="replace")
+    found = re.findall(r'<xacro:arg\s+name="(\w+)"(?:\s+default="([^"]*)")?', text)
+    return [(name, "" if "$" in usual else usual) for name, usual in found]
 
 
 def _text(value: object) -> str:

@@ -29,7 +29,7 @@ def new(
     body: BodyOption = None,
     face: FaceOption = None,
     law: str | None = None,
-    against: str = "steel",
+    against: str | None = None,
     press: float | None = None,
     place: str | None = None,
     at: str | None = None,
@@ -61,7 +61,7 @@ def new(
     offset X Y Z : Center of the sphere in the frame [m]; by default the end of its link.
     unit : Length unit of the surface file: mm, cm, m, inch, ...
     law : Material of the sphere: steel, aluminium, plastic, wood, rubber, silicone.
-    against : Material of the surface.
+    against : Material of the surface; by default steel, or plastic where steel is too heavy.
     press N : Normal force [N].
     place : Where the surface is, seen from the tip: below, above, +x, -x, +y, -y; by default below,
         if the joints allow it.

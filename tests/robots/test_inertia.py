@@ -74,6 +74,25 @@ def test_a_stated_mass_stays(tmp_path: Path) -> None:
     assert robot.model.inertias[2].mass == pytest.approx(1000.0 * 4 / 3 * np.pi * 1e-3, rel=1e-2)
 
 
+def test_masses_without_moments_of_inertia_get_those_of_the_geometry(tmp_path: Path) -> None:
+    write_obj(tmp_path / "box.obj", *meshes.cube(0.1))
+    file = arm(tmp_path, '<mesh filename="box.obj"/>')
+    zero = 'ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"'
+    stated = f'<inertial><origin xyz="0.05 0 0"/><mass value="3"/><inertia {zero}/></inertial>'
+    text = file.read_text()
+    for name in ("upper", "lower"):
+        text = text.replace(f'<link name="{name}">', f'<link name="{name}">{stated}')
+    file.write_text(text)
+    robot = robots.load_file(file, density=1000.0)
+    assert robot.model.inertias[2].mass == 3.0
+    np.testing.assert_allclose(robot.model.inertias[2].inertia, 0.005 * np.eye(3), atol=1e-8)
+    assert "the moments of inertia of links upper, lower are those of their" in robot.assumed
+    out = tmp_path / "a.toml"
+    done = call("new", "--robot", str(file), "--out", str(out))
+    assert done.exit_code == 0, done.output
+    assert "density = 2700" in out.read_text()
+
+
 def test_without_masses_one_sentence_lists_the_links(tmp_path: Path) -> None:
     file = arm(tmp_path, '<box size="0.1 0.1 0.1"/>')
     for command in (

@@ -290,6 +290,11 @@ def test_a_base_is_freed_and_fixed(tmp_path):
                                as_drawn[:7])  # fmt: skip
     with pytest.raises(robots.RobotError, match="has a joint already: it cannot float"):
         robots.load_file(FOLDER / "hinge.xml", free_flyer=True)
+    other = '<worldbody><body name="other"><joint name="b"/><geom size="1"/></body>'
+    beside = LIMB.format(free="<freejoint/>", place="0.2 0 0 0.5 1 0 0 0")
+    free.write_text(beside.replace("<worldbody>", other))
+    held = robots.load_file(free, free_flyer=False, pose="home")
+    np.testing.assert_allclose(held.q0, [0.2, 0.3])
 
 
 def test_an_open_mesh_weighs_as_its_hull_and_nothing_where_nothing_moves(tmp_path):

@@ -200,6 +200,65 @@ def test_arguments_without_a_default_are_taken_from_the_package_and_said(tmp_pat
     assert given.model.existFrame("a_b")
 
 
+def test_an_argument_that_names_a_file_takes_one_that_is_there(tmp_path: Path) -> None:
+    for name in ("big", "small"):
+        (tmp_path / "models" / name).mkdir(parents=True)
+        macro = f'<robot name="m"><link name="{name}"/></robot>'
+        (tmp_path / "models" / name / f"{name}_arm.xacro").write_text(macro)
+    head = '<robot name="$(arg kind)" xmlns:xacro="http://wiki.ros.org/xacro">'
+    head += '<xacro:arg name="kind" default="arm"/><xacro:include filename="models/$(arg kind)/'
+    file = tmp_path / "arm.xacro"
+    file.write_text(f'{head}$(arg kind)_arm.xacro"/></robot>')
+    with pytest.warns(RobotWarning, match=r"kind=big: or give others; kind may be big, small$"):
+        assert robots.load_file(file).model.existFrame("big")
+    assert robots.load_file(file, xacro_args={"kind": "small"}).model.existFrame("small")
+    with pytest.raises(robots.RobotError, match=r"kind may be big, small$"):
+        robots.load_file(file, xacro_args={"kind": "medium"})
+
+
+def test_an_argument_has_the_default_of_the_launch_file_that_names_the_robot(
+    tmp_path: Path,
+) -> None:
+    arm = package(tmp_path / "src" / "arm")
+    launches = package(tmp_path / "src" / "bringup") / "launch"
+    launches.mkdir()
+    for name, names, value in (("a", "other.xacro", "mk1"), ("b", "arm.xacro", "mk2")):
+        declared = f'DeclareLaunchArgument("model",\n  default_value="{value}")  # {names}'
+        (launches / f"{name}.launch.py").write_text(declared)
+    file = arm / "arm.xacro"
+    file.write_text(
+        '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><link name="$(arg model)"/>'
+        "</robot>"
+    )
+    with pytest.warns(RobotWarning, match="model=mk2"):
+        assert robots.load_file(file).model.existFrame("mk2")
+
+
+def test_colors_of_a_missing_package_are_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "arm.xacro"
+    head = '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><xacro:include filename='
+    link = '<link name="a"><visual><geometry><sphere radius="1"/></geometry>'
+    body = f"{link}<xacro:orange/></visual></link></robot>"
+    file.write_text(f'{head}"$(find far)/common_materials.xacro"/>{body}')
+    assert robots.load_file(file).visual_model.ngeoms == 1
+    assert "without colors: there is no package 'far'" in capsys.readouterr().err
+    file.write_text(f'{head}"$(find far)/arm_macro.xacro"/>{body}')
+    with pytest.raises(robots.RobotError, match="there is no package 'far'"):
+        robots.load_file(file)
+
+
+def test_a_property_may_be_stated_below_what_uses_it(tmp_path: Path) -> None:
+    file = tmp_path / "arm.xacro"
+    file.write_text(
+        '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><link name="${root}"/>'
+        '<xacro:property name="root" value="${part}_link"/>'
+        '<xacro:property name="part" value="base"/></robot>'
+    )
+    assert robots.load_file(file).model.existFrame("base_link")
+
+
 @pytest.mark.parametrize("name", ["part.xacro", "part.xml"])
 def test_a_part_of_a_robot_names_the_robot_that_includes_it(tmp_path: Path, name: str) -> None:
     part, whole = tmp_path / name, tmp_path / f"robot{Path(name).suffix}"

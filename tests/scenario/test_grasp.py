@@ -144,6 +144,17 @@ def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
     assert np.allclose(-forces[log.row == last].sum(axis=0), [0, 0, 9.81 * mass], atol=0.02)
 
 
+def test_a_part_that_is_too_heavy_of_steel_is_of_plastic(tmp_path):
+    import trimesh
+
+    file = tmp_path / "block.stl"
+    trimesh.creation.box((0.06, 0.06, 0.12)).export(file)
+    made = new_scenario(GRIPPER, file, tips="all", unit="m", out=out(tmp_path))
+    assert made.why[0].startswith("the part is of plastic, as with steel no grasp of")
+    with pytest.raises(SphshellError, match="a lighter --against"):
+        new_scenario(GRIPPER, file, tips="all", unit="m", against="steel", out=tmp_path / "b.toml")
+
+
 def test_fingers_that_mimic_others_hold_too(tmp_path):
     """Two fingers move as one; motors make up for friction that would keep them from pressing."""
     file, text = tmp_path / "gripper.urdf", GRIPPER.read_text("utf-8")

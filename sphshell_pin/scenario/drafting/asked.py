@@ -51,7 +51,8 @@ class Asked:
         Of a CAD file: those to take, by name or number; by default all of it.
     material, against
         What the sphere and the surface are made of, names of MATERIALS; by default a free body is
-        of steel, any other sphere of rubber, or of plastic where rubber is too soft.
+        of steel, any other sphere of rubber, or of plastic where rubber is too soft; the surface of
+        steel, or of plastic where a hand cannot hold it.
     press
         Normal force [N] of a robot with a fixed base.
     place
@@ -89,7 +90,7 @@ class Asked:
     bodies: Sequence[str] | None = None
     faces: Sequence[str | int] | None = None
     material: str | None = None
-    against: str = "steel"
+    against: str | None = None
     press: float | None = None
     place: str | None = None
     at: Array | str | None = None

@@ -38,6 +38,10 @@ class CannotHold(SphshellError):
     """No grasp of all fingertips that were asked for holds the part."""
 
 
+class TooHeavy(CannotHold):
+    """There are grasps, and none of them bears the part's weight."""
+
+
 def every_tip(robot: LoadedRobot, asked: Asked) -> list[Tip]:
     """Return all fingertips of `robot`.
 
@@ -85,7 +89,7 @@ class HoldSearch(Search):
         press, shell = self.asked.press, self.shell
         materials = (
             find_material(self.asked.material or "rubber"),
-            find_material(self.asked.against),
+            find_material(self.asked.against or "steel"),
         )
         part, hand = Part.of(shell, materials[1]), Hand(self.model, tips)
         mu, _ = friction_between(*materials)
@@ -114,7 +118,7 @@ class HoldSearch(Search):
             if works is not None:
                 return works
             said = self.faults[-1].text
-        raise CannotHold(
+        raise TooHeavy(
             f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {said}; a lighter "
             "--against, another --press, or a smaller part"
         )

@@ -18,10 +18,11 @@ from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import floats, is_path
+from sphshell_pin.robots.inertia import states_masses_alone
 from sphshell_pin.scenario.drafting.asked import WORDS, Asked
 from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
-from sphshell_pin.scenario.drafting.hand import HoldSearch, every_tip
+from sphshell_pin.scenario.drafting.hand import HoldSearch, TooHeavy, every_tip
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import part_file
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
@@ -39,6 +40,8 @@ from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, HalfS
 _SIZE, _BALL, _OF_ROOM = 15.0, 0.1, 0.5
 # Such surfaces that a hand can hold; half their width there, in radii of a fingertip.
 HELD_WORDS, _IN_HAND = ("sphere", "cylinder", "box"), 2.5
+# Density that gives links with masses alone their moments of inertia [kg/m^3].
+_DENSITY = 2700.0
 # Ends of other limbs that are tried where one does not come to the part.
 _MOST_ENDS = 2
 
@@ -72,6 +75,12 @@ def new_scenario(
                 note = f"frame '{other}', as with '{error.frame}' {said}"
                 return replace(made, why=(note, *made.why))
         raise
+    except TooHeavy as error:
+        if asked.against is not None:
+            raise
+        made = _written(replace(asked, against="plastic"))
+        note = f"the part is of plastic, as with steel {str(error).partition(';')[0]}"
+        return replace(made, why=(note, *made.why))
     except CannotStand as error:
         if asked.base is not None:
             raise
@@ -83,12 +92,7 @@ def new_scenario(
 def _written(asked: Asked) -> NewScenario:
     """Write the scenario that is asked for; CannotStand as DropSearch raises it."""
     file = _free_path(asked)
-    section = _robot_section(asked, file)
-    bare = _build_bare(section, file)
-    shaped = None if asked.base is not None else _base(bare.assembly.model)
-    if shaped is not None:
-        section = section.model_copy(update={"base": shaped})
-        bare = _build_bare(section, file)
+    section, bare, shaped = _bare(asked, file)
     loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
     if radius and (too_large := radius_fault(bare.assembly.model, radius)):
         raise InvalidParameter("radius", radius, too_large)
@@ -121,6 +125,26 @@ def _written(asked: Asked) -> NewScenario:
     shape = shaped and not in_hand and f"the base is {shaped}, by the robot's shape: or --base"
     why = tuple(one for one in (shape, *made.why, loaded.assumed) if one)
     return replace(made, why=why)
+
+
+def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
+    """Return the robot's table, the robot alone, and the base that its shape gives it if it does.
+
+    Links that state masses alone get moments of inertia.
+    """
+    section = _robot_section(asked, file)
+    bare = _build_bare(section, file)
+    description = bare.assembly.loaded[0].description
+    changed: dict[str, object] = {}
+    if not asked.density and description is not None and states_masses_alone(description):
+        changed["density"] = _DENSITY
+    shaped = None if asked.base is not None else _base(bare.assembly.model)
+    if shaped is not None:
+        changed["base"] = shaped
+    if changed:
+        section = section.model_copy(update=changed)
+        bare = _build_bare(section, file)
+    return section, bare, shaped
 
 
 def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:

@@ -107,7 +107,7 @@ class Search(ABC):
         does = "holds" if plan.part else _DOES[type(plan.control)]
         title = f"{loaded.name} {does} {shell.name}"
         if loaded.assumed:
-            title += f", its masses from its geometry at {section.density:g} kg/m^3"
+            title += f", its missing inertias from its geometry at {section.density:g} kg/m^3"
         text = draft_text(self.file.stem, title, section, shell, plan)
         scenario = parse_scenario(text, self.file)
         check_knobs(scenario, self.file, ranges=True)

@@ -46,7 +46,7 @@ class Contact:
 
 def chosen_materials(asked: Asked, tips: Sequence[Tip], load: float) -> tuple[Material, Material]:
     """Return what sphere and surface are made of; `load` [kg] rests on each, 0: it falls."""
-    other = find_material(asked.against)
+    other = find_material(asked.against or "steel")
     if asked.material is not None:
         return find_material(asked.material), other
     if not load:

@@ -68,6 +68,8 @@ def _touch_fault(plan: Plan, result: Result) -> Fault | None:
     least = min(times, key=times.__getitem__)
     if plan.part and times[least] < _HELD * plan.duration:
         return Fault("touch", f"'{least}' loses the part")
+    if isinstance(plan.control, Hold) and len(times) == 2 and not times[least]:
+        return Fault("touch", f"'{least}' comes down beside the surface")
     return None if any(times.values()) else Fault("touch", "the sphere never touches the surface")
 
 
