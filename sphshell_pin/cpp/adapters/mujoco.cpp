@@ -1,10 +1,6 @@
 #include "adapters/mujoco.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <exception>
-#include <mutex>
-#include <stdexcept>
 
 namespace sphshell {
 namespace {

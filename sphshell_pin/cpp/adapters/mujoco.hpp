@@ -6,16 +6,9 @@
 // a function of MuJoCo's state, which holds the memory, too.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <cstring>
-#include <memory>
 #include <shared_mutex>
-#include <string>
 #include <thread>
-#include <unordered_map>
-#include <utility>
-#include <vector>
 
 #include "dynamics/scene/scene_data.hpp"
 

@@ -1,12 +1,5 @@
 // Which contacts a model of MuJoCo has, and the functions by which MuJoCo calls them.
-#include <algorithm>
-#include <cstdint>
-#include <cstdlib>
-#include <cstring>
-#include <mutex>
-#include <optional>
 #include <random>
-#include <stdexcept>
 #include <unordered_set>
 
 #include "adapters/mujoco.hpp"
@@ -89,6 +82,12 @@ std::shared_ptr<const Set> contacts_of(const void* model) {
   return nullptr;
 }
 
+template <class Is>
+bool any_of_model(const void* model, const Is& is) {
+  const auto here = contacts_of(model);
+  return here && std::any_of(here->begin(), here->end(), is);
+}
+
 }  // namespace
 
 void apply_passive(const void* model, void* data) {
@@ -156,10 +155,7 @@ int filter_contact(const void* model, void*, int geom, int other) {
   const int* const type = value_at<const int*>(model, all.layout->contype);
   const int* const affinity = value_at<const int*>(model, all.layout->conaffinity);
   if (!(type[geom] & affinity[other]) && !(type[other] & affinity[geom])) return 1;
-  const auto here = contacts_of(model);
-  return here && std::any_of(here->begin(), here->end(), [&](const auto& contacts) {
-           return contacts->separates(geom, other);
-         });
+  return any_of_model(model, [&](const auto& one) { return one->separates(geom, other); });
 }
 
 std::string register_passive(void* model, std::shared_ptr<MujocoContacts> contacts) {
@@ -205,15 +201,11 @@ void unregister_passive(const MujocoContacts* contacts) {
 }
 
 bool is_taken(const void* model, int instance) {
-  const auto here = contacts_of(model);
-  return here && std::any_of(here->begin(), here->end(),
-                             [&](const auto& one) { return one->memory().instance == instance; });
+  return any_of_model(model, [&](const auto& one) { return one->memory().instance == instance; });
 }
 
 bool acts_on(const void* model, const MujocoContacts* contacts) {
-  const auto here = contacts_of(model);
-  return here && std::any_of(here->begin(), here->end(),
-                             [&](const auto& one) { return one.get() == contacts; });
+  return any_of_model(model, [&](const auto& one) { return one.get() == contacts; });
 }
 
 void end_model(const void* model) {

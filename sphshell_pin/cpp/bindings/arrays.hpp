@@ -1,7 +1,6 @@
 // Conversions between C++ rows and NumPy arrays that own their memory.
 #pragma once
 
-#include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
 #include <Eigen/Core>
@@ -11,10 +10,9 @@
 #include <utility>
 #include <vector>
 
-namespace sphshell {
+#include "bindings/own_errors.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
+namespace sphshell {
 
 template <class T>
 using Array = nb::ndarray<nb::numpy, T>;
@@ -64,14 +62,15 @@ Array<Element> by_rows(const Eigen::MatrixXd& x) {
 
 inline Array<double> to_array(const Eigen::MatrixXd& x) { return by_rows(x); }
 
-// What users may only read.
-inline Array<const double> read_only_array(const Eigen::VectorXd& x) {
-  return array_of<const double>(std::vector<double>(x.begin(), x.end()), {std::size_t(x.size())});
-}
-
-// Row by row, as NumPy's arrays are by default, while Eigen's matrices are column by column.
-inline Array<const double> read_only_array(const Eigen::MatrixXd& x) {
-  return by_rows<const double>(x);
+// What users may only read: a vector, or a matrix row by row, as NumPy's arrays are by default,
+// while Eigen's are column by column.
+template <class Derived>
+Array<const double> read_only_array(const Eigen::MatrixBase<Derived>& x) {
+  if constexpr (Derived::ColsAtCompileTime != 1)
+    return by_rows<const double>(x);
+  else
+    return array_of<const double>(std::vector<double>(x.derived().begin(), x.derived().end()),
+                                  {std::size_t(x.size())});
 }
 
 // The three numbers of a vector, behind those that are there.

@@ -1,19 +1,11 @@
 #include "bindings/interop.hpp"
 
-#include "bindings/callbacks.hpp"
 #include "bindings/law_integral.hpp"
-#include "bindings/own_errors.hpp"
 
-#include <nanobind/eigen/dense.h>
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "contact/laws/dual.hpp"
-#include "sphshell_pin/laws/friction.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using namespace sphshell;
 
 namespace {

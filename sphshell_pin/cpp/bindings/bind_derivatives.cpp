@@ -3,10 +3,7 @@
 #include "bindings/evaluations.hpp"
 #include "bindings/held_step.hpp"
 #include "bindings/records.hpp"
-#include "dynamics/derivatives/sensitivities.hpp"
 
-#include <nanobind/eigen/dense.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 namespace sphshell {
@@ -35,12 +32,11 @@ void bind(nb::class_<T>& bound) {
                   }
                   linearization.set_parameters({});
                   const Eigen::Index nv = v.size();
-                  return nb::make_tuple(
-                      read_only_array(acceleration),
-                      read_only_array(MatrixX(jacobian.topLeftCorner(nv, nv))),
-                      read_only_array(MatrixX(jacobian.block(0, nv, nv, nv))),
-                      read_only_array(MatrixX(linearization.inverse_mass())),
-                      read_only_array(MatrixX(linearization.by_parameters().topRows(nv))));
+                  return nb::make_tuple(read_only_array(acceleration),
+                                        read_only_array(jacobian.topLeftCorner(nv, nv)),
+                                        read_only_array(jacobian.block(0, nv, nv, nv)),
+                                        read_only_array(linearization.inverse_mass()),
+                                        read_only_array(linearization.by_parameters().topRows(nv)));
                 });
           },
           "q"_a, "v"_a.none(), "tau"_a.none(), "parameters"_a, "repeat"_a = 1)
@@ -57,9 +53,8 @@ void bind(nb::class_<T>& bound) {
               linearization.set_parameters({});
               std::vector<ContactRow> rows;
               scene.log(q, v, rows);
-              return nb::make_tuple(
-                  to_bytes(std::move(rows)), read_only_array(MatrixX(out.force_world)),
-                  read_only_array(MatrixX(out.normal_force)), read_only_array(MatrixX(out.depth)));
+              return nb::make_tuple(to_bytes(std::move(rows)), read_only_array(out.force_world),
+                                    read_only_array(out.normal_force), read_only_array(out.depth));
             });
           },
           "q"_a, "v"_a.none(), "parameters"_a)
@@ -78,9 +73,9 @@ void bind(nb::class_<T>& bound) {
               MatrixX by(2 * nv, tangent.q.cols());
               by << tangent.q, tangent.v;
               return nb::make_tuple(read_only_array(end.q), read_only_array(end.v),
-                                    read_only_array(MatrixX(by.middleCols(first, 2 * nv))),
-                                    read_only_array(MatrixX(by.rightCols(nv))),
-                                    read_only_array(MatrixX(by.leftCols(first))));
+                                    read_only_array(by.middleCols(first, 2 * nv)),
+                                    read_only_array(by.rightCols(nv)),
+                                    read_only_array(by.leftCols(first)));
             });
           },
           "integrator"_a, "dt"_a, "q"_a, "v"_a.none(), "tau"_a.none(), "parameters"_a);

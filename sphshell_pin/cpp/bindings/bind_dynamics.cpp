@@ -1,25 +1,15 @@
 #include "bindings/interop.hpp"
 
-#include <functional>
-#include <limits>
-#include <memory>
-#include <type_traits>
-
-#include "bindings/arrays.hpp"
 #include "bindings/callbacks.hpp"
 #include "bindings/evaluations.hpp"
 #include "bindings/records.hpp"
 #include "dynamics/compiled/compiled_robot.hpp"
 #include "dynamics/scene/model_fault.hpp"
-#include "dynamics/derivatives/linearization.hpp"
-#include "dynamics/run/simulation.hpp"
 #include "dynamics/run/touches.hpp"
 
-#include <nanobind/eigen/dense.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
@@ -45,13 +35,8 @@ struct Run {
       std::vector<Sensor> sensors)
       // In braces, as then what is checked is moved after its check.
       : simulation{checked(model_of(model), q0, v0),
-                   std::move(pairs),
-                   std::move(joints),
-                   settings,
-                   std::move(controller),
-                   std::move(q0),
-                   std::move(v0),
-                   std::move(sensors)} {}
+                   {std::move(pairs), std::move(joints), settings, std::move(controller),
+                    std::move(q0), std::move(v0), std::move(sensors)}} {}
 
  private:
   static const pinocchio::Model& checked(const pinocchio::Model& model, const VectorX& q0,

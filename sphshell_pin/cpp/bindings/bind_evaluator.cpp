@@ -1,19 +1,7 @@
 #include "bindings/interop.hpp"
 
-#include <memory>
-#include <string>
-#include <vector>
-
-#include <pinocchio/spatial.hpp>
-
 #include "bindings/evaluations.hpp"
 #include "bindings/held_step.hpp"
-#include "dynamics/scene/chain.hpp"
-#include "dynamics/scene/contact_row.hpp"
-#include "dynamics/derivatives/linearization.hpp"
-
-#include <nanobind/eigen/dense.h>
-#include <nanobind/stl/string.h>
 
 // Names of its own, as files may be compiled together.
 namespace sphshell::evaluator {

@@ -2,8 +2,6 @@
 #include <nanobind/stl/optional.h>
 
 #include <optional>
-#include <utility>
-#include <vector>
 
 #include "bindings/arrays.hpp"
 #include "bindings/gil.hpp"

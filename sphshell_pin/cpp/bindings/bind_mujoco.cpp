@@ -2,13 +2,9 @@
 #include "bindings/interop.hpp"
 
 #include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <map>
-
 #include "adapters/mujoco.hpp"
-#include "bindings/arrays.hpp"
 #include "bindings/evaluations.hpp"
 #include "bindings/gil.hpp"
 #include "bindings/records.hpp"

@@ -1,15 +1,11 @@
 #include "bindings/interop.hpp"
 
-#include <memory>
-
 #include "bindings/evaluations.hpp"
 #include "bindings/gil.hpp"
 #include "bindings/records.hpp"
 #include "dynamics/run/rollout.hpp"
 
-#include <nanobind/eigen/dense.h>
 #include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 namespace sphshell {

@@ -2,7 +2,6 @@
 
 #include "dynamics/sensing/sensors.hpp"
 
-#include <nanobind/eigen/dense.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>

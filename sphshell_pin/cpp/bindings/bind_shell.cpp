@@ -1,16 +1,6 @@
-#include <algorithm>
-#include <cstddef>
-#include <memory>
-#include <optional>
-
-#include "bindings/arrays.hpp"
 #include "bindings/gil.hpp"
-#include "bindings/own_errors.hpp"
 #include "bindings/records.hpp"
-#include "contact/query/query.hpp"
-#include "shell/curved/curved.hpp"
 #include "shell/in_parallel.hpp"
-#include "shell/shell.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/optional.h>
@@ -359,16 +349,16 @@ void bind_shell(nanobind::module_& m) {
   const auto array = [&](const char* name, auto get) {
     shell.def_prop_ro(name, get, nb::rv_policy::automatic);
   };
-  array("vertices", [](nb::handle self) {
-    return view<double>(self, nb::cast<const Shell&>(self).vertices());
-  });
-  array("triangles",
-        [](nb::handle self) { return view<int>(self, nb::cast<const Shell&>(self).triangles()); });
-  array("triangle_element",
-        [](nb::handle self) { return view<int>(self, nb::cast<const Shell&>(self).element()); });
-  array("triangle_normals", [](nb::handle self) {
-    return view<double>(self, nb::cast<const Shell&>(self).topology().face_normal);
-  });
+  const auto memory = [&](const char* name, auto number, auto rows) {
+    array(name, [rows](nb::handle self) {
+      return view<decltype(number)>(self, rows(nb::cast<const Shell&>(self)));
+    });
+  };
+  memory("vertices", double(), [](const Shell& s) -> auto& { return s.vertices(); });
+  memory("triangles", int(), [](const Shell& s) -> auto& { return s.triangles(); });
+  memory("triangle_element", int(), [](const Shell& s) -> auto& { return s.element(); });
+  memory("triangle_normals", double(),
+         [](const Shell& s) -> auto& { return s.topology().face_normal; });
   array("control_point_offsets", &control_point_offsets);
   array("corner_normals", &corner_normals);
   array("bending", &bending);

@@ -4,11 +4,6 @@
 // refer to each other in a circle, so every cycle passes through a Python object that is cleared.
 #pragma once
 
-#include <nanobind/nanobind.h>
-
-#include <cstdint>
-#include <vector>
-
 #include "bindings/gil.hpp"
 #include "dynamics/control/controllers.hpp"
 

@@ -1,11 +1,6 @@
 // Evaluations of one scene: at single states by any number of threads, or along a motion.
 #pragma once
 
-#include <memory>
-#include <utility>
-#include <vector>
-
-#include "bindings/one_user.hpp"
 #include "bindings/state_arguments.hpp"
 #include "dynamics/scene/scene_state.hpp"
 

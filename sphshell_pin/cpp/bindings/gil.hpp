@@ -5,7 +5,7 @@
 // instead until the process is gone, as Python 3.14 has it.
 #pragma once
 
-#include <nanobind/nanobind.h>
+#include "bindings/own_errors.hpp"
 
 #include <chrono>
 #include <stdexcept>
@@ -13,9 +13,6 @@
 #include <utility>
 
 namespace sphshell {
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 [[noreturn]] inline void sleep_for_ever() {
   for (;;) std::this_thread::sleep_for(std::chrono::hours(1));

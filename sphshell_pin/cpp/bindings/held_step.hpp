@@ -1,10 +1,6 @@
 // A step of an integrator under held torques, and its derivatives.
 #pragma once
 
-#include <memory>
-#include <string>
-#include <utility>
-
 #include "dynamics/derivatives/step_derivatives.hpp"
 #include "dynamics/integrators/table.hpp"
 

@@ -1,8 +1,5 @@
 #include "bindings/law_integral.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "contact/laws/gauss.hpp"
 
 namespace sphshell {
@@ -17,7 +14,7 @@ constexpr int kMostJumps = 1000;  // noise has one everywhere: then no interval 
 
 // The rule is exact for a sum of powers of the depth, halves among them, up to the seventh.
 double LawIntegral::gauss(double from, double to, const double* parameters) const {
-  const GaussRule rule = gauss_rule(8);
+  const GaussRule& rule = gauss_rule(8);
   double sum = 0;
   for (int i = 0; i < rule.size; ++i) {
     const double s = from + rule.nodes[i] * (to - from), force = force_(s * s, 0.0, parameters);

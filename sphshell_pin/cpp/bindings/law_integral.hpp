@@ -1,10 +1,6 @@
 // The elastic energy of a user's force that states none.
 #pragma once
 
-#include <memory>
-#include <utility>
-#include <vector>
-
 #include "bindings/callbacks.hpp"
 
 namespace sphshell {

@@ -2,6 +2,23 @@
 
 namespace sphshell {
 
+namespace {
+
+// A dictionary of names and values, one after the other.
+template <class Value, class... Rest>
+void put(nb::dict& out, const char* name, Value&& value, Rest&&... rest) {
+  out[name] = std::forward<Value>(value);
+  if constexpr (sizeof...(rest) > 0) put(out, std::forward<Rest>(rest)...);
+}
+template <class... Fields>
+nb::dict dict_of(Fields&&... fields) {
+  nb::dict out;
+  put(out, std::forward<Fields>(fields)...);
+  return out;
+}
+
+}  // namespace
+
 // What numpy.dtype takes: names, formats, offsets and the size of a row.
 nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size) {
   nb::list names, formats, offsets;
@@ -12,18 +29,12 @@ nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size) {
                                    : nb::make_tuple(field.type, field.size));
     offsets.append(field.offset);
   }
-  nb::dict out;
-  out["names"] = names;
-  out["formats"] = formats;
-  out["offsets"] = offsets;
-  out["itemsize"] = size;
-  return out;
+  return dict_of("names", names, "formats", formats, "offsets", offsets, "itemsize", size);
 }
 
 // Rows of times and states (n, ...); contacts of all rows one behind the other, with the row of
 // each; events and sensor readings column by column.
 nb::dict to_dict(Record record, int nq, int nv) {
-  nb::dict out;
   const std::size_t n = record.t.size();
   std::vector<double> event_t;
   std::vector<int> event_pair, event_kind;
@@ -32,46 +43,35 @@ nb::dict to_dict(Record record, int nq, int nv) {
     event_pair.push_back(e.pair);
     event_kind.push_back(static_cast<int>(e.kind));
   }
-  out["t"] = to_array(std::move(record.t));
-  out["q"] = to_array(std::move(record.q), {n, std::size_t(nq)});
-  out["v"] = to_array(std::move(record.v), {n, std::size_t(nv)});
-  out["energy"] = to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)});
-  out["contact_row"] = to_array(std::move(record.contact_row));
-  out["contacts"] = to_bytes(std::move(record.contacts));
-  if (record.states) {
-    out["states"] = to_array(std::move(*record.states));
-    out["state_sizes"] = to_array(std::move(record.state_sizes));
-  }
+  SensorRows& sensors = record.sensors;
+  nb::dict out = dict_of(
+      "t", to_array(std::move(record.t)), "q", to_array(std::move(record.q), {n, std::size_t(nq)}),
+      "v", to_array(std::move(record.v), {n, std::size_t(nv)}), "energy",
+      to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)}), "contact_row",
+      to_array(std::move(record.contact_row)), "contacts", to_bytes(std::move(record.contacts)),
+      "event_t", to_array(std::move(event_t)), "event_pair", to_array(std::move(event_pair)),
+      "event_kind", to_array(std::move(event_kind)), "sensor", to_array(std::move(sensors.sensor)),
+      "sensor_t", to_array(std::move(sensors.t)), "sensor_sampled",
+      to_array(std::move(sensors.sampled)), "sensor_values", to_array(std::move(sensors.values)));
+  if (record.states)
+    put(out, "states", to_array(std::move(*record.states)), "state_sizes",
+        to_array(std::move(record.state_sizes)));
   if (record.torques) out["torques"] = to_array(std::move(*record.torques), {n, std::size_t(nv)});
   if (record.patches) out["patches"] = to_bytes(std::move(*record.patches));
-  out["event_t"] = to_array(std::move(event_t));
-  out["event_pair"] = to_array(std::move(event_pair));
-  out["event_kind"] = to_array(std::move(event_kind));
-  out["sensor"] = to_array(std::move(record.sensors.sensor));
-  out["sensor_t"] = to_array(std::move(record.sensors.t));
-  out["sensor_sampled"] = to_array(std::move(record.sensors.sampled));
-  out["sensor_values"] = to_array(std::move(record.sensors.values));
   return out;
 }
 
 nb::dict as_python(SensitivityRecord record) {
-  nb::dict out;
-  out["q"] = to_array(std::move(record.q));
-  out["v"] = to_array(std::move(record.v));
-  out["force_world"] = to_array(std::move(record.force_world));
-  out["normal_force"] = to_array(std::move(record.normal_force));
-  out["depth"] = to_array(std::move(record.depth));
-  return out;
+  return dict_of("q", to_array(std::move(record.q)), "v", to_array(std::move(record.v)),
+                 "force_world", to_array(std::move(record.force_world)), "normal_force",
+                 to_array(std::move(record.normal_force)), "depth",
+                 to_array(std::move(record.depth)));
 }
 
 nb::dict as_python(const Counts& counts) {
-  nb::dict out;
-  out["steps"] = counts.steps;
-  out["rejected"] = counts.rejected;
-  out["evaluations"] = counts.evaluations;
-  out["event_steps"] = counts.event_steps;
-  out["event_queries"] = counts.event_queries;
-  return out;
+  return dict_of("steps", counts.steps, "rejected", counts.rejected, "evaluations",
+                 counts.evaluations, "event_steps", counts.event_steps, "event_queries",
+                 counts.event_queries);
 }
 
 nb::object as_python(const std::optional<DeepStart>& start) {
@@ -81,30 +81,18 @@ nb::object as_python(const std::optional<DeepStart>& start) {
 
 nb::list as_python(const std::vector<PairSummary>& summaries) {
   nb::list out;
-  for (const PairSummary& s : summaries) {
-    nb::dict d;
-    d["contact_time"] = s.contact_time;
-    d["impulse"] = s.impulse;
-    d["peak_force"] = s.peak_force;
-    d["peak_force_time"] = s.peak_force_time;
-    d["max_depth"] = s.max_depth;
-    d["max_depth_time"] = s.max_depth_time;
-    d["touches"] = s.touches;
-    out.append(d);
-  }
+  for (const PairSummary& s : summaries)
+    out.append(dict_of("contact_time", s.contact_time, "impulse", s.impulse, "peak_force",
+                       s.peak_force, "peak_force_time", s.peak_force_time, "max_depth", s.max_depth,
+                       "max_depth_time", s.max_depth_time, "touches", s.touches));
   return out;
 }
 
 nb::list as_python(const std::vector<LimitSummary>& limits) {
   nb::list out;
-  for (const LimitSummary& s : limits) {
-    nb::dict d;
-    d["cut_time"] = s.cut_time;
-    d["first_cut"] = s.first_cut;
-    d["peak_speed"] = s.peak_speed;
-    d["first_too_fast"] = s.first_too_fast;
-    out.append(d);
-  }
+  for (const LimitSummary& s : limits)
+    out.append(dict_of("cut_time", s.cut_time, "first_cut", s.first_cut, "peak_speed", s.peak_speed,
+                       "first_too_fast", s.first_too_fast));
   return out;
 }
 

@@ -1,11 +1,6 @@
 // What runs write down, as Python takes it.
 #pragma once
 
-#include <nanobind/nanobind.h>
-
-#include <utility>
-#include <vector>
-
 #include "bindings/arrays.hpp"
 #include "dynamics/run/simulation.hpp"
 

@@ -1,13 +1,9 @@
 // What the public classes hold.
 #pragma once
 
-#include <memory>
-#include <mutex>
-
 #include "contact/query/query.hpp"
 #include "shell/curved/curved.hpp"
 #include "sphshell_pin/query.hpp"
-#include "sphshell_pin/shell.hpp"
 
 namespace sphshell_pin {
 

@@ -1,5 +1,3 @@
-#include "sphshell_pin/query.hpp"
-
 #include "library/checks.hpp"
 #include "library/impl.hpp"
 

@@ -1,6 +1,5 @@
 #include "sphshell_pin/scene.hpp"
 
-#include <algorithm>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 
 #include "dynamics/compiled/compiled_robot.hpp"

@@ -1,10 +1,3 @@
-#include "sphshell_pin/shell.hpp"
-
-#include <algorithm>
-#include <array>
-
-#include <Eigen/Geometry>
-
 #include "library/checks.hpp"
 #include "library/impl.hpp"
 #include "shell/cleaning/mending.hpp"

@@ -2,7 +2,6 @@
 
 #include <coal/BVH/BVH_model.h>
 
-#include <cmath>
 #include <functional>
 #include <stdexcept>
 

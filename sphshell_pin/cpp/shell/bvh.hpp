@@ -2,12 +2,7 @@
 // collision traversal costs an order of magnitude more and reports every triangle as a contact.
 #pragma once
 
-#include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <array>
-#include <vector>
 
 #include "shell/large_array.hpp"
 #include "shell/topology.hpp"

@@ -10,6 +10,7 @@
 #include <vector>
 
 #ifdef __linux__
+#include <malloc.h>
 #include <sys/mman.h>
 #include <unistd.h>
 #endif
@@ -93,5 +94,15 @@ struct LargePageAllocator {
 
 template <class T>
 using LargeArray = std::vector<T, LargePageAllocator<T>>;
+
+// To be called where much was freed: glibc's malloc would keep most of it for later. `count` is the
+// number of triangles: small shells are not worth it.
+inline void give_back_freed_memory(std::size_t count) {
+#ifdef __GLIBC__
+  if (count > 10000) malloc_trim(0);
+#else
+  (void)count;
+#endif
+}
 
 }  // namespace sphshell

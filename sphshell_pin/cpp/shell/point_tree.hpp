@@ -41,9 +41,8 @@ class PointTree {
       stack_.pop_back();
       if (!meets(node.box)) continue;
       if (node.right < 0) {
-        for (std::size_t k = node.from; k < node.to; ++k) {
+        for (std::size_t k = node.from; k < node.to; ++k)
           if (visit(members_[k])) return true;
-        }
       } else {
         std::int32_t first = self + 1, second = node.right;
         turn = turn * 1664525U + 1013904223U;  // the linear congruence of Numerical Recipes
@@ -79,11 +78,9 @@ class PointTree {
     nodes_.push_back(node);
     if (to - from <= 8) return;
     int widest = 0;
-    for (int axis = 1; axis < D; ++axis) {
-      if (node.box.high[axis] - node.box.low[axis] > node.box.high[widest] - node.box.low[widest]) {
+    for (int axis = 1; axis < D; ++axis)
+      if (node.box.high[axis] - node.box.low[axis] > node.box.high[widest] - node.box.low[widest])
         widest = axis;
-      }
-    }
     const std::size_t middle = from + (to - from) / 2;
     std::nth_element(members_.begin() + static_cast<std::ptrdiff_t>(from),
                      members_.begin() + static_cast<std::ptrdiff_t>(middle),

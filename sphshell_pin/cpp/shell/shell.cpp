@@ -1,15 +1,7 @@
 #include "shell/shell.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <utility>
-
 #include "shell/curved/curved.hpp"
-#include "shell/free_memory.hpp"
 #include "shell/in_parallel.hpp"
-#include "shell/sheets.hpp"
-#include "shell/triangle.hpp"
 
 namespace sphshell {
 
@@ -180,11 +172,10 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   Vec3 normal = facet.normal;
   // closest_on_triangle: 0 the face, 1 to 3 an edge, 4 to 6 a vertex. The pseudo-normal of that
   // feature gives the sign of the distance.
-  if (at.feature >= 4) {
+  if (at.feature >= 4)
     normal = topology_.vertex_normal[triangles_[t][at.feature - 4]];
-  } else if (at.feature >= 1) {
+  else if (at.feature >= 1)
     normal = topology_.edge_normal(topology_.edge_at(3 * t + at.feature - 1));
-  }
   const double length = normal.norm();
   normal = length > 1e-9 ? Vec3(normal / length) : facet.normal;
   const double distance = std::sqrt(best);

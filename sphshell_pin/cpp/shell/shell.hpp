@@ -2,15 +2,11 @@
 #pragma once
 
 #include <atomic>
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <vector>
 
 #include "shell/bvh.hpp"
-#include "shell/large_array.hpp"
-#include "shell/topology.hpp"
 
 namespace sphshell {
 
@@ -81,7 +77,6 @@ struct CurveOptions {
 };
 
 class CurvedShell;
-struct Sheets;
 class Tangents;
 
 class Shell {

@@ -1,16 +1,10 @@
 #include "shell/topology.hpp"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
-#include <utility>
 
 #include "shell/disjoint_sets.hpp"
 #include "shell/half_edges.hpp"
-#include "shell/large_array.hpp"
 
 namespace sphshell {
 namespace {
@@ -273,6 +267,27 @@ Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle
   build_patches(element, *this);
   build_vertices(vertices, triangles, *this);
   find_pinches(vertices.size(), triangles, *this);
+}
+
+Sheets::Sheets(const Topology& topology) : rim(topology.face_normal.size(), 0) {
+  DisjointSets sets(rim.size());
+  for (const Edge& edge : topology.edges) {
+    if (!edge.on_rim()) {
+      sets.merge(triangle_of(topology.incidence[edge.begin]),
+                 triangle_of(topology.incidence[edge.begin + 1]));
+      continue;
+    }
+    for (int i = 0; i < edge.count; ++i) {
+      const int h = topology.incidence[edge.begin + i];
+      rim[triangle_of(h)] |= static_cast<std::uint8_t>(1 << side_of(h));
+    }
+  }
+  // Triangles that edges connect which are no border.
+  sheet = sets.labels();
+  closed.assign(static_cast<std::size_t>(sets.count()), 1);
+  for (std::size_t t = 0; t < rim.size(); ++t)
+    // A sheet with any border edge is open.
+    if (rim[t]) closed[static_cast<std::size_t>(sheet[t])] = 0;
 }
 
 }  // namespace sphshell

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -16,6 +17,38 @@ using Triangle = std::array<int, 3>;
 // Box of the vertices that triangles use.
 Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
                            const std::vector<Triangle>& triangles);
+
+// feature: 0 the face, 1 + k the edge from corner k to the next, 4 + k the corner k.
+struct ClosestPoint {
+  Vec3 point;
+  int feature;
+};
+
+// Voronoi regions of a triangle with the unit normal n: the plane's own half-planes decide, which
+// stays accurate on needles where barycentric coordinates (Ericson 2005, 5.1.5) lose all digits.
+inline ClosestPoint closest_on_triangle(const Vec3& x, const Vec3 corner[3], const Vec3& n) {
+  bool inside = true;
+  double best = 1e300;
+  ClosestPoint out{corner[0], 4};
+  for (int k = 0; k < 3; ++k) {
+    const Vec3& a = corner[k];
+    const Vec3 edge = corner[k == 2 ? 0 : k + 1] - a;
+    const Vec3 from = x - a;
+    if (n.dot(edge.cross(from)) >= 0) continue;
+    inside = false;
+    const double length2 = edge.squaredNorm();
+    const double t = std::clamp(from.dot(edge) / length2, 0.0, 1.0);
+    const Vec3 p = a + t * edge;
+    const double d2 = (x - p).squaredNorm();
+    if (d2 < best) {
+      best = d2;
+      out.point = p;
+      out.feature = t <= 0 ? 4 + k : t >= 1 ? 4 + (k == 2 ? 0 : k + 1) : 1 + k;
+    }
+  }
+  if (inside) out = {x - (x - corner[0]).dot(n) * n, 0};
+  return out;
+}
 
 // In [0, pi], accurate at both ends, where acos is not.
 inline double angle_between(const Vec3& a, const Vec3& b) {
@@ -101,6 +134,16 @@ struct Topology {
   // crease_angle [rad]; triangles of one element are contiguous in `element`.
   Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
            const std::vector<int>& element, double crease_angle, const CadFaces& cad = {});
+};
+
+// Triangles that are connected through edges of two half-edges wound alike form a sheet: it has an
+// orientation. What is left are its rims: borders, and edges of three or more triangles.
+struct Sheets {
+  std::vector<int> sheet;         // per triangle
+  std::vector<std::uint8_t> rim;  // per triangle, bit k: its side k is on a rim
+  std::vector<char> closed;       // per sheet: it has no rim
+
+  explicit Sheets(const Topology& topology);
 };
 
 }  // namespace sphshell

@@ -12,8 +12,6 @@
 // flat at d = 0, the first derivatives agree there too, wherever K_j goes on smoothly. Next to one
 // joint h is the share of the other face: of all that go from 1/2 to 0 and are flat at both ends it
 // has the smallest second derivative, by which the force changes.
-#include <algorithm>
-#include <cmath>
 #include <tuple>
 
 #include "contact/curvature/curvature_field.hpp"

@@ -1,9 +1,6 @@
 #include "contact/curvature/curvature.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <tuple>
 
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/query/closest_on_side.hpp"

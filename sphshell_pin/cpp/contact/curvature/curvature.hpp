@@ -1,10 +1,6 @@
 // The shape of the gap between a sphere and a curved shell.
 #pragma once
 
-#include <utility>
-#include <vector>
-
-#include "contact/query/contact.hpp"
 #include "contact/curvature/curvature_field.hpp"
 #include "contact/laws/hertz.hpp"
 

@@ -1,9 +1,5 @@
 #include "contact/curvature/curvature_field.hpp"
 
-#include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <tuple>
 
 #include "contact/query/closest_on_cell.hpp"

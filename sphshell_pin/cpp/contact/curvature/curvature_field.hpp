@@ -1,10 +1,7 @@
 // The curvature of the surface that curved elements were made from.
 #pragma once
 
-#include <cstdint>
 #include <unordered_map>
-#include <utility>
-#include <vector>
 
 #include "contact/query/contact.hpp"
 #include "shell/curved/curved.hpp"

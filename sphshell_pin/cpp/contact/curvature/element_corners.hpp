@@ -1,10 +1,6 @@
 // Corners and sides of curved elements, by facets: corner 3 facet + k, half-edge 3 facet + side.
 #pragma once
 
-#include <algorithm>
-#include <utility>
-#include <vector>
-
 #include "shell/curved/curved.hpp"
 
 namespace sphshell {

@@ -1,8 +1,5 @@
 #include "contact/faces/crown.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "contact/faces/shares.hpp"
 
 namespace sphshell {

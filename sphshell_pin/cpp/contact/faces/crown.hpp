@@ -1,8 +1,6 @@
 // How the corners of what lies on a plane share a contact.
 #pragma once
 
-#include <vector>
-
 #include "contact/laws/wrench_derivatives.hpp"
 #include "shell/faces/flats.hpp"
 

@@ -1,13 +1,9 @@
 #include "contact/faces/face_feet.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <type_traits>
 
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/query/closest_on_side.hpp"
-#include "shell/curved/face_search.hpp"
-#include "shell/faces/face_cells.hpp"
 
 namespace sphshell {
 namespace {

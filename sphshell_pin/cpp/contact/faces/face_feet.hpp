@@ -1,9 +1,6 @@
 // Closest points on the faces that facets lie on, in closed form.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "contact/query/minimum.hpp"
 #include "shell/curved/curved.hpp"
 

@@ -1,11 +1,7 @@
 #include "contact/faces/rings.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "contact/query/broad_phase.hpp"
 #include "shell/curved/curved.hpp"
-#include "shell/faces/face_cells.hpp"
 
 namespace sphshell {
 namespace {

@@ -1,8 +1,6 @@
 // Spheres on the axis of a face or of a round border: they touch all of a circle alike.
 #pragma once
 
-#include <vector>
-
 #include "contact/query/minimum.hpp"
 
 namespace sphshell {

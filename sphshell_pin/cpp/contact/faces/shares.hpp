@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <vector>
 
 #include "contact/query/contact.hpp"

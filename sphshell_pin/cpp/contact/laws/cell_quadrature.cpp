@@ -1,7 +1,5 @@
 #include "contact/laws/cell_quadrature.hpp"
 
-#include <limits>
-
 #include "contact/query/closest_on_side.hpp"
 
 namespace sphshell {
@@ -59,7 +57,7 @@ void Sextic::roots(double begin, double end, int depth, double* out, int& count)
 
 // The arc from a to b, counterclockwise round the region, in pieces that are nearly straight.
 template <class Region>
-bool CellQuadrature<Region>::add_arc(const Vec2& a, const Vec2& b, const Part& w, int depth) {
+bool CellQuadrature<Region>::add_arc(const Vec2& a, const Vec2& b, const Corners& w, int depth) {
   // Halved at the point over the middle of its chord until it is nearly straight.
   const Arc arc(*this, a, b);
   if (arc.lean() > kFlatArc) {
@@ -77,9 +75,9 @@ bool CellQuadrature<Region>::add_arc(const Vec2& a, const Vec2& b, const Part& w
 
 // A boundary that meets no side; `found`: there is one.
 template <class Region>
-bool CellQuadrature<Region>::add_loop(const Part& w, bool& found) {
+bool CellQuadrature<Region>::add_loop(const Corners& w, bool& found) {
   found = false;
-  const Vec2 start = (w.corner[0] + w.corner[1] + w.corner[2]) / 3;
+  const Vec2 start = (w[0] + w[1] + w[2]) / 3;
   CellPoint lowest;
   if (!find_minimum(patch_, region_.probe(), {start.x(), start.y()}, lowest)) return true;
   if (!(region_.value(lowest.point) < 0)) return true;
@@ -87,7 +85,7 @@ bool CellQuadrature<Region>::add_loop(const Part& w, bool& found) {
   // points of it, and the arcs between them.
   const Vec2 center(lowest.u, lowest.v);
   for (int k = 0; k < 3; ++k) {
-    const Vec2 d = w.corner[next_corner(k)] - w.corner[k], from = center - w.corner[k];
+    const Vec2 d = w[next_corner(k)] - w[k], from = center - w[k];
     if (d.x() * from.y() - d.y() * from.x() <= 0) return true;
   }
   Vec2 around[4];
@@ -103,11 +101,11 @@ bool CellQuadrature<Region>::add_loop(const Part& w, bool& found) {
 
 // Where the ray from a place inside the region leaves it, within the part.
 template <class Region>
-bool CellQuadrature<Region>::root_towards(const Vec2& from, const Vec2& direction, const Part& w,
+bool CellQuadrature<Region>::root_towards(const Vec2& from, const Vec2& direction, const Corners& w,
                                           Vec2& out) const {
   double most = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k) {
-    const Vec2 d = w.corner[next_corner(k)] - w.corner[k], to = w.corner[k] - from;
+    const Vec2 d = w[next_corner(k)] - w[k], to = w[k] - from;
     const double across = direction.x() * d.y() - direction.y() * d.x();
     // Up to the side of the triangle that the ray meets first.
     if (across > 0) most = std::min(most, (to.x() * d.y() - to.y() * d.x()) / across);

@@ -1,13 +1,8 @@
 // Integrals over the part of a curved element inside a ball, or below a plane.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/laws/gauss.hpp"
-#include "shell/curved/curved.hpp"
 
 namespace sphshell {
 
@@ -137,13 +132,10 @@ class CellQuadrature {
   // visit(x, area vector by parameters, weight) for all quadrature points.
   template <class Visit>
   void run(Visit&& visit) {
-    part({Corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}}, 0, visit);
+    part({Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}, 0, visit);
   }
 
  private:
-  struct Part {
-    Corners corner;
-  };
   // A piece of the boundary: a straight one, or an arc over the chord from a to b.
   struct Piece {
     Vec2 a, b;
@@ -153,11 +145,11 @@ class CellQuadrature {
   static constexpr int kMostPieces = 64, kMostLevels = 24;
 
   template <class Visit>
-  void part(const Part& w, int level, Visit& visit);
+  void part(const Corners& w, int level, Visit& visit);
   template <class Visit>
-  void divide(const Part& w, int level, Visit& visit);
+  void divide(const Corners& w, int level, Visit& visit);
   template <class Visit>
-  void whole(const Part& w, int order, Visit& visit);
+  void whole(const Corners& w, int order, Visit& visit);
   template <class Visit>
   void at(const Vec2& w, double weight, Visit& visit) {
     const Vec3 x = patch_.point(w.x(), w.y());
@@ -195,9 +187,9 @@ class CellQuadrature {
   // Pieces of the region's border from a to b, each flat enough for a graph over its chord; a whole
   // loop of it inside the part; and a point of it along a ray. False where they fail: the part is
   // then divided.
-  bool add_arc(const Vec2& a, const Vec2& b, const Part& w, int depth);
-  bool add_loop(const Part& w, bool& found);
-  bool root_towards(const Vec2& from, const Vec2& direction, const Part& w, Vec2& out) const;
+  bool add_arc(const Vec2& a, const Vec2& b, const Corners& w, int depth);
+  bool add_loop(const Corners& w, bool& found);
+  bool root_towards(const Vec2& from, const Vec2& direction, const Corners& w, Vec2& out) const;
   struct ArcPoint {
     Vec2 w, dw;
   };
@@ -265,19 +257,19 @@ class CellQuadrature<Region>::Arc {
 // it is cut in two, from its longest side to the corner opposite.
 template <class Region>
 template <class Visit>
-void CellQuadrature<Region>::divide(const Part& w, int level, Visit& visit) {
+void CellQuadrature<Region>::divide(const Corners& w, int level, Visit& visit) {
   int k = 0;
   double longest2 = 0;
   for (int i = 0; i < 3; ++i) {
-    const double side2 = to_plane(w.corner[next_corner(i)] - w.corner[i]).squaredNorm();
+    const double side2 = to_plane(w[next_corner(i)] - w[i]).squaredNorm();
     if (side2 > longest2) longest2 = side2, k = i;
   }
-  const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
-  const Vec2& top = w.corner[next_corner(next_corner(k))];
+  const Vec2 &p = w[k], &q = w[next_corner(k)];
+  const Vec2& top = w[next_corner(next_corner(k))];
   const Vec2 base = to_plane(q - p), up = to_plane(top - p);
   // No longer than four times its height.
   if (longest2 <= 4 * (base.x() * up.y() - base.y() * up.x())) {
-    for (const Corners& quarter : quarters(w.corner)) part({quarter}, level + 2, visit);
+    for (const Corners& quarter : quarters(w)) part(quarter, level + 2, visit);
     return;
   }
   // Halved time and again, a needle falls into ever more and thinner ones side by side. It is cut
@@ -289,15 +281,15 @@ void CellQuadrature<Region>::divide(const Part& w, int level, Visit& visit) {
   const double reach = size / (2 * std::sqrt(longest2));
   const double t = reach > 0.25 ? 0.5 : near < 0.5 ? near + reach : near - reach;
   const Vec2 cut = p + t * (q - p);
-  part({Corners{p, cut, top}}, level + 1, visit);
-  part({Corners{cut, q, top}}, level + 1, visit);
+  part({p, cut, top}, level + 1, visit);
+  part({cut, q, top}, level + 1, visit);
 }
 
 // Stroud's rule of degree 5, Dunavant's of degree 8 (Int. J. Numer. Methods Eng. 21 (1985) 1129),
 // or a product of Gauss's.
 template <class Region>
 template <class Visit>
-void CellQuadrature<Region>::whole(const Part& w, int order, Visit& visit) {
+void CellQuadrature<Region>::whole(const Corners& w, int order, Visit& visit) {
   struct Orbit {
     double weight, a, b, c;
   };
@@ -311,17 +303,16 @@ void CellQuadrature<Region>::whole(const Part& w, int order, Visit& visit) {
       {0.103217370534718250, 0.658861384496479963, 0.170569307751760018, 0.170569307751760018},
       {0.032458497623198080, 0.898905543365937904, 0.050547228317031048, 0.050547228317031048},
       {0.027230314174434994, 0.008394777409957605, 0.728492392955404281, 0.263112829634638113}};
-  const Vec2 e1 = w.corner[1] - w.corner[0], e2 = w.corner[2] - w.corner[0];
+  const Vec2 e1 = w[1] - w[0], e2 = w[2] - w[0];
   const double twice = e1.x() * e2.y() - e1.y() * e2.x();
   if (order > 4) {
-    const GaussRule rule = gauss_rule(order);
+    const GaussRule& rule = gauss_rule(order);
     for (int i = 0; i < rule.size; ++i)
-      sector(w.corner[0], w.corner[1] + rule.nodes[i] * (e2 - e1), e2 - e1, rule.weights[i], rule,
-             visit);
+      sector(w[0], w[1] + rule.nodes[i] * (e2 - e1), e2 - e1, rule.weights[i], rule, visit);
     return;
   }
   const auto put = [&](double weight, double b1, double b2) {
-    at(w.corner[0] + b1 * e1 + b2 * e2, weight * twice / 2, visit);
+    at(w[0] + b1 * e1 + b2 * e2, weight * twice / 2, visit);
   };
   const Orbit* orbit = order < 4 ? kSeven : kSixteen;
   const int count = order < 4 ? 3 : 5;
@@ -335,7 +326,7 @@ void CellQuadrature<Region>::whole(const Part& w, int order, Visit& visit) {
 
 template <class Region>
 template <class Visit>
-void CellQuadrature<Region>::part(const Part& w, int level, Visit& visit) {
+void CellQuadrature<Region>::part(const Corners& w, int level, Visit& visit) {
   // Its control points: of the three sides, each from its corner on, and the middle one.
   Vec3 net[3][4], middle;
   if (level == 0) {
@@ -352,12 +343,12 @@ void CellQuadrature<Region>::part(const Part& w, int level, Visit& visit) {
     middle = c.c00 + (c.c10 + c.c01) / 3 + c.c11 / 6;
   } else {
     for (int k = 0; k < 3; ++k) {
-      const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
+      const Vec2 &p = w[k], &q = w[next_corner(k)];
       net[k][0] = patch_.polar(p, p, p);
       net[k][1] = patch_.polar(p, p, q);
       net[k][2] = patch_.polar(p, q, q);
     }
-    middle = patch_.polar(w.corner[0], w.corner[1], w.corner[2]);
+    middle = patch_.polar(w[0], w[1], w[2]);
   }
   for (int k = 0; k < 3; ++k) net[k][3] = net[next_corner(k)][0];
   // From the convex hull of the control points.
@@ -376,7 +367,7 @@ void CellQuadrature<Region>::part(const Part& w, int level, Visit& visit) {
   bool any = false, fails = false, has_exit = false, has_entry = false;
   Vec2 exit, first_entry;
   for (int k = 0; k < 3; ++k) {
-    const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
+    const Vec2 &p = w[k], &q = w[next_corner(k)];
     // Walks round the triangle: pieces of the sides inside the region, and arcs from where the
     // boundary leaves it to where it comes back.
     const Sextic along = region_.along(net[k][0], net[k][1], net[k][2], net[k][3]);
@@ -416,10 +407,10 @@ void CellQuadrature<Region>::part(const Part& w, int level, Visit& visit) {
   // Pieces in line with the pole contribute nothing: a corner inside, else a crossing.
   Vec2 pole = pieces_[0].a;
   for (int k = 0; k < 3; ++k)
-    if (region_.value(net[k][0]) < 0) pole = w.corner[k];
+    if (region_.value(net[k][0]) < 0) pole = w[k];
   if (corners_inside == 0 && looped) pole = (pieces_[0].a + pieces_[count_ / 2].a) / 2;
-  const GaussRule rule = gauss_rule(order);
-  const GaussRule along_arc = gauss_rule(std::max(order, 5));
+  const GaussRule& rule = gauss_rule(order);
+  const GaussRule& along_arc = gauss_rule(std::max(order, 5));
   for (int i = 0; i < count_; ++i) {
     const Piece& piece = pieces_[i];
     if (!piece.is_arc) {

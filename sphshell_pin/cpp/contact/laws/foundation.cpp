@@ -1,14 +1,7 @@
 #include "contact/laws/foundation.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "contact/laws/cell_quadrature.hpp"
 #include "contact/query/tolerances.hpp"
-#include "shell/curved/curved.hpp"
-#include "shell/sheets.hpp"
-#include "shell/triangle.hpp"
 
 namespace sphshell {
 namespace {
@@ -70,7 +63,7 @@ void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& r
   int count = 0;
   along.roots(0, 1, 0, t, count);
   t[count] = 1;
-  const GaussRule rule = gauss_rule(8);
+  const GaussRule& rule = gauss_rule(8);
   // Between the roots of rho^2 = R^2 the side is inside and outside in turn.
   bool inside = along.f[0] < 0;
   double from = 0;
@@ -278,7 +271,7 @@ void Foundation::find_on_ball(double ball, const Vec3& center, double radius, bo
   if (!(near < far) || e == 0) return;
   const Vec3 axis = center / e;
   // Rings at a distance rho: dA = 2 pi ball rho d(rho) / e, and polynomials of degree 4.
-  const GaussRule rule = gauss_rule(points ? 8 : 3);
+  const GaussRule& rule = gauss_rule(points ? 8 : 3);
   double pushed = 0, turned = 0, energy = 0;
   FoundationSum sum;
   Vec3 across = axis.unitOrthogonal(), third = axis.cross(across);

@@ -3,9 +3,6 @@
 // between a plane and a shell: kappa times the depth below the plane.
 #pragma once
 
-#include <memory>
-#include <vector>
-
 #include "contact/query/broad_phase.hpp"
 #include "contact/laws/foundation_flat.hpp"
 

@@ -1,8 +1,6 @@
 // The elastic foundation over one flat facet, in closed form.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 
 #include "contact/query/contact.hpp"

@@ -1,8 +1,5 @@
 #include "contact/query/broad_phase.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 namespace sphshell {
 
 BroadPhase::BroadPhase(bool follow) : follow_(follow) {

@@ -1,12 +1,9 @@
 // Which facets a sphere may touch.
 #pragma once
 
-#include <vector>
-
 #include "contact/query/contact.hpp"
 #include "shell/curved/cell_bounds.hpp"
 #include "shell/curved/face_search.hpp"
-#include "shell/shell.hpp"
 
 namespace sphshell {
 

@@ -1,11 +1,8 @@
 #include "contact/query/closest_on_cell.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
 
 #include "contact/query/closest_on_side.hpp"
-#include "contact/query/tolerances.hpp"
 
 namespace sphshell {
 namespace {

@@ -1,9 +1,6 @@
 // The point of a curved element, a cell, nearest to a point, and how it follows that point.
 #pragma once
 
-#include <array>
-#include <utility>
-
 #include "contact/query/contact.hpp"
 #include "shell/curved/curved.hpp"
 

@@ -1,10 +1,6 @@
 // The point of a cubic side nearest to a point, for certain.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
-
 #include "contact/query/contact.hpp"
 #include "contact/query/tolerances.hpp"
 #include "shell/curved/curved.hpp"

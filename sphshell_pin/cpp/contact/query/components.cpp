@@ -1,13 +1,11 @@
 #include "contact/query/components.hpp"
 
-#include <algorithm>
 #include <numeric>
 #include <type_traits>
 
 #include "contact/query/closest_on_cell.hpp"
 #include "contact/query/closest_on_side.hpp"
 #include "contact/faces/face_feet.hpp"
-#include "shell/curved/curved.hpp"
 
 namespace sphshell {
 namespace {

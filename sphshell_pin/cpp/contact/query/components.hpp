@@ -1,10 +1,6 @@
 // Components of the surface inside the sphere: each counts once.
 #pragma once
 
-#include <cstdint>
-#include <Eigen/Geometry>
-#include <vector>
-
 #include "contact/query/minimum.hpp"
 
 namespace sphshell {

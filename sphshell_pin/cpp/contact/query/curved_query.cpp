@@ -1,7 +1,5 @@
 #include "contact/query/curved_query.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <type_traits>
 
 #include "contact/query/closest_on_cell.hpp"

@@ -1,13 +1,9 @@
 // Contacts with curved elements: the minima of the distance that the cells hold.
 #pragma once
 
-#include <vector>
-
 #include "contact/query/broad_phase.hpp"
 #include "contact/query/components.hpp"
 #include "contact/faces/face_feet.hpp"
-#include "contact/query/minimum.hpp"
-#include "shell/curved/curved.hpp"
 
 namespace sphshell {
 

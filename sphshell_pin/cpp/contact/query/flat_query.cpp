@@ -1,13 +1,9 @@
 #include "contact/query/flat_query.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <map>
 #include <numeric>
 
 #include "contact/query/regions.hpp"
-#include "shell/triangle.hpp"
 
 namespace sphshell {
 namespace {

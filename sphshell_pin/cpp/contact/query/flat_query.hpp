@@ -1,9 +1,6 @@
 // The exact polyhedron: one contact at every local minimum of the distance over the surface.
 #pragma once
 
-#include <utility>
-#include <vector>
-
 #include "contact/query/broad_phase.hpp"
 #include "contact/query/minimum.hpp"
 

@@ -1,8 +1,6 @@
 // Minima of the distance as the queries find them, before a shell's side is looked at.
 #pragma once
 
-#include <cmath>
-
 #include "contact/query/contact.hpp"
 #include "contact/query/tolerances.hpp"
 #include "shell/shell.hpp"

@@ -1,13 +1,10 @@
 #include "contact/query/query.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <type_traits>
 
 #include "contact/query/curved_query.hpp"
 #include "contact/faces/rings.hpp"
 #include "contact/query/flat_query.hpp"
-#include "shell/triangle.hpp"
 
 namespace sphshell {
 namespace {

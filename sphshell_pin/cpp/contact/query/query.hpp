@@ -1,9 +1,6 @@
 // Where a sphere touches a shell.
 #pragma once
 
-#include <memory>
-#include <vector>
-
 #include "contact/query/contact.hpp"
 #include "shell/shell.hpp"
 

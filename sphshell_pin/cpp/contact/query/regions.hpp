@@ -1,8 +1,6 @@
 // Over which feature of a triangle a sphere's center stands.
 #pragma once
 
-#include <algorithm>
-
 #include "shell/shell.hpp"
 
 namespace sphshell {

@@ -1,10 +1,5 @@
 #include "contact/query/tracker.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <utility>
-
 namespace sphshell {
 namespace {
 

@@ -1,8 +1,6 @@
 // Which contact goes on from which, from one accepted step to the next.
 #pragma once
 
-#include <vector>
-
 #include "contact/query/query.hpp"
 
 namespace sphshell {

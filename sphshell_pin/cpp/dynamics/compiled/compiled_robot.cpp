@@ -9,7 +9,6 @@
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "dynamics/scene/multibody.hpp"
 

@@ -3,7 +3,6 @@
 
 #include <pinocchio/multibody.hpp>
 
-#include <memory>
 #include <string>
 
 namespace sphshell {

@@ -1,11 +1,6 @@
 #include "dynamics/control/controllers.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <algorithm>
-#include <pinocchio/spatial.hpp>
-#include <utility>
-
-#include "dynamics/control/target_path.hpp"
 
 namespace sphshell {
 namespace {
@@ -13,28 +8,21 @@ namespace {
 constexpr double kMobility = 1e-9;  // of the largest: directions in which a frame cannot move
 
 // `actuated` is 1 where a joint's velocity is driven, else 0 (a free-floating base or object).
-class GravityCompensation : public Controller {
+class GravityCompensation : public Controller, Fields {
  public:
-  explicit GravityCompensation(const Fields& fields) : actuated_(fields.vector("actuated")) {}
+  explicit GravityCompensation(const Fields& fields) : Fields(fields) {}
   void torque(SceneData& scene, double, const VectorX& q, const VectorX&, VectorX& tau) override {
     tau = scene.body().gravity(q).cwiseProduct(actuated_);
   }
 
  private:
-  VectorX actuated_;
+  const VectorX actuated_ = vector("actuated");
 };
 
 // kp (q_ref - q) - kd v, and the gravity torque where asked for.
-class JointPd : public Controller {
+class JointPd : public Controller, Fields {
  public:
-  explicit JointPd(const Fields& fields)
-      : kp_(fields.vector("kp")),
-        kd_(fields.vector("kd")),
-        q_ref_(fields.vector("q_ref")),
-        actuated_(fields.vector("actuated")),
-        error_(VectorX::Zero(kd_.size())),
-        gravity_(fields.number("gravity") != 0),
-        friction_(fields.number("friction_compensation") != 0) {}
+  explicit JointPd(const Fields& fields) : Fields(fields) {}
 
   void torque(SceneData& scene, double, const VectorX& q, const VectorX& v, VectorX& tau) override {
     scene.body().difference(q, q_ref_, error_);
@@ -45,39 +33,29 @@ class JointPd : public Controller {
   }
 
  private:
-  VectorX kp_, kd_, q_ref_, actuated_, error_;
-  bool gravity_, friction_;
+  const VectorX kp_ = vector("kp"), kd_ = vector("kd"), q_ref_ = vector("q_ref"),
+                actuated_ = vector("actuated");
+  VectorX error_ = VectorX::Zero(kd_.size());
+  const bool gravity_ = flag("gravity"), friction_ = flag("friction_compensation");
 };
 
 // Parameters of CartesianImpedance; units as in dynamics/control/impedance.py.
-struct ImpedanceSettings {
-  explicit ImpedanceSettings(const Fields& f)
-      : joint(f.integer("joint")),
-        path_joint(f.integer("path_joint")),
-        frame(f.frame("frame")),
-        path_placement(f.frame("path_placement")),
-        stiffness(f.number("stiffness")),
-        damping(f.number("damping")),
-        normal_force(f.number("normal_force")),
-        force_rise(f.number("force_rise")),
-        rotational_stiffness(f.number("rotational_stiffness")),
-        rotational_damping(f.number("rotational_damping")),
-        posture_stiffness(f.vector("posture_stiffness")),
-        joint_damping(f.vector("joint_damping")),
-        q_ref(f.vector("q_ref")),
-        actuated(f.vector("actuated")),
-        decoupled(f.number("decoupled") != 0),
-        friction_compensation(f.number("friction_compensation") != 0) {}
+struct ImpedanceSettings : Fields {
+  explicit ImpedanceSettings(const Fields& fields) : Fields(fields) {}
 
-  int joint, path_joint;                            // that carry the controlled frame, and the path
-  SE3 frame, path_placement;                        // in those joints
-  double stiffness, damping;                        // [N/m], [N s/m]
-  double normal_force;                              // pressed against the normal [N]
-  double force_rise;                                // time in which that comes on [s]
-  double rotational_stiffness, rotational_damping;  // [N m], [N m s]
-  VectorX posture_stiffness, joint_damping, q_ref, actuated;
-  bool decoupled;              // the inertia of the robot does not disturb the frame
-  bool friction_compensation;  // motors make up for damping and dry friction of the joints
+  // That carry the controlled frame, and the path; these in those joints.
+  int joint = integer("joint"), path_joint = integer("path_joint");
+  SE3 frame = Fields::frame("frame"), path_placement = Fields::frame("path_placement");
+  double stiffness = number("stiffness"), damping = number("damping");  // [N/m], [N s/m]
+  double normal_force = number("normal_force");                  // pressed against the normal [N]
+  double force_rise = number("force_rise");                      // time in which that comes on [s]
+  double rotational_stiffness = number("rotational_stiffness");  // [N m]
+  double rotational_damping = number("rotational_damping");      // [N m s]
+  VectorX posture_stiffness = vector("posture_stiffness"), joint_damping = vector("joint_damping"),
+          q_ref = vector("q_ref"), actuated = vector("actuated");
+  bool decoupled = flag("decoupled");  // the inertia of the robot does not disturb the frame
+  // Motors make up for damping and dry friction of the joints.
+  bool friction_compensation = flag("friction_compensation");
 };
 
 // In the path's frame.

@@ -1,11 +1,6 @@
 // Joint torques from the state.
 #pragma once
 
-#include <limits>
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "dynamics/control/fields.hpp"
 #include "dynamics/scene/scene_data.hpp"
 

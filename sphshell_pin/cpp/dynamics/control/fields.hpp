@@ -2,10 +2,8 @@
 #pragma once
 
 #include <map>
-#include <memory>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "dynamics/control/target_path.hpp"
 #include "dynamics/scene/geometry.hpp"   // SE3
@@ -13,20 +11,18 @@
 
 namespace sphshell {
 
-// Arrays are flat, in the order of rows. A field that is not there is a fault of the caller's.
+// Arrays are flat, in the order of rows. A field that is not there is a fault of the caller's. Its
+// readers derive from it, and name each field where they declare what holds it.
 struct Fields {
   std::map<std::string, VectorX> values;
 
   const VectorX& vector(const char* name) const { return values.at(name); }
   double number(const char* name) const { return vector(name).value(); }
   int integer(const char* name) const { return static_cast<int>(number(name)); }
-  std::vector<double> list(const char* name) const {
-    const VectorX& all = vector(name);
-    return {all.begin(), all.end()};
-  }
-  std::vector<int> integers(const char* name) const {
-    const VectorX& all = vector(name);
-    return {all.begin(), all.end()};
+  bool flag(const char* name) const { return number(name) != 0; }
+  template <class Number = double>
+  std::vector<Number> list(const char* name) const {
+    return {vector(name).begin(), vector(name).end()};
   }
   PathPoints points(const char* name) const {
     const VectorX& all = vector(name);

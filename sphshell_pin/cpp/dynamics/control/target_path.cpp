@@ -1,6 +1,5 @@
 #include "dynamics/control/target_path.hpp"
 
-#include <algorithm>
 #include <limits>
 
 namespace sphshell {

@@ -1,9 +1,7 @@
 // A curve, and how a target moves along it.
 #pragma once
 
-#include <vector>
-
-#include "shell/triangle.hpp"
+#include "shell/topology.hpp"
 
 namespace sphshell {
 

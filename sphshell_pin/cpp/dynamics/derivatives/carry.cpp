@@ -1,6 +1,4 @@
 // Derivatives of the steps of each method: of what it computes, not of what it approximates.
-#include <cmath>
-#include <utility>
 
 #include "dynamics/derivatives/step_derivatives.hpp"
 #include "dynamics/integrators/explicit.hpp"

@@ -1,9 +1,6 @@
 #include "dynamics/derivatives/coordinate_derivatives.hpp"
 
 #include <Eigen/LU>
-#include <cmath>
-
-#include "contact/laws/wrench_derivatives.hpp"
 
 namespace sphshell {
 namespace {

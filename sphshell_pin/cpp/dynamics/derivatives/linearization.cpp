@@ -1,7 +1,5 @@
 #include "dynamics/derivatives/linearization.hpp"
 
-#include <pinocchio/spatial.hpp>
-
 namespace sphshell {
 namespace {
 

@@ -1,10 +1,7 @@
 // Derivatives of the contact forces, and of the equations of motion.
 #pragma once
 
-#include <vector>
-
 #include "dynamics/scene/chain.hpp"
-#include "dynamics/scene/parameter.hpp"
 #include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {

@@ -1,5 +1,4 @@
 // How contacts answer parameters of their pair.
-#include <algorithm>
 
 #include "dynamics/derivatives/linearization.hpp"
 

@@ -1,11 +1,5 @@
 #include "dynamics/derivatives/sensitivities.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
-
-#include "dynamics/integrators/stepper.hpp"
-
 namespace sphshell {
 namespace {
 

@@ -1,9 +1,6 @@
 // How the motion of a run changes with parameters and with its start.
 #pragma once
 
-#include <utility>
-#include <vector>
-
 #include "dynamics/derivatives/step_derivatives.hpp"
 #include "dynamics/run/recording.hpp"
 

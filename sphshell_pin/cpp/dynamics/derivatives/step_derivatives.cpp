@@ -1,9 +1,6 @@
 #include "dynamics/derivatives/step_derivatives.hpp"
 
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
-#include <utility>
 
 #include "dynamics/integrators/stepper.hpp"
 

@@ -1,8 +1,6 @@
 // How changes of a state, of torques and of parameters travel along a step.
 #pragma once
 
-#include <functional>
-
 #include "dynamics/derivatives/coordinate_derivatives.hpp"
 #include "dynamics/derivatives/linearization.hpp"
 

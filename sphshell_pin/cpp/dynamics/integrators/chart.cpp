@@ -1,7 +1,5 @@
 #include "dynamics/integrators/chart.hpp"
 
-#include <cmath>
-
 namespace sphshell {
 namespace {
 

@@ -1,8 +1,6 @@
 // The equations of motion in coordinates round the state at which a step begins.
 #pragma once
 
-#include <limits>
-
 #include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {

@@ -1,9 +1,7 @@
 // Explicit methods.
 #pragma once
 
-#include <array>
 #include <tuple>
-#include <vector>
 
 #include "dynamics/integrators/stepper.hpp"
 

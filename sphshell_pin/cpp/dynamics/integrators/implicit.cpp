@@ -1,7 +1,5 @@
 #include "dynamics/integrators/implicit.hpp"
 
-#include <cmath>
-
 namespace sphshell {
 namespace {
 

@@ -1,11 +1,5 @@
 #include "dynamics/integrators/table.hpp"
 
-#include <stdexcept>
-#include <string>
-#include <tuple>
-#include <type_traits>
-#include <utility>
-
 #include "dynamics/integrators/explicit.hpp"
 #include "dynamics/integrators/implicit.hpp"
 

@@ -1,7 +1,6 @@
 // Integration methods by the names that scenarios give them.
 #pragma once
 
-#include <memory>
 #include <string_view>
 
 #include "dynamics/integrators/stepper.hpp"

@@ -1,9 +1,5 @@
 #include "dynamics/run/continuous_detection.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 namespace sphshell {
 namespace {
 

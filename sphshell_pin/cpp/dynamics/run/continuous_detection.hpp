@@ -1,8 +1,6 @@
 // No sphere passes through a shell between two evaluations of the forces.
 #pragma once
 
-#include <vector>
-
 #include "dynamics/integrators/chart.hpp"
 
 namespace sphshell {

@@ -1,11 +1,6 @@
 #include "dynamics/run/events.hpp"
 
-#include <algorithm>
 #include <boost/math/tools/toms748_solve.hpp>
-#include <cmath>
-#include <cstdint>
-#include <functional>
-#include <limits>
 
 namespace sphshell {
 namespace {

@@ -1,10 +1,6 @@
 // Where within a step the motion has a kink.
 #pragma once
 
-#include <array>
-#include <functional>
-#include <vector>
-
 #include "dynamics/integrators/chart.hpp"
 
 namespace sphshell {

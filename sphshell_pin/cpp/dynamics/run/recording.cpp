@@ -1,13 +1,6 @@
 #include "dynamics/run/recording.hpp"
 
-#include <algorithm>
 #include <boost/math/tools/minima.hpp>
-#include <cmath>
-#include <cstdint>
-#include <limits>
-#include <utility>
-
-#include "dynamics/scene/patch.hpp"
 
 namespace sphshell {
 namespace {

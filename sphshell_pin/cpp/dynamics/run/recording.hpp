@@ -1,10 +1,6 @@
 // What a run keeps: rows of the motion, events, and figures of each pair.
 #pragma once
 
-#include <functional>
-#include <optional>
-#include <vector>
-
 #include "dynamics/run/stepping.hpp"
 
 namespace sphshell {

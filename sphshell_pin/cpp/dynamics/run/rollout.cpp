@@ -77,9 +77,7 @@ Outcome Rollout::run(Task task, Lent& lent) const {
   Outcome out;
   // An exception that left a thread would end the process.
   try {
-    Simulation run(model_, std::move(task.pairs), std::move(task.joints), task.settings,
-                   std::move(task.controller), std::move(task.q0), std::move(task.v0),
-                   std::move(task.sensors));
+    Simulation run(model_, std::move(task));
     try {
       out.deep_start = run.deep_start();
       if (!out.deep_start) out.status = run.advance(kInfinity, kInfinity, &stopped_);

@@ -1,30 +1,12 @@
 // Many runs of one model, shared out over threads.
 #pragma once
 
-#include <atomic>
 #include <condition_variable>
-#include <cstddef>
-#include <deque>
-#include <memory>
-#include <mutex>
-#include <string>
 #include <thread>
-#include <utility>
-#include <vector>
 
 #include "dynamics/run/simulation.hpp"
 
 namespace sphshell {
-
-// One run to make.
-struct Task {
-  std::vector<Pair> pairs;
-  JointForces::Effects joints;
-  RunSettings settings;
-  std::shared_ptr<Controller> controller;
-  VectorX q0, v0;
-  std::vector<Sensor> sensors;
-};
 
 // What is left of a run.
 struct Outcome {

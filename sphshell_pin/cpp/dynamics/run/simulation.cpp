@@ -1,9 +1,6 @@
 #include "dynamics/run/simulation.hpp"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <utility>
 
 namespace sphshell {
 namespace {
@@ -14,11 +11,6 @@ constexpr double kDeepStart = 0.5;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-// With bristles that are not stretched.
-State state_at(double t, VectorX q, VectorX v, int bristle_size) {
-  return {t, std::move(q), std::move(v), VectorX::Zero(bristle_size), {}};
 }
 
 // Torques that sensors ask for leave no trace in the figures of the effort limits.
@@ -34,24 +26,24 @@ class KeptCuts {
 
 }  // namespace
 
-Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
-                       JointForces::Effects joints, RunSettings settings,
-                       std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
-                       std::vector<Sensor> sensors)
-    : settings_(std::move(settings)),
-      scene_(model, std::move(pairs), std::move(joints)),
-      controller_(std::move(controller)),
-      stepping_(
-          scene_, *this, settings_,
-          state_at(settings_.start_time, std::move(q0), std::move(v0), scene_.bristle_size())),
+Simulation::Simulation(const pinocchio::Model& model, Task task)
+    : settings_(std::move(task.settings)),
+      scene_(model, std::move(task.pairs), std::move(task.joints)),
+      controller_(std::move(task.controller)),
+      stepping_(scene_, *this, settings_,
+                {settings_.start_time,
+                 std::move(task.q0),
+                 std::move(task.v0),
+                 VectorX::Zero(scene_.bristle_size()),
+                 {}}),  // bristles that are not stretched
       recorder_(scene_, settings_.start_time, end(), settings_.record_dt, settings_.patches),
       tau_(VectorX::Zero(model.nv)),
       cut_(static_cast<std::size_t>(model.nv), 0),
       next_control_(settings_.start_time) {
-  if (!sensors.empty())
+  if (!task.sensors.empty())
     // The base is private: no other function could convert to it.
-    sensors_ = std::make_unique<Sensors>(std::move(sensors), scene_, static_cast<Torques&>(*this),
-                                         push_, settings_.start_time);
+    sensors_ = std::make_unique<Sensors>(std::move(task.sensors), scene_,
+                                         static_cast<Torques&>(*this), push_, settings_.start_time);
   if (settings_.torques) record_torques();
   if (settings_.states) recorder_.record_states(kept_);
   if (controller_) controller_->prepare(scene_);

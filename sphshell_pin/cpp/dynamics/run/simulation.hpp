@@ -1,18 +1,9 @@
 // One run: the loop over the steps, the controller's torques, and changes on the way.
 #pragma once
 
-#include <atomic>
-#include <limits>
-#include <memory>
-#include <optional>
-#include <vector>
-
 #include "dynamics/control/controllers.hpp"
 #include "dynamics/derivatives/sensitivities.hpp"
-#include "dynamics/control/push.hpp"
-#include "dynamics/run/recording.hpp"
 #include "dynamics/sensing/sensors.hpp"
-#include "dynamics/run/stepping.hpp"
 
 namespace sphshell {
 
@@ -23,6 +14,16 @@ struct RunSettings : StepSettings {
   bool patches = false;   // record those of contacts
   bool torques = false;   // record those of the controller
   bool states = false;    // record the state of the run with each row
+};
+
+// One run to make.
+struct Task {
+  std::vector<Pair> pairs;
+  JointForces::Effects joints;
+  RunSettings settings;
+  std::shared_ptr<Controller> controller;
+  VectorX q0, v0;
+  std::vector<Sensor> sensors = {};
 };
 
 // A sphere that starts too deep in a shell for its contacts to be trusted.
@@ -51,9 +52,7 @@ class Simulation : private Torques {
  public:
   enum class Status : int { Running = 0, Finished = 1, Diverged = 2, Stuck = 3 };
 
-  Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
-             RunSettings settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
-             std::vector<Sensor> sensors = {});
+  Simulation(const pinocchio::Model& model, Task task);
 
   // Before the start: what is recorded changes with these by so much. The controller is then asked
   // at other states, too.

@@ -1,7 +1,6 @@
 #include "dynamics/run/touches.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <limits>
 
 namespace sphshell {
 namespace {

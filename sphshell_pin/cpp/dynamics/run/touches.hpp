@@ -1,8 +1,6 @@
 // Where pairs touch at a state, or would, and how they can move there: what a run begins with.
 #pragma once
 
-#include <vector>
-
 #include "dynamics/scene/multibody.hpp"
 #include "dynamics/scene/pair.hpp"
 

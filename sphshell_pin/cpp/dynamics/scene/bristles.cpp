@@ -1,8 +1,5 @@
 #include "dynamics/scene/bristles.hpp"
 
-#include <algorithm>
-#include <limits>
-
 namespace sphshell {
 namespace {
 

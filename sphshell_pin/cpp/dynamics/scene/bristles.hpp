@@ -2,9 +2,6 @@
 // contacts begin, end, split and merge.
 #pragma once
 
-#include <utility>
-#include <vector>
-
 #include "contact/query/tracker.hpp"
 #include "dynamics/scene/multibody.hpp"
 

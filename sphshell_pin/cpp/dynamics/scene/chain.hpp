@@ -1,8 +1,6 @@
 // The joints between two bodies, and how the one moves against the other.
 #pragma once
 
-#include <vector>
-
 #include "contact/laws/wrench_derivatives.hpp"
 #include "dynamics/scene/multibody.hpp"
 

@@ -1,10 +1,5 @@
 #include "dynamics/scene/clusters.hpp"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-
-#include "shell/curved/curved.hpp"
-
 namespace sphshell {
 namespace {
 

@@ -1,8 +1,6 @@
 // Spheres that are far from a shell together: one test instead of one for each.
 #pragma once
 
-#include <vector>
-
 #include "dynamics/scene/multibody.hpp"
 #include "dynamics/scene/pair.hpp"
 

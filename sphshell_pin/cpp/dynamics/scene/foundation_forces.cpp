@@ -1,10 +1,6 @@
 #include <Eigen/Eigenvalues>
-#include <algorithm>
-#include <cmath>
 
-#include "contact/laws/bristle_slopes.hpp"
 #include "contact/laws/dual.hpp"
-#include "dynamics/scene/patch.hpp"
 #include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {

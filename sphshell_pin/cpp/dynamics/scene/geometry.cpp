@@ -1,10 +1,5 @@
 #include "dynamics/scene/geometry.hpp"
 
-#include <algorithm>
-#include <cmath>
-
-#include "shell/curved/curved.hpp"
-
 namespace sphshell {
 namespace {
 
@@ -61,6 +56,20 @@ void PlaneBelow::find(const SE3& plane_from_shell, double height, Query& query) 
     contact.normal = Vec3::UnitZ();
     contact.dn_dc = (turn * contact.dn_dc * turn.transpose()).eval();
   }
+}
+
+// At the point of the ball that is closest to the center of the other one. Of two spheres with one
+// center any normal will do; one that is pressed through the ball's center comes out behind: it has
+// no sides.
+void Ball::find(const Vec3& center, double other, std::vector<Contact>& contacts) const {
+  contacts.clear();
+  const double distance = center.norm(), depth = other + radius - distance;
+  if (!(depth > 0)) return;
+  const Vec3 normal = distance > 0 ? Vec3(center / distance) : Vec3::UnitZ();
+  Contact& contact =
+      contacts.emplace_back(Contact{radius * normal, normal, depth, 0, Feature::Face});
+  if (distance > 0) contact.dn_dc = (Mat3::Identity() - normal * normal.transpose()) / distance;
+  contact.rim = true;
 }
 
 // At any distance, so that the depth can be followed through zero.

@@ -3,15 +3,10 @@
 // it is.
 #pragma once
 
-#include <algorithm>
-#include <functional>
-#include <memory>
 #include <pinocchio/spatial.hpp>
 #include <variant>
-#include <vector>
 
 #include "contact/laws/foundation.hpp"
-#include "contact/query/ball.hpp"
 #include "contact/query/query.hpp"
 #include "shell/curved/curved.hpp"
 
@@ -49,6 +44,9 @@ struct AnyGeometry {
   double disc_radius(double radius) const { return radius; }
   double curvature() const { return 0; }
   const Shell* smooth_shell() const { return nullptr; }
+  void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }
+  void overlap(Foundation&, const Vec3&, double, bool, bool) const {}
+  double distance(const Vec3&) const { return 0; }
   double depth_behind(const Vec3&, double) const { return 0; }
   void follow_size(Contact&) const {}
 };
@@ -81,8 +79,9 @@ struct Ball : AnyGeometry {
 
   template <class Pose>
   void find(const Pose&, const SE3&, const Vec3& center, double other, Query& query) const {
-    find_on_ball(radius, center, other, query.contacts);
+    find(center, other, query.contacts);
   }
+  void find(const Vec3& center, double other, std::vector<Contact>& contacts) const;
   void find_near(const Vec3& center, double other, double margin, Query& query) const;
   Contact nearest(const SE3& pose_i, const SE3& pose_j, const Vec3& center, double other,
                   Query& query) const;
@@ -115,9 +114,6 @@ struct PlaneBelow : AnyGeometry {
   void find(const SE3& plane_from_shell, double height, Query& query) const;
   Contact nearest(const SE3& pose_i, const SE3& pose_j, const Vec3& center, double radius,
                   Query& query) const;
-  void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }
-  void overlap(Foundation&, const Vec3&, double, bool, bool) const {}
-  double distance(const Vec3&) const { return 0; }
 };
 
 // Points that a user's function finds, of whose geometry nothing else is known.
@@ -138,9 +134,6 @@ struct SourcePoints : AnyGeometry {
   void find(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts) const;
   Contact nearest(const SE3& pose_i, const SE3& pose_j, const Vec3& center, double radius,
                   Query& query) const;
-  void find_near(const Vec3&, double, double, Query& query) const { query.contacts.clear(); }
-  void overlap(Foundation&, const Vec3&, double, bool, bool) const {}
-  double distance(const Vec3&) const { return 0; }
 };
 
 using Geometry = std::variant<ShellSurface, Ball, PlaneBelow, SourcePoints>;

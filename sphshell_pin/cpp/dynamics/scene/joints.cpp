@@ -1,7 +1,5 @@
 #include "dynamics/scene/joints.hpp"
 
-#include <utility>
-
 #include "contact/laws/dual.hpp"
 
 namespace sphshell {

@@ -2,10 +2,6 @@
 // damping, dry friction; and the limits of their motors and speeds.
 #pragma once
 
-#include <algorithm>
-#include <memory>
-#include <vector>
-
 #include "sphshell_pin/laws/normal.hpp"
 #include "dynamics/scene/multibody.hpp"
 

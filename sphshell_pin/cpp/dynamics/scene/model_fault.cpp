@@ -51,18 +51,16 @@ std::string index_fault(const pinocchio::Model& model) {
            again;
   if (static_cast<std::size_t>(model.nframes) != model.frames.size())
     return "nframes = " + std::to_string(model.nframes) + " is not the number of its frames";
-  for (const auto& [name, values] :
-       {std::pair{"armature", &model.armature}, std::pair{"damping", &model.damping},
-        std::pair{"lowerDryFrictionLimit", &model.lowerDryFrictionLimit},
-        std::pair{"upperDryFrictionLimit", &model.upperDryFrictionLimit}})
-    if (values->size() != model.nv)
-      return std::string(name) + " has " + std::to_string(values->size()) + " numbers, nv is " +
-             std::to_string(model.nv);
-  for (const auto& [name, values] : {std::pair{"lowerPositionLimit", &model.lowerPositionLimit},
-                                     std::pair{"upperPositionLimit", &model.upperPositionLimit}})
-    if (values->size() != model.nq)
-      return std::string(name) + " has " + std::to_string(values->size()) + " numbers, nq is " +
-             std::to_string(model.nq);
+  for (const auto& [name, values, size, of] :
+       {std::tuple("armature", &model.armature, model.nv, "nv"),
+        {"damping", &model.damping, model.nv, "nv"},
+        {"lowerDryFrictionLimit", &model.lowerDryFrictionLimit, model.nv, "nv"},
+        {"upperDryFrictionLimit", &model.upperDryFrictionLimit, model.nv, "nv"},
+        {"lowerPositionLimit", &model.lowerPositionLimit, model.nq, "nq"},
+        {"upperPositionLimit", &model.upperPositionLimit, model.nq, "nq"}})
+    if (values->size() != size)
+      return std::string(name) + " has " + std::to_string(values->size()) + " numbers, " + of +
+             " is " + std::to_string(size);
   return "";
 }
 

@@ -8,7 +8,6 @@
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
-#include <string>
 
 #include "dynamics/compiled/compiled_robot.hpp"
 
@@ -30,6 +29,11 @@ void find_curved(const pinocchio::JointModel& joint, std::vector<CurvedSegment>&
   if (kind == "JointModelSpherical") add(Group::Rotation);
   if (kind == "JointModelPlanar") add(Group::Planar);
 }
+
+// Of one joint, as Pinocchio takes them one after the other: its placement and velocity; its axes.
+template <template <class, int, template <class, int> class, class...> class Step, class... Vector>
+using StepOf = Step<double, 0, pinocchio::JointCollectionDefaultTpl, Vector...>;
+using Axes = StepOf<pinocchio::impl::JointJacobiansForwardStep, VectorX, Matrix6X>;
 
 // Compiled code writes placements, velocities and forces as numbers in a row.
 static_assert(sizeof(pinocchio::SE3) == 12 * sizeof(double));
@@ -81,9 +85,7 @@ void Multibody::kinematics(const VectorX& q) {
                                  nullptr, data_.oMi[0].rotation().data(), nullptr);
   // The step of Pinocchio's own forward kinematics, for the joints on the way to contacts
   // alone.
-  using Step =
-      pinocchio::impl::ForwardKinematicZeroStep<double, 0, pinocchio::JointCollectionDefaultTpl,
-                                                VectorX>;
+  using Step = StepOf<pinocchio::impl::ForwardKinematicZeroStep, VectorX>;
   for (int j : needed_)
     Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q));
 }
@@ -93,9 +95,7 @@ void Multibody::kinematics(const VectorX& q, const VectorX& v) {
     return compiled_->kinematics(needed_.data(), static_cast<int>(needed_.size()), q.data(),
                                  v.data(), data_.oMi[0].rotation().data(),
                                  data_.v[0].toVector().data());
-  using Step =
-      pinocchio::impl::ForwardKinematicFirstStep<double, 0, pinocchio::JointCollectionDefaultTpl,
-                                                 VectorX, VectorX>;
+  using Step = StepOf<pinocchio::impl::ForwardKinematicFirstStep, VectorX, VectorX>;
   for (int j : needed_)
     Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, v));
 }
@@ -105,11 +105,8 @@ void Multibody::kinematics(const VectorX& q, const VectorX& v) {
 // velocities of all joints per independent one. Pinocchio's crba is not used, since it is wrong
 // where joints are not numbered depth first and where a tree branches behind a mimic joint.
 void Multibody::compute_mass(const VectorX& q) {
-  using Step =
-      pinocchio::impl::JointJacobiansForwardStep<double, 0, pinocchio::JointCollectionDefaultTpl,
-                                                 VectorX, Matrix6X>;
   for (int j = 1; j < model_.njoints; ++j) {
-    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, data_.J));
+    Axes::run(model_.joints[j], data_.joints[j], Axes::ArgsType(model_, data_, q, data_.J));
     data_.oYcrb[j] = data_.oMi[j].act(model_.inertias[j]);
   }
   data_.M.setZero();
@@ -270,11 +267,8 @@ void Multibody::turn_axes(const VectorX& q, TurningAxes& axes) {
 void Multibody::place_axes(const VectorX& q) {
   for (TurningAxes& axes : turning_)
     if (std::binary_search(needed_.begin(), needed_.end(), axes.joint)) turn_axes(q, axes);
-  using Step =
-      pinocchio::impl::JointJacobiansForwardStep<double, 0, pinocchio::JointCollectionDefaultTpl,
-                                                 VectorX, Matrix6X>;
   for (int j : needed_)
-    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, data_.J));
+    Axes::run(model_.joints[j], data_.joints[j], Axes::ArgsType(model_, data_, q, data_.J));
 }
 
 const VectorX& Multibody::gravity(const VectorX& q) {

@@ -1,7 +1,3 @@
-#include <algorithm>
-
-#include "contact/laws/bristle_slopes.hpp"
-#include "dynamics/scene/patch.hpp"
 #include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {

@@ -1,8 +1,5 @@
 #include "dynamics/scene/scene_data.hpp"
 
-#include <algorithm>
-#include <utility>
-
 namespace sphshell {
 
 SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,

@@ -1,15 +1,9 @@
 // The contacts of a multibody model at one state, and their forces.
 #pragma once
 
-#include <algorithm>
-#include <utility>
-#include <vector>
-
 #include "contact/curvature/curvature.hpp"
-#include "contact/query/tracker.hpp"
 #include "dynamics/scene/bristles.hpp"
 #include "dynamics/scene/clusters.hpp"
-#include "dynamics/scene/contact_row.hpp"
 #include "dynamics/scene/joints.hpp"
 #include "dynamics/scene/pair_forces.hpp"
 

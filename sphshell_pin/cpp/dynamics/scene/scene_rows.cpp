@@ -1,7 +1,4 @@
 // What is kept of the contacts of a scene: rows of runs, and its memory as numbers.
-#include <algorithm>
-#include <cmath>
-#include <optional>
 
 #include "dynamics/scene/scene_data.hpp"
 

@@ -1,10 +1,6 @@
 // A scene along a motion that somebody else integrates.
 #pragma once
 
-#include <optional>
-#include <utility>
-#include <vector>
-
 #include "dynamics/derivatives/linearization.hpp"
 
 namespace sphshell {

@@ -1,9 +1,6 @@
 #include "dynamics/sensing/sensors.hpp"
 
-#include <algorithm>
 #include <bitset>
-#include <cmath>
-#include <utility>
 
 namespace sphshell {
 namespace {
@@ -48,20 +45,13 @@ bool has(const std::vector<int>& sorted, int one) {
 
 // The wrench that the parts before a frame exert on those beyond it: in the frame, about its
 // origin.
-class ForceTorque : public Measured {
+class ForceTorque : public Measured, Fields {
  public:
-  explicit ForceTorque(const Fields& f)
-      : joint_(f.integer("joint")),
-        frame_(f.frame("frame")),
-        children_(f.integers("children")),
-        pairs_i_(f.integers("pairs_i")),
-        pairs_j_(f.integers("pairs_j")),
-        frames_(f.integers("frames")) {
+  explicit ForceTorque(const Fields& fields) : Fields(fields) {
     // Mass, first and second moments, as of Pinocchio's dynamic parameters; no mass: nothing is
     // beyond the sensor.
-    const VectorX& parameters = f.vector("inertia");
-    inertia_ = parameters[0] > 0 ? pinocchio::Inertia::FromDynamicParameters(parameters)
-                                 : pinocchio::Inertia::Zero();
+    if (const VectorX& parameters = vector("inertia"); parameters[0] > 0)
+      inertia_ = pinocchio::Inertia::FromDynamicParameters(parameters);
   }
 
   int size() const override { return 6; }
@@ -92,18 +82,21 @@ class ForceTorque : public Measured {
   }
 
  private:
-  int joint_;                   // that carries the frame
-  SE3 frame_;                   // in that joint
-  pinocchio::Inertia inertia_;  // of what is beyond it on this joint, in that joint
-  std::vector<int> children_;   // joints that are beyond it, and hang on this joint
-  std::vector<int> pairs_i_, pairs_j_,
-      frames_;  // whose body i or j, and which, are beyond it on it
+  const int joint_ = integer("joint");  // that carries the frame
+  const SE3 frame_ = frame("frame");    // in that joint
+  pinocchio::Inertia inertia_ =
+      pinocchio::Inertia::Zero();  // of what is beyond it on this joint, in that joint
+  const std::vector<int> children_ =
+      list<int>("children");  // joints beyond it that hang on this joint
+  // Whose body i or j, and which, are beyond it on this joint.
+  const std::vector<int> pairs_i_ = list<int>("pairs_i"), pairs_j_ = list<int>("pairs_j"),
+                         frames_ = list<int>("frames");
 };
 
 // The generalized force that a joint transmits behind the gear: without what its own rotor takes.
-class JointTorque : public Measured {
+class JointTorque : public Measured, Fields {
  public:
-  explicit JointTorque(const Fields& f) : index_(f.integer("index")) {}
+  explicit JointTorque(const Fields& fields) : Fields(fields) {}
   int size() const override { return 1; }
   void read(const Evaluated& at, double* out) const override {
     const Multibody& body = at.scene.body();
@@ -111,17 +104,14 @@ class JointTorque : public Measured {
   }
 
  private:
-  int index_;  // of its velocity
+  const int index_ = integer("index");  // of its velocity
 };
 
 // The sum of the normal forces of its pairs; 1 once that is above the threshold, 0 once it is below
 // `release` [N].
-class ContactSwitch : public Measured {
+class ContactSwitch : public Measured, Fields {
  public:
-  explicit ContactSwitch(const Fields& f)
-      : pairs_(f.integers("pairs")),
-        threshold_(f.number("threshold")),
-        release_(f.number("release")) {}
+  explicit ContactSwitch(const Fields& fields) : Fields(fields) {}
   int size() const override { return 1; }
   void read(const Evaluated& at, double* out) const override {
     double sum = 0;
@@ -134,8 +124,8 @@ class ContactSwitch : public Measured {
   bool is_dynamic() const override { return false; }
 
  private:
-  std::vector<int> pairs_;
-  double threshold_, release_;
+  const std::vector<int> pairs_ = list<int>("pairs");
+  const double threshold_ = number("threshold"), release_ = number("release");
 };
 
 // A new sensor is its class above and one line here, and a class of that kind in Python.

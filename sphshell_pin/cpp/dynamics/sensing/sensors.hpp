@@ -1,12 +1,7 @@
 // What a robot's computer knows of a run: sampled, filtered, noisy, limited and delayed readings.
 #pragma once
 
-#include <cstdint>
 #include <deque>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "dynamics/control/fields.hpp"
 #include "dynamics/control/push.hpp"

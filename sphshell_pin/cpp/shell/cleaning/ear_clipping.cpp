@@ -1,7 +1,4 @@
 // Ear clipping of polygons in space, by shape rather than by order.
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <numeric>
 
 #include "shell/cleaning/mending.hpp"
@@ -102,13 +99,9 @@ class Clipper {
   static constexpr double kBlocked = -1.0;
 
   void prepare(int n) {
-    next_.resize(n);
-    previous_.resize(n);
     // The outline as a doubly linked list of corners.
+    for (auto* list : {&next_, &previous_, &rank_, &order_, &first_copy_}) list->resize(n);
     score_.resize(n);
-    rank_.resize(n);
-    order_.resize(n);
-    first_copy_.resize(n);
     copies_.assign(n, 0);
     blocker_.assign(n, -1);
     if (waiting_.size() < flat_.size()) waiting_.resize(n);
@@ -142,9 +135,8 @@ class Clipper {
   // Puts the vertices that are left into the tree.
   void plant() {
     std::vector<std::int32_t> left;
-    for (std::size_t i = 0; i < flat_.size(); ++i) {
+    for (std::size_t i = 0; i < flat_.size(); ++i)
       if (copies_[i] > 0) left.push_back(static_cast<std::int32_t>(i));
-    }
     planted_ = left_ = left.size();
     tree_ = PointTree<2>(flat_.front().data(), std::move(left));
   }
@@ -175,17 +167,15 @@ class Clipper {
     evaluate_ear(after);
     if (!gone) return;
     // An ear that was blocked by this vertex may be free now; all others stay as they are.
-    for (const int k : waiting_[copy]) {
+    for (const int k : waiting_[copy])
       if (blocker_[k] == copy) evaluate_ear(k);
-    }
   }
 
   int best_ear(int start) const {
     if (many_) return order_[ears_.first(kTie)];
     int best = start;
-    for (int i = next_[start]; i != start; i = next_[i]) {
+    for (int i = next_[start]; i != start; i = next_[i])
       if (better(i, best)) best = i;
-    }
     return best;
   }
 
@@ -193,47 +183,33 @@ class Clipper {
   void project(std::size_t polygon) {
     first_ = polygons_.offsets[polygon];
     const std::int64_t last = polygons_.offsets[polygon + 1];
+    const auto at = [&](std::int64_t slot) { return place(points_, polygons_.corners[slot]); };
+    const auto unit = [](const Vec3& x) -> Vec3 {
+      const double size = std::hypot(x[0], x[1], x[2]);
+      return x / (size > 0.0 ? size : 1.0);
+    };
+    const auto dot = [](const Vec3& a, const Vec3& b) {
+      return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    };
     // The first axis lies along the longest edge, so that coordinates do not depend on the
     // polygon's first corner.
-    std::array<double, 3> normal{}, along{};
-    const double* origin = point(first_);
+    const Vec3 origin = at(first_);
+    Vec3 normal = Vec3::Zero(), along = Vec3::Zero();
     double longest = 0.0;
     for (std::int64_t s = first_; s < last; ++s) {
-      const double* a = point(s);
-      const double* b = point(polygons_.next(polygon, s));
-      std::array<double, 3> p{}, q{}, edge{};
-      for (int k = 0; k < 3; ++k) {
-        p[k] = a[k] - origin[k];
-        q[k] = b[k] - origin[k];
-        edge[k] = q[k] - p[k];
-      }
-      for (int k = 0; k < 3; ++k) {
-        normal[k] += p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3];
-      }
+      const Vec3 p = at(s) - origin, q = at(polygons_.next(polygon, s)) - origin;
+      const Vec3 edge = q - p;
+      normal += p.cross(q);
       const double length = std::hypot(edge[0], edge[1], edge[2]);
-      if (length > longest) {
-        longest = length;
-        along = edge;
-      }
+      if (length > longest) longest = length, along = edge;
     }
-    double size = std::hypot(normal[0], normal[1], normal[2]);
-    for (double& x : normal) x /= size > 0.0 ? size : 1.0;
-    double lean = 0.0;
-    for (int k = 0; k < 3; ++k) lean += normal[k] * along[k];
-    for (int k = 0; k < 3; ++k) along[k] -= lean * normal[k];
-    size = std::hypot(along[0], along[1], along[2]);
-    for (double& x : along) x /= size > 0.0 ? size : 1.0;
+    normal = unit(normal);
+    along = unit(along - dot(normal, along) * normal);
+    const Vec3 across = normal.cross(along);
     flat_.clear();
     for (std::int64_t s = first_; s < last; ++s) {
-      const double* a = point(s);
-      Vec2 uv{};
-      for (int k = 0; k < 3; ++k) {
-        const double d = a[k] - origin[k];
-        uv[0] += d * along[k];
-        uv[1] += d * (normal[(k + 1) % 3] * along[(k + 2) % 3] -
-                      normal[(k + 2) % 3] * along[(k + 1) % 3]);
-      }
-      flat_.push_back(uv);
+      const Vec3 d = at(s) - origin;
+      flat_.push_back({dot(d, along), dot(d, across)});
     }
   }
 
@@ -358,9 +334,8 @@ EarClips clip_ears(const PolygonView& polygons, const double* points, double tol
   EarClips out;
   out.tangled.assign(polygons.count, 0);
   Clipper clipper(polygons, points, tolerance);
-  for (std::size_t p = 0; p < polygons.count; ++p) {
+  for (std::size_t p = 0; p < polygons.count; ++p)
     if (!clipper.clip(p, out)) out.tangled[p] = 1;
-  }
   return out;
 }
 

@@ -1,24 +1,16 @@
 #include "shell/cleaning/mending.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
-#include <numeric>
-#include <utility>
 
 #include "shell/disjoint_sets.hpp"
 #include "shell/half_edges.hpp"
-#include "shell/large_array.hpp"
-#include "shell/topology.hpp"
 
 namespace sphshell {
 namespace {
 
 std::array<Vec3, 3> corners_of(const double* points, const std::int32_t* vertices) {
   std::array<Vec3, 3> out;
-  for (int k = 0; k < 3; ++k)
-    out[k] = Eigen::Map<const Vec3>(points + 3 * static_cast<std::size_t>(vertices[k]));
+  for (int k = 0; k < 3; ++k) out[k] = place(points, vertices[k]);
   return out;
 }
 
@@ -51,10 +43,8 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
   std::sort(places.begin(), places.end());
   // Merges two points that are near each other; whether they are equal.
   const auto merge = [&](const Place& one, const Place& other) {
-    const double* p = points + 3 * static_cast<std::size_t>(one.second);
-    const double* q = points + 3 * static_cast<std::size_t>(other.second);
-    const double dx = p[0] - q[0], dy = p[1] - q[1], dz = p[2] - q[2];
-    const double squared = dx * dx + dy * dy + dz * dz;
+    const Vec3 d = place(points, one.second) - place(points, other.second);
+    const double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     if (squared <= tolerance * tolerance) groups.merge(one.second, other.second);
     return squared == 0.0;
   };
@@ -88,10 +78,8 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
   for (std::size_t i = 0; i < count; ++i) {
     const std::int32_t first = groups.find(static_cast<std::int32_t>(i));
     out.representative[i] = first;
-    const double* a = points + 3 * i;
-    const double* b = points + 3 * static_cast<std::size_t>(first);
-    const double distance = std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-    out.largest_distance = std::max(out.largest_distance, distance);
+    const Vec3 off = place(points, i) - place(points, first);
+    out.largest_distance = std::max(out.largest_distance, std::hypot(off[0], off[1], off[2]));
   }
   return out;
 }

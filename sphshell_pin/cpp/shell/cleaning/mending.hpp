@@ -6,9 +6,7 @@
 // same polygon (cyclic).
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <vector>
+#include "shell/topology.hpp"
 
 namespace sphshell {
 
@@ -23,6 +21,11 @@ struct PolygonView {
     return slot + 1 == offsets[polygon + 1] ? offsets[polygon] : slot + 1;
   }
 };
+
+// Point i of points (n, 3).
+inline Eigen::Map<const Vec3> place(const double* points, std::size_t i) {
+  return Eigen::Map<const Vec3>(points + 3 * i);
+}
 
 struct Weld {
   std::vector<std::int32_t> representative;  // lowest index of each group of merged points

@@ -1,11 +1,6 @@
 // How much of each closed component of a surface lies inside which others, along lines.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
 #include <map>
 #include <tuple>
-#include <utility>
 
 #include "shell/cleaning/mending.hpp"
 #include "shell/point_tree.hpp"
@@ -25,9 +20,8 @@ Overlaps overlaps(const double* points, const std::int32_t* triangles,
                                          {-0.50770552, -0.05988616, 0.85945101}}};
   const auto turned = [&](const double* p) {
     Vec out{};
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 3; ++k)
       out[k] = kAxes[k][0] * p[0] + kAxes[k][1] * p[1] + kAxes[k][2] * p[2];
-    }
     return out;
   };
   // In the plane across the lines.
@@ -98,11 +92,10 @@ Overlaps overlaps(const double* points, const std::int32_t* triangles,
     const Crossing& here = crossings[k];
     if (k == 0 || crossings[k - 1].line != here.line) in.clear();
     const auto known = std::find(in.begin(), in.end(), here.component);
-    if (known == in.end()) {
+    if (known == in.end())
       in.push_back(here.component);
-    } else {
+    else
       in.erase(known);
-    }
     const std::int32_t own = place_component[here.line];
     if (std::find(in.begin(), in.end(), own) == in.end()) continue;
     // Closed components leave every line outside: another crossing follows.

@@ -1,7 +1,4 @@
 // Vertices that lie on the open edges of other polygons, found with a k-d tree.
-#include <algorithm>
-#include <array>
-#include <cmath>
 
 #include "shell/cleaning/mending.hpp"
 #include "shell/point_tree.hpp"
@@ -10,7 +7,7 @@ namespace sphshell {
 namespace {
 
 // Slab test of the segment against the box grown by the tolerance: never misses a point.
-bool meets(const PointTree<3>::Box& box, const double* a, const double* b, double tolerance) {
+bool meets(const PointTree<3>::Box& box, const Vec3& a, const Vec3& b, double tolerance) {
   double enter = 0.0, leave = 1.0;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = box.low[axis] - tolerance, high = box.high[axis] + tolerance;
@@ -56,22 +53,18 @@ Insertions find_t_junctions(const PolygonView& polygons, const double* points,
         if (corner < owner.size()) owner[corner] = open_polygons[k];
       }
     }
-    const double* a = points + 3 * static_cast<std::size_t>(polygons.corners[slot]);
-    const double* b =
-        points + 3 * static_cast<std::size_t>(polygons.corners[polygons.next(polygon, slot)]);
-    const std::array<double, 3> d{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const Vec3 a = place(points, polygons.corners[slot]);
+    const Vec3 b = place(points, polygons.corners[polygons.next(polygon, slot)]), d = b - a;
     const double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     hits.clear();
     const auto near = [&](const PointTree<3>::Box& box) { return meets(box, a, b, tolerance); };
     tree.search(near, [&](std::int32_t vertex) {
       if (owner[static_cast<std::size_t>(vertex)] == open_polygons[k]) return false;
-      const double* p = points + 3 * static_cast<std::size_t>(vertex);
-      const std::array<double, 3> e{p[0] - a[0], p[1] - a[1], p[2] - a[2]};
+      const Vec3 e = place(points, vertex) - a;
       const double t = (e[0] * d[0] + e[1] * d[1] + e[2] * d[2]) / squared;
-      if (t > 0.0 && t < 1.0 &&
-          std::hypot(e[0] - t * d[0], e[1] - t * d[1], e[2] - t * d[2]) <= tolerance) {
+      const Vec3 off = e - t * d;
+      if (t > 0.0 && t < 1.0 && std::hypot(off[0], off[1], off[2]) <= tolerance)
         hits.push_back({t, vertex});
-      }
       // More than `most` are not wanted: the search ends.
       return out.slot.size() + hits.size() > most;
     });

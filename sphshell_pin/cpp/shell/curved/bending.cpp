@@ -1,16 +1,10 @@
 // Curved elements from the normals at their corners: their sides, then their middles.
 #include <Eigen/Dense>
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <optional>
-#include <vector>
 
 #include "shell/curved/creases.hpp"
 #include "shell/curved/curved.hpp"
 #include "shell/curved/limiter.hpp"
 #include "shell/curved/vertex_normals.hpp"
-#include "shell/faces/snapping.hpp"
 #include "shell/in_parallel.hpp"
 
 namespace sphshell {

@@ -1,9 +1,5 @@
 #include "shell/curved/cell_bounds.hpp"
 
-#include <algorithm>
-#include <array>
-#include <limits>
-
 #include "shell/curved/curved.hpp"
 #include "shell/in_parallel.hpp"
 

@@ -1,10 +1,6 @@
 // What is certain of a curved element, wherever it is seen from.
 #pragma once
 
-#include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
-
 #include "shell/shell.hpp"
 
 namespace sphshell {

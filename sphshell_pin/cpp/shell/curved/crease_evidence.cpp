@@ -1,8 +1,4 @@
 // Estimates of the surface by single elements, and the evidence that an edge is smooth.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 
 #include "shell/curved/crease_search.hpp"
 #include "shell/in_parallel.hpp"

@@ -2,14 +2,7 @@
 // sought.
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
-#include <optional>
-#include <utility>
-#include <vector>
-
 #include "shell/curved/creases.hpp"
-#include "shell/curved/fans.hpp"
 
 namespace sphshell {
 

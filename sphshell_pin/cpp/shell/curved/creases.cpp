@@ -1,9 +1,6 @@
 #include "shell/curved/creases.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <utility>
 
 #include "shell/curved/crease_search.hpp"
 

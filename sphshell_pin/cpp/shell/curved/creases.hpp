@@ -1,8 +1,6 @@
 // Which edges of a tessellation are creases, although its elements turn there by little.
 #pragma once
 
-#include <vector>
-
 #include "shell/faces/recognition.hpp"
 #include "shell/curved/fans.hpp"
 

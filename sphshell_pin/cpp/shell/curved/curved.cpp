@@ -1,13 +1,8 @@
 #include "shell/curved/curved.hpp"
 
-#include <algorithm>
-#include <utility>
-
 #include "shell/curved/creases.hpp"
 #include "shell/curved/limiter.hpp"
 #include "shell/curved/vertex_normals.hpp"
-#include "shell/faces/snapping.hpp"
-#include "shell/free_memory.hpp"
 
 namespace sphshell {
 namespace {

@@ -1,18 +1,11 @@
 // Curved elements over the triangles of a shell: cubic patches that meet the vertex normals.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <mutex>
-#include <optional>
-#include <vector>
-
 #include "shell/curved/cell_bounds.hpp"
 #include "shell/curved/face_search.hpp"
 #include "shell/faces/face_cells.hpp"
 #include "shell/faces/flats.hpp"
 #include "shell/faces/recognition.hpp"
-#include "shell/shell.hpp"
 
 namespace sphshell {
 

@@ -1,7 +1,4 @@
 // One curved element: how its control points are stored, and the polynomials they make.
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <cstring>
 
 #include "shell/curved/curved.hpp"

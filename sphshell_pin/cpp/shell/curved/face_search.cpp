@@ -1,7 +1,5 @@
 #include "shell/curved/face_search.hpp"
 
-#include <algorithm>
-
 #include "shell/curved/curved.hpp"
 
 namespace sphshell {

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <utility>
-#include <vector>
 
 #include "shell/shell.hpp"
 

@@ -1,9 +1,6 @@
 // The corners that meet at a vertex, joined where the surface goes on smoothly between them.
 #pragma once
 
-#include <algorithm>
-#include <vector>
-
 #include "shell/disjoint_sets.hpp"
 #include "shell/shell.hpp"
 

@@ -1,10 +1,5 @@
 #include "shell/curved/limiter.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <utility>
-
 namespace sphshell {
 namespace {
 

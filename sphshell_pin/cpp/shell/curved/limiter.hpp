@@ -7,9 +7,6 @@
 // ENO: Harten et al., J. Comput. Phys. 71 (1987) 231) the smaller of two slopes limits both.
 #pragma once
 
-#include <utility>
-#include <vector>
-
 #include "shell/faces/coplanar.hpp"
 #include "shell/curved/fans.hpp"
 

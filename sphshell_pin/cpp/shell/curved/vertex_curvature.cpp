@@ -1,7 +1,6 @@
 #include "shell/curved/vertex_curvature.hpp"
 
 #include <Eigen/Dense>
-#include <cmath>
 
 namespace sphshell {
 namespace {

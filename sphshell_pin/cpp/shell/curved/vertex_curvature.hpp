@@ -1,8 +1,6 @@
 // Curvature of a smooth surface at a vertex, from positions and normals around it.
 #pragma once
 
-#include <vector>
-
 #include "shell/topology.hpp"
 
 namespace sphshell {

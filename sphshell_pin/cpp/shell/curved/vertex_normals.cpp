@@ -1,12 +1,8 @@
 #include "shell/curved/vertex_normals.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "shell/curved/creases.hpp"
-#include "shell/curved/fans.hpp"
 #include "shell/in_parallel.hpp"
 #include "shell/curved/limiter.hpp"
 

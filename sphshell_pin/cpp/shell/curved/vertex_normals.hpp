@@ -1,8 +1,6 @@
 // Normals at the corners of triangles, where none were given.
 #pragma once
 
-#include <vector>
-
 #include "shell/faces/recognition.hpp"
 
 namespace sphshell {

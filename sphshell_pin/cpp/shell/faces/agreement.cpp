@@ -1,11 +1,6 @@
 // Tangent faces that were fitted one by one miss each other by the rounding of their vertices: they
 // are fitted once more, together.
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <map>
-#include <utility>
 
 #include "shell/disjoint_sets.hpp"
 #include "shell/faces/recognizer.hpp"
@@ -140,12 +135,7 @@ class Agreement {
 
 void agree_on_borders(const Shell& shell, Faces& faces, double tolerance) {
   const auto is_plane = [&](int f) { return faces.shapes[f].kind == FaceKind::Plane; };
-  std::vector<std::vector<int>> around(shell.vertices().size());
-  for (std::size_t t = 0; t < faces.of.size(); ++t)
-    for (const int v : shell.triangles()[t])
-      if (faces.of[t] >= 0 &&
-          std::find(around[v].begin(), around[v].end(), faces.of[t]) == around[v].end())
-        around[v].push_back(faces.of[t]);
+  const std::vector<std::vector<int>> around = faces_at_vertices(shell, faces);
   std::vector<std::vector<Vec3>> points(faces.shapes.size());
   std::map<std::pair<int, int>, Contacts> contacts;
   DisjointSets chains(faces.shapes.size());

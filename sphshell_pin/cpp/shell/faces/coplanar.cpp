@@ -1,11 +1,8 @@
 #include "shell/faces/coplanar.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <tuple>
-#include <utility>
 
 namespace sphshell {
 namespace {

@@ -1,8 +1,6 @@
 // Regions of connected coplanar triangles: however a plane was divided, it is one facet.
 #pragma once
 
-#include <vector>
-
 #include "shell/shell.hpp"
 
 namespace sphshell {

@@ -1,8 +1,6 @@
 // Whether the vertices of a region over-determine its primitive: three points lie on a circle, two
 // circles on a sphere, any three rings on a torus.
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
 
 #include "shell/faces/recognizer.hpp"
 
@@ -158,13 +156,11 @@ bool Recognizer::is_over_determined(const Growth& growth) {
       return distinct(std::move(levels), 20 * growth.window).size() >= 4;
     });
   }
-  const Vec3 u = s.axis.unitOrthogonal(), v = s.axis.cross(u);
   std::vector<double> around, across, offs;
   for (const int vertex : vertices) {
-    const Vec3 y = point(vertex) - s.point;
-    const double a = y.dot(u), b = y.dot(v), off = std::hypot(a, b);
-    if (off > 10 * growth.window) around.push_back(std::atan2(b, a)), offs.push_back(off);
-    if (s.kind == FaceKind::Torus) across.push_back(std::atan2(y.dot(s.axis), off - s.radius));
+    const Place at = place_on(s, point(vertex));
+    if (at.off > 10 * growth.window) around.push_back(at.around), offs.push_back(at.off);
+    if (s.kind == FaceKind::Torus) across.push_back(at.across);
   }
   if (offs.empty()) return false;
   // Angles nearer than what the tolerance is at that radius are one.

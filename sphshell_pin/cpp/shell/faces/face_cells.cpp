@@ -1,7 +1,5 @@
 #include "shell/faces/face_cells.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <string>

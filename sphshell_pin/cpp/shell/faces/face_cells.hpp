@@ -2,9 +2,6 @@
 // face gives the numbers.
 #pragma once
 
-#include <array>
-#include <cstdint>
-
 #include "shell/faces/face_joints.hpp"
 #include "shell/shell.hpp"
 

@@ -1,6 +1,4 @@
 // Crossings: the curves of two faces that are neither lines nor circles.
-#include <algorithm>
-#include <cmath>
 
 #include "shell/faces/face_joints.hpp"
 

@@ -1,8 +1,5 @@
 #include "shell/faces/face_joints.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 namespace sphshell {
 namespace {
 
@@ -161,11 +158,10 @@ std::vector<Section> sections(const Primitive& one, const Primitive& two, const 
   // The axis of revolution: of a sphere that through the other's center, or upright on it.
   for (const auto& [a, b] : {std::pair(&one, &two), std::pair(&two, &one)}) {
     if (is(*a, FaceKind::Plane)) continue;
-    if (!is(*a, FaceKind::Sphere)) {
+    if (!is(*a, FaceKind::Sphere))
       add(a->point, a->axis, true);
-    } else if (is(*b, FaceKind::Plane) || is(*b, FaceKind::Sphere)) {
+    else if (is(*b, FaceKind::Plane) || is(*b, FaceKind::Sphere))
       add(a->point, is(*b, FaceKind::Plane) ? b->axis : Vec3(b->point - a->point), true);
-    }
     if (is(*a, FaceKind::Cylinder)) add(a->point, a->axis, false);
   }
   return out;

@@ -1,9 +1,7 @@
 // Where two faces meet: one record for the whole border between them, read from both sides.
 #pragma once
 
-#include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "shell/faces/primitive.hpp"
 

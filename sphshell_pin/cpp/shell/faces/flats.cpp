@@ -1,9 +1,6 @@
 #include "shell/faces/flats.hpp"
 
-#include <algorithm>
 #include <map>
-#include <numeric>
-#include <utility>
 
 #include "shell/curved/curved.hpp"
 

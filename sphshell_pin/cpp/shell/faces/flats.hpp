@@ -1,8 +1,6 @@
 // What a shell can lie on: flat faces, and the lines of cylinders and cones.
 #pragma once
 
-#include <vector>
-
 #include "shell/shell.hpp"
 
 namespace sphshell {

@@ -1,8 +1,4 @@
 // Regions of triangles that a primitive explains.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <utility>
 
 #include "shell/faces/recognizer.hpp"
 
@@ -241,14 +237,12 @@ void Recognizer::leave_own_faces_out(Growth& growth) {
     if (s.kind != FaceKind::Sphere) {
       // A band lies between two rulings; on a torus between two circles about the axis, as a whole.
       std::vector<double> where;
-      const Vec3 u = s.axis.unitOrthogonal(), v = s.axis.cross(u);
       for (const int vertex : vertices) {
-        const Vec3 y = point(vertex) - s.point;
-        const double a = y.dot(u), b = y.dot(v);
+        const Place place = place_on(s, point(vertex));
         if (s.kind == FaceKind::Torus)
-          where.push_back(std::hypot(a, b) / s.second * 10);
-        else if (std::hypot(a, b) > 1e-3 * s.radius)
-          where.push_back(std::atan2(b, a));
+          where.push_back(place.off / s.second * 10);
+        else if (place.off > 1e-3 * s.radius)
+          where.push_back(place.around);
       }
       std::sort(where.begin(), where.end());
       int count = 1;

@@ -1,7 +1,5 @@
 // What a mesh may be at a place: shapes through a patch, and about the axes of faces beside it.
-#include <algorithm>
 #include <queue>
-#include <utility>
 
 #include "shell/faces/recognizer.hpp"
 

@@ -1,9 +1,6 @@
 #include "shell/faces/recognizer.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <limits>
 
 namespace sphshell {
 namespace {

@@ -1,8 +1,6 @@
 // Planes, cylinders, cones, spheres and tori in closed form, and how they are fitted to points.
 #pragma once
 
-#include <vector>
-
 #include "shell/topology.hpp"
 
 namespace sphshell {

@@ -1,11 +1,6 @@
 #include "shell/faces/recognition.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numeric>
-#include <utility>
 
 #include "shell/faces/recognizer.hpp"
 

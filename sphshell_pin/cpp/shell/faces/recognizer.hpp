@@ -2,10 +2,7 @@
 // snapping.cpp: the search for faces in a mesh.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <map>
-#include <vector>
 
 #include "shell/faces/recognition.hpp"
 
@@ -25,6 +22,21 @@ inline double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
+// The place of a point on a shape with an axis: its angle around it [rad], its distance from it
+// [m], and what is constant on a circle about the axis: on a torus the angle of the tube [rad],
+// else the height [m].
+struct Place {
+  double around, off, across;
+};
+
+inline Place place_on(const Primitive& s, const Vec3& x) {
+  const Vec3 u = s.axis.unitOrthogonal(), y = x - s.point;
+  const double a = y.dot(u), b = y.dot(s.axis.cross(u)), off = std::hypot(a, b);
+  const double height = y.dot(s.axis);
+  return {std::atan2(b, a), off,
+          s.kind == FaceKind::Torus ? std::atan2(height, off - s.radius) : height};
+}
+
 // Which way a facet is turned in the parameters of a shape, seen along the shape's normals: 1 or
 // -1; 0 where its corners are on one line there within the tolerance, as those of a cap are. The
 // normal of a needle may lie in the surface; that its corners are counter-clockwise in the
@@ -34,6 +46,9 @@ int turned_on(const Primitive& shape, const std::array<Vec3, 3>& corners, double
 // The cylinder, cone or torus with a known axis through `point`: its radii follow from points.
 Primitive with_axis(FaceKind kind, const Vec3& point, const Vec3& axis,
                     const std::vector<Vec3>& points);
+
+// Per vertex the faces that its triangles lie on, each once, in the order of the triangles.
+std::vector<std::vector<int>> faces_at_vertices(const Shell& shell, const Faces& faces);
 
 // Fits tangent round faces once more so that they agree on their borders; planes stay.
 void agree_on_borders(const Shell& shell, Faces& faces, double tolerance);

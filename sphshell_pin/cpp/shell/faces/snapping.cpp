@@ -1,8 +1,5 @@
-#include "shell/faces/snapping.hpp"
-
+// Vertices and curves of elements, moved onto the faces that they are off by rounding.
 #include <Eigen/Dense>
-#include <algorithm>
-#include <array>
 
 #include "shell/faces/face_cells.hpp"
 #include "shell/faces/recognizer.hpp"
@@ -13,9 +10,6 @@ namespace {
 constexpr int kMostSnaps = 8;
 // Faces are tangent that come as near as this to each other, over the size.
 constexpr double kTouch = 1e-14;
-// Vertices stay that are nearer to their faces than what those may be off, or than this share of
-// the tolerance.
-constexpr double kLeastSnap = 1e-3;
 // Curves are settled on faces in so many rounds, by at most this share of their chord.
 constexpr int kMostSettlings = 3;
 constexpr double kMostSettled = 0.02;
@@ -112,18 +106,22 @@ void settle_on_all(const Faces& faces, const std::vector<int>& around, const Vec
 
 }  // namespace
 
+std::vector<std::vector<int>> faces_at_vertices(const Shell& shell, const Faces& faces) {
+  std::vector<std::vector<int>> out(shell.vertices().size());
+  for (std::size_t t = 0; t < faces.of.size(); ++t)
+    for (const int v : shell.triangles()[t])
+      if (const int f = faces.of[t];
+          f >= 0 && std::find(out[v].begin(), out[v].end(), f) == out[v].end())
+        out[v].push_back(f);
+  return out;
+}
+
 std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, double tolerance) {
   const auto flat = [](const Primitive& one) { return one.kind == FaceKind::Plane; };
   // Flat elements are on planes as they are.
   if (std::all_of(faces.shapes.begin(), faces.shapes.end(), flat)) return {};
   const std::vector<Vec3>& before = shell.vertices();
-  std::vector<std::vector<int>> around(before.size());
-  for (std::size_t t = 0; t < shell.triangles().size(); ++t)
-    for (const int v : shell.triangles()[t]) {
-      const int f = faces.of_triangle(static_cast<int>(t));
-      if (f >= 0 && std::find(around[v].begin(), around[v].end(), f) == around[v].end())
-        around[v].push_back(f);
-    }
+  std::vector<std::vector<int>> around = faces_at_vertices(shell, faces);
   std::vector<Vec3> out = before;
   bool any = false;
   for (std::size_t v = 0; v < out.size(); ++v) {
@@ -187,11 +185,10 @@ void settle_on_faces(const Shell& shell, const Edge& edge, const Faces& faces, c
   if (!curved) offset = {Vec3::Zero(), Vec3::Zero()};
   if (!(border || at_tip) || !curved) return;
   const std::array<Vec3, 2> before = offset;
-  if (only >= 0 && faces.shapes[only].kind != FaceKind::Plane) {
+  if (only >= 0 && faces.shapes[only].kind != FaceKind::Plane)
     settle_on_one(faces.shapes[only], begin, d, offset);
-  } else {
+  else
     settle_on_all(faces, around, begin, d, offset);
-  }
   // An edge that is nowhere near its faces stays as it is.
   for (int k = 0; k < 2; ++k)
     if (!((offset[k] - before[k]).norm() <= kMostSettled * d.norm())) offset = before;

@@ -1,8 +1,4 @@
 // The steps in which a round face was sampled, and the planes between two rulings that are wider.
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <utility>
 
 #include "shell/faces/recognizer.hpp"
 
@@ -25,21 +21,6 @@ constexpr double kSameRuling = 0.02;
 constexpr double kGoesOn = 0.99995;
 // Nearer to the axis than this share of the radius an angle means nothing.
 constexpr double kOnAxis = 1e-3;
-
-// The place of a point on a shape with an axis: its angle around it [rad], its distance from it
-// [m], and what is constant on a circle about the axis: on a torus the angle of the tube [rad],
-// else the height [m].
-struct Place {
-  double around, off, across;
-};
-
-Place place_on(const Primitive& s, const Vec3& x) {
-  const Vec3 u = s.axis.unitOrthogonal(), y = x - s.point;
-  const double a = y.dot(u), b = y.dot(s.axis.cross(u)), off = std::hypot(a, b);
-  const double height = y.dot(s.axis);
-  return {std::atan2(b, a), off,
-          s.kind == FaceKind::Torus ? std::atan2(height, off - s.radius) : height};
-}
 
 double angle_from(double a, double b) { return std::abs(std::remainder(a - b, 2 * M_PI)); }
 

@@ -2,10 +2,6 @@
 // contact, and both forces together.
 #pragma once
 
-#include <algorithm>
-#include <type_traits>
-#include <variant>
-
 #include "sphshell_pin/laws/bristle.hpp"
 #include "sphshell_pin/laws/normal.hpp"
 

@@ -3,16 +3,9 @@
 // docs/laws.md.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <functional>
 #include <sstream>
-#include <stdexcept>
-#include <type_traits>
-#include <variant>
 
-#include "sphshell_pin/laws/contact_force.hpp"
-#include "sphshell_pin/laws/parameters.hpp"
 #include "sphshell_pin/laws/table.hpp"
 
 namespace sphshell_pin {

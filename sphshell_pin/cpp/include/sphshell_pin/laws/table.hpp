@@ -3,10 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <stdexcept>
-#include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "sphshell_pin/laws/contact_force.hpp"
 #include "sphshell_pin/laws/parameters.hpp"
