@@ -15,15 +15,12 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario.format.build import build
 from tests import models
 from tests.dynamics.scenes import assert_rate_jacobian
+from tests.texts import text_of
 
 MASS, LENGTH, OWN = 1.0, 0.3, 0.01
 INERTIA = OWN + MASS * LENGTH**2
 STIFFNESS = 500.0
-URDF = """<robot name="link"><link name="base"/><link name="arm"><inertial><mass value="1"/>
-<origin xyz="0 0 -0.3"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
-</inertial></link><joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1.2" effort="5" velocity="3"/>
-<dynamics damping="0.7" friction="0.3"/></joint></robot>"""
+URDF = text_of("robots/link.urdf")
 
 
 def link(gravity: float = 0.0) -> pin.Model:

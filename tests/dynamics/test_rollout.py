@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-import trimesh
 
 import sphshell_pin as sp
 from sphshell_pin import errors
-from tests import models
+from tests import meshes, models
 from tests.results import assert_same_bits
 
 G = 9.81
@@ -33,11 +32,8 @@ every = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda i: type(i)
 PAIR = "tip"
 
 
-def ball_on_plate(friction=models.FRICTION, law=models.LAW, side="both") -> sp.Scene:
-    scene = sp.Scene(models.ball())
-    shell = models.plate(side=side)
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, name=PAIR)
-    return scene
+def ball_on_plate(friction=models.FRICTION, law=models.LAW) -> sp.Scene:
+    return models.on_shell(models.ball(), models.plate(), law, friction, name=PAIR)
 
 
 def starts(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -47,9 +43,7 @@ def starts(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 
 def slider_scene(law) -> sp.Scene:
-    scene = sp.Scene(models.slider())
-    scene.add_contact(sp.Sphere(R, "ball"), models.plate(), law=law, name=PAIR)
-    return scene
+    return models.on_shell(models.slider(), models.plate(), law, name=PAIR)
 
 
 @every
@@ -207,22 +201,9 @@ def test_contact_sources_over_threads(friction) -> None:
         assert_same_bits(rollout[run], alone)
 
 
-def test_frictions_of_all_kinds_side_by_side() -> None:
-    q0s, v0s = starts(3)
-    kinds = [None, models.FRICTION, BRISTLES]
-    rollout = sp.Simulation(ball_on_plate(), sp.Implicit()).rollout(
-        q0s, v0s, 0.05, threads=3, vary={f"{PAIR}.friction": kinds}, record_dt=1e-2
-    )
-    for run, friction in enumerate(kinds):
-        alone = sp.Simulation(ball_on_plate(friction), sp.Implicit())
-        assert_same_bits(rollout[run], alone.run(q0s[run], v0s[run], 0.05, record_dt=1e-2))
-
-
 def test_deep_starts_in_a_solid_are_seen_as_run_sees_them() -> None:
-    box = trimesh.creation.box(extents=(0.4, 0.4, 0.4))
-    scene = sp.Scene(models.ball())
-    shell = sp.Shell(box.vertices, box.faces, side="outside")
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=models.LAW, name=PAIR)
+    shell = sp.Shell(*meshes.cube(0.4), side="outside")
+    scene = models.on_shell(models.ball(), shell, models.LAW)
     q0s = [models.free_q([0, 0, z]) for z in (0.30, 0.24, 0.21, 0.0)]
     simulation = sp.Simulation(scene, sp.Adaptive())
     rollout = simulation.rollout(q0s, None, 1e-3)

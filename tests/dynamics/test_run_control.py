@@ -282,15 +282,8 @@ def test_lock_equals_the_model_reduced_by_hand() -> None:
         pin.buildReducedModel(model, [locked], q_lock), models.LAW, models.FRICTION
     )
     scene = sp.Scene(model, lock=["two_joint"], q_lock=q_lock)
-    scene.add_contact(
-        sphere=sp.Sphere(RADIUS, frame="ball"),
-        shell=models.plate(),
-        frame="universe",
-        law=models.LAW,
-        friction=models.FRICTION,
-        method="facets",
-        name="ball-plate",
-    )
+    more = {"friction": models.FRICTION, "method": "facets", "name": "ball-plate"}
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), models.plate(), law=models.LAW, **more)
     assert scene.model.nq == 2
     q0, v0 = np.array([0.3, 0.5]), np.array([1.0, 0.0])
     a, b = (sp.Simulation(s, sp.RungeKutta4(dt=1e-3)).run(q0, v0, 0.4) for s in (by_hand, scene))
