@@ -14,8 +14,9 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS_Compound
 
 import sphshell_pin as sp
+from sphshell_pin.shell.raw import random_places
 from tests import models
-from tests.contact.helpers import directions, places_by_area
+from tests.contact.helpers import directions
 from tests.contact.smooth.test_gradient import assert_gradient
 from tests.contact.walks import jumps, paths
 from tests.meshes import random_rotation
@@ -61,7 +62,7 @@ def faces_in(path: Path):
 def spheres(shell: sp.Shell, count: int, radius: float, seed: int = 0):
     """Centers (count, 3) near a surface, deep and shallow, over its faces and beside its edges."""
     rng = np.random.default_rng(seed)
-    which, on = places_by_area(shell.vertices, shell.triangles, rng, count)
+    which, on = random_places(shell.vertices[shell.triangles], count, rng)
     away = 0.9 * shell._binding.triangle_normals[which]
     aside = 0.6 * directions(rng, count)
     return on + radius * np.where(rng.random(count)[:, None] < 0.5, away, aside)
