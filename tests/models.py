@@ -117,11 +117,13 @@ def linear_law(stiffness: float, damping: float = 0.0) -> ImpactLaw:
     return ImpactLaw(stiffness, 1.0, damping, 1e-6)
 
 
-def on_shell(model: pin.Model, shell, law, friction=None, *, radius: float = 0.05, **more) -> Scene:  # type: ignore[no-untyped-def]
+def on_shell(  # type: ignore[no-untyped-def]
+    model: pin.Model, shell, law, friction=None, *, radius: float = 0.05, offset=(0, 0, 0), **more
+) -> Scene:
     """Scene of a sphere at the frame "ball" and a shell, a fixed one unless `more` has a frame."""
     scene = Scene(model)
     more = {"name": "ball", **more}
-    scene.add_contact(Sphere(radius, "ball"), shell, law=law, friction=friction, **more)
+    scene.add_contact(Sphere(radius, "ball", offset), shell, law=law, friction=friction, **more)
     return scene
 
 

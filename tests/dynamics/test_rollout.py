@@ -7,6 +7,7 @@ import re
 import signal
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,37 +74,24 @@ def test_a_varied_run_is_that_of_the_scene_built_so() -> None:
     ]
     offsets, radii = 1e-3 * rng.normal(size=(count, 3)), rng.uniform(0.04, 0.049, count)
     stiffnesses, mus = rng.uniform(1e5, 1e6, count), rng.uniform(0.3, 0.9, count)
-    rollout = sp.Simulation(ball_on_plate(), sp.Adaptive(1e-8)).rollout(
-        q0s,
-        v0s,
-        0.05,
-        vary={
-            f"{PAIR}.law.stiffness": stiffnesses,
-            f"{PAIR}.friction.mu_static": mus,
-            f"{PAIR}.friction": [sp.CoulombFriction(1.0, 0.2, 1e-3, 1e-2)] * count,
-            f"{PAIR}.sphere.radius": radii,
-            f"{PAIR}.sphere.offset": offsets,
-            f"{PAIR}.placement": poses,
-        },
-        record_dt=5e-3,
-    )
+    vary = {
+        "law.stiffness": stiffnesses,
+        "friction.mu_static": mus,
+        "friction": [sp.CoulombFriction(1.0, 0.2, 1e-3, 1e-2)] * count,
+        "sphere.radius": radii,
+        "sphere.offset": offsets,
+        "placement": poses,
+    }
+    vary = {f"{PAIR}.{key}": values for key, values in vary.items()}
+    simulation = sp.Simulation(ball_on_plate(), sp.Adaptive(1e-8))
+    rollout = simulation.rollout(q0s, v0s, 0.05, vary=vary, record_dt=5e-3)
     for run in range(count):
-        scene = sp.Scene(models.ball())
-        law = sp.ImpactLaw(
-            stiffnesses[run], models.LAW.exponent, models.LAW.damping, models.LAW.full_damping_depth
-        )
-        scene.add_contact(
-            sp.Sphere(radii[run], "ball", offsets[run]),
-            models.plate(),
-            placement=poses[run],
-            law=law,
-            friction=sp.CoulombFriction(mus[run], 0.2, 1e-3, 1e-2),
-            name=PAIR,
-        )
-        alone = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
-            q0s[run], v0s[run], 0.05, record_dt=5e-3
-        )
-        assert_same_bits(rollout[run], alone)
+        law = replace(models.LAW, stiffness=stiffnesses[run])
+        friction = sp.CoulombFriction(mus[run], 0.2, 1e-3, 1e-2)
+        more = {"radius": radii[run], "offset": offsets[run], "placement": poses[run], "name": PAIR}
+        scene = models.on_shell(models.ball(), models.plate(), law, friction, **more)
+        one = sp.Simulation(scene, sp.Adaptive(1e-8)).run(q0s[run], v0s[run], 0.05, record_dt=5e-3)
+        assert_same_bits(rollout[run], one)
         assert rollout[run].scene.pairs[0].law == law
 
 
@@ -277,14 +265,6 @@ def test_progress_grows_to_one() -> None:
     shares.clear()
     sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s[:0], None, progress=shares.append)
     assert shares == [1.0]
-
-
-@pytest.fixture
-def keyboard():
-    """Let SIGINT interrupt, as on a terminal; a shell's background jobs ignore it."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("keyboard")
