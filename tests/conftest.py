@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 
 import pytest
 
@@ -39,6 +40,14 @@ def no_pictures():
     """Runs draw nothing."""
     with without_pictures():
         yield
+
+
+@pytest.fixture
+def keyboard():
+    """Let SIGINT interrupt, as on a terminal; a shell's background jobs ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.hookimpl(tryfirst=True)  # marks are looked at next

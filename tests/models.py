@@ -78,8 +78,15 @@ def ball(
 
 def slider(gravity: float = 9.81, mass: float = 1.0) -> pin.Model:
     """Mass on a vertical prismatic joint, frame "ball" at its center: q is the center's height."""
-    model = empty(gravity)
-    add_body(model, "ball", pin.JointModelPZ(), inertia=pin.Inertia.FromSphere(mass, 0.05))
+    return ball(gravity, mass, joint=pin.JointModelPZ())
+
+
+def block(
+    gravity: float = 9.81, mass: float = 1.0, radius: float = 0.05, *, tilt: float = 0.0
+) -> pin.Model:
+    """Ball that slides without turning, q its center; gravity leans by `tilt` [rad] along x."""
+    model = ball(gravity, mass, radius, pin.JointModelTranslation())
+    model.gravity.linear = gravity * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
     return model
 
 
@@ -100,25 +107,30 @@ def plate(size: float = 1.0, count: int = 8, side: str = "both") -> Shell:
     return Shell(*meshes.random_plate(count, seed=count, size=size, slivers=False), side=side)
 
 
+def square(size: float = 2.0) -> Shell:
+    """Flat square z = 0 of one element."""
+    return Shell(*meshes.grid_plate(size=size, quads=True))
+
+
 def linear_law(stiffness: float, damping: float = 0.0) -> ImpactLaw:
     """Spring and dashpot whose damping is constant from a micrometer of depth on."""
     return ImpactLaw(stiffness, 1.0, damping, 1e-6)
 
 
-def on_plate(model: pin.Model, law, friction=None, *, radius: float = 0.05, **more) -> Scene:  # type: ignore[no-untyped-def]
-    """Scene of the frame "ball" on a fixed plate z = 0."""
+def on_shell(  # type: ignore[no-untyped-def]
+    model: pin.Model, shell, law, friction=None, *, radius: float = 0.05, offset=(0, 0, 0), **more
+) -> Scene:
+    """Scene of a sphere at the frame "ball" and a shell, a fixed one unless `more` has a frame."""
     scene = Scene(model)
-    scene.add_contact(
-        sphere=Sphere(radius, frame="ball"),
-        shell=more.pop("shell", None) or plate(),
-        frame="universe",
-        law=law,
-        friction=friction,
-        method="facets",
-        name="ball-plate",
-        **more,
-    )
+    more = {"name": "ball", **more}
+    scene.add_contact(Sphere(radius, "ball", offset), shell, law=law, friction=friction, **more)
     return scene
+
+
+def on_plate(model: pin.Model, law, friction=None, *, shell=None, **more) -> Scene:  # type: ignore[no-untyped-def]
+    """The same on a fixed plate z = 0, by its facets."""
+    more = {"method": "facets", "name": "ball-plate", **more}
+    return on_shell(model, shell or plate(), law, friction, **more)
 
 
 def two_free_bodies(law, friction=None, *, radius: float = 0.05) -> Scene:  # type: ignore[no-untyped-def]
@@ -127,18 +139,8 @@ def two_free_bodies(law, friction=None, *, radius: float = 0.05) -> Scene:  # ty
     add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=pin.Inertia.FromSphere(1.0, radius))
     lump = pin.Inertia(2.0, np.array([0.02, -0.03, 0.01]), np.diag([0.03, 0.02, 0.04]))
     add_body(model, "table", pin.JointModelFreeFlyer(), inertia=lump)
-    scene = Scene(model)
-    scene.add_contact(
-        sphere=Sphere(radius, frame="ball"),
-        shell=plate(size=2.0),
-        frame="table",
-        placement=TABLE,
-        law=law,
-        friction=friction,
-        method="facets",
-        name="ball-table",
-    )
-    return scene
+    more = {"frame": "table", "placement": TABLE, "method": "facets", "name": "ball-table"}
+    return on_shell(model, plate(size=2.0), law, friction, radius=radius, **more)
 
 
 TABLE = pin.SE3(pin.utils.rpyToMatrix(0.3, -0.4, 0.5), np.array([0.05, 0.02, -0.03]))

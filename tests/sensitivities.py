@@ -198,10 +198,7 @@ def thrown(
     gap: float = 0.01,
 ) -> Case:
     """A free, spinning ball that meets a plate at an angle."""
-    scene = sp.Scene(models.ball())
-    plate = models.plate(4.0) if shell is None else shell
-    scene.add_contact(
-        sp.Sphere(R, "ball"), plate, law=law, friction=friction, method=method, name="ball"
-    )
+    shell = models.plate(4.0) if shell is None else shell
+    scene = models.on_shell(models.ball(), shell, law, friction, method=method)
     q0 = models.free_q([0.02, -0.03, R + gap])
     return Case(scene, q0, [0.3, 0.15, -0.5, 2.0, -3.0, 1.0], duration, integrator)

@@ -57,15 +57,6 @@ def directions(rng: np.random.Generator, count: int | None = None) -> NDArray[np
     return np.asarray(out / np.linalg.norm(out, axis=-1, keepdims=True))
 
 
-def places_by_area(vertices, triangles, rng: np.random.Generator, count: int):  # type: ignore[no-untyped-def]
-    """Triangles (count,), chosen as their areas are, and a random place (count, 3) on each."""
-    corners = vertices[triangles]
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(spans, axis=1)
-    which = rng.choice(len(areas), count, p=areas / areas.sum())
-    return which, np.einsum("nk,nkx->nx", rng.dirichlet([1.0, 1.0, 1.0], count), corners[which])
-
-
 def difference(a, b, radius: float) -> float:  # type: ignore[no-untyped-def]
     """Largest difference of two sets matched by nearest point; inf if counts differ.
 

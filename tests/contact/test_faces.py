@@ -4,7 +4,6 @@ from pathlib import Path
 
 import coal
 import numpy as np
-import pinocchio as pin
 import pytest
 from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
@@ -15,11 +14,12 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS_Compound
 
 import sphshell_pin as sp
-from tests.contact.helpers import directions, places_by_area
+from sphshell_pin.shell.raw import random_places
+from tests import models
+from tests.contact.helpers import directions
 from tests.contact.smooth.test_gradient import assert_gradient
 from tests.contact.walks import jumps, paths
 from tests.meshes import random_rotation
-from tests.models import ball
 from tests.parts import occ
 from tests.parts.occ import parts
 
@@ -62,7 +62,7 @@ def faces_in(path: Path):
 def spheres(shell: sp.Shell, count: int, radius: float, seed: int = 0):
     """Centers (count, 3) near a surface, deep and shallow, over its faces and beside its edges."""
     rng = np.random.default_rng(seed)
-    which, on = places_by_area(shell.vertices, shell.triangles, rng, count)
+    which, on = random_places(shell.vertices[shell.triangles], count, rng)
     away = 0.9 * shell._binding.triangle_normals[which]
     aside = 0.6 * directions(rng, count)
     return on + radius * np.where(rng.random(count)[:, None] < 0.5, away, aside)
@@ -240,10 +240,8 @@ def test_a_ring_that_a_border_cuts_is_none(tmp_path):
 @pytest.mark.parametrize("friction", [None, sp.CoulombFriction()])
 def test_a_ball_that_falls_into_a_seat_rests_on_its_axis(friction, step):
     radius, shell = 6.0 * MM, sp.Shell.from_file(step)
-    scene = sp.Scene(ball(9.81, 0.05, radius, pin.JointModelTranslation()))
     law = sp.ImpactLaw(1e6, exponent=1.5, damping=50.0, full_damping_depth=1e-5)
-    friction = {} if friction is None else {"friction": friction}
-    scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law, **friction)
+    scene = models.on_shell(models.block(9.81, 0.05, radius), shell, law, friction, radius=radius)
     half_angle = np.arctan(0.6)
     touching = 10.0 * MM + radius / np.sin(half_angle) - 2.0 * MM / np.tan(half_angle)
     start = np.array([35 * MM, 20 * MM, touching + 2 * MM])

@@ -56,19 +56,10 @@ def test_one_exact_contact(kind: str, how: str, count: int) -> None:
             center = np.array([place[0], place[1], sign * (RADIUS - DEPTH)])
             contacts = shell.contacts(center, RADIUS, method=method)
             assert len(contacts) == 1, (center, contacts.point)
+            if np.abs(place).max() < 0.49:  # edges and vertices inside the plate are none
+                assert contacts.feature[0] == Feature.FACE
             worst = np.maximum(worst, errors(contacts, sign * up))
     assert worst.max() <= 1e-12
-
-
-def test_inner_edges_and_vertices_are_face_contacts() -> None:
-    vertices, triangles = meshes.grid_plate(4, 4)
-    shell = Shell(vertices, triangles)
-    for x, y in [(0.0, 0.0), (0.25, 0.0), (0.125, 0.125), (0.1, 0.25), (-0.25, 0.25)]:
-        contacts = shell.contacts([x, y, 0.09], RADIUS, method="facets")
-        assert len(contacts) == 1
-        assert contacts.feature[0] == Feature.FACE
-        assert np.array_equal(contacts.point[0], [x, y, 0.0])
-        assert np.array_equal(contacts.normal[0], [0.0, 0.0, 1.0])
 
 
 def test_centre_on_the_surface_gives_a_finite_unit_normal() -> None:

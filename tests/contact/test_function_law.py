@@ -218,9 +218,6 @@ def test_a_scene_that_is_changed_during_its_run_has_no_result() -> None:
         sp.Simulation(scene).run([0.0499], None, 0.02, controller=controller)
 
 
-OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
-
-
 def test_copies_and_pickles() -> None:
     assert copy.deepcopy(C_LAW) == copy.copy(C_LAW) == C_LAW
     assert hash(copy.copy(C_LAW)) == hash(C_LAW)

@@ -1,12 +1,11 @@
 """`HertzLaw` where a flat goes on smoothly into a fillet: the energy does not jump."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
 from tests.contact.test_hertz_law import MODULUS
-from tests.models import ball
+from tests.models import block, on_shell
 from tests.oracle.hertz import hertz_contact
 
 RADIUS, BEND, HALF, DEPTH = 0.01, 0.015, 0.02, 4e-5
@@ -27,13 +26,8 @@ def halfpipe(**more) -> sp.Shell:
 
 
 def scene(law=LAW, shell=None, gravity=0.0) -> sp.Scene:
-    model = ball(0.0, 0.05, RADIUS, pin.JointModelTranslation())
-    model.gravity.linear = np.array([0.0, 0.0, -gravity])
-    out = sp.Scene(model)
-    out.add_contact(
-        sp.Sphere(RADIUS, "ball"), shell or halfpipe(), law=law, friction=None, name="c"
-    )
-    return out
+    model = block(gravity, 0.05, RADIUS)
+    return on_shell(model, shell or halfpipe(), law, radius=RADIUS, name="c")
 
 
 def center(beyond: float) -> np.ndarray:
@@ -119,10 +113,9 @@ def test_derivatives_are_those_of_differences(beyond: float) -> None:
     )
     assert np.abs(found.by_q[0] - by_q).max() < 1e-5 * np.abs(by_q).max()
     assert np.abs(by_q - by_q.T).max() < 1e-5 * np.abs(by_q).max()  # the force is a gradient
-    larger, smaller = (sp.Scene(one.model) for _ in range(2))
-    for other, sign in ((larger, 1), (smaller, -1)):
-        sphere = sp.Sphere(RADIUS + sign * step, "ball")
-        other.add_contact(sphere, halfpipe(), law=LAW, friction=None, name="c")
+    larger, smaller = (
+        on_shell(one.model, halfpipe(), LAW, radius=RADIUS + sign * step) for sign in (1, -1)
+    )
     by_radius = (force(larger, at) - force(smaller, at)) / (2 * step)
     assert np.abs(found.by_parameters[0][:, 0] - by_radius).max() < 1e-5 * np.abs(by_radius).max()
 

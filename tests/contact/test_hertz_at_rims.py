@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from tests.models import ball
+from tests.models import block, on_shell
 
 RADIUS = 6e-3
 LAW = sp.HertzLaw(2e7, 0.4)
@@ -34,9 +34,7 @@ SHELLS = {
 
 
 def scene(shell: sp.Shell, mass: float = 0.02) -> sp.Scene:
-    out = sp.Scene(ball(0.0, mass, RADIUS, pin.JointModelTranslation()))
-    out.add_contact(sp.Sphere(RADIUS, "ball"), shell, law=LAW, name="c")
-    return out
+    return on_shell(block(0.0, mass, RADIUS), shell, LAW, radius=RADIUS)
 
 
 def starts(shell: sp.Shell, rng: np.random.Generator, lean: float):

@@ -197,15 +197,6 @@ def test_t_junctions() -> None:
             assert difference(first, second, 0.2) <= 1e-12, center
 
 
-def test_order_of_elements_never_changes_the_force() -> None:
-    """On the borders themselves the set may hang on rounding, but not on the numbering."""
-    mesh = FLAT["plate"]
-    shells = [shell_from(*shuffled(*mesh, None, seed)) for seed in range(4)]
-    for center in positions(*mesh, RADIUS, 150, seed=9, heights=(0.3, 0.9)):
-        forces = [force_sum(s.contacts(center, RADIUS, method="facets")) for s in shells]
-        assert np.ptp(forces, axis=0).max() <= 1e-12, center.tolist()
-
-
 # A floor that turns up into a wall by a quarter of a cylinder: flat elements beside curved ones.
 ROUND, LONG, WIDE = 3.0, 4.0, 6.0
 
@@ -232,29 +223,12 @@ def fillet(seed: int = 0, h: float = 0.6):
     return tuple(np.concatenate([part[i] for part in parts]) for i in range(3))
 
 
-def split_flat(vertices, elements, normals):
-    """Cut every flat element in three at a point within."""
-    rng = np.random.default_rng(5)
-    kept, added, more, count = [], [], [], len(vertices)
-    for t in elements:
-        if np.ptp(vertices[t, 2]) > 0 and np.ptp(vertices[t, 0]) > 0:
-            kept.append(t)
-            continue
-        added.append(rng.dirichlet([2.0, 2.0, 2.0]) @ vertices[t])
-        more.append(normals[t[0]])
-        kept += [(t[k], t[(k + 1) % 3], count) for k in range(3)]
-        count += 1
-    return np.concatenate([vertices, added]), np.array(kept), np.concatenate([normals, more])
-
-
-@pytest.mark.parametrize("change", ["other flat elements", "split flat elements"])
-def test_flat_elements_beside_curved_ones(change: str) -> None:
+def test_flat_elements_beside_curved_ones() -> None:
     given = fillet()
     assert mean_edge(given[0], given[1]) < 1
-    shell = Shell(given[0], given[1], normals=given[2])
+    shell = shell_from(*given)
     assert shell.num_patches == 1
-    changed = fillet(seed=7) if change.startswith("other") else split_flat(*given)
-    other = Shell(changed[0], changed[1], normals=changed[2])
+    other = shell_from(*fillet(seed=7))
     rng = np.random.default_rng(6)
     s = rng.uniform(-2.5, 2.5 + ROUND * np.pi / 2, 200)
     turn = np.clip(s / ROUND, 0, np.pi / 2)

@@ -13,14 +13,14 @@ from tests.validation.rattleback import ellipsoid
 AXES = np.array([0.2, 0.03, 0.02])
 
 
-def scene_of(shell: sp.Shell, law=None, friction=None, method=None, **plane) -> sp.Scene:
+def scene_of(
+    shell: sp.Shell, law=None, friction=None, method=None, inertia=None, **plane
+) -> sp.Scene:
     """`shell` on a free body, over a plane of the world."""
-    model = empty()
-    add_body(model, "body", pin.JointModelFreeFlyer())
+    model, law = empty(), law or linear_law(1e4)
+    add_body(model, "body", pin.JointModelFreeFlyer(), inertia=inertia)
     scene = sp.Scene(model)
-    scene.add_contact(
-        sp.Plane("universe", **plane), shell, "body", None, law or linear_law(1e4), friction, method
-    )
+    scene.add_contact(sp.Plane("universe", **plane), shell, "body", None, law, friction, method)
     return scene
 
 

@@ -86,18 +86,3 @@ def test_shown_contact_is_the_resultant() -> None:
             force = found.depth[0] ** 1.5 * found.normal[0]
             assert force == pytest.approx(force_sum(found), abs=2e-4 * 0.04**1.5)
     assert merged > 10
-
-
-def test_level_places() -> None:
-    """kLevel, kConvex, kMostHalvings: where all is nearly equally near, what is found is nearest to
-    1e-7 of the depth, and the potential is that of one contact."""
-    vertices, elements = meshes.icosphere(3)
-    shell, rng = Shell(vertices, elements, normals=vertices), np.random.default_rng(0)
-    corners = np.linalg.norm(shell.vertices, axis=1)
-    for reach in (1e-3, 1e-5, 1e-7, 1e-9):
-        center = reach * rng.normal(size=3)
-        found = shell.contacts(center, 1.1)
-        nearest = np.linalg.norm(shell.vertices - center, axis=1).min()
-        assert corners == pytest.approx(1.0)
-        assert found.terms.depth.max() >= (1.1 - nearest) * (1 - 1e-7)
-        assert energy(found) == pytest.approx((1.1 - nearest) ** 2.5 / 2.5, rel=1e-2)

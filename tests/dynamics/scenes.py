@@ -59,12 +59,8 @@ def turned(q: Array, seed: int) -> Array:
 
 def free_ball(shell: sp.Shell, law=LAWS["impact"], friction=None, *, gravity=9.81, **more):  # type: ignore[no-untyped-def]
     """Free ball of radius one on a fixed shell."""
-    mass = more.pop("mass", 1.0)
-    scene = sp.Scene(models.ball(gravity, mass, 1.0))
-    scene.add_contact(
-        sp.Sphere(1.0, "ball"), shell, law=law, friction=friction, name="ball", **more
-    )
-    return scene
+    model = models.ball(gravity, more.pop("mass", 1.0), 1.0)
+    return models.on_shell(model, shell, law, friction, radius=1.0, **more)
 
 
 def on_surface(name: str, law=LAWS["impact"], friction=None, seed: int = 0, **more) -> State:  # type: ignore[no-untyped-def]

@@ -22,18 +22,11 @@ every = pytest.mark.parametrize("integrator", FIVE, ids=lambda i: type(i).__name
 ACCURATE = sp.Adaptive(1e-9)
 
 
-def one_quad(size: float = 4.0) -> sp.Shell:
-    return sp.Shell(*meshes.grid_plate(size=size, quads=True))
-
-
-def block(friction: sp.BristleFriction, shell: sp.Shell | None = None, **more) -> sp.Scene:
+def block(friction: sp.BristleFriction) -> sp.Scene:
     """1 kg that slides without turning."""
-    model = models.empty()
-    models.add_body(model, "ball", pin.JointModelTranslation())
-    law = models.linear_law(K, 300.0)
-    scene = sp.Scene(model)
-    scene.add_contact(sp.Sphere(R, "ball"), shell or one_quad(), law=law, friction=friction, **more)
-    return scene
+    return models.on_shell(
+        models.block(), models.square(4.0), models.linear_law(K, 300.0), friction
+    )
 
 
 def run(scene: sp.Scene, integrator, q, v=None, duration=1.0, **more) -> sp.Result:
@@ -114,11 +107,12 @@ def test_a_bristle_that_slides_stores_what_it_holds(speed: float) -> None:
 def test_borders_of_elements_are_not_felt(method: str) -> None:
     """A ball that slides and then rolls over 800 triangles, and over one square."""
     ends = []
-    for shell in (one_quad(2.0), sp.Shell(*meshes.random_plate(800, seed=4, size=2.0))):
-        scene = sp.Scene(models.ball(radius=R))
-        friction = sp.BristleFriction(0.2, 0.15, K, 30.0, torsional=True)
-        law = models.linear_law(K, 300.0)
-        scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, method=method)
+    law, friction = (
+        models.linear_law(K, 300.0),
+        sp.BristleFriction(0.2, 0.15, K, 30.0, torsional=True),
+    )
+    for shell in (models.square(2.0), sp.Shell(*meshes.random_plate(800, seed=4, size=2.0))):
+        scene = models.on_shell(models.ball(), shell, law, friction, method=method)
         q = models.free_q([-0.2, 0.03, R - DEPTH])
         rows = run(scene, ACCURATE, q, [0.8, 0.3, 0, 0.0, -4.0, 20.0], 0.6, record_dt=0.05)
         ends.append(rows)
@@ -133,11 +127,8 @@ def turntable(friction: sp.BristleFriction) -> sp.Scene:
     hub = pin.Inertia(1e3, np.zeros(3), 1e6 * np.eye(3))
     models.add_body(model, "disc", pin.JointModelRZ(), inertia=hub)
     models.add_body(model, "ball", pin.JointModelTranslation())
-    scene = sp.Scene(model)
-    law = models.linear_law(K, 300.0)
     shell = sp.Shell(*meshes.random_plate(300, seed=2, size=2.0))
-    scene.add_contact(sp.Sphere(R, "ball"), shell, frame="disc", law=law, friction=friction)
-    return scene
+    return models.on_shell(model, shell, models.linear_law(K, 300.0), friction, frame="disc")
 
 
 @every
@@ -162,45 +153,10 @@ def test_a_block_rides_on_a_turntable(integrator) -> None:
         assert along[20:] == pytest.approx(x + stretch, abs=2e-8)
 
 
-def crossing(angle: float, record_dt: float, method: str = "smooth") -> sp.Result:
-    """A block slides, and sticks at last, over a groove whose walls rise by `angle` [rad]."""
-    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
-    friction = sp.BristleFriction(0.4, 0.3, 1e4, 50.0)
-    model = models.empty()
-    models.add_body(model, "ball", pin.JointModelTranslation())
-    scene = sp.Scene(model)
-    law = sp.ImpactLaw(1e4, 1.0, 100.0, 2e-3)  # its damping sets in softly: no kink of its own
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, method=method)
-    height = R / np.cos(angle) + 0.02 * np.tan(angle) - G / 1e4
-    v = [0.4, 0.03, -0.4 * np.tan(angle)]
-    return run(scene, sp.Adaptive(1e-8), [-0.02, 0.1, height], v, 0.15, record_dt=record_dt)
-
-
-def largest_jump(rows: sp.Result) -> float:
-    """Of the sum of friction forces between rows [N]."""
-    force = np.zeros((len(rows.t), 3))
-    np.add.at(force, rows.contacts.row, rows.contacts.friction_force_world)
-    return float(np.linalg.norm(np.diff(force[5:], axis=0), axis=1).max())
-
-
-@pytest.mark.parametrize("degrees", [1.0, 5.0, 12.0])
-def test_friction_is_continuous_where_contacts_part_and_join(degrees: float) -> None:
-    angle = np.radians(degrees)
-    coarse, fine = (crossing(angle, dt) for dt in (2e-4, 2.5e-5))
-    passes = np.bincount(fine.contacts.row[fine.contacts.normal_force < 0], minlength=1)
-    both = np.bincount(fine.contacts.row).max() > 1
-    assert passes.sum() > 0 or both
-    assert largest_jump(fine) < 0.4 * largest_jump(coarse)
-    assert largest_jump(fine) < 0.02 * 0.4 * G
-    assert np.abs(fine.energy.residual).max() < 1e-6 * fine.energy.exchanged
-
-
 def test_lift_off_forgets() -> None:
     """At every touch the bristle begins unstretched, whatever it held when it left."""
-    scene = sp.Scene(models.ball(radius=R))
-    friction = sp.BristleFriction(0.5, 0.5, 1e4)
-    law = models.linear_law(1e4, 3.0)
-    scene.add_contact(sp.Sphere(R, "ball"), one_quad(), law=law, friction=friction)
+    law, friction = models.linear_law(1e4, 3.0), sp.BristleFriction(0.5, 0.5, 1e4)
+    scene = models.on_shell(models.ball(), models.square(4.0), law, friction)
     v = [1.0, 0.3, -1.0, 5.0, 8.0, 1.0]
     rows = run(scene, ACCURATE, models.free_q([0, 0, R + 0.01]), v, 1.2)
     log = rows.contacts
@@ -216,7 +172,7 @@ def test_lift_off_forgets() -> None:
 DEEP = 1e-3
 
 
-def drill(*joints: pin.JointModel, mu: float = 0.4) -> sp.Scene:
+def drill(*joints: pin.JointModel) -> sp.Scene:
     """A ball held at a depth of 1 mm, on `joints`."""
     model = models.empty(0.0)
     place = pin.SE3(np.eye(3), np.array([0.0, 0.0, R - DEEP]))
@@ -227,11 +183,8 @@ def drill(*joints: pin.JointModel, mu: float = 0.4) -> sp.Scene:
         place = pin.SE3.Identity()
     lump = pin.Inertia.FromSphere(1.0, R)
     models.add_body(model, "ball", joints[-1], parent, placement=place, inertia=lump)
-    scene = sp.Scene(model)
-    friction = sp.BristleFriction(mu, mu, 1e6, 0.0, torsional=True)
-    law = models.linear_law(1e4)
-    scene.add_contact(sp.Sphere(R, "ball"), one_quad(), law=law, friction=friction)
-    return scene
+    friction = sp.BristleFriction(0.4, 0.4, 1e6, 0.0, torsional=True)
+    return models.on_shell(model, models.square(4.0), models.linear_law(1e4), friction)
 
 
 INERTIA = 0.4 * R**2

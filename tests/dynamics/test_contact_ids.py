@@ -1,7 +1,6 @@
 """A contact keeps its number over elements and smooth edges, and no other gets it."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
@@ -10,14 +9,10 @@ from tests import meshes, models
 RADIUS = 0.01
 
 
-def ball(shell: sp.Shell, start, gravity=(0.0, 0.0, -9.81), velocity=None, duration=0.5):
+def ball(shell: sp.Shell, start, velocity=None, duration=0.5):
     """Run of a ball without rotation, from `start` (3,)."""
-    model, inertia = models.empty(), pin.Inertia.FromSphere(0.05, RADIUS)
-    models.add_body(model, "tip", pin.JointModelTranslation(), inertia=inertia)
-    model.gravity.linear = np.array(gravity)
-    scene = sp.Scene(model)
     law = sp.ImpactLaw(1e4, exponent=1.0, damping=2.0)
-    scene.add_contact(sp.Sphere(RADIUS, "tip"), shell, law=law)
+    scene = models.on_shell(models.block(9.81, 0.05, RADIUS), shell, law, radius=RADIUS)
     run = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4))
     return run.run(start, np.zeros(3) if velocity is None else velocity, duration)
 

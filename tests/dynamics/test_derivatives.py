@@ -36,7 +36,7 @@ from tests.dynamics.scenes import (
 )
 from tests.dynamics.test_external_forces import CASES
 from tests.dynamics.test_mimic import CASES as MIMIC
-from tests.models import ARM_Q, TURNING, free_q, two_free_bodies, two_free_state
+from tests.models import ARM_Q, TURNING, free_q
 
 IMPACT = LAWS["impact"]
 WHERE: dict[str, Callable[..., State]] = {
@@ -252,29 +252,6 @@ def test_rates_of_several_pairs_and_of_mimic_joints() -> None:
     for name in MIMIC:
         scene, q, v = scenes.mimicking(name)
         assert_rate_jacobian(scene, q, v, stretched(scene, 1e-5))
-
-
-def test_nothing_touches() -> None:
-    """Then they are Pinocchio's own, to the last bits, and no parameter matters."""
-    scene = two_free_bodies(IMPACT, COULOMB)
-    q, v = two_free_state(depth=-0.2)
-    by_q, by_v = scene.contact_derivatives(q, v)
-    assert by_q.shape == by_v.shape == (12, 12)
-    assert not by_q.any()
-    assert not by_v.any()
-    model, data, tau = scene.model, scene.model.createData(), np.arange(12.0)
-    got = scene.dynamics_derivatives(q, v, tau, parameters=differences.names_of(scene))
-    pin.computeABADerivatives(model, data, q, v, tau)
-    minv = np.triu(data.Minv) + np.triu(data.Minv, 1).T
-    for found, expected in (
-        (got.acceleration, data.ddq),
-        (got.by_q, data.ddq_dq),
-        (got.by_v, data.ddq_dv),
-        (got.by_tau, minv),
-    ):
-        size = np.abs(expected).max()
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * size)
-    assert not got.by_parameters.any()
 
 
 def test_bristles_of_a_state() -> None:

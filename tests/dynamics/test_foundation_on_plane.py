@@ -12,9 +12,8 @@ from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter
 from tests.contact.test_planes import egg, pose, rotations, scene_of, support
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
-from tests.dynamics.test_planes import over_plane, touching
+from tests.dynamics.test_planes import over_plane, reach_of, touching
 from tests.meshes import cube, grid_plate, icosphere
-from tests.models import add_body, empty
 
 KAPPA = 2e8  # [Pa/m]
 LAW = sp.FoundationLaw(2e5, 1e-3, 3.0)
@@ -108,8 +107,7 @@ SHELLS = {
 def test_derivatives_are_those_of_finite_differences(name, law, friction, ground: bool) -> None:
     shell = SHELLS[name]()
     scene = over_plane(shell, law, friction, ground=ground)
-    turned = pin.exp3(np.array([0.02, 0.03, 0.4]))
-    q, v = touching(scene, 8e-4, 5, turned, lambda turned: -(shell.vertices @ turned.T)[:, 2].min())
+    q, v = touching(scene, 8e-4, 5, pin.exp3(np.array([0.02, 0.03, 0.4])), reach_of(shell))
     assert_derivatives(scene, q, v)
     assert_rows(scene, q, v)
     if not ground:
@@ -118,12 +116,7 @@ def test_derivatives_are_those_of_finite_differences(name, law, friction, ground
 
 def thrown(shell: sp.Shell, inertia: pin.Inertia, law, friction, tilt: float = 0.0):
     """A free body over a plane that leans by `tilt` about y."""
-    model = empty()
-    add_body(model, "body", pin.JointModelFreeFlyer(), inertia=inertia)
-    scene = sp.Scene(model)
-    normal = (np.sin(tilt), 0.0, np.cos(tilt))
-    scene.add_contact(sp.Plane("universe", normal=normal), shell, "body", None, law, friction)
-    return scene
+    return scene_of(shell, law, friction, inertia=inertia, normal=(np.sin(tilt), 0.0, np.cos(tilt)))
 
 
 BOX = pin.Inertia.FromBox(0.2, 0.06, 0.05, 0.04)

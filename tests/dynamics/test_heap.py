@@ -10,25 +10,9 @@ from pathlib import Path
 import pytest
 
 from tests.programs import python
+from tests.texts import DATA
 
 ROOT = Path(__file__).parents[2]
-
-COUNTER = r"""
-#include <stddef.h>
-void *__libc_malloc(size_t); void *__libc_calloc(size_t, size_t);
-void *__libc_realloc(void *, size_t); void *__libc_memalign(size_t, size_t);
-static long calls;
-static void count(void) { __atomic_add_fetch(&calls, 1, __ATOMIC_RELAXED); }
-long heap_calls(void) { return __atomic_load_n(&calls, __ATOMIC_RELAXED); }
-void *malloc(size_t n) { count(); return __libc_malloc(n); }
-void *calloc(size_t k, size_t n) { count(); return __libc_calloc(k, n); }
-void *realloc(void *p, size_t n) { count(); return __libc_realloc(p, n); }
-void *memalign(size_t a, size_t n) { count(); return __libc_memalign(a, n); }
-void *aligned_alloc(size_t a, size_t n) { count(); return __libc_memalign(a, n); }
-int posix_memalign(void **p, size_t a, size_t n) {
-  count(); *p = __libc_memalign(a, n); return *p ? 0 : 12;
-}
-"""
 
 PROBE = """
 import ctypes, sys
@@ -66,9 +50,7 @@ def counter(tmp_path_factory: pytest.TempPathFactory) -> Path:
     compiler = shutil.which("cc")
     if compiler is None or not sys.platform.startswith("linux"):
         pytest.skip("counting heap calls needs Linux and a C compiler called cc")
-    folder = tmp_path_factory.mktemp("heap")
-    source, library = folder / "counter.c", folder / "counter.so"
-    source.write_text(COUNTER)
+    source, library = DATA / "heap_counter.c", tmp_path_factory.mktemp("heap") / "counter.so"
     build = [compiler, "-O2", "-shared", "-fPIC", "-fno-builtin", source, "-o", library]
     subprocess.run(build, check=True, capture_output=True)
     return library

@@ -15,15 +15,12 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario.format.build import build
 from tests import models
 from tests.dynamics.scenes import assert_rate_jacobian
+from tests.texts import text_of
 
 MASS, LENGTH, OWN = 1.0, 0.3, 0.01
 INERTIA = OWN + MASS * LENGTH**2
 STIFFNESS = 500.0
-URDF = """<robot name="link"><link name="base"/><link name="arm"><inertial><mass value="1"/>
-<origin xyz="0 0 -0.3"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
-</inertial></link><joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1.2" effort="5" velocity="3"/>
-<dynamics damping="0.7" friction="0.3"/></joint></robot>"""
+URDF = text_of("robots/link.urdf")
 
 
 def link(gravity: float = 0.0) -> pin.Model:
@@ -32,27 +29,38 @@ def link(gravity: float = 0.0) -> pin.Model:
     return model
 
 
-def slider() -> pin.Model:
-    """Mass that falls along z."""
-    return models.slider(mass=2.0)
+def swing(joints, integrator, q: float, v: float, *more, gravity: float = 0.0, **options):
+    """Run of the link from an angle and a speed."""
+    scene = sp.Scene(link(gravity), joints=sp.JointComponents(**joints))
+    return sp.Simulation(scene, integrator).run([q], [v], *more, **options)
 
 
-def joint_of(model: pin.Model) -> str:
-    return str(model.names[1])
+WEIGHT = 2.0 * 9.81
+
+
+def held(friction: sp.JointFriction, integrator, q: float, duration: float, **options) -> sp.Result:
+    """Run of a mass of 2 kg along z under dry friction."""
+    joints = sp.JointComponents(friction={"ball_joint": friction})
+    scene = sp.Scene(models.slider(mass=2.0), joints=joints)
+    return sp.Simulation(scene, integrator).run([q], None, duration, **options)
 
 
 def residual(result: sp.Result) -> float:
     return float(np.abs(result.energy.residual).max() / result.energy.exchanged)
 
 
-def stops(law: sp.ImpactLaw | sp.HuntCrossleyLaw, upper: float = 0.5) -> sp.JointComponents:
-    return sp.JointComponents(limits={"hinge": sp.JointLimits(-1.0, upper, law)})
+def stops(law: sp.ImpactLaw | sp.HuntCrossleyLaw, lower: float = -1.0) -> dict[str, object]:
+    return {"limits": {"hinge": sp.JointLimits(lower, 0.5, law)}}
 
 
-@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-9, 1e-11), sp.Implicit(1e-9, 1e-11)])
+every = pytest.mark.parametrize(
+    "integrator", [sp.Adaptive(1e-9, 1e-11), sp.Implicit(1e-9, 1e-11)], ids=lambda one: one.kind
+)
+
+
+@every
 def test_a_link_bounces_off_its_stop_as_the_closed_form(integrator):
-    scene = sp.Scene(link(), joints=stops(sp.ImpactLaw(STIFFNESS, 1.0)))
-    result = sp.Simulation(scene, integrator).run([0.0], [2.0], 1.0)
+    result = swing(stops(sp.ImpactLaw(STIFFNESS, 1.0)), integrator, 0.0, 2.0, 1.0)
     rate = math.sqrt(STIFFNESS / INERTIA)
     off = 0.25 + math.pi / rate
     touch, lift_off = result.events
@@ -68,29 +76,22 @@ def test_a_link_bounces_off_its_stop_as_the_closed_form(integrator):
 
 
 def test_the_lower_stop_is_the_mirror_image() -> None:
-    law = sp.HuntCrossleyLaw(STIFFNESS, 1.5, 0.3)
-    joints = sp.JointComponents(limits={"hinge": sp.JointLimits(-0.5, 0.5, law)})
-    up, down = (
-        sp.Simulation(sp.Scene(link(), joints=joints), sp.RungeKutta4(1e-3)).run([0.0], [v], 0.5)
-        for v in (2.0, -2.0)
-    )
+    joints = stops(sp.HuntCrossleyLaw(STIFFNESS, 1.5, 0.3), -0.5)
+    up, down = (swing(joints, sp.RungeKutta4(1e-3), 0.0, v, 0.5) for v in (2.0, -2.0))
     np.testing.assert_array_equal(up.q, -down.q)
 
 
-def test_a_damped_stop_throws_back_at_its_restitution() -> None:
+@every
+def test_a_damped_stop_throws_back_at_its_restitution(integrator) -> None:
     law = sp.HuntCrossleyLaw.with_restitution(STIFFNESS, 1.0, 0.6, 2.0)
-    for integrator in (sp.Adaptive(1e-9, 1e-11), sp.Implicit(1e-8, 1e-10)):
-        result = sp.Simulation(sp.Scene(link(), joints=stops(law)), integrator).run(
-            [0.0], [2.0], 0.6
-        )
-        assert result.v[-1, 0] == pytest.approx(-1.2, abs=1e-6)
-        assert residual(result) < 1e-7
+    result = swing(stops(law), integrator, 0.0, 2.0, 0.6)
+    assert result.v[-1, 0] == pytest.approx(-1.2, abs=1e-6)
+    assert residual(result) < 1e-7
 
 
 def test_damping_and_armature_decay_as_the_closed_form() -> None:
-    joints = sp.JointComponents(damping={"hinge": 0.3}, armature={"hinge": 0.05})
-    scene = sp.Scene(link(), joints=joints)
-    result = sp.Simulation(scene, sp.Adaptive(1e-11, 1e-13)).run([0.0], [1.0], 2.0)
+    joints = {"damping": {"hinge": 0.3}, "armature": {"hinge": 0.05}}
+    result = swing(joints, sp.Adaptive(1e-11, 1e-13), 0.0, 1.0, 2.0)
     expected = np.exp(-0.3 / (INERTIA + 0.05) * result.t)
     np.testing.assert_allclose(result.v[:, 0], expected, rtol=1e-8)
     lost = 0.5 * (INERTIA + 0.05) * (1.0 - expected[-1] ** 2)
@@ -101,11 +102,7 @@ def test_damping_and_armature_decay_as_the_closed_form() -> None:
     "integrator", [sp.Adaptive(1e-6, 1e-8), sp.Implicit(1e-6, 1e-8), sp.SemiImplicitEuler(1e-3)]
 )
 def test_dry_friction_holds_99_percent_for_a_minute_without_creep(integrator):
-    model = slider()
-    weight = 2.0 * 9.81
-    friction = sp.JointFriction(weight / 0.99)
-    scene = sp.Scene(model, joints=sp.JointComponents(friction={joint_of(model): friction}))
-    result = sp.Simulation(scene, integrator).run([1.0], None, 60.0, record_dt=1.0)
+    result = held(sp.JointFriction(WEIGHT / 0.99), integrator, 1.0, 60.0, record_dt=1.0)
     # The load comes on at once, and the spring gives way by a part of a millimeter.
     assert result.q[1, 0] == pytest.approx(1.0, abs=2e-3)
     assert np.ptp(result.q[1:, 0]) < 1e-10
@@ -113,12 +110,11 @@ def test_dry_friction_holds_99_percent_for_a_minute_without_creep(integrator):
 
 def test_a_joint_that_is_held_stores_the_work_of_its_load() -> None:
     """Of the work F x the spring x = F / k holds a half; its damping took the other."""
-    model, weight, stiffness = slider(), 2.0 * 9.81, 1e3
-    friction = sp.JointFriction(2 * weight, stiffness, 20.0)
-    scene = sp.Scene(model, joints=sp.JointComponents(friction={joint_of(model): friction}))
-    result = sp.Simulation(scene, sp.Adaptive(1e-9, 1e-11)).run([0.0], None, 3.0)
-    assert result.q[-1, 0] == pytest.approx(-weight / stiffness, rel=1e-6)
-    assert result.energy.friction_loss[-1] == pytest.approx(0.5 * weight**2 / stiffness, rel=1e-5)
+    stiffness = 1e3
+    friction = sp.JointFriction(2 * WEIGHT, stiffness, 20.0)
+    result = held(friction, sp.Adaptive(1e-9, 1e-11), 0.0, 3.0)
+    assert result.q[-1, 0] == pytest.approx(-WEIGHT / stiffness, rel=1e-6)
+    assert result.energy.friction_loss[-1] == pytest.approx(0.5 * WEIGHT**2 / stiffness, rel=1e-5)
     assert residual(result) < 1e-6
 
 
@@ -136,12 +132,9 @@ def test_the_order_of_joints_changes_no_step() -> None:
     assert runs[0].q[-1, 0] == pytest.approx(runs[1].q[-1, 1], rel=1e-9)
 
 
-@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)])
-def test_dry_friction_slides_at_101_percent(integrator: sp.Adaptive | sp.Implicit) -> None:
-    model = slider()
-    weight = 2.0 * 9.81
-    joints = sp.JointComponents(friction={joint_of(model): sp.JointFriction(weight / 1.01)})
-    result = sp.Simulation(sp.Scene(model, joints=joints), integrator).run([1.0], None, 1.0)
+@every
+def test_dry_friction_slides_at_101_percent(integrator) -> None:
+    result = held(sp.JointFriction(WEIGHT / 1.01), integrator, 1.0, 1.0)
     # All of the limit acts once the spring has given way.
     acceleration = np.diff(result.v[-2:, 0]) / np.diff(result.t[-2:])
     assert acceleration[0] == pytest.approx(-9.81 * (1 - 1 / 1.01), rel=1e-6)
@@ -149,10 +142,8 @@ def test_dry_friction_slides_at_101_percent(integrator: sp.Adaptive | sp.Implici
 
 
 def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
-    joints = sp.JointComponents(friction={"hinge": sp.JointFriction(0.3)})
-    result = sp.Simulation(sp.Scene(link(9.81), joints=joints), sp.Adaptive(1e-8, 1e-10)).run(
-        [0.8], None, 6.0
-    )
+    joints = {"friction": {"hinge": sp.JointFriction(0.3)}}
+    result = swing(joints, sp.Adaptive(1e-8, 1e-10), 0.8, 0.0, 6.0, gravity=9.81)
     # Three half swings of a pendulum lose four fifths of its height.
     assert abs(result.v[-1, 0]) < 1e-4
     assert residual(result) < 1e-6
@@ -160,7 +151,7 @@ def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
     assert result.energy.friction_loss[-1] == pytest.approx(stored, rel=1e-3)
 
 
-@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)])
+@every
 def test_compensated_friction_leaves_the_motion_as_it_is_without(integrator) -> None:
     """The motor does the work that friction takes; beyond its effort limit friction is back."""
     hold = sp.JointPD(kp=20.0, kd=1.0, q_ref=[0.5])
@@ -183,17 +174,11 @@ def test_compensated_friction_leaves_the_motion_as_it_is_without(integrator) -> 
 
 
 def test_torques_are_cut_at_the_effort_limit_and_the_result_says_when() -> None:
-    joints = sp.JointComponents(effort={"hinge": 5.0}, speed={"hinge": 3.0})
-    scene = sp.Scene(link(), joints=joints)
-    asked: list[float] = []
-
-    def push(t: float, *_: object) -> list[float]:
-        asked.append(20.0 * (1 - t))
-        return asked[-1:]
-
-    result = sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(
-        [0.0], [0.0], 0.9, push, control_dt=0.01
+    joints, push = (
+        {"effort": {"hinge": 5.0}, "speed": {"hinge": 3.0}},
+        lambda t, *_: [20.0 * (1 - t)],
     )
+    result = swing(joints, sp.RungeKutta4(1e-3), 0.0, 0.0, 0.9, push, control_dt=0.01)
     # 5 N m until t = 0.75, then what is asked for, held over 0.01 s.
     speed = 5.0 * 0.75 / INERTIA
     assert result.v[750, 0] == pytest.approx(speed, rel=1e-9)
@@ -231,11 +216,10 @@ def test_events_of_limits_name_the_joint_that_met_them() -> None:
 
 
 def test_efforts_may_differ_by_direction() -> None:
-    scene = sp.Scene(link(), joints=sp.JointComponents(effort={"hinge": (-2.0, 5.0)}))
+    joints = {"effort": {"hinge": (-2.0, 5.0)}}
     for asked, got in ((10.0, 5.0), (-10.0, -2.0), (1.0, 1.0)):
-        result = sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(
-            [0.0], [0.0], 0.1, lambda *_, asked=asked: [asked], control_dt=0.1
-        )
+        push = lambda *_, asked=asked: [asked]  # noqa: E731
+        result = swing(joints, sp.RungeKutta4(1e-3), 0.0, 0.0, 0.1, push, control_dt=0.1)
         assert result.v[-1, 0] == pytest.approx(0.1 * got / INERTIA, rel=1e-9)
 
 
@@ -284,13 +268,9 @@ def test_springs_of_joints_and_bristles_of_contacts_live_side_by_side() -> None:
     dry = sp.JointComponents(
         friction={"one_joint": sp.JointFriction(0.4), "two_joint": sp.JointFriction(0.2)}
     )
+    law, friction = sp.HuntCrossleyLaw(1e6, 1.5, 0.2), sp.BristleFriction(0.5, 0.4, 1e4, 1.0, 1e-2)
     scene = sp.Scene(models.arm(), joints=dry)
-    scene.add_contact(
-        sp.Sphere(0.05, frame="ball"),
-        models.plate(),
-        law=sp.HuntCrossleyLaw(1e6, 1.5, 0.2),
-        friction=sp.BristleFriction(0.5, 0.4, 1e4, 1.0, 1e-2),
-    )
+    scene.add_contact(sp.Sphere(0.05, "ball"), models.plate(), law=law, friction=friction)
     for integrator in (sp.Adaptive(1e-7, 1e-9), sp.Implicit(1e-7, 1e-9)):
         result = sp.Simulation(scene, integrator).run(models.ARM_Q, [1.0, 0.0, 0.0], 1.0)
         assert next(iter(result.stats.pairs.values())).touches > 1
@@ -342,14 +322,12 @@ def test_an_open_run_takes_over_new_numbers_of_joints() -> None:
 
 
 def test_results_with_joints_are_saved_and_loaded(tmp_path: Path) -> None:
-    scene = sp.Scene(link(), joints=stops(sp.ImpactLaw(STIFFNESS, 1.0)))
-    result = sp.Simulation(scene, sp.Adaptive(1e-6)).run([0.0], [2.0], 0.5)
+    result = swing(stops(sp.ImpactLaw(STIFFNESS, 1.0)), sp.Adaptive(1e-6), 0.0, 2.0, 0.5)
     loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
     assert loaded.stats.joints == result.stats.joints
     assert loaded.events == result.events
-    again = sp.Simulation(pickle.loads(pickle.dumps(scene)), sp.Adaptive(1e-6)).run(
-        [0.0], [2.0], 0.5
-    )
+    scene = pickle.loads(pickle.dumps(result.scene))
+    again = sp.Simulation(scene, sp.Adaptive(1e-6)).run([0.0], [2.0], 0.5)
     np.testing.assert_array_equal(again.q, result.q)
 
 
@@ -370,10 +348,9 @@ def test_wrong_components_are_refused(joints, error, words):
 
 
 def test_ranges_belong_to_angles_and_lengths() -> None:
-    model = models.ball()
     limits = sp.JointLimits(-1.0, 1.0, sp.ImpactLaw(1.0, 1.0))
     with pytest.raises(InvalidParameter, match="is a joint without a range"):
-        sp.Scene(model, joints=sp.JointComponents(limits={joint_of(model): limits}))
+        sp.Scene(models.ball(), joints=sp.JointComponents(limits={"ball_joint": limits}))
     with pytest.raises(InvalidParameter, match="lower below upper"):
         sp.JointLimits(1.0, 1.0, sp.ImpactLaw(1.0, 1.0))
 

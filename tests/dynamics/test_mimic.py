@@ -9,42 +9,13 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import mimics, shortened
 from sphshell_pin.errors import SphshellError
 from tests import meshes
-
-# Two fingers of two links each, as those of Robotiq's 2F-85: the knuckles of both sides follow one
-# joint, and the fingertips turn back so that the pads stay parallel.
-FINGER = """
-<link name="{side}_knuckle"><inertial><mass value="0.03"/><origin xyz="0.02 0 0.02"/>
-<inertia ixx="1e-5" iyy="1.2e-5" izz="0.8e-5" ixy="0" ixz="1e-6" iyz="0"/></inertial></link>
-<link name="{side}_pad"><inertial><mass value="0.02"/><origin xyz="0 0 0.02"/>
-<inertia ixx="6e-6" iyy="7e-6" izz="2e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="{side}_knuckle_joint" type="revolute"><parent link="{parent}"/>
-<child link="{side}_knuckle"/><origin xyz="0 {y} 0"/><axis xyz="{sign} 0 0"/>
-<limit lower="-1" upper="1" effort="5" velocity="2"/>{mimic}</joint>
-<joint name="{side}_pad_joint" type="revolute"><parent link="{side}_knuckle"/>
-<child link="{side}_pad"/><origin xyz="0 {out} 0.05"/><axis xyz="{sign} 0 0"/>
-<limit lower="-1" upper="1" effort="5" velocity="2"/>
-<mimic joint="left_knuckle_joint" multiplier="-1" offset="{offset}"/></joint>
-"""
-GRIPPER = f"""<robot name="gripper"><link name="world"/>
-<link name="palm"><inertial><mass value="0.8"/><inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0"
-ixz="0" iyz="0"/></inertial></link><joint name="lift" type="prismatic"><parent link="world"/>
-<child link="palm"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="50" velocity="1"/>
-</joint>{FINGER.format(side="left", parent="palm", y=0.02, out=0.03, sign=1, mimic="", offset=0)}{
-    FINGER.format(
-        side="right",
-        parent="palm",
-        y=-0.02,
-        out=-0.03,
-        sign=-1,
-        offset=0.1,
-        mimic='<mimic joint="left_knuckle_joint" multiplier="0.9"/>',
-    )
-}</robot>"""
+from tests.texts import text_of
 
 
 def gripper() -> tuple[pin.Model, pin.Model]:
     """Return the gripper with exact mimic joints, and with free ones."""
-    return tuple(pin.buildModelFromXML(GRIPPER, mimic=mimic) for mimic in (True, False))  # type: ignore[return-value]
+    text = text_of("robots/two_fingers.urdf")
+    return tuple(pin.buildModelFromXML(text, mimic=mimic) for mimic in (True, False))  # type: ignore[return-value]
 
 
 def panda() -> tuple[pin.Model, pin.Model]:

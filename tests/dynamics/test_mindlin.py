@@ -77,10 +77,7 @@ def held_ball(joint: pin.JointModel, depth: float, friction, inertia: pin.Inerti
     model = models.empty(0.0)
     place = pin.SE3(np.eye(3), np.array([0.0, 0.0, R - depth]))
     models.add_body(model, "ball", joint, placement=place, inertia=inertia)
-    scene = sp.Scene(model)
-    quad = sp.Shell([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
-    scene.add_contact(sp.Sphere(R, "ball"), quad, law=LAW, friction=friction)
-    return scene
+    return models.on_shell(model, models.square(), LAW, friction, radius=R)
 
 
 @pytest.mark.parametrize("integrator", [sp.Adaptive(1e-10), sp.Implicit(1e-8)], ids=str)
@@ -211,12 +208,9 @@ def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -
 )  # fmt: skip
 def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyped-def]
     angle = math.radians(10)
-    model = models.empty()
-    model.gravity.linear = 9.81 * np.array([math.sin(angle), 0.0, -math.cos(angle)])
-    models.add_body(model, "ball", pin.JointModelTranslation())
     law = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT, restitution=0.1, speed=0.1)
     friction = sp.MindlinFriction(0.5, 0.4, *SOFT, damping_time=0.01)
-    scene = models.on_plate(model, law, friction)
+    scene = models.on_plate(models.block(tilt=angle), law, friction)
     start = [0.0, 0.0, 0.05 - law.depth_at(9.81 * math.cos(angle))]
     run = sp.Simulation(scene, integrator).run(start, duration=4.0, record_dt=1.0)
     assert np.abs(run.v[-1]).max() < 1e-8
@@ -277,17 +271,21 @@ class TestRolling:
         assert run.q[-1, 0] - run.q[-2, 0] == pytest.approx(0.1 * share * 0.01, rel=1e-3)
 
 
-@pytest.mark.parametrize("rings", [1, 3])
-def test_friction_is_continuous_over_a_groove(rings: int) -> None:
+OVER_GROOVES = [
+    (sp.MindlinFriction(0.4, 0.3, 1e6, 0.4, torsional=True, damping_time=1e-4, rings=1), 5),
+    (sp.MindlinFriction(0.4, 0.3, 1e6, 0.4, torsional=True, damping_time=1e-4, rings=3), 5),
+    *((sp.BristleFriction(0.4, 0.3, 1e4, 50.0), degrees) for degrees in (1, 5, 12)),
+]
+
+
+@pytest.mark.parametrize(("friction", "degrees"), OVER_GROOVES)
+def test_friction_is_continuous_over_a_groove(friction, degrees: float) -> None:  # type: ignore[no-untyped-def]
     """Where contacts split and merge; and friction gives nothing back."""
-    shell = sp.Shell(*meshes.v_groove(math.radians(5), size=2.0, cells=6))
-    scene = sp.Scene(models.ball(radius=0.1))
+    angle = math.radians(degrees)
+    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
     law = sp.HuntCrossleyLaw(3e5, 1.5, 0.5)
-    friction = sp.MindlinFriction(
-        0.4, 0.3, 1e6, 0.4, torsional=True, damping_time=1e-4, rings=rings
-    )
-    scene.add_contact(sp.Sphere(0.1, "ball"), shell, law=law, friction=friction)
-    height = 0.1 / math.cos(math.radians(5)) + 0.02 * math.tan(math.radians(5)) - 5e-4
+    scene = models.on_shell(models.ball(radius=0.1), shell, law, friction, radius=0.1)
+    height = 0.1 / math.cos(angle) + 0.02 * math.tan(angle) - 5e-4
     jumps = []
     for record_dt in (2e-4, 2.5e-5):
         run = sp.Simulation(scene, sp.Adaptive(1e-8)).run(

@@ -10,17 +10,8 @@ from scipy.integrate import solve_ivp
 import sphshell_pin as sp
 from sphshell_pin import _core
 from tests import meshes, models
+from tests.dynamics.test_mindlin import LAW, RUBBER, STEEL, STICKS, UP, R, disc
 from tests.studies import mostly_studies
-
-R = 0.02
-RUBBER, STEEL = (4e6, 0.48), (2.1e11, 0.3)
-UP = np.array([0.0, 0.0, 1.0])
-LAW = sp.ImpactLaw.hertz(R, *RUBBER, *STEEL)
-STICKS = sp.MindlinFriction(1e3, 1e3, *RUBBER, *STEEL, torsional=True)
-
-
-def disc(depth: float) -> float:
-    return math.sqrt(R * depth)
 
 
 class Path:
@@ -131,8 +122,7 @@ def test_energy_of_random_rolls(seed: int, make) -> None:  # type: ignore[no-unt
     vertices, triangles = meshes.dome(cells=10, size=1.0, radius=1.0)
     height = 0.02 * np.sin(9 * vertices[:, 0]) * np.cos(7 * vertices[:, 1])
     shell = sp.Shell(vertices * [1, 1, -1] + height[:, None] * [0, 0, 1], triangles)
-    scene = sp.Scene(models.ball(radius=radius))
-    scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law, friction=friction)
+    scene = models.on_shell(models.ball(radius=radius), shell, law, friction, radius=radius)
     q = models.free_q([*rng.uniform(-0.1, 0.1, 2), 0.0])
     q[2] = 0.1 + max(0.0, -float(shell.closest_points(q[None, :3]).distances[0]))
     v = np.concatenate([rng.uniform(-0.5, 0.5, 3), rng.uniform(-10, 10, 3)])

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from tests import meshes, models
+from tests import models
 
 R = 0.01
 INTEGRATORS = [
@@ -19,22 +19,9 @@ every = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda i: type(i)
 pytestmark = pytest.mark.filterwarnings("ignore::sphshell_pin.errors.WeakLawWarning")
 
 
-def sheet(size: float = 1.0) -> sp.Shell:
-    return sp.Shell(*meshes.grid_plate(size=size, quads=True))
-
-
-def point_mass(mass: float = 1.0, gravity: float = 0.0) -> pin.Model:
-    """Ball without rotation: q is its centre."""
-    model = models.empty(gravity)
-    inertia = pin.Inertia.FromSphere(mass, R)
-    models.add_body(model, "ball", pin.JointModelTranslation(), inertia=inertia)
-    return model
-
-
-def scene_of(model: pin.Model, shell: sp.Shell, law: sp.ImpactLaw, **more) -> sp.Scene:
-    scene = sp.Scene(model)
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, **more)
-    return scene
+def scene_of(model: pin.Model, size: float, law: sp.ImpactLaw, **more) -> sp.Scene:
+    """A sphere at the frame "ball" and a sheet of this size."""
+    return models.on_shell(model, models.square(size), law, radius=R, **more)
 
 
 def run(scene: sp.Scene, integrator, q, v, duration: float, **more) -> sp.Result:
@@ -46,9 +33,9 @@ def stopping(speed: float, mass: float = 1.0, share: float = 0.3) -> sp.ImpactLa
     return models.linear_law(mass * (speed / (share * R)) ** 2)
 
 
-def fingertip(gravity: float = 0.0) -> pin.Model:
+def fingertip() -> pin.Model:
     """Arm of 0.5 m about y, the frame "ball" at its tip: nothing but turns."""
-    model = models.empty(gravity)
+    model = models.empty(0.0)
     lump = pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), 1e-4 * np.eye(3))
     reach = pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0]))
     models.add_body(model, "ball", pin.JointModelRY(), inertia=lump, frame=reach)
@@ -60,7 +47,7 @@ def fingertip(gravity: float = 0.0) -> pin.Model:
 def test_a_sweeping_arm_meets_a_thin_plate(integrator, rate: float) -> None:
     """100 rad/s and 1e-2 s: an arm that turns 1 rad a step comes back from the plate."""
     law = stopping(0.5 * rate, mass=1.0004)
-    scene = scene_of(fingertip(), sheet(0.2), law, placement=at(0.5))
+    scene = scene_of(fingertip(), 0.2, law, placement=at(0.5))
     start = -0.8  # the tip is above the plate, and the angle grows downward
     rows = run(scene, integrator, [start], [rate], 1.6 / rate)
     assert "touch" in [e.kind for e in rows.events]
@@ -75,10 +62,10 @@ def at(x: float) -> pin.SE3:
 
 def paddle(axis: pin.JointModel, placement: pin.SE3) -> sp.Scene:
     """A resting ball, and a sheet on a heavy hub."""
-    model = point_mass()
+    model = models.block(0.0, radius=R)
     hub = pin.Inertia(1e3, np.zeros(3), 1e3 * np.eye(3))
     models.add_body(model, "hub", axis, inertia=hub)
-    return scene_of(model, sheet(0.4), stopping(50.0), frame="hub", placement=placement)
+    return scene_of(model, 0.4, stopping(50.0), frame="hub", placement=placement)
 
 
 @every
@@ -105,7 +92,7 @@ def test_a_sheet_that_spins_in_its_plane_lets_a_sphere_rest(integrator) -> None:
 def test_whole_turns_within_a_step_are_seen(times: int) -> None:
     """An arm that comes back to where it was after a step has swept everything on its way."""
     rate, dt = times * 2 * np.pi / 1e-2, 1e-2
-    scene = scene_of(fingertip(), sheet(0.2), stopping(0.5 * rate, 1.0004), placement=at(0.5))
+    scene = scene_of(fingertip(), 0.2, stopping(0.5 * rate, 1.0004), placement=at(0.5))
     rows = run(scene, sp.SemiImplicitEuler(dt), [-0.8], [rate], 3 * dt)
     assert "touch" in [e.kind for e in rows.events]
 
@@ -113,7 +100,7 @@ def test_whole_turns_within_a_step_are_seen(times: int) -> None:
 @every
 def test_a_graze_of_an_edge_within_a_step(integrator) -> None:
     """A tenth of the radius deep, in and out again within a step."""
-    scene = scene_of(point_mass(), sheet(), models.linear_law(1e6))
+    scene = scene_of(models.block(0.0), 1.0, models.linear_law(1e6))
     speed = 40.0
     start, v = [0.5 + 0.9 * R, 0.0, 0.3], [0.0, 0.0, -speed]
     rows = run(scene, integrator, start, v, 0.6 / speed)
@@ -133,14 +120,14 @@ def test_what_turns_a_sphere_round_within_a_step_is_a_touch(share: float) -> Non
     dt = 1e-2
     speed = 0.5 * R / dt
     law = models.linear_law(2 * speed / dt / ((0.5 - share) * 0.5 * R))
-    scene = scene_of(point_mass(), sheet(), law)
+    scene = scene_of(models.block(0.0), 1.0, law)
     rows = run(scene, sp.RungeKutta4(dt), [0.01, 0.02, (1 + 0.5 * share) * R], [0, 0, -speed], dt)
     figures = rows.stats.pairs[rows.pairs[0]]
     assert [event.kind for event in rows.events][:1] == ["touch"]
     assert figures.impulse == pytest.approx(rows.v[-1, 2] + speed, rel=1e-2)
 
 
-def led(path, integrator, law=None, shell=None) -> sp.Result:
+def led(path) -> sp.Result:
     """Lead a heavy ball along the corners of `path` [m] in a second."""
     path = np.array(path, dtype=float)
     pieces = len(path) - 1
@@ -150,26 +137,17 @@ def led(path, integrator, law=None, shell=None) -> sp.Result:
         goal = path[i] + (t * pieces - i) * (path[i + 1] - path[i])
         return 1e4 * (1e5 * (goal - q) + 600.0 * (pieces * (path[i + 1] - path[i]) - v))
 
-    scene = scene_of(point_mass(1e4), shell or sheet(), law or models.linear_law(100.0))
-    return run(
-        scene,
-        integrator,
-        path[0],
-        pieces * (path[1] - path[0]),
-        1.0,
-        controller=controller,
-        control_dt=2e-4,
-    )
-
-
-FINE = sp.SemiImplicitEuler(2e-4)
+    scene = scene_of(models.block(0.0, 1e4), 1.0, models.linear_law(100.0))
+    more = {"controller": controller, "control_dt": 2e-4}
+    speed = pieces * (path[1] - path[0])
+    return run(scene, sp.SemiImplicitEuler(2e-4), path[0], speed, 1.0, **more)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_pushed_past_and_back(side: float) -> None:
     """k depth all the way, depth measured from the side it came from; ends where it began."""
     up = side * np.array([0, 0, R])
-    rows = led([1.2 * up, -0.4 * up, 1.2 * up], FINE)
+    rows = led([1.2 * up, -0.4 * up, 1.2 * up])
     kinds = [e.kind for e in rows.events]
     assert kinds == ["touch", "deep", "through", "lift_off"]
     log = rows.contacts
@@ -182,7 +160,7 @@ def test_pushed_past_and_back(side: float) -> None:
 def test_after_it_lifted_off_the_memory_is_gone() -> None:
     """Through with a law too weak, away, and back from the far side: met as anybody."""
     up = np.array([0, 0, R])
-    rows = led([1.2 * up, -1.5 * up, -0.5 * up, -1.5 * up], FINE)
+    rows = led([1.2 * up, -1.5 * up, -0.5 * up, -1.5 * up])
     late = rows.contacts.t > 0.5
     assert late.any()
     assert np.array_equal(rows.contacts.normal_world[late, 2], -np.ones(late.sum()))
@@ -193,8 +171,7 @@ def test_after_it_lifted_off_the_memory_is_gone() -> None:
 @pytest.mark.parametrize("beside", [0.01, 0.05, 0.3])
 def test_round_the_rim_without_being_turned(integrator, beside: float) -> None:
     """A centre that passes the rim outside the sheet never was on its other side."""
-    law = models.linear_law(100.0)
-    scene = scene_of(point_mass(1e3), sheet(), law)
+    scene = scene_of(models.block(0.0, 1e3), 1.0, models.linear_law(100.0))
     start = [0.5 + beside * R, 0.03, 1.26 * R]
     rows = run(scene, integrator, start, [0.0, 0.0, -0.2], 2.6 * R / 0.2)
     assert [e.kind for e in rows.events] == ["touch", "deep", "lift_off"]
@@ -211,7 +188,7 @@ def test_round_the_rim_after_having_been_pushed_past() -> None:
     x = 0.5
     path = [[x - R, 1.2], [x - R, -0.4], [x + 0.6 * R, -0.4], [x + 0.6 * R, 0.4], [x - R, 0.4]]
     path = [[at_x, 0.0, z * R] for at_x, z in path] + [[x - R, 0.0, 1.4 * R]]
-    log = led(path, FINE).contacts
+    log = led(path).contacts
     back = log.t > 0.81
     assert back.any()
     assert np.array_equal(log.normal_world[back, 2], np.ones(back.sum()))
@@ -222,6 +199,6 @@ def test_sliding_fast_after_a_hit_goes_back_to_fixed_steps() -> None:
     """A step of a quarter of the radius is made as it is: 0.2 mm a step here."""
     friction = sp.BristleFriction(0.05, 0.05, 1e4, 50.0)
     law = models.linear_law(1e4, 100.0)
-    scene = scene_of(point_mass(gravity=9.81), sheet(20.0), law, friction=friction)
+    scene = scene_of(models.block(), 20.0, law, friction=friction)
     down = run(scene, sp.SemiImplicitEuler(1e-3), [0.0, 0.0, 3 * R], [0.2, 0.0, -2.0], 1.0)
     assert down.stats.evaluations < 3000

@@ -6,7 +6,7 @@ import pytest
 
 import sphshell_pin as sp
 from tests.contact.test_planes import egg as egg_shell
-from tests.contact.test_planes import rotations, support
+from tests.contact.test_planes import rotations, scene_of, support
 from tests.meshes import cube
 from tests.models import add_body, empty, pose_of
 
@@ -28,6 +28,11 @@ def over_plane(shell: sp.Shell, law, friction=None, *, ground: bool = True) -> s
 
 def egg(law, friction=None, *, ground: bool = True) -> sp.Scene:
     return over_plane(egg_shell(10, EGG), law, friction, ground=ground)
+
+
+def reach_of(shell: sp.Shell):
+    """How far a shell that is turned goes down from its origin, by its vertices."""
+    return lambda turned: -(shell.vertices @ turned.T)[:, 2].min()
 
 
 def touching(scene: sp.Scene, depth: float = 2e-4, seed: int = 0, turned=None, reach=None):
@@ -68,13 +73,8 @@ def test_rolling_loses_no_energy() -> None:
 @pytest.mark.parametrize("face", [0.0, np.pi / 2])
 def test_a_box_stays_on_its_face(face: float) -> None:
     """Put down level it neither falls over nor jitters, whatever its direction."""
-    model = empty()
-    add_body(model, "box", pin.JointModelFreeFlyer())
-    scene = sp.Scene(model)
-    shell = sp.Shell(*cube(0.2))
-    friction = sp.BristleFriction(0.4, 0.3, 1e5, 50.0)
-    law = sp.ImpactLaw(1e6, 1.0, 500.0, 1e-4)
-    scene.add_contact(sp.Plane("universe"), shell, "box", law=law, friction=friction)
+    shell, law = sp.Shell(*cube(0.2)), sp.ImpactLaw(1e6, 1.0, 500.0, 1e-4)
+    scene = scene_of(shell, law, sp.BristleFriction(0.4, 0.3, 1e5, 50.0))
     turn = pin.utils.rotate("z", 0.3) @ pin.utils.rotate("x", face)
     low = float((np.asarray(shell.vertices) @ turn[2]).min())
     q = np.concatenate(([0.1, 0.2, -low], pin.Quaternion(turn).coeffs()))

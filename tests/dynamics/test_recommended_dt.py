@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.scene.explain import _round_down, relaxation_time, weakness
+from sphshell_pin.dynamics.scene.explain import relaxation_time, weakness
 from sphshell_pin.errors import SetupWarning
 from tests import models
 from tests.dynamics.scenes import in_touch, two_spheres
@@ -40,10 +40,7 @@ def falling(law: object, friction: object = None, gravity: float = 0.0) -> sp.Sc
 
 def block(law: object, friction: object) -> sp.Scene:
     """A mass that slides but does not turn, at rest on a plate."""
-    model = models.empty()
-    inertia = models.pin.Inertia.FromSphere(MASS, RADIUS)
-    models.add_body(model, "ball", models.pin.JointModelTranslation(), inertia=inertia)
-    return models.on_plate(model, law, friction)
+    return models.on_plate(models.block(mass=MASS), law, friction)
 
 
 def shortest(scene: sp.Scene, q: list[float], v: list[float]) -> float:
@@ -309,13 +306,6 @@ def test_what_is_heavier_than_a_mountain_does_not_move(mass: float, moves: bool)
     assert math.isfinite(pair.effective_mass) == moves
 
 
-def test_rounding_forgives_rounding() -> None:
-    for digit, below in ((1.0, 0.5), (2.0, 1.0), (5.0, 2.0)):
-        assert _round_down(digit * (1 - 0.75e-12)) == digit
-        assert _round_down(digit * (1 - 1.5e-12)) == below
-        assert _round_down(digit) == digit
-
-
 def source(points: list, depths: list, friction: sp.BristleFriction | None = None) -> sp.Scene:
     scene = sp.Scene(models.slider(0.0, MASS))
     normals = np.tile([0.0, 0.6, 0.8], (len(depths), 1))
@@ -345,9 +335,7 @@ def test_a_source_counts_where_it_is_deepest() -> None:
 
 def test_what_cannot_move_along_the_normal_has_no_time_scales() -> None:
     """A slide along the plate: only its friction rings."""
-    model = models.empty()
-    inertia = models.pin.Inertia.FromSphere(MASS, RADIUS)
-    models.add_body(model, "ball", models.pin.JointModelPX(), inertia=inertia)
+    model = models.ball(mass=MASS, joint=models.pin.JointModelPX())
     scene = models.on_plate(model, ELASTIC["linear"])
     explained = scene.explain()
     assert math.isnan(explained.pairs[0].effective_mass)

@@ -163,16 +163,3 @@ def test_many_contacts_of_a_source_cost_in_proportion() -> None:
     assert len(contacts) == 30_000
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(Q, None, 3e-4)
     assert np.array_equal(result.contacts.contact_id[-30_000:], np.arange(30_000))
-
-
-def test_the_core_refuses_arrays_of_other_lengths() -> None:
-    scene = on_plate(ball(), LAW)
-    shell = scene.pairs[0].side_j.shell._binding
-    with pytest.raises(InvalidParameter, match="radii"):
-        shell.contacts_batch(np.zeros((5, 3)), np.ones(2), 0, 1)
-    with pytest.raises(InvalidParameter, match=r"curve\(\)"):
-        sp.Shell(shell.vertices, shell.triangles)._binding.contacts(np.zeros(3), 0.1, 2)
-    with pytest.raises(InvalidParameter, match="q has shape"):
-        scene._binding.contacts(np.zeros(3), np.zeros(6))
-    with pytest.raises(InvalidParameter, match="v has shape"):
-        scene._binding.external_forces(Q, np.zeros(5))

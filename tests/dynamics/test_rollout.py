@@ -7,16 +7,16 @@ import re
 import signal
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
-import trimesh
 
 import sphshell_pin as sp
 from sphshell_pin import errors
-from tests import models
+from tests import meshes, models
 from tests.results import assert_same_bits
 
 G = 9.81
@@ -33,11 +33,8 @@ every = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda i: type(i)
 PAIR = "tip"
 
 
-def ball_on_plate(friction=models.FRICTION, law=models.LAW, side="both") -> sp.Scene:
-    scene = sp.Scene(models.ball())
-    shell = models.plate(side=side)
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, name=PAIR)
-    return scene
+def ball_on_plate(friction=models.FRICTION, law=models.LAW) -> sp.Scene:
+    return models.on_shell(models.ball(), models.plate(), law, friction, name=PAIR)
 
 
 def starts(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -47,9 +44,7 @@ def starts(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 
 def slider_scene(law) -> sp.Scene:
-    scene = sp.Scene(models.slider())
-    scene.add_contact(sp.Sphere(R, "ball"), models.plate(), law=law, name=PAIR)
-    return scene
+    return models.on_shell(models.slider(), models.plate(), law, name=PAIR)
 
 
 @every
@@ -79,37 +74,24 @@ def test_a_varied_run_is_that_of_the_scene_built_so() -> None:
     ]
     offsets, radii = 1e-3 * rng.normal(size=(count, 3)), rng.uniform(0.04, 0.049, count)
     stiffnesses, mus = rng.uniform(1e5, 1e6, count), rng.uniform(0.3, 0.9, count)
-    rollout = sp.Simulation(ball_on_plate(), sp.Adaptive(1e-8)).rollout(
-        q0s,
-        v0s,
-        0.05,
-        vary={
-            f"{PAIR}.law.stiffness": stiffnesses,
-            f"{PAIR}.friction.mu_static": mus,
-            f"{PAIR}.friction": [sp.CoulombFriction(1.0, 0.2, 1e-3, 1e-2)] * count,
-            f"{PAIR}.sphere.radius": radii,
-            f"{PAIR}.sphere.offset": offsets,
-            f"{PAIR}.placement": poses,
-        },
-        record_dt=5e-3,
-    )
+    vary = {
+        "law.stiffness": stiffnesses,
+        "friction.mu_static": mus,
+        "friction": [sp.CoulombFriction(1.0, 0.2, 1e-3, 1e-2)] * count,
+        "sphere.radius": radii,
+        "sphere.offset": offsets,
+        "placement": poses,
+    }
+    vary = {f"{PAIR}.{key}": values for key, values in vary.items()}
+    simulation = sp.Simulation(ball_on_plate(), sp.Adaptive(1e-8))
+    rollout = simulation.rollout(q0s, v0s, 0.05, vary=vary, record_dt=5e-3)
     for run in range(count):
-        scene = sp.Scene(models.ball())
-        law = sp.ImpactLaw(
-            stiffnesses[run], models.LAW.exponent, models.LAW.damping, models.LAW.full_damping_depth
-        )
-        scene.add_contact(
-            sp.Sphere(radii[run], "ball", offsets[run]),
-            models.plate(),
-            placement=poses[run],
-            law=law,
-            friction=sp.CoulombFriction(mus[run], 0.2, 1e-3, 1e-2),
-            name=PAIR,
-        )
-        alone = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
-            q0s[run], v0s[run], 0.05, record_dt=5e-3
-        )
-        assert_same_bits(rollout[run], alone)
+        law = replace(models.LAW, stiffness=stiffnesses[run])
+        friction = sp.CoulombFriction(mus[run], 0.2, 1e-3, 1e-2)
+        more = {"radius": radii[run], "offset": offsets[run], "placement": poses[run], "name": PAIR}
+        scene = models.on_shell(models.ball(), models.plate(), law, friction, **more)
+        one = sp.Simulation(scene, sp.Adaptive(1e-8)).run(q0s[run], v0s[run], 0.05, record_dt=5e-3)
+        assert_same_bits(rollout[run], one)
         assert rollout[run].scene.pairs[0].law == law
 
 
@@ -207,22 +189,9 @@ def test_contact_sources_over_threads(friction) -> None:
         assert_same_bits(rollout[run], alone)
 
 
-def test_frictions_of_all_kinds_side_by_side() -> None:
-    q0s, v0s = starts(3)
-    kinds = [None, models.FRICTION, BRISTLES]
-    rollout = sp.Simulation(ball_on_plate(), sp.Implicit()).rollout(
-        q0s, v0s, 0.05, threads=3, vary={f"{PAIR}.friction": kinds}, record_dt=1e-2
-    )
-    for run, friction in enumerate(kinds):
-        alone = sp.Simulation(ball_on_plate(friction), sp.Implicit())
-        assert_same_bits(rollout[run], alone.run(q0s[run], v0s[run], 0.05, record_dt=1e-2))
-
-
 def test_deep_starts_in_a_solid_are_seen_as_run_sees_them() -> None:
-    box = trimesh.creation.box(extents=(0.4, 0.4, 0.4))
-    scene = sp.Scene(models.ball())
-    shell = sp.Shell(box.vertices, box.faces, side="outside")
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=models.LAW, name=PAIR)
+    shell = sp.Shell(*meshes.cube(0.4), side="outside")
+    scene = models.on_shell(models.ball(), shell, models.LAW)
     q0s = [models.free_q([0, 0, z]) for z in (0.30, 0.24, 0.21, 0.0)]
     simulation = sp.Simulation(scene, sp.Adaptive())
     rollout = simulation.rollout(q0s, None, 1e-3)
@@ -296,14 +265,6 @@ def test_progress_grows_to_one() -> None:
     shares.clear()
     sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s[:0], None, progress=shares.append)
     assert shares == [1.0]
-
-
-@pytest.fixture
-def keyboard():
-    """Let SIGINT interrupt, as on a terminal; a shell's background jobs ignore it."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("keyboard")

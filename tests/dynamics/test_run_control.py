@@ -1,9 +1,9 @@
 """How runs start, stop, repeat and are kept: controllers, faults, files, locked joints."""
 
+import os
 import signal
-import subprocess
 import sys
-import time
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +19,6 @@ from tests.results import assert_same_bits
 
 RADIUS = 0.05
 START = models.free_q([0.1, -0.05, RADIUS + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20.0, 5.0])
-ROOT = Path(__file__).parents[2]
 
 
 def bouncing(integrator=None) -> sp.Simulation:
@@ -42,46 +41,23 @@ def test_a_diverging_run_keeps_what_it_computed() -> None:
     assert "dt" in str(caught.value)
 
 
-CTRL_C = """
-import signal
-import sys
-# Tests that run in the background pass on that Ctrl-C is to be ignored.
-signal.signal(signal.SIGINT, signal.default_int_handler)
-sys.path.insert(0, {root!r})
-from tests.dynamics.test_run_control import START, bouncing
-from sphshell_pin.errors import Interrupted
-simulation = bouncing()
-try:
-    print("started", flush=True)
-    simulation.run(*START, 1e5, record_dt=1e-2, **{options})
-except Interrupted as stop:
-    rows = stop.result
-    print("kept", len(rows.t), rows.t[-1] > 0, stop.t >= rows.t[-1], flush=True)
-"""
-
-
+@pytest.mark.usefixtures("keyboard")
 @pytest.mark.parametrize(
     "options",
-    ["{}", "{'controller': lambda t, q, v, c: 0 * v, 'control_dt': 1e-3}"],
+    [{}, {"controller": lambda t, q, v, c: 0 * v, "control_dt": 1e-3}],
     ids=["plain", "python controller"],
 )
-def test_ctrl_c(options: str) -> None:
-    program = CTRL_C.format(root=str(ROOT), options=options)
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as child:
-        assert child.stdout.readline().strip() == "started"
-        time.sleep(0.3)
-        child.send_signal(signal.SIGINT)
-        try:
-            said, faults = child.communicate(timeout=20)
-        finally:
-            child.kill()
-    assert child.returncode == 0, faults
-    kept, rows, *truths = said.split()
-    assert kept == "kept"
-    assert int(rows) > 1
-    assert truths == ["True", "True"]
+def test_ctrl_c(options) -> None:
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        with pytest.raises(errors.Interrupted) as caught:
+            bouncing().run(*START, 1e5, record_dt=1e-2, **options)
+    finally:
+        timer.cancel()
+    t = caught.value.result.t
+    assert len(t) > 1
+    assert caught.value.t >= t[-1] > 0
 
 
 def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
@@ -282,15 +258,8 @@ def test_lock_equals_the_model_reduced_by_hand() -> None:
         pin.buildReducedModel(model, [locked], q_lock), models.LAW, models.FRICTION
     )
     scene = sp.Scene(model, lock=["two_joint"], q_lock=q_lock)
-    scene.add_contact(
-        sphere=sp.Sphere(RADIUS, frame="ball"),
-        shell=models.plate(),
-        frame="universe",
-        law=models.LAW,
-        friction=models.FRICTION,
-        method="facets",
-        name="ball-plate",
-    )
+    more = {"friction": models.FRICTION, "method": "facets", "name": "ball-plate"}
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), models.plate(), law=models.LAW, **more)
     assert scene.model.nq == 2
     q0, v0 = np.array([0.3, 0.5]), np.array([1.0, 0.0])
     a, b = (sp.Simulation(s, sp.RungeKutta4(dt=1e-3)).run(q0, v0, 0.4) for s in (by_hand, scene))

@@ -18,22 +18,16 @@ SLOPE = 0.3  # [rad], below atan(0.5)
 
 def on_slope(friction: sp.BristleFriction = BRISTLE, free: bool = False) -> sp.Scene:
     """1 kg on an inclined plate; a block that cannot turn, or a ball that can."""
-    model = models.empty()
-    lump = pin.Inertia.FromSphere(1.0, R)
+    model = models.block()
     if free:
+        model = models.empty()
         light = pin.Inertia.FromSphere(1e-6, R)
         carrier = models.add_body(model, "carrier", pin.JointModelTranslation(), inertia=light)
-        models.add_body(model, "ball", pin.JointModelSpherical(), carrier, inertia=lump)
-    else:
-        models.add_body(model, "ball", pin.JointModelTranslation(), inertia=lump)
-    scene = sp.Scene(model)
+        models.add_body(model, "ball", pin.JointModelSpherical(), carrier)
     place = pin.SE3(pin.utils.rotate("y", SLOPE), np.zeros(3))
     plate = sp.Shell(*meshes.random_plate(60, seed=3, size=4.0))
     law = models.linear_law(K, 300.0)
-    scene.add_contact(
-        sp.Sphere(R, "ball"), plate, placement=place, law=law, friction=friction, name="tip"
-    )
-    return scene
+    return models.on_shell(model, plate, law, friction, placement=place, name="tip")
 
 
 def start(scene: sp.Scene, gap: float = -1e-5) -> tuple[np.ndarray, np.ndarray]:

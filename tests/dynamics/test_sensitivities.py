@@ -10,7 +10,6 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.named_numbers import with_value
 from sphshell_pin.errors import Interrupted, InvalidParameter, ResultError
 from tests import differences, meshes, models
 from tests.dynamics.scenes import FRICTIONS
@@ -117,9 +116,7 @@ def test_several_bounces(integrator: str) -> None:
 @every_integrator
 def test_sliding(integrator: str) -> None:
     """A block that is braked by friction, in touch throughout."""
-    model = models.empty()
-    models.add_body(model, "ball", pin.JointModelTranslation())
-    scene = models.on_plate(model, IMPACT, COULOMB)
+    scene = models.on_plate(models.block(), IMPACT, COULOMB)
     depth = IMPACT.depth_at(9.81)
     case = Case(scene, [0.0, 0.0, R - depth], [0.4, 0.1, 0.0], 0.04, INTEGRATORS[integrator])
     case.check([f"{PAIR}.friction.mu_static", f"{PAIR}.friction.mu_dynamic", "v0"], depth=depth)
@@ -130,10 +127,8 @@ def test_two_spheres_that_collide() -> None:
     model = models.empty(0.0)
     for name in ("one", "two"):
         models.add_body(model, name, pin.JointModelFreeFlyer())
-    scene = sp.Scene(model)
-    scene.add_contact(
-        sp.Sphere(0.05, "one"), sp.Sphere(0.08, "two"), law=HUNT, friction=COULOMB, name="balls"
-    )
+    scene, balls = sp.Scene(model), (sp.Sphere(0.05, "one"), sp.Sphere(0.08, "two"))
+    scene.add_contact(*balls, law=HUNT, friction=COULOMB, name="balls")
     q0 = np.r_[models.free_q([0.0, 0.0, 0.14]), models.free_q([0.03, 0.0, 0.0])]
     v0 = np.r_[0.1, 0.2, -0.6, 1, 2, 3.0, np.zeros(6)]
     case = Case(scene, q0, v0, 0.04)
@@ -163,24 +158,13 @@ def sampled(t: float, q: Array, v: Array, contacts: object) -> Array:
     ),
 )
 def test_a_controller_of_the_package(control_dt: float | None, integrator: str) -> None:
-    scene = sp.Scene(models.arm())
-    plate = models.plate()
-    scene.add_contact(sp.Sphere(R, "ball"), plate, law=HUNT, friction=COULOMB, name="tip")
-    q0 = models.ARM_Q.copy()
-    height = models.pose_of(scene.model, q0, "ball").translation[2]
-    place = pin.SE3(np.eye(3), np.array([0, 0, height - R - 1e-3]))
-    pair = with_value(scene.pairs[0], ("side_j", "placement"), place)
-    scene = scene.with_pairs((pair,))
+    model, q0 = models.arm(), models.ARM_Q
+    height = models.pose_of(model, q0, "ball").translation[2]
+    more = {"placement": pin.SE3(np.eye(3), np.array([0, 0, height - R - 1e-3])), "name": "tip"}
+    scene = models.on_shell(model, models.plate(), HUNT, COULOMB, **more)
     control = sp.JointPD(80.0, 4.0, q_ref=q0 + [0.0, 0.1, 0.05])
-    case = Case(
-        scene,
-        q0,
-        np.zeros(3),
-        0.06,
-        INTEGRATORS[integrator],
-        controller=control,
-        control_dt=control_dt,
-    )
+    more = {"controller": control, "control_dt": control_dt}
+    case = Case(scene, q0, np.zeros(3), 0.06, INTEGRATORS[integrator], **more)
     names = ["tip.law.stiffness", "tip.friction.mu_static", "tip.placement", "q0"]
     result = case.check(names, error=100.0)
     assert len(result.contacts.t) >= 3
@@ -196,8 +180,7 @@ def test_a_controller_of_the_users_own(integrator: str) -> None:
 @pytest.mark.parametrize("integrator", ["adaptive", "implicit"])
 def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     """The acceleration jumps there; so do the derivatives of v."""
-    scene = sp.Scene(models.slider(9.81, 0.3))
-    scene.add_contact(sp.Sphere(R, "ball"), models.plate(1.0), law=HUNT, name="ball")
+    scene = models.on_shell(models.slider(9.81, 0.3), models.plate(1.0), HUNT)
 
     def tau(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
         return np.array([4.0 + 2.0 * v[0] if len(contacts.depth) else 0.5])
@@ -215,16 +198,8 @@ def test_the_panda_on_the_blade(integrator: object) -> None:
 
     built = build("fingertip_on_blade")
     pair = built.scene.pairs[0].name
-    case = Case(
-        built.scene,
-        built.q0,
-        built.v0,
-        0.05,
-        integrator,
-        controller=built.controller,
-        control_dt=1e-3,
-        record_dt=0.01,
-    )
+    more = {"controller": built.controller, "control_dt": 1e-3, "record_dt": 0.01}
+    case = Case(built.scene, built.q0, built.v0, 0.05, integrator, **more)
     names = ["law.stiffness", "law.damping", "friction.mu_static", "sphere.radius", "placement"]
     # The controller's torques are differenced; its decoupling solves for an inertia of 6 by 6.
     columns = [f"{pair}.{name}" for name in names] + ["v0"]
@@ -233,25 +208,19 @@ def test_the_panda_on_the_blade(integrator: object) -> None:
 
 
 def test_a_joint_that_meets_its_stop() -> None:
-    model = models.empty(0.0)
-    models.add_body(model, "ball", pin.JointModelPZ())
     stop = sp.JointLimits(-0.1, 0.1, sp.HuntCrossleyLaw(2e5, 1.5, 0.3))
-    scene = sp.Scene(model, joints=sp.JointComponents(limits={"ball_joint": stop}))
-    case = Case(scene, [0.0], [2.0], 0.15)
+    joints = sp.JointComponents(limits={"ball_joint": stop})
+    case = Case(sp.Scene(models.slider(0.0), joints=joints), [0.0], [2.0], 0.15)
     result = case.check(["q0", "v0"])
     assert "stop" in [event.kind for event in result.events]
-
-
-def impulse(result: sp.Result) -> float:
-    """Of the rows, at equal times: the force's integral over the row's spacing."""
-    return float(result.contacts.force_world[:, 2].sum())
 
 
 FIGURES: dict[str, Callable[[sp.Result], float]] = {
     "height": lambda result: float(result.q[-1, 0]),
     "speed": lambda result: float(result.v[-1, 0] ** 2),
     "deepest": lambda result: float(result.contacts.depth.max()),
-    "impulse": impulse,
+    # Of the rows, at equal times: the force's integral over the row's spacing.
+    "impulse": lambda result: float(result.contacts.force_world[:, 2].sum()),
     "mean force": lambda result: float(np.linalg.norm(result.contacts.force_world, axis=1).mean()),
     "nothing": lambda result: 3.0,
 }

@@ -34,8 +34,7 @@ def off_an_ellipsoid(law: sp.NormalLaw, friction: object, inside: bool, place: l
     normals = vertices / axes
     normals *= sign / np.linalg.norm(normals, axis=1, keepdims=True)
     shell = sp.Shell(vertices * axes, triangles[:, :: int(sign)], normals=normals, faces=False)
-    scene = sp.Scene(models.ball(gravity=0.0))
-    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, name="ball")
+    scene = models.on_shell(models.ball(gravity=0.0), shell, law, friction)
     at = np.array(place) / np.linalg.norm(place)
     normal = sign * at / axes / np.linalg.norm(at / axes)
     q0 = models.free_q(at * axes + 1.02 * R * normal)

@@ -8,6 +8,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from tests.dynamics.test_sensor_wrench import URDF, arm, read, sensor, weight
 from tests.models import pose_of
+from tests.texts import DATA, text_of
 
 
 def test_joints_that_mimic_others():
@@ -29,14 +30,7 @@ def test_joints_that_mimic_others():
 
 def test_the_drive_of_joints_that_follow_carries_them():
     """A slide of 1 kg, and one of 0.5 kg that goes up twice as far."""
-    part = """<inertial><mass value="{}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
-    </inertial>"""
-    slide = """<joint name="{0}" type="prismatic"><parent link="base"/><child link="{1}"/>
-    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>{2}</joint>"""
-    urdf = f"""<robot name="r"><link name="base"/><link name="one">{part.format(1.0)}</link>
-    <link name="two">{part.format(0.5)}</link>{slide.format("first", "one", "")}
-    {slide.format("second", "two", '<mimic joint="first" multiplier="2"/>')}</robot>"""
-    model = pin.buildModelFromXML(urdf, mimic=True)
+    model = pin.buildModelFromXML(text_of("robots/two_slides.urdf"), mimic=True)
     drive = sp.JointTorqueSensor(name="drive", joint="first")
     wrench = sp.ForceTorqueSensor(name="wrench", frame="two")
     result = read(sp.Scene(model), [0.1], sp.GravityCompensation(), [drive, wrench])
@@ -49,16 +43,9 @@ def test_the_drive_of_joints_that_follow_carries_them():
     assert abs(fall.sensors["wrench"].values[0, 2] - 0.5 * (acceleration + 9.81)) < 1e-12
 
 
-MJCF = """<mujoco><worldbody><body name="a"><joint name="j" type="hinge" axis="0 0 1"/>
-<geom type="sphere" size="0.1" mass="1"/><body name="b" pos="0 0 1"><site name="s"/>
-<geom type="sphere" size="0.1" mass="2"/><body name="c" pos="0 0 1"><joint name="k" type="hinge"/>
-<geom type="sphere" size=".1" mass="3"/></body></body></body></worldbody></mujoco>"""
-
-
 @pytest.mark.parametrize(("frame", "mass"), [("a", 6), ("j", 6), ("b", 5), ("c", 3)])
-def test_bodies_of_an_mjcf_file(frame, mass, tmp_path):
-    (tmp_path / "a.xml").write_text(MJCF, encoding="utf-8")
-    model = pin.buildModelFromMJCF(str(tmp_path / "a.xml"))
+def test_bodies_of_an_mjcf_file(frame, mass):
+    model = pin.buildModelFromMJCF(str(DATA / "robots" / "bodies_and_site.xml"))
     scene = sp.Scene(model)
     result = read(scene, pin.neutral(model), sp.GravityCompensation(), [sensor(frame)])
     expected = [0, 0, 9.81 * mass, 0, 0, 0]

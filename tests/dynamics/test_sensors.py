@@ -9,6 +9,7 @@ from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import models
 from tests.results import assert_same_bits
+from tests.texts import text_of
 
 BALL = "ball_joint"
 
@@ -74,19 +75,12 @@ def test_the_filter_follows_a_parabola_exactly(steps_over_tau, slope):
     assert log.values[:, 4] == pytest.approx(-2.0 * 9.81 * place, abs=1e-11)
 
 
-# A tip of a quarter of the mass, with a sensor between the two.
-HAMMER = """<robot name="r"><link name="base"/><link name="body"><inertial><mass value="0.75"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="ball"><inertial><mass value="0.25"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="slide" type="prismatic"><parent link="base"/><child link="body"/>
-<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="mount" type="fixed"><parent link="body"/><child link="ball"/></joint></robot>"""
-
-
 def test_the_filter_misses_no_impact():
-    """Of a blow between two samples, the filtered signal keeps the impulse."""
-    model = pin.buildModelFromXML(HAMMER)
+    """Of a blow between two samples, the filtered signal keeps the impulse.
+
+    A tip of a quarter of the mass, with a sensor between the two.
+    """
+    model = pin.buildModelFromXML(text_of("robots/hammer.urdf"))
     scene = models.on_plate(model, sp.ImpactLaw(1e9, 1.5))
     sensor = sp.ForceTorqueSensor(name="wrist", frame="mount", rate=1000, cutoff=30)
     duration = 0.12

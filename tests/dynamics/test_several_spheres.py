@@ -100,11 +100,8 @@ def test_together_they_move_as_one_by_one(integrator) -> None:  # type: ignore[n
 @pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-2), sp.Adaptive(1e-5)])
 def test_a_fast_pad_passes_through_nothing(integrator, speed: float) -> None:  # type: ignore[no-untyped-def]
     law = models.linear_law(1.0 * (speed / (0.3 * R)) ** 2)
-    inertia = pin.Inertia.FromSphere(1.0, R)
-    model = models.empty(0.0)
-    models.add_body(model, "ball", pin.JointModelTranslation(), inertia=inertia)
-    sheet = sp.Shell(*meshes.grid_plate(size=1.0, quads=True))
-    scene = scene_of(pad(), together=True, shell=sheet, model=model, law=law, friction=None)
+    more = {"shell": models.square(1.0), "model": models.block(0.0), "law": law, "friction": None}
+    scene = scene_of(pad(), together=True, **more)
     start = np.array([-0.03, 0.02, 0.2137])
     result = sp.Simulation(scene, integrator).run(start, [0.1 * speed, 0, -speed], 0.42 / speed)
     assert result.v[-1, 2] > 0.5 * speed
@@ -147,13 +144,9 @@ def test_a_group_over_the_bulge_of_a_coarse_shell_is_not_far() -> None:
     # All spheres of the group on a line out of the flat's middle: none reaches the flat itself.
     radius = 0.25 * bulge
     spheres = [sp.Sphere(radius, "ball", tuple(0.1 * k * bulge * out)) for k in range(4)]
-    model = models.empty()
-    models.add_body(model, "ball", pin.JointModelTranslation())
-    law = sp.ImpactLaw(1e6, 1.0)
+    more = {"law": sp.ImpactLaw(1e6, 1.0), "friction": None, "method": "smooth"}
     together, alone = (
-        scene_of(
-            spheres, together=one, shell=shell, model=model, law=law, friction=None, method="smooth"
-        )
+        scene_of(spheres, together=one, shell=shell, model=models.block(), **more)
         for one in (True, False)
     )
     q = out * (1 + 0.5 * radius)

@@ -14,9 +14,9 @@ from sphshell_pin.errors import SetupWarning
 from tests.contact.test_planes import pose, scene_of
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
 from tests.dynamics.test_foundation_on_plane import FRICTIONS, box, thrown
-from tests.dynamics.test_planes import INERTIA
+from tests.dynamics.test_planes import over_plane, reach_of, touching
 from tests.meshes import cube, grid_plate
-from tests.models import add_body, empty, linear_law
+from tests.models import linear_law
 
 LAW = sp.ImpactLaw(1e6, 1.5, 50.0, 1e-4)
 CROWN = 1e3  # its radius over the size of the shell
@@ -54,34 +54,17 @@ SHELLS = {
 
 
 def lying(
-    name: str, law, friction, *, ground: bool = True, tilt: float = 0.2, seed: int = 5
+    name: str, law, friction, *, ground: bool = True, tilt: float = 0.2
 ) -> tuple[sp.Scene, np.ndarray, np.ndarray]:
     """A body that lies flat but for a share of the crown's tilt, and its state."""
-    model, frame = empty(), "universe"
     make, flat = SHELLS[name]
     shell = make()
-    if not ground:
-        frame = "table"
-        add_body(model, frame, pin.JointModelFreeFlyer())
-    add_body(model, "body", pin.JointModelFreeFlyer(), inertia=INERTIA)
-    scene = sp.Scene(model)
-    plane = sp.Plane(frame, (0.0, 0.0, 0.01), (0.1, -0.05, 1.0))
-    scene.add_contact(plane, shell, "body", None, law, friction)
-    rng = np.random.default_rng(seed)
-    q = pin.neutral(model)
-    place = plane.placement
-    if not ground:
-        q = pin.integrate(model, q, 0.3 * rng.normal(size=model.nv))
-        data = model.createData()
-        pin.forwardKinematics(model, data, q)
-        place = data.oMi[1] * place
-    lean = rng.normal(size=3) * [1, 1, 0]
+    scene = over_plane(shell, law, friction, ground=ground)
+    lean = np.random.default_rng(5).normal(size=3) * [1, 1, 0]
     lean *= tilt / CROWN / np.linalg.norm(lean)
     turn = pin.exp3(lean) @ pin.utils.rotate("z", 0.4) @ flat
-    lowest = (shell.vertices @ turn.T)[:, 2].min()
-    q[-7:-4] = place.act(np.array([0.01, 0.02, -lowest - 2e-4]))
-    q[-4:] = pin.Quaternion(place.rotation @ turn).coeffs()
-    return scene, q, rng.normal(size=model.nv) * 0.02  # so that all corners press
+    q, v = touching(scene, 2e-4, 5, turn, reach_of(shell))
+    return scene, q, v / 15  # so that all corners press
 
 
 @pytest.mark.parametrize("ground", [True, False])

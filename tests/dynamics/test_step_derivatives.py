@@ -204,28 +204,6 @@ def test_a_state_with_bristles() -> None:
     assert np.abs((got.by_parameters[:3] - DT * step) / (DT * size)).max() <= 1e-12
 
 
-def test_matrices_of_steps_in_a_row_are_those_of_a_run() -> None:
-    """The product over ten steps, against differences of a run of ten steps."""
-    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
-    zero, count = np.zeros(3), 10
-    for integrator in STEPPERS.values():
-        simulation = sp.Simulation(scene, integrator)
-        whole, at, speed = np.eye(6), q, v
-        for _ in range(count):
-            step = simulation.step_derivatives(at, speed)
-            whole, at, speed = step.by_state @ whole, step.q, step.v
-
-        def end(q: Array, v: Array, simulation: sp.Simulation = simulation) -> Array:
-            run = simulation.run(q, v, count * DT, lambda *_: zero)
-            return np.r_[run.q[-1], run.v[-1]]
-
-        start, moves = end(q, v), differences.moves(scene, q, v)
-        for column, name in enumerate(f"{half}.{k}" for half in "qv" for k in range(3)):
-            moved, scale, _ = moves[name]
-            f = lambda x, moved=moved, start=start, end=end: end(*moved(x)[1:3]) - start  # noqa: E731
-            assert differences.off(whole[:, column], f, scale, known=differences.ROUNDING) <= 1e-6
-
-
 def test_bad_input() -> None:
     """Names, states and results are those of `dynamics_derivatives`."""
     scene, q, v = in_bowl(LAWS["impact"], COULOMB)

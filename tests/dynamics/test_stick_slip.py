@@ -1,11 +1,10 @@
 """The period of stick-slip, and what `v_stribeck` costs of it: the figures of docs/dynamics.md."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from tests.models import ball
+from tests import models
 
 MASS, SPRING, DRAWN, STATIC, DYNAMIC, RADIUS = 1.0, 1e3, 0.01, 0.6, 0.4, 0.02
 
@@ -23,13 +22,10 @@ def period() -> float:
     ("v_stribeck", "percent"), [(1e-4, -0.13), (1e-3, 2.7), (3e-3, 5.2), (1e-2, 9.5)]
 )
 def test_the_period_of_stick_slip(v_stribeck: float, percent: float) -> None:
-    model = ball(0.0, MASS, RADIUS, pin.JointModelTranslation())
-    model.gravity.linear = np.array([0.0, 0.0, -9.81])
-    scene = sp.Scene(model)
-    plate = sp.Shell([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
     friction = sp.BristleFriction(STATIC, DYNAMIC, 1e6, 100.0, v_stribeck)
     law = sp.ImpactLaw(1e6, 1.0, 300.0, 1e-6)
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), plate, law=law, friction=friction, name="c")
+    model = models.block(9.81, MASS, RADIUS)
+    scene = models.on_shell(model, models.square(), law, friction, radius=RADIUS)
 
     def pull(t, q, _v, _contacts):
         return np.array([SPRING * (DRAWN * t - q[0]), 0.0, 0.0])

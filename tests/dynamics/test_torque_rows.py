@@ -9,6 +9,7 @@ from sphshell_pin import robots
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.errors import InvalidParameter
+from tests import models
 from tests.results import assert_same_bits
 
 Q0 = np.array([0.2, 0.6, 0.5])
@@ -24,14 +25,13 @@ INTEGRATORS = [
 
 def simulation(integrator=None, effort=None):
     finger = robots.load("three_link_finger")
-    wall = sp.Shell(
-        [[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]], [[0, 1, 2, 3]]
-    )
     upright = pin.SE3(pin.rpy.rpyToMatrix(0.0, -np.pi / 2, 0.0), np.array([0.07, 0.0, 0.1]))
     joints = JointComponents(effort={} if effort is None else {"knuckle": effort})
     scene = sp.Scene(finger.model, joints=joints)
     law = sp.HuntCrossleyLaw(1e6, 1.5, dissipation=2.0)
-    scene.add_contact(sp.Sphere(0.010, "tip"), wall, placement=upright, law=law, name="tip-wall")
+    scene.add_contact(
+        sp.Sphere(0.010, "tip"), models.square(0.2), placement=upright, law=law, name="tip-wall"
+    )
     return sp.Simulation(scene, integrator or sp.RungeKutta4(2e-4))
 
 

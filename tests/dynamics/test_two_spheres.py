@@ -9,7 +9,6 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import DeepStart
 from tests import models
 from tests.dynamics.scenes import (
@@ -101,42 +100,6 @@ def balls_on_a_line(count: int, radius: float, mass: float) -> pin.Model:
     for k in range(count):
         models.add_body(model, f"ball{k}", pin.JointModelPX(), inertia=inertia)
     return model
-
-
-def cradle(count: int, gap: float, law) -> tuple[sp.Scene, Array]:  # type: ignore[no-untyped-def]
-    radius = 0.01
-    scene = sp.Scene(balls_on_a_line(count, radius, 0.03))
-    for k in range(count - 1):
-        ends = sp.Sphere(radius, f"ball{k}"), sp.Sphere(radius, f"ball{k + 1}")
-        scene.add_contact(*ends, law=law, name=f"{k}-{k + 1}")
-    q = (2 * radius + gap) * np.arange(count, dtype=float)
-    q[0] -= 1e-3
-    return scene, q
-
-
-def test_newtons_cradle_in_touch() -> None:
-    # Balls that touch from the start are in contact together, with Hertz's law: the velocities are
-    # those of the chain of springs (Hinch and Saint-Jean, Proc. R. Soc. A 455 (1999) 3201, for five
-    # balls), here integrated apart from the package.
-    law = sp.ImpactLaw(1e9, 1.5)
-    scene, q = cradle(5, 0.0, law)
-    result = sp.Simulation(scene, sp.Adaptive(1e-9, 1e-11)).run(q, [1.0, 0, 0, 0, 0], 2e-3)
-    assert np.abs(result.v.sum(axis=1) - 1.0).max() < 1e-12
-    x, v, dt = q.copy(), np.array([1.0, 0, 0, 0, 0]), 5e-8
-    x[0] += 0.999e-3
-
-    def acceleration(x: Array) -> Array:
-        push = 1e9 * np.maximum(0.02 - np.diff(x), 0.0) ** 1.5 / 0.03
-        return np.concatenate([[0.0], push]) - np.concatenate([push, [0.0]])
-
-    a = acceleration(x)
-    for _ in range(20000):  # velocity Verlet
-        v += 0.5 * dt * a
-        x += dt * v
-        a = acceleration(x)
-        v += 0.5 * dt * a
-    assert np.allclose(result.v[-1], v, rtol=0, atol=1e-5)
-    assert result.v[-1, 4] > 0.98
 
 
 def spinning_impact(friction, integrator) -> sp.Result:  # type: ignore[no-untyped-def]

@@ -73,20 +73,10 @@ class ImpactTest:
 
     def scene(self) -> sp.Scene:
         """Build the scene: a free or a sliding sphere, and a target that stands still."""
-        r = self.aim.radius
-        model = models.empty(gravity=0.0)
-        joint = pin.JointModelTranslation() if self.turn is None else pin.JointModelFreeFlyer()
-        models.add_body(model, "ball", joint, inertia=pin.Inertia.FromSphere(self.mass, r))
-        scene = sp.Scene(model)
-        scene.add_contact(
-            sp.Sphere(r, "ball"),
-            self.aim.shell,
-            placement=self.aim.placement,
-            law=self.law,
-            friction=self.friction,
-            name="impact",
-        )
-        return scene
+        make, r = (models.block if self.turn is None else models.ball), self.aim.radius
+        more = {"radius": r, "placement": self.aim.placement, "name": "impact"}
+        model = make(0.0, self.mass, r)
+        return models.on_shell(model, self.aim.shell, self.law, self.friction, **more)
 
     def state(self) -> tuple[Array, Array]:
         """Return q and v at the start."""

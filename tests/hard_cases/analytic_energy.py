@@ -18,7 +18,6 @@ from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.surfaces import Mesh, icosphere
 from tests import models
-from tests.hard_cases import surfaces
 from tests.hard_cases.analytic_impact import (
     BY_TOLERANCE,
     FIXED,
@@ -179,7 +178,7 @@ def spinning_ball() -> Verdicts:
         (sp.Adaptive(1e-9), 1e-8),
         (sp.Implicit(1e-7), 1e-7),
     ):
-        scene = scene_of(surfaces.plate(), law, bristle(0.3, 1e5))
+        scene = scene_of(models.square(), law, bristle(0.3, 1e5))
         spin = [0.0, speed / (RADIUS - depth), SPIN]
         q0, v0 = state([-0.5, 0.0, RADIUS - depth], [speed, 0.0, 0.0], spin)
         result = sp.Simulation(scene, integrator).run(q0, v0, 2.0, record_dt=0.1)
@@ -199,7 +198,7 @@ def on_turntable() -> Verdicts:
         disc = pin.Inertia(1.0, np.zeros(3), 1e-2 * np.eye(3))
         models.add_body(model, "table", pin.JointModelRUBZ(), inertia=disc)
         friction = bristle(0.3, 1e5)
-        scene = scene_of(surfaces.plate(), law, friction, model=model, frame="table")
+        scene = scene_of(models.square(), law, friction, model=model, frame="table")
         spin = SPIN * np.array([0.5, 0.5, math.sqrt(0.5)])
         q0, v0 = state([0.1, 0.0, RADIUS - law.depth_at(MASS * GRAVITY)], np.zeros(3), spin)
         simulation = sp.Simulation(scene, integrator)

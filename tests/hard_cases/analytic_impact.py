@@ -15,7 +15,6 @@ import numpy as np
 import sphshell_pin as sp
 from sphshell_pin.study.report.closed_forms import FALL, bounce
 from tests import models
-from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (
     GRAVITY,
     MASS,
@@ -48,7 +47,7 @@ class Impact:
 
 def impact(law: sp.ImpactLaw | sp.HuntCrossleyLaw, speed: float, expected: float) -> Impact:
     """Shoot the ball at the plate; `expected` [s] is about how long it stays in touch."""
-    scene = scene_of(surfaces.plate(), law, model=free_ball(gravity=0.0))
+    scene = scene_of(models.square(), law, model=free_ball(gravity=0.0))
     q0, v0 = state([0.1, 0.03, RADIUS + GAP], [0.0, 0.0, -speed], [0.0, 0.0, 0.0])
     duration = GAP / speed + 2 * expected
     result = sp.Simulation(scene, PRECISE).run(q0, v0, duration, record_dt=expected / 4000)
@@ -107,7 +106,7 @@ def bouncing_error(integrator: object) -> float:
     """Return the error after five bounces, in the sixth flight, over the height of fall."""
     height, stiffness, end = FALL, 1e4, 0.75
     model = models.slider(GRAVITY, MASS)
-    scene = scene_of(surfaces.plate(), sp.ImpactLaw(stiffness, 1.0), model=model)
+    scene = scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
     result = sp.Simulation(scene, integrator).run([RADIUS + height], None, end)
     z, speed = bounce(np.array(end), stiffness)
     fall = math.sqrt(2 * GRAVITY * height)
@@ -120,7 +119,7 @@ def oscillation_error(integrator: object) -> float:
     omega, sag = math.sqrt(stiffness / MASS), MASS * GRAVITY / stiffness
     start = 0.8 * sag
     model = models.slider(GRAVITY, MASS)
-    scene = scene_of(surfaces.plate(), sp.ImpactLaw(stiffness, 1.0), model=model)
+    scene = scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
     result = sp.Simulation(scene, integrator).run([RADIUS - sag + start], None, end)
     z, speed = start * math.cos(omega * end), -start * omega * math.sin(omega * end)
     return math.hypot(

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.study.report.swing import ball_model
+from tests import models
 from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (
     GRAVITY,
@@ -56,7 +57,7 @@ def incline() -> Verdicts:
             expected = GRAVITY * (math.sin(angle) - mu * math.cos(angle))
             law = "g (sin A - mu cos A)"
         slope, friction = tilted(angle), make(mu)
-        scene = scene_of(surfaces.plate(), SOFT, friction, placement=slope)
+        scene = scene_of(models.square(), SOFT, friction, placement=slope)
         rest = np.zeros(3)
         q0, v0 = state(slope.act(np.array([-0.5, 0.0, RADIUS - depth])), rest, rest)
         result = sp.Simulation(scene, PRECISE).run(q0, v0, 0.2, record_dt=0.1)
@@ -73,7 +74,7 @@ def sliding_to_rolling() -> Verdicts:
     depth = SOFT.depth_at(MASS * GRAVITY)
     b = beta(depth)
     for make in (bristle, coulomb):
-        scene = scene_of(surfaces.plate(), SOFT, make(mu))
+        scene = scene_of(models.square(), SOFT, make(mu))
         q0, v0 = state([-0.5, 0.0, RADIUS - depth], [speed, 0.0, 0.0], [0.0, 0.0, 0.0])
         slide = speed / (mu * GRAVITY * (1 + 1 / b))
         result = sp.Simulation(scene, PRECISE).run(q0, v0, 2.5 * slide, record_dt=slide / 4)
@@ -125,7 +126,7 @@ def creep(integrator: object, friction: object, duration: float) -> float:
     """
     slope = tilted(math.atan(OF_CONE * MU_SLOPE))
     model = ball_model()
-    scene = scene_of(surfaces.plate(), SOFT, friction, model=model, placement=slope)
+    scene = scene_of(models.square(), SOFT, friction, model=model, placement=slope)
     depth = SOFT.depth_at(MASS * GRAVITY * slope.rotation[2, 2])
     q0 = slope.act(np.array([0.0, 0.0, RADIUS - depth]))
     result = sp.Simulation(scene, integrator).run(q0, None, duration, record_dt=duration / 2)

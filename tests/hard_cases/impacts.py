@@ -18,6 +18,7 @@ from sphshell_pin.shell.curvature import curved_mesh
 from tests.hard_cases.aims import STOPPED_AT, ImpactTest, draw
 from tests.hard_cases.targets import all_targets, crossings, sweep, winding
 from tests.hard_cases.verdict import Verdict, Verdicts, at_most, case
+from tests.rolling import velocities
 
 FIXED = ("SemiImplicitEuler", "RungeKutta4", "LinearlyImplicitEuler")
 # Energy that may be gained: this share, and with explicit fixed steps besides a (step / depth)^b,
@@ -58,13 +59,9 @@ class Tally:
 
 def positions(result: sp.Result) -> tuple[Array, Array]:
     """Return centers and velocities in the world (n, 3) of a result's rows."""
-    q, v = result.q, result.v
-    if q.shape[1] == 3:
-        return q, v
-    # v' = v + 2 w (u x v) + 2 u x (u x v), of the quaternion (u, w).
-    u, w, linear = q[:, 3:6], q[:, 6:7], v[:, :3]
-    across = np.cross(u, linear)
-    return q[:, :3], linear + 2 * (w * across + np.cross(u, across))
+    if result.q.shape[1] == 3:
+        return result.q, result.v
+    return result.q[:, :3], velocities(result)
 
 
 def path(impact: ImpactTest, result: sp.Result) -> tuple[Array, Array, NDArray[np.bool_]]:

@@ -1,7 +1,6 @@
 """Balls that rest on several places.
 
-In a groove, in a cone that it touches along a ring, on eight spikes, on a slope by friction for
-1000 s.
+In a groove, in a cone that it touches along a ring, on eight spikes.
 """
 
 import math
@@ -20,16 +19,6 @@ RADIUS, MASS, GRAVITY = 0.02, 0.3, 9.81
 WEIGHT = MASS * GRAVITY
 
 
-def slides(gravity: Array | None = None) -> pin.Model:
-    """Return a ball that can move but not turn, frame "ball" at its center."""
-    model = models.empty(GRAVITY)
-    if gravity is not None:
-        model.gravity.linear = gravity
-    inertia = pin.Inertia.FromSphere(MASS, RADIUS)
-    models.add_body(model, "ball", pin.JointModelTranslation(), inertia=inertia)
-    return model
-
-
 def rest(
     model: pin.Model,
     shell: sp.Shell,
@@ -40,8 +29,7 @@ def rest(
     method: str = "smooth",
 ) -> sp.Result:
     """Let the ball settle on `shell`."""
-    scene = sp.Scene(model)
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), shell, law=law, method=method, name="seat")
+    scene = models.on_shell(model, shell, law, radius=RADIUS, method=method)
     return sp.Simulation(scene, integrator).run(q, duration=duration, record_dt=duration)
 
 
@@ -70,7 +58,7 @@ def wedge(half_angle: float, integrator: Any, method: str) -> tuple[Array, Array
     height = (RADIUS - 0.9 * depth) / math.sin(half_angle)
     slow = math.sqrt(MASS / (2 * stiffness)) / math.sin(half_angle)
     result = rest(
-        slides(),
+        models.block(GRAVITY, MASS),
         shell,
         damped(stiffness, damping),
         np.array([0.0, 0.01, height]),
@@ -145,7 +133,7 @@ def seated(
     stiffness = WEIGHT / (depth * math.sin(a))
     right = ring_depth(a, columns, flat, stiffness)
     law = damped(stiffness, 2 * math.sqrt(stiffness * MASS))
-    model = slides() if free else models.slider(GRAVITY, MASS)
+    model = models.block(GRAVITY, MASS) if free else models.slider(GRAVITY, MASS)
     height = (RADIUS - 0.9 * right) / math.sin(a)
     q = np.array([1e-5 * RADIUS, 0.0, height]) if free else np.array([height])
     shell = cone(a, columns, max(columns // 8, 2), flat)
@@ -211,7 +199,7 @@ def on_spikes(integrator: Any, method: str) -> tuple[Array, float, float]:
     z = height_on_spikes(stiffness)
     q = np.array([1e-4 * RADIUS, 2e-4 * RADIUS, z + 1e-3 * RADIUS])
     duration = 120 * math.sqrt(0.02 * RADIUS / GRAVITY)
-    result = rest(slides(), spikes(), law, q, integrator, duration, method)
+    result = rest(models.block(GRAVITY, MASS), spikes(), law, q, integrator, duration, method)
     form = WEIGHT / (SPIKES * z / math.hypot(z, 0.6 * RADIUS))
     return last_forces(result), form, float(result.q[-1, 2]) / z
 
@@ -230,34 +218,3 @@ def spiked() -> Verdicts:
             law = "N = m g / (8 cos), each"
             yield compare("spikes", tried, law, form, worst, 1e-6)
             yield compare("spikes", tried, "height, of what is right", 1, height, 1e-8)
-
-
-def drift(integrator: Any, friction: Any, duration: float, settling: float = 1.0) -> Array:
-    """Lay a ball that cannot turn on a slope of 10 degrees.
-
-    Return how far it is from its place after `settling`, at ten times until `duration` [m].
-    """
-    angle = math.radians(10.0)
-    gravity = GRAVITY * np.array([math.sin(angle), 0.0, -math.cos(angle)])
-    scene = models.on_plate(
-        slides(gravity),
-        damped(1e5, 100.0),
-        friction,
-        radius=RADIUS,
-        shell=models.plate(20 * RADIUS),
-    )
-    q = np.array([0.003, -0.002, RADIUS - WEIGHT / 1e5])
-    simulation = sp.Simulation(scene, integrator)
-    settled = simulation.run(q, duration=settling, record_dt=settling)
-    rest_of_it = (duration - settling) / 10
-    result = simulation.run(settled.q[-1], settled.v[-1], duration - settling, record_dt=rest_of_it)
-    return np.asarray(np.linalg.norm(result.q[1:] - result.q[1], axis=1))
-
-
-@case("at rest on a slope for 1000 s", slow=True)
-def long_slope() -> Verdicts:
-    friction = sp.BristleFriction(0.4, 0.3, stiffness=1e5, damping=100.0)
-    for integrator in (sp.LinearlyImplicitEuler(1e-3), sp.Implicit()):
-        tried = f"{type(integrator).__name__}, 1000 s on 10 deg, bristles"
-        away = float(np.max(drift(integrator, friction, 1000.0)))
-        yield at_most("slope", tried, "stays where it settled [m]", away, 1e-9)

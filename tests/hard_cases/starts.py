@@ -59,12 +59,8 @@ STIFFNESS = 1e6
 
 def graze(integrator: Any, friction: Any) -> tuple[float, float]:
     """Fly along a plate, 1e-12 m deep in it, at 1 m/s; return speeds away and along [m/s]."""
-    law = sp.ImpactLaw(STIFFNESS, 1.0)
-    model = models.empty(gravity=0.0)
-    inertia = pin.Inertia.FromSphere(MASS, RADIUS)
-    models.add_body(model, "ball", pin.JointModelTranslation(), inertia=inertia)
-    plate = models.plate(0.5)
-    scene = models.on_plate(model, law, friction, radius=RADIUS, shell=plate)
+    model, law = models.block(0.0, MASS, RADIUS), sp.ImpactLaw(STIFFNESS, 1.0)
+    scene = models.on_plate(model, law, friction, radius=RADIUS, shell=models.plate(0.5))
     q, v = np.array([-0.1, 0.01, RADIUS - GRAZE]), np.array([1.0, 0.0, 0.0])
     result = sp.Simulation(scene, integrator).run(q, v, 0.2, record_dt=0.1)
     if not np.isfinite(result.q).all():

@@ -85,11 +85,6 @@ def cone(half_angle: float, low: float, high: float, side: float = SIDE) -> Shel
     return grid(place, (low, high), (0.0, 2 * math.pi), rows, columns, ring=True)
 
 
-def plate(size: float = 2.0) -> Shell:
-    """Flat square z = 0 of one element."""
-    return Shell(*meshes.grid_plate(size=size, quads=True))
-
-
 def groove(half_angle: float, size: float = 2.0) -> Shell:
     """V-groove along y: its walls stand at `half_angle` from the plane of symmetry x = 0."""
     return Shell(*meshes.v_groove(math.pi / 2 - half_angle, size))

@@ -14,7 +14,8 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
+from OCP.Extrema import Extrema_GenLocateExtPS
+from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.IntTools import IntTools_FClass2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_OUT
 from OCP.TopLoc import TopLoc_Location
@@ -36,7 +37,6 @@ SPACING = 1 / 80
 """Distance of seeds from each other, at most, as a share of the size."""
 
 EDGE_POINTS = 129
-NEWTON_STEPS = 30
 
 
 class ExactShape:
@@ -122,37 +122,11 @@ class ExactShape:
         return bool(self.inside[face].Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_OUT)
 
     def _foot(self, face: int, seed: Array, point: Array) -> tuple[Array, Array]:
-        """Foot of a point on the untrimmed surface, by Newton's method with a line search."""
+        """Foot of a point on the untrimmed surface, by Newton's method; else the seed itself."""
         surface = self.surfaces[face]
-        place, u, v, uu, vv, uv = gp_Pnt(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec()
-        low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
-        high = np.array([surface.LastUParameter(), surface.LastVParameter()])
-        # Round a closed surface the way may lead across its seam.
-        endless = np.array([surface.IsUPeriodic(), surface.IsVPeriodic()])
-        low, high = np.where(endless, -np.inf, low), np.where(endless, np.inf, high)
-        at = np.array(seed, float)
-        for _ in range(NEWTON_STEPS):
-            surface.D2(*at.tolist(), place, u, v, uu, vv, uv)
-            r = np.array(place.Coord()) - point
-            a, b = np.array(u.Coord()), np.array(v.Coord())
-            slope = np.array([r @ a, r @ b])
-            metric = np.array([[a @ a, a @ b], [a @ b, b @ b]])
-            bend = np.array([r @ uu.Coord(), r @ uv.Coord(), r @ vv.Coord()])
-            full = metric + np.array([[bend[0], bend[1]], [bend[1], bend[2]]])
-            if full[0, 0] <= 0.0 or np.linalg.det(full) <= 1e-14 * full[0, 0] * abs(full[1, 1]):
-                full = metric + 1e-14 * np.trace(metric) * np.eye(2)
-            step = -np.linalg.solve(full, slope)
-            for share in (1.0, 0.5, 0.25, 0.1, 0.01):
-                new = np.clip(at + share * step, low, high)
-                offset = np.array(surface.Value(*new.tolist()).Coord()) - point
-                if offset @ offset <= r @ r:
-                    break
-            else:
-                break
-            moved = np.linalg.norm(a * (new - at)[0] + b * (new - at)[1])
-            at = new
-            if moved <= 1e-14 * (1.0 + np.abs(point).max()):
-                break
+        search = Extrema_GenLocateExtPS(surface, 1e-12, 1e-12)
+        search.Perform(gp_Pnt(*point.tolist()), *seed.tolist(), False)
+        at = np.array(search.Point().Parameter()) if search.IsDone() else seed
         return np.array(surface.Value(*at.tolist()).Coord()), at
 
     def _from_edge(self, edge: int, seed: float, point: Array) -> float:

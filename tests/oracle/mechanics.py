@@ -43,32 +43,6 @@ def world_motion(model: pin.Model, data: pin.Data, joint: int) -> pin.Motion:
     return data.oMi[joint].act(data.v[joint])
 
 
-def generalised_force_by_virtual_work(
-    model: pin.Model,
-    q: Vector,
-    point: Vector,
-    force_on_joint: dict[int, Vector],
-    step: float = 2.0**-17,
-) -> Vector:
-    """Sum over bodies of force . d(material point)/dq_k through pin.integrate, central differences.
-
-    The point is held fast in each body while the joint coordinate moves; the error is
-    O(step^2 + eps/step), about 1e-10 of the force times the arm.
-    """
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    local = {joint: data.oMi[joint].actInv(point) for joint in force_on_joint}
-    total = np.zeros(model.nv)
-    for k in range(model.nv):
-        delta = np.zeros(model.nv)
-        for sign in (1.0, -1.0):
-            delta[k] = sign * step
-            pin.forwardKinematics(model, data, pin.integrate(model, q, delta))
-            for joint, force in force_on_joint.items():
-                total[k] += sign * float(force @ data.oMi[joint].act(local[joint])) / (2 * step)
-    return total
-
-
 def total_momentum(model: pin.Model, q: Vector, v: Vector) -> pin.Force:
     """Linear and angular momentum of the whole system about the world's origin."""
     data = model.createData()

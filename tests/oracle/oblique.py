@@ -1,13 +1,12 @@
 """Oblique impact of elastic spheres, computed apart from the package.
 
-Three theories of the same impact, both in Maw, Barber and Fawcett's dimensionless numbers (Wear 38
+Two theories of the same impact, both in Maw, Barber and Fawcett's dimensionless numbers (Wear 38
 (1976) 101): psi = kappa u / (mu v_n) of the contact point's tangential velocity u, and
 chi = kappa (1 + 1 / K^2) / 2, with kappa = 4 G* / E* and K^2 = 2/5 of a solid ball.
 
-- `rigid_disc`: the disc of contact sticks or slips as a whole, its force is kept while it grows and
-  falls with its radius: what MindlinFriction states.
 - `rings`: the disc is divided into equal shares of its radius, each of which sticks or slips as a
-  whole; what it carries moves with the places that the shares move over.
+  whole; what it carries moves with the places that the shares move over. A single one is the disc
+  as a whole: its force is kept while it grows and falls with its radius.
 - `micro_slip`: each ring of it slips for itself, the theory of Mindlin, Deresiewicz and Maw, by the
   method of dimensionality reduction (Popov and Hess, Method of Dimensionality Reduction in Contact
   Mechanics and Friction, 2015; of impacts Lyashenko and Popov, Scientific Reports 5 (2015) 8479):
@@ -30,24 +29,6 @@ def kappa(young_1: float, poisson_1: float, young_2: float, poisson_2: float) ->
     tangential = (2 - poisson_1) / shear[0] + (2 - poisson_2) / shear[1]
     normal = (1 - poisson_1**2) / young_1 + (1 - poisson_2**2) / young_2
     return 4 * normal / tangential
-
-
-def rigid_disc(psi_1: Array, kappa: float, dissipation: float = 0.0, steps: int = 40_000) -> Array:
-    """Return psi (k,) of the rebound, where the disc of contact sticks or slips as a whole.
-
-    `dissipation` is Hunt and Crossley's b times the normal speed. The error is below 1e-4.
-    """
-    force = np.zeros_like(psi_1)
-    before = 0.0
-
-    def advance(psi: Array, x: float, limit: float, h: float) -> Array:
-        nonlocal force, before
-        kept = force * min(1.0, np.sqrt(x / before)) if before > 0 else force
-        force = np.clip(kept + 15 / 8 * np.sqrt(x) * h * psi, -limit, limit)
-        before = x
-        return force
-
-    return _rebound(psi_1, kappa, dissipation, steps, advance)
 
 
 def rings(

@@ -30,54 +30,25 @@ def chain(links: list[str], joints: list[tuple[str, str]]) -> robots.LoadedRobot
         return robots.load_file(file, mimic=True, density=2700.0)
 
 
-@case(
-    "stack-of-tasks/pinocchio#2753",
-    "stack-of-tasks/pinocchio#2761",
-    wanted="a continuous joint that mimics another at -1/2 is loaded, and turns with it",
-    figure="degrees of freedom of leader and follower",
-    truth=1,
-    bound=0,
-)
+@case
 def continuous_joints_that_mimic() -> float:
     mimic = '<mimic joint="j0" multiplier="-0.5"/>'
     return chain([_MASS] * 3, [("continuous", ""), ("continuous", mimic)]).model.nv
 
 
-@case(
-    "RobotLocomotion/drake#21472",
-    "google-deepmind/mujoco#3527",
-    wanted="a gripper whose five joints mimic the first one has one degree of freedom",
-    figure="degrees of freedom",
-    truth=1,
-    bound=0,
-)
+@case
 def gripper_that_mimics() -> float:
     rules = [f'<mimic joint="j0" multiplier="{ratio}"/>' for ratio in (1, -1, 1, -1, 1)]
     return chain([_MASS] * 7, [("revolute", rule) for rule in ("", *rules)]).model.nv
 
 
-@case(
-    "o3de/o3de-extras#137",
-    "ros-industrial/motoman#322",
-    "ros-industrial/kuka_experimental#88",
-    "ros-industrial/kuka_experimental#128",
-    wanted="a link without an inertial gets the mass of its geometry: a box of aluminium",
-    figure="its mass [kg]",
-    truth=2700.0 * 0.1 * 0.2 * 0.3,
-    bound=1e-7,
-)
+@case
 def links_without_masses() -> float:
     shape = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
     return float(chain([_MASS, shape], [("revolute", "")]).model.inertias[1].mass)
 
 
-@case(
-    "gumyr/build123d#671",
-    wanted="a part that an assembly uses twice is there twice, as a solid (STEP)",
-    figure="volume over that of two parts",
-    truth=2.0,
-    bound=1e-12,
-)
+@case
 def part_used_twice() -> float:
     from OCP.BRep import BRep_Builder
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
@@ -102,13 +73,7 @@ def part_used_twice() -> float:
     return float(np.linalg.det(corners).sum() / 6.0 / 6e-9)
 
 
-@case(
-    "ipa320/schunk_modular_robotics#150",
-    wanted="a binary STL with a byte or more after its triangles is read",
-    figure="elements read",
-    truth=4,
-    bound=0,
-)
+@case
 def bytes_after_an_stl() -> float:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "part.stl"

@@ -14,26 +14,13 @@ from tests.public_cases.shapes import binary_stl, terrain
 HEIGHT = 0.2
 
 
-@case(
-    "google-deepmind/mujoco#2206",
-    wanted="the depth of a sphere stays right when more than half of it is in a box",
-    figure="depth of a sphere of 5 mm that is 9 mm deep [m]",
-    truth=0.009,
-    bound=1e-15,
-)
+@case
 def deeper_than_half() -> float:
     box = sp.Shell(*cube(), side="outside")
     return float(box.contacts([0, 0, 0.5 + 0.005 - 0.009], 0.005).depth.max())
 
 
-@case(
-    "google-deepmind/mujoco#1784",
-    "google-deepmind/mujoco#2688",
-    wanted="points above a terrain have no negative distance from it",
-    figure="of 2000 points, those with a distance off by more than the terrain's roughness",
-    truth=0,
-    bound=0,
-)
+@case
 def above_a_terrain() -> float:
     def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return HEIGHT * np.sin(3 * x) * np.cos(2 * y)
@@ -73,57 +60,22 @@ def deepest_in_bore(suffix: str, gap: float) -> float:
     return max(float(one.depth.max(initial=0.0)) for one in found)
 
 
-HOLE = (
-    "bulletphysics/bullet3#4278",
-    "bulletphysics/bullet3#2148",
-    "bulletphysics/bullet3#1636",
-    "bulletphysics/bullet3#4589",
-    "google-deepmind/mujoco#393",
-)
-
-
-@case(
-    *HOLE,
-    wanted="a ball fits through a round hole that is 20 um wider (STEP)",
-    figure="deepest contact [m]",
-    truth=0.0,
-    bound=0.0,
-)
+@case
 def through_a_round_hole() -> float:
     return deepest_in_bore("step", 1e-5)
 
 
-@case(
-    *HOLE,
-    wanted="the same through the STL of that part",
-    figure="deepest contact [m]",
-    truth=0.0,
-    bound=0.0,
-)
+@case
 def through_a_round_hole_of_triangles() -> float:
     return deepest_in_bore("stl", 1e-5)
 
 
-@case(
-    *HOLE,
-    wanted="a ball that is 20 um wider than the hole is stopped by its wall (STL)",
-    figure="deepest contact [m]",
-    truth=1e-5,
-    bound=1e-9,
-)
+@case
 def too_wide_for_a_round_hole() -> float:
     return deepest_in_bore("stl", -1e-5)
 
 
-@case(
-    "gazebosim/gz-sim#2656",
-    "iory/scikit-robot#770",
-    "ros-visualization/rviz#517",
-    wanted="a mesh with scale 1 -1 1 is mirrored, and its normals still point outwards",
-    figure="depth of a sphere 1 mm in the mirrored tetrahedron [m]",
-    truth=1e-3,
-    bound=1e-9,
-)
+@case
 def mirrored_mesh() -> float:
     link = (
         '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
@@ -144,16 +96,7 @@ def mirrored_mesh() -> float:
     return float(shell.contacts([0.02, -0.04, -0.009], 0.01).depth.max())
 
 
-@case(
-    "FreeCAD/FreeCAD#18078",
-    "FreeCAD/FreeCAD#20546",
-    "CadQuery/cadquery#1375",
-    "CadQuery/cadquery#1829",
-    wanted="a cube of one inch is as large whatever the unit of its STEP file: mm, inch, m, ft, um",
-    figure="side that is farthest from it [m]",
-    truth=0.0254,
-    bound=1e-14,
-)
+@case
 def units_of_a_step_file() -> float:
     from tests.shell.cad_shapes import box, write_step
 
@@ -165,16 +108,7 @@ def units_of_a_step_file() -> float:
     return float(max(sides, key=lambda side: abs(side - 0.0254)))
 
 
-@case(
-    "ros-visualization/rviz#1244",
-    "ros-industrial/abb#104",
-    "ros-industrial/abb_experimental#5",
-    "ros-industrial/motoman#123",
-    wanted='a binary STL whose header begins with "solid" is read as binary',
-    figure="elements read",
-    truth=4,
-    bound=0,
-)
+@case
 def binary_stl_called_solid() -> float:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "part.stl"

@@ -12,6 +12,7 @@ import time
 from benchmarks.measured import FOLDER, Measured, write
 from sphshell_pin.study.report.contents import Finding
 from tests.validation.cases import NOT_FOUND, Case, Outcome, collect, explanations
+from tests.validation.pictures import draw
 
 PICTURES = FOLDER.parent / "pictures" / "validation"
 
@@ -58,13 +59,11 @@ def judged(finding: Finding) -> tuple[str, str]:
 
 def section(one: Case, found: Outcome) -> Measured:
     """Return the section of a case."""
-    for picture in found.pictures:
-        (PICTURES / f"{picture.name}.png").write_bytes(picture.png)
-    pictures = [(f"validation/{one.name}.png", one.caption) for one in found.pictures]
+    (PICTURES / f"{one.key}.png").write_bytes(draw(found.panels))
     texts = [f"**{heading}.** {text}" for heading, text in one.texts.items()]
     return Measured(
         one.title,
-        pictures=pictures,
+        pictures=[(f"validation/{one.key}.png", one.caption)],
         table=Measured.of(found.tables[0]).table if found.tables else (),
         notes=[*texts, *found.notes, *explanations(found)],
     )

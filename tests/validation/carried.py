@@ -17,7 +17,7 @@ from sphshell_pin.study.report.swing import GRAVITY
 from tests.rolling import Ball, turned
 from tests.validation.balls import plane
 from tests.validation.cases import Outcome, case, read
-from tests.validation.pictures import Panel, draw
+from tests.validation.pictures import Panel
 
 BOX, SIDES, FORCE = 10.0, np.array([20.0, 20.0, 1.0]), 150.0  # [kg], [m], [N]
 BALL, SLIDES, ROLLS = Ball(1.0, 0.5), 0.4, 0.8  # coefficients of box on ground, ball on box
@@ -103,5 +103,4 @@ def carried_balls() -> Outcome:
     motion = [("box, 60°", t, speeds[:, 0]), ("ball, 60°", t, speeds[:, 1])]
     exact = [("closed form", t, EXACT[0] * t), ("_ball", t, EXACT[1] * t)]
     panel = Panel("time [s]", "speed along the force [m/s]", (), motion, exact)
-    caption = "Speeds of box and balls."
-    return Outcome(findings, [draw("carried_balls", [panel], caption)], tables=[table])
+    return Outcome(findings, [panel], tables=[table])

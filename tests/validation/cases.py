@@ -2,9 +2,9 @@
 
 A module of MODULES holds the cases of one subject. A case is a function with the decorator `case`,
 and a table of cases.toml with its source; it runs the scenes and returns an Outcome: error figures
-with their bounds, and a picture. What it is compared with lies in tests/data/validation, a csv file
-for each source; the lines of such a file that begin with "#" say where the numbers come from and
-how they were read, and stand on the page.
+with their bounds, and the panels of a picture. What it is compared with lies in
+tests/data/validation, a csv file for each source; the lines of such a file that begin with "#" say
+where the numbers come from and how they were read, and stand on the page.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ import numpy as np
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.errors import NameNotFound
-from sphshell_pin.study.report.contents import Finding, Picture, Table
+from sphshell_pin.study.report.contents import Finding, Table
 from tests.register import Register
+from tests.validation.pictures import Panel
 
 MODULES = (
     "kharaz",
@@ -47,6 +48,8 @@ STATED: dict[str, Any] = tomllib.loads(
 )
 NOT_FOUND: list[str] = STATED.pop("not_found")
 """What could not be compared, as its numbers were not found: none is made up."""
+WHY: dict[str, str] = STATED.pop("explanations")
+"""The physics that the theory leaves out, of figures that are out of their bounds."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class Outcome:
     """
 
     findings: Sequence[Finding]
-    pictures: Sequence[Picture]
+    panels: Sequence[Panel]
     tables: Sequence[Table] = ()
     notes: Sequence[str] = ()
     explained: Mapping[str, str] = field(default_factory=dict)
@@ -81,6 +84,7 @@ class Case:
     title: str
     source: str
     setting: str
+    caption: str
     bound: str
     leaves_out: str
     run: Callable[[], Outcome]

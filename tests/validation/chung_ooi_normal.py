@@ -7,10 +7,10 @@ from sphshell_pin.study.report.contents import Finding
 from tests.validation.balls import Ball, Impact, head_on, on_plane
 from tests.validation.cases import Data, Outcome, case, read, within
 from tests.validation.oblique import RIGID, rms
-from tests.validation.pictures import Panel, draw
+from tests.validation.pictures import Panel
 
 
-def _outcome(name: str, data: Data, impact: Impact) -> Outcome:
+def _outcome(data: Data, impact: Impact) -> Outcome:
     """Compare force against depth and time, on the points of the two figures."""
     depth, time = data.where("series", "depth"), data.where("series", "time")
     peak = 1e3 * time["force"].max()
@@ -42,8 +42,7 @@ def _outcome(name: str, data: Data, impact: Impact) -> Outcome:
             [("ours", micro * impact.t, force)],
         ),
     ]
-    caption = "Force of the contact against the approach and against time."
-    return Outcome(findings, [draw(name, panels, caption)])
+    return Outcome(findings, panels)
 
 
 @case("chung_ooi_1")
@@ -51,16 +50,15 @@ def spheres() -> Outcome:
     """Run test 1."""
     law = sp.HertzLaw(4.8e10, 0.2)
     down, up = Ball(0.01, 2800.0, (0, 0, -10.0)), Ball(0.01, 2800.0, (0, 0, 10.0))
-    return _outcome("chung_ooi_1", read("chung_ooi_1"), head_on(down, up, law, rows=200))
+    return _outcome(read("chung_ooi_1"), head_on(down, up, law, rows=200))
 
 
 @case("chung_ooi_2")
 def plane() -> Outcome:
     """Run test 2."""
     law = sp.HertzLaw(7e10, 0.3, RIGID, 0.3)
-    return _outcome(
-        "chung_ooi_2", read("chung_ooi_2"), on_plane(Ball(0.1, 2699.0, (0, 0, -0.2)), law, rows=200)
-    )
+    ball = Ball(0.1, 2699.0, (0, 0, -0.2))
+    return _outcome(read("chung_ooi_2"), on_plane(ball, law, rows=200))
 
 
 STATED = (0.2, 0.4, 0.6, 0.8, 1.0)
@@ -85,4 +83,4 @@ def restitution() -> Outcome:
         findings += within(1e-6, (name.replace(" ", "_"), what, error))
         ours.append((f"ours, {name}", STATED, back))
     panel = Panel("restitution stated", "speed back over speed", [("stated", STATED, STATED)], ours)
-    return Outcome(findings, [draw("chung_ooi_3", [panel], "Speed back over speed, as stated.")])
+    return Outcome(findings, [panel])

@@ -7,10 +7,10 @@ import numpy as np
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import Finding
 from tests.validation.balls import Ball, head_on
-from tests.validation.cases import Data, Outcome, case, read, within
+from tests.validation.cases import WHY, Data, Outcome, case, read, within
 from tests.validation.kharaz import RINGS, THEORY
 from tests.validation.oblique import MOBILITY, Setting, rms
-from tests.validation.pictures import Panel, draw
+from tests.validation.pictures import Panel
 
 STEEL = Setting(1e-5, 7850.0, 2.08e11, 0.3, 0.3)
 POLYETHYLENE = Setting(1e-5, 1400.0, 1e9, 0.4, 0.3)
@@ -58,19 +58,11 @@ def sliding() -> Outcome:
             )
         )
     out = [f.key for f in findings if not f.met and not f.key.endswith("_fem")]
-    explained = dict.fromkeys(out, CONTRADICTED)
-    caption = "Points of finite elements (fem) and of the codes; our lines; with micro-slip."
-    return Outcome(findings, [draw("chung_ooi_5", panels, caption)], explained=explained)
+    explained = dict.fromkeys(out, WHY["contradicted"])
+    return Outcome(findings, panels, explained=explained)
 
 
 RECOIL = "the same after, of the patch"
-CONTRADICTED = (
-    "The benchmark's own curves contradict each other here, and its finite elements contradict "
-    "this one. Without damping the recoil depends only on the incident angle over mu and on "
-    "Poisson's ratio. At an incident of 4 its codes give -2.8; in test 4, for the oxide at 20 "
-    "degrees (4.0, Poisson's ratio 0.23 in place of 0.3), -1.4; the finite elements -1.7 and our "
-    "run -1.5."
-)
 
 
 def by_theory(one: Setting, incident: Array, quantity: str) -> Array:
@@ -93,16 +85,6 @@ def after_spinning(one: Setting, x: Array, quantity: str) -> Array:
         seen = one.impact(normal, 0.0, -patch / one.radius)
         out.append(-seen.patch / patch if quantity == "beta" else seen.patch / seen.normal)
     return np.array(out)
-
-
-DAMPED = (
-    "Damping along the plane: what was read of the benchmark does not state it, but its curves "
-    "have it. At a restitution of 0.5 it decides how far a patch swings back that sticks. "
-)
-HOW_MUCH = (
-    "Integrated by itself, Tsuji's dashpot along the plane, of the same ratio as along the normal, "
-    "brings the largest beta down from 0.47 to 0.17; the benchmark has 0.12."
-)
 
 
 def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
@@ -132,9 +114,8 @@ def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
             )
         )
     out = [f.key for f in findings if not f.met and f.key.endswith("_sticking")]
-    explained = dict.fromkeys(out, DAMPED + HOW_MUCH)
-    caption = "Points of Chung and Ooi, and our lines."
-    return Outcome(findings, [draw(key, panels, caption)], explained=explained)
+    explained = dict.fromkeys(out, WHY["damped"])
+    return Outcome(findings, panels, explained=explained)
 
 
 AXES = {
@@ -184,7 +165,7 @@ def opposite() -> Outcome:
                 [(f"ours, {name}", before, spins)],
             )
         )
-    return Outcome(findings, [draw("chung_ooi_7", panels, "The spin stays as it was.")])
+    return Outcome(findings, panels)
 
 
 @case("chung_ooi_8")

@@ -4,21 +4,12 @@ import numpy as np
 
 import sphshell_pin as sp
 from tests.validation.balls import plane
-from tests.validation.cases import Outcome, case, read, within
+from tests.validation.cases import WHY, Outcome, case, read, within
 from tests.validation.ellipses import Touch, press
-from tests.validation.pictures import Panel, draw
+from tests.validation.pictures import Panel
 
 RADIUS, MODULUS, POISSON, THICKNESS = 8e-3, 1e5, 0.49, 4e-3  # all cancel in what is compared
 BOUND = 0.05
-LAYER = (
-    "FoundationLaw takes the pad for a thin layer whose points give way alone, so that the force "
-    "grows as approach^2. A pad is thick against the contact: its tissue hangs together, as in "
-    "Hertz's half-space."
-)
-BONE = (
-    "Hertz's half-space has no bone. Under larger forces the contact is wide against the tissue "
-    "over the bone, and the pressure follows the local compression."
-)
 
 
 def exponent(touches: list[Touch]) -> float:
@@ -81,9 +72,8 @@ def finger_pad() -> Outcome:
             logarithmic=True,
         ),
     ]
-    caption = "Pressure over the contact, and displacement against force, of the two laws."
     return Outcome(
         findings,
-        [draw("finger_pad", panels, caption)],
-        explained={"FoundationLaw_exponent": LAYER, "HertzLaw_shape": BONE},
+        panels,
+        explained={"FoundationLaw_exponent": WHY["layer"], "HertzLaw_shape": WHY["bone"]},
     )

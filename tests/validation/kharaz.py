@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import Finding
-from tests.validation.cases import Data, Outcome, case, read, within
+from tests.validation.cases import WHY, Data, Outcome, case, read, within
 from tests.validation.oblique import MOBILITY, Rebound, Setting, of, rms, thrown
-from tests.validation.pictures import Panel, draw
+from tests.validation.pictures import Panel
 
 SPEED = 3.9
 RINGS = 8  # that slip for themselves, where micro-slip counts
@@ -26,13 +26,6 @@ NAMES = {
     "rebound_angle": "rebound angle of the center [deg]",
     "patch_angle": "rebound angle of the patch [deg]",
 }
-WHOLE = (
-    "Codes like MFIX multiply the whole displacement along the plane by the present stiffness: a "
-    "growing disc stiffens a spring that is stretched already. Integrated by itself, that rule "
-    "gives 0.95 at 5 degrees, where Chung and Ooi and MFIX have 0.95 and 0.94. In ours the new "
-    "rim of the disc carries none of the force, and no path gains energy. The measured points of "
-    "Kharaz are on the other side of our line."
-)
 INCIDENCE = "angle of incidence [deg]"
 THEORY = "with micro-slip (Maw and others)"
 
@@ -91,19 +84,13 @@ def measured() -> Outcome:
         ours = [(name, ANGLES, taken(line, quantity, ANGLES)) for name, line in lines.items()]
         dashed = [(THEORY, ANGLES, with_micro_slip(GLASS, quantity, ANGLES))]
         panels.append(Panel(INCIDENCE, NAMES[quantity], marks, ours, dashed))
-    own = (
-        "The measured spins, and the angles of the patch that follow from them, have an error of "
-        "their own: whatever the friction, angular momentum about the contact point gives "
-        "spin = 5/2 (v - v') / r, and what follows from the measured v' differs by "
-        f"{_own_error(data):.1%} (rms, over the largest spin). The theory, drawn dashed, is off by "
-    )
+    own = _own_error(data)
     explained = {
-        f.key: f"{own}{theory[f.key]:.2g}."
+        f.key: WHY["spins"].format(own=own, theory=theory[f.key])
         for f in findings
         if not f.met and f.key in ("spin", "patch_angle")
     }
-    caption = "Measured points, each as read by three codes; our lines; the theory with micro-slip."
-    return Outcome(findings, [draw("kharaz", panels, caption)], explained=explained)
+    return Outcome(findings, panels, explained=explained)
 
 
 def _own_error(data: Data) -> float:
@@ -160,17 +147,10 @@ def rigid() -> Outcome:
         theory = [(THEORY, ANGLES, with_micro_slip(OXIDE, quantity, ANGLES))]
         panels.append(Panel(INCIDENCE, NAMES[quantity], marks, ours, theory))
     findings += _speeds()
-    steep = f"It is the point at 5 degrees alone. {WHOLE}"
-    depth = (
-        "The depth is no longer nothing beside the radius: at 3.9 m/s it is 0.3 % of it, and the "
-        "lever of friction is the radius less the depth, where the theory takes the radius."
-    )
-    known = {"restitution_oxide": steep, "restitution_alloy": steep, "speed_at_3.9": depth}
+    steep = f"It is the point at 5 degrees alone. {WHY['whole_displacement']}"
+    known = {"restitution_oxide": steep, "restitution_alloy": steep, "speed_at_3.9": WHY["depth"]}
     explained = {f.key: known[f.key] for f in findings if not f.met and f.key in known}
-    caption = (
-        "Points computed by Chung and Ooi; our lines; the theory with micro-slip for the oxide."
-    )
-    return Outcome(findings, [draw("chung_ooi_4", panels, caption)], explained=explained)
+    return Outcome(findings, panels, explained=explained)
 
 
 def _speeds() -> list[Finding]:
@@ -202,7 +182,6 @@ def mfix() -> Outcome:
             findings += within(bound, one, unit=unit(quantity))
         theirs, line = [("MFIX", angle, there)], [("ours", angle, here)]
         panels.append(Panel(INCIDENCE, NAMES[quantity], theirs, line))
-    shallow = f"It is the points below 10 degrees. {WHOLE}"
+    shallow = f"It is the points below 10 degrees. {WHY['whole_displacement']}"
     explained = {f.key: shallow for f in findings if not f.met and "_from_10" not in f.key}
-    caption = "Points computed by MFIX, and our line."
-    return Outcome(findings, [draw("mfix_dem05", panels, caption)], explained=explained)
+    return Outcome(findings, panels, explained=explained)

@@ -14,7 +14,7 @@ from sphshell_pin.contact.normal_law import bisect
 from sphshell_pin.study.report.swing import GRAVITY
 from tests.rolling import Ball, state
 from tests.validation.cases import Outcome, case, within
-from tests.validation.pictures import Panel, draw
+from tests.validation.pictures import Panel
 
 BALL, BIG = Ball(0.1, 0.02), 0.2  # [kg], [m]; radius of the fixed one [m]
 START = 1e-3  # [rad] from the top, at rest
@@ -91,5 +91,4 @@ def ball_leaves_ball() -> Outcome:
         (),
         [("closed form; acos(2/3), acos(10/17)", fine, curve), *(("_end", fine, y) for y in ends)],
     )
-    caption = "Where the ball leaves."
-    return Outcome(findings, [draw("ball_leaves_ball", [panel], caption)])
+    return Outcome(findings, [panel])

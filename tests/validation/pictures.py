@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sphshell_pin.study.report import drawing
-from sphshell_pin.study.report.contents import Picture
 
 COLORS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.VIOLET, drawing.RED)
 MARKS = ("o", "s", "^", "D", "v")
@@ -31,8 +30,8 @@ class Panel:
     equal: bool = False
 
 
-def draw(name: str, panels: Sequence[Panel], caption: str) -> Picture:
-    """Draw the panels side by side."""
+def draw(panels: Sequence[Panel]) -> bytes:
+    """Return the panels side by side as a PNG file."""
     wide = 2 if len(panels) == 4 else len(panels)
     tall = len(panels) // wide
     with drawing.canvas(max(4.6, 3.9 * wide), 3.3 * tall) as figure:
@@ -58,5 +57,4 @@ def draw(name: str, panels: Sequence[Panel], caption: str) -> Picture:
             axis.set_ylabel(panel.y)
             axis.grid(visible=True)
             axis.legend(fontsize=drawing.SMALL - 0.5, edgecolor="none", framealpha=0.85)
-        png = drawing.png_of(figure)
-    return Picture(name, png, caption, caption)
+        return drawing.png_of(figure)

@@ -13,7 +13,7 @@ from sphshell_pin.study.report.swing import GRAVITY
 from tests.rolling import Ball, in_bowl, in_cylinder, on_turntable, velocities
 from tests.validation.balls import plane
 from tests.validation.cases import Outcome, case, read, within
-from tests.validation.pictures import Panel, Series, draw
+from tests.validation.pictures import Panel, Series
 
 WOOD = 1e10  # Young's modulus [Pa]
 RESISTANCE = 0.005
@@ -71,8 +71,7 @@ def turntable() -> Outcome:
         ("circle", "largest distance of a path from its circle, over the radius", max(misses)),
     )
     panel = Panel("x [mm]", "y [mm]", (), ours, theory, equal=True)
-    caption = "Paths of three balls on a turntable; the circles are those of the closed form."
-    return Outcome(findings, [draw("turntable", [panel], caption)])
+    return Outcome(findings, [panel])
 
 
 @case("golf_ball")
@@ -93,8 +92,7 @@ def golf_ball() -> Outcome:
     ]
     ours, form = ("ours", t, 1e3 * height), ("closed form", t, 1e3 * exact)
     panel = Panel("time [s]", "height over the rim [mm]", (), [ours], [form])
-    caption = "The height of the ball's center over three swings, in six turns."
-    return Outcome(findings, [draw("golf_ball", [panel], caption)])
+    return Outcome(findings, [panel])
 
 
 @case("curved_track")
@@ -159,5 +157,4 @@ def curved_track() -> Outcome:
         "The paper takes the force as constant, as it is 3 % less than the weight where the ball "
         f"turns. At the bottom, where the ball is fastest, it is {bottom:.3f} of the weight."
     ]
-    caption = "The swing, and the normal force on the way."
-    return Outcome(findings, [draw("curved_track", panels, caption)], notes=notes)
+    return Outcome(findings, panels, notes=notes)

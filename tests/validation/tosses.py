@@ -19,7 +19,7 @@ from sphshell_pin.study.report.swing import GRAVITY
 from tests.rolling import turned
 from tests.validation.balls import plane
 from tests.validation.cases import DATA, Outcome, case
-from tests.validation.pictures import Panel, draw
+from tests.validation.pictures import Panel
 
 MASS, INERTIA, WIDTH = 0.37, 0.00081, 0.1048  # [kg], [kg m^2], [m], as published with the data
 STIFFNESS = 10800.0  # [N/m], as published with the data; half or twice of it changes little
@@ -113,10 +113,9 @@ def cube_tosses() -> Outcome:
             [(f"{axis}, ours", t, ours[:, k]) for k, axis in enumerate("xyz")],
         ),
     ]  # fmt: skip
-    caption = "Errors of the 450 tosses, and one with the middle error of them."
     return Outcome(
         findings,
-        [draw("cube_tosses", panels, caption)],
+        panels,
         notes=[f"{doubt}."],
         explained={
             f.key: f"{doubt}: the bound is within it."

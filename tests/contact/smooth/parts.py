@@ -1,4 +1,4 @@
-"""Turned, extruded and convex parts as CAD exports them, with their exact distances.
+"""Turned and extruded parts as CAD exports them, with their exact distances.
 
 Few long triangles along every straight stretch, quads split along random diagonals; every third
 part is rotated, every third rounded to single precision, as an STL file has it.
@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.shell.raw import area_vectors
 from tests import meshes
 
-Ints = NDArray[np.int64]
+Ints = NDArray[np.int32]
+PLACES = 500
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,7 @@ class Part:
         if seed % 3 == 0:
             return self
         if seed % 3 == 1:
-            turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
-            turn *= np.sign(np.linalg.det(turn))
+            turn = meshes.random_rotation(seed)
             return Part(self.vertices @ turn.T, self.elements, self.places @ turn.T, self.distances)
         vertices = self.vertices.astype(np.float32).astype(float)
         return Part(vertices, self.elements, self.places, self.distances)
@@ -60,62 +61,36 @@ def distance_to_polyline(points: Array, corners: Array) -> Array:
     return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
 
 
-def split(quads: Ints, rng: np.random.Generator) -> Ints:
-    """Triangles of quads (m, 4), along random diagonals."""
-    turned = np.where(rng.random(len(quads))[:, None] < 0.5, quads, np.roll(quads, 1, axis=1))
-    return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
-
-
-def turned(profile: Array, sides: int, rng: np.random.Generator, places: int = 500) -> Part:
-    """The profile (k, 2) of radii and heights turned about z, with flat lids."""
-    angle = 2 * np.pi * np.arange(sides) / sides
-    rings = [
-        np.stack([r * np.cos(angle), r * np.sin(angle), np.full(sides, z)], 1) for r, z in profile
-    ]
-    low, high = sides * len(profile), sides * len(profile) + 1
-    here, there = np.arange(sides), np.roll(np.arange(sides), -1)
-    quads = [
-        np.stack(
-            [k * sides + here, k * sides + there, (k + 1) * sides + there, (k + 1) * sides + here],
-            1,
-        )
-        for k in range(len(profile) - 1)
-    ]
-    last = sides * (len(profile) - 1)
-    lids = [
-        np.stack([np.full(sides, low), there, here], 1),
-        np.stack([np.full(sides, high), last + here, last + there], 1),
-    ]
-    vertices = np.concatenate([*rings, [[0, 0, profile[0, 1]], [0, 0, profile[-1, 1]]]])
-    elements = np.concatenate([split(np.concatenate(quads), rng), *lids])
-    which = rng.integers(len(profile) - 1, size=places)
-    along = np.diff(profile, axis=0)[which]
-    aside = np.stack([along[:, 1], -along[:, 0]], 1) / np.linalg.norm(along, axis=1)[:, None]
-    flat = profile[which] + rng.uniform(0.02, 0.98, places)[:, None] * along
-    flat += rng.choice([0.5, 0.1, -0.25], places)[:, None] * aside
-    flat = flat[flat[:, 0] > 0.02]
-    turn = rng.uniform(0, 2 * np.pi, len(flat))
-    centers = np.stack([flat[:, 0] * np.cos(turn), flat[:, 0] * np.sin(turn), flat[:, 1]], 1)
-    closed = np.concatenate([[[0, profile[0, 1]]], profile, [[0, profile[-1, 1]]]])
-    return Part(vertices, elements, centers, distance_to_polyline(flat, closed))
-
-
-def extruded(
-    section: Array, height: float, rows: int, rng: np.random.Generator, places: int = 500
-) -> Part:
-    """A strip over the polyline `section` (k, 2), open above and below."""
-    count = len(section)
-    vertices = np.concatenate(
-        [np.c_[section, np.full(count, z)] for z in np.linspace(0, height, rows + 1)]
-    )
-    quads = meshes._cells(rows, count - 1)[:, ::-1]
-    which = rng.integers(count - 1, size=places)
+def swept(sweep, stations: Array, section: Array, rng: np.random.Generator, closed: bool) -> Part:
+    """The polyline `section` (k, 2) at each of the stations, the last joined to the first if
+    `closed`; `sweep` takes points (n, 2) to their places at stations (n,)."""
+    vertices = np.concatenate([sweep(section, np.full(len(section), s)) for s in stations])
+    quads = meshes._cells(len(stations) - (not closed), len(section) - 1)[:, ::-1] % len(vertices)
+    which = rng.integers(len(section) - 1, size=PLACES)
     along = np.diff(section, axis=0)[which]
     aside = np.stack([-along[:, 1], along[:, 0]], 1) / np.linalg.norm(along, axis=1)[:, None]
-    flat = section[which] + rng.uniform(0.02, 0.98, places)[:, None] * along
-    flat += rng.choice([0.3, 0.1, -0.3, -0.1], places)[:, None] * aside
-    centers = np.c_[flat, rng.uniform(0.05, 0.95, places) * height]
-    return Part(vertices, split(quads, rng), centers, distance_to_polyline(flat, section))
+    flat = section[which] + rng.uniform(0.02, 0.98, PLACES)[:, None] * along
+    flat += rng.choice([0.5, 0.25, 0.1, -0.1, -0.25], PLACES)[:, None] * aside
+    centers = sweep(flat, rng.uniform(0.05, 0.95, PLACES) * stations[-1])
+    elements = meshes._split(quads, rng.random(len(quads)) < 0.5)
+    return Part(vertices, elements, centers, distance_to_polyline(flat, section))
+
+
+def turned(profile: Array, sides: int, rng: np.random.Generator) -> Part:
+    """The profile (k, 2) of radii and heights turned about z, open below and above."""
+
+    def turn(flat: Array, angle: Array) -> Array:
+        radius, height = flat.T
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], 1)
+
+    return swept(turn, 2 * np.pi * np.arange(sides) / sides, profile, rng, closed=True)
+
+
+def extruded(section: Array, height: float, rows: int, rng: np.random.Generator) -> Part:
+    """A strip over the polyline `section` (k, 2), open above and below."""
+    return swept(
+        lambda flat, z: np.c_[flat, z], np.linspace(0, height, rows + 1), section, rng, False
+    )
 
 
 def polyline(lengths: Array, turns: Array, first: float = 0.0) -> Array:
@@ -187,11 +162,6 @@ def distance_to_fillet(points: Array, turn: float, wall: float) -> Array:
 
 def averaged_normals(vertices: Array, elements: Ints) -> Array:
     """Per vertex, weighted by area: what an exporter writes for "smooth shading"."""
-    spans = np.cross(
-        vertices[elements[:, 1]] - vertices[elements[:, 0]],
-        vertices[elements[:, 2]] - vertices[elements[:, 0]],
-    )
     out = np.zeros_like(vertices)
-    for k in range(3):
-        np.add.at(out, elements[:, k], spans)
+    np.add.at(out, elements, area_vectors(vertices[elements])[:, None])
     return out / np.linalg.norm(out, axis=1)[:, None]

@@ -91,15 +91,23 @@ def _cylinder(z: Array, angle: Array) -> tuple[Array, Array]:
     return point, normal
 
 
-def cylinder_mesh(h: float) -> tuple[Array, NDArray[np.int32], Array]:
-    rows, columns = round(1.15 * LENGTH / h), round(1.15 * 2 * np.pi * TUBE / h)
-    z, angle, triangles = jittered_grid(
-        (-LENGTH / 2, LENGTH / 2), (0.0, 2 * np.pi), rows, columns, rows
-    )
-    triangles = closed_round(angle, triangles, columns)
-    point, normal = _cylinder(z, angle)
-    point, normal, triangles = used(point, normal, triangles)
-    return point, triangles[:, ::-1].copy(), normal
+def round_mesh(surface, ends: tuple[float, float], length: float, step: int):
+    """Mesh of a surface that its second parameter closes; every `step`-th corner in turn."""
+
+    def mesh(h: float) -> tuple[Array, NDArray[np.int32], Array]:
+        rows, columns = round(1.15 * length / h), round(1.15 * 2 * np.pi * TUBE / h)
+        along, turn, triangles = jittered_grid(ends, (0.0, 2 * np.pi), rows, columns, rows)
+        triangles = closed_round(turn, triangles, columns)
+        # Without the vertices that no triangle uses.
+        kept, mapped = np.unique(triangles, return_inverse=True)
+        elements = mapped.reshape(-1, 3).astype(np.int32)[:, ::step]
+        point, normal = surface(along, turn)
+        return point[kept], elements.copy(), normal[kept]
+
+    return mesh
+
+
+cylinder_mesh = round_mesh(_cylinder, (-LENGTH / 2, LENGTH / 2), LENGTH, -1)
 
 
 def cylinder_points(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
@@ -119,15 +127,7 @@ def _torus(along: Array, round_: Array) -> tuple[Array, Array]:
     return RING * out - TUBE * normal, normal
 
 
-def torus_mesh(h: float) -> tuple[Array, NDArray[np.int32], Array]:
-    rows, columns = round(1.15 * 2 * SECTOR * RING / h), round(1.15 * 2 * np.pi * TUBE / h)
-    along, round_, triangles = jittered_grid(
-        (-SECTOR, SECTOR), (0.0, 2 * np.pi), rows, columns, rows
-    )
-    triangles = closed_round(round_, triangles, columns)
-    point, normal = _torus(along, round_)
-    point, normal, triangles = used(point, normal, triangles)
-    return point, triangles.copy(), normal
+torus_mesh = round_mesh(_torus, (-SECTOR, SECTOR), 2 * SECTOR * RING, 1)
 
 
 def torus_points(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
@@ -157,14 +157,6 @@ def wavy_mesh(h: float) -> tuple[Array, NDArray[np.int32], Array]:
 def wavy_points(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     clear = SHEET - 1.3
     return _wavy(rng.uniform(-clear, clear, count), rng.uniform(-clear, clear, count))
-
-
-def used(
-    point: Array, normal: Array, triangles: NDArray[np.int32]
-) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Leave out the vertices that no triangle uses."""
-    kept, mapped = np.unique(triangles, return_inverse=True)
-    return point[kept], normal[kept], mapped.reshape(-1, 3).astype(np.int32)
 
 
 def can(columns: int = 40, rows: int = 4):

@@ -77,22 +77,6 @@ def assert_continuous(shell, paths, depth: float, least: int = 1, limit: float =
     assert worst[0] <= limit, worst
 
 
-def work_error(shell, path):
-    """Work of the force along a path and change of the potential, which should cancel; as a share
-    of the largest potential. Gauss's rule, twelve nodes between borders of regions."""
-    places = [path[0]]
-    for start, end in pairwise(path):
-        places += [center for pair in borders(shell, start, end, 1e-9) for center in pair] + [end]
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    done = 0.0
-    for start, end in pairwise(places):
-        middle, half = (start + end) / 2, (end - start) / 2
-        forces = [force_sum(query(shell, middle + s * half)) for s in nodes]
-        done += weights @ forces @ half
-    energies = [energy(query(shell, place)) for place in path]
-    return abs(done + energies[-1] - energies[0]) / max(energies)
-
-
 def assert_as_defined(shell, places, depth: float) -> None:
     """Force and potential are those of the pieces of surface inside the sphere."""
     for center in places:

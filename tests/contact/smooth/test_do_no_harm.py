@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
+import trimesh
 
 from sphshell_pin import Shell
+from sphshell_pin.shell.raw import random_places
 from tests import meshes
-from tests.contact.helpers import directions, places_by_area
+from tests.contact.helpers import directions
 from tests.contact.smooth.parts import (
     Part,
     averaged_normals,
@@ -73,18 +74,6 @@ def test_chamfers_stay_flat(wall: float, rows: int) -> None:
         assert part.errors()[0] <= 1e-12
 
 
-def outward(points):
-    """Vertices and elements of the convex hull of points (n, 3), wound outward."""
-    hull = ConvexHull(points)
-    number = np.full(len(points), -1)
-    number[hull.vertices] = np.arange(len(hull.vertices))
-    vertices, elements = points[hull.vertices], number[hull.simplices]
-    a, b, c = (vertices[elements[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - vertices.mean(axis=0)) < 0
-    elements[inward] = elements[inward][:, ::-1]
-    return vertices, elements
-
-
 def solids():
     for size in ((0.1, 0.1, 0.4), (1, 1, 1), (0.01, 1, 1)):
         yield f"box {size}", np.array(np.meshgrid(*[(0, s) for s in size])).reshape(3, -1).T * 1.0
@@ -100,7 +89,8 @@ def solids():
 @pytest.mark.parametrize(("name", "points"), list(solids()), ids=[name for name, _ in solids()])
 def test_smooth_shaded_solids(name: str, points) -> None:
     """Normals that were averaged over the edges are set aside, and the report counts them."""
-    vertices, elements = outward(points)
+    hull = trimesh.convex.convex_hull(points)
+    vertices, elements = np.array(hull.vertices), np.array(hull.faces)
     shell = Shell(vertices, elements, normals=averaged_normals(vertices, elements))
     size = np.linalg.norm(np.ptp(vertices, axis=0))
     rng = np.random.default_rng(0)
@@ -119,7 +109,7 @@ def test_propeller(radii: tuple[float, float]) -> None:
     more inside the flat elements touches the curved ones."""
     shell = Shell.from_file(Path(__file__).parents[2] / "data" / "propeller.stl", unit="mm")
     rng, count = np.random.default_rng(0), 2000
-    which, on_flat = places_by_area(shell.vertices, shell.triangles, rng, count)
+    which, on_flat = random_places(shell.vertices[shell.triangles], count, rng)
     radius = np.exp(rng.uniform(*np.log(radii), count))
     outside = ((1 - rng.uniform(0.05, 0.2, count)) * radius)[:, None] * shell.triangle_normals[
         which

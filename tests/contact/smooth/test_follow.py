@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from sphshell_pin import Scene, Sphere
 from tests.contact.helpers import directions
 from tests.contact.smooth.surfaces import SURFACES, shell_of
 from tests.contact.smooth.test_sweeps_edges import edged
-from tests.models import ball, free_q, linear_law
+from tests.models import ball, free_q, linear_law, on_shell
 
 
 def rows(contacts, point, normal):
@@ -36,14 +35,7 @@ def paths(name: str):
 @pytest.mark.parametrize("name", ["bowl", "torus inside", "wavy above", "can", "cube", "sheet"])
 def test_scene_finds_what_the_shell_finds(name: str) -> None:
     shell = shell_of(name, 0.3) if name in SURFACES else edged(name)
-    scene = Scene(ball(gravity=0.0))
-    scene.add_contact(
-        sphere=Sphere(1.0, frame="ball"),
-        shell=shell,
-        frame="universe",
-        law=linear_law(1000.0),
-        method="smooth",
-    )
+    scene = on_shell(ball(gravity=0.0), shell, linear_law(1000.0), radius=1.0, method="smooth")
     found = 0
     for path in paths(name):
         for center in path:

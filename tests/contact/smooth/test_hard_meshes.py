@@ -6,7 +6,7 @@ import pytest
 from sphshell_pin import Shell
 from sphshell_pin.shell.curvature import curved_mesh
 from tests import meshes
-from tests.contact.helpers import directions, energy, force_sum, shell_of
+from tests.contact.helpers import energy, force_sum, shell_of
 from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, push
 from tests.contact.smooth.surfaces import SURFACES
 from tests.oracle.pieces import potential_and_force
@@ -86,23 +86,6 @@ def test_centre_on_a_curved_surface(side: str) -> None:
     vertices, elements = meshes.icosphere(3)
     shell = Shell(vertices, elements, normals=vertices, side=side, faces=False)
     assert_normal_at_the_surface(shell)
-
-
-@pytest.mark.parametrize("size", [1e-3, 1e3])
-def test_sphere_of_another_size_than_the_elements(size: float) -> None:
-    """Sphere 1e-3 and 1e3 times the elements, on a plate and outside a ball; one contact."""
-    rng = np.random.default_rng(0)
-    # Both have elements of about 0.05 m.
-    plate, radius = shell_of(meshes.random_plate(800, slivers=False)), 0.05 * size
-    for x, y in rng.uniform(-0.4, 0.4, (100, 2)):
-        assert push(plate, [x, y, radius * (1 - DEPTH)], radius) == pytest.approx(UP, abs=1e-9)
-    vertices, elements = meshes.icosphere(4)
-    ball = Shell(0.7 * vertices, elements, normals=vertices)
-    for out in directions(rng, 100):
-        foot = ball.contacts(0.8 * out, 0.2, method="smooth").point[0]
-        center = foot + (1 - DEPTH) * radius * out
-        assert len(find(ball, center, radius)) == 1
-        assert push(ball, center, radius) == pytest.approx(out, abs=2e-3)
 
 
 @pytest.mark.parametrize("exact", [True, False])

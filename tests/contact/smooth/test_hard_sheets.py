@@ -1,16 +1,13 @@
 """Hard cases: sheets, folds, tips and vertices."""
 
-import coal
 import numpy as np
 import pytest
 
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, given, push
-from tests.contact.smooth.test_true_edges import cone
 from tests.oracle.pieces import potential_and_force
 
 
@@ -118,17 +115,6 @@ def test_smooth_vertex_of_any_valence(valence: int, sign: float) -> None:
             assert push(shell, center) == pytest.approx(sign * normal, abs=0.02)
 
 
-@pytest.mark.parametrize("valence", [3, 100])
-def test_tip_of_any_valence(valence: int) -> None:
-    """Tip of 3 or 100 facets; over it a contact with the vertex, exact."""
-    shell, rng = Shell(*cone(valence, 1.0)), np.random.default_rng(0)
-    for lean in rng.uniform(-0.4, 0.4, (100, 3)) * [1.0, 1.0, 0.0]:
-        normal = (UP + lean) / np.linalg.norm(UP + lean)
-        found = find(shell, (1 - DEPTH) * normal)
-        assert found.feature.tolist() == [Feature.VERTEX]
-        assert push(shell, (1 - DEPTH) * normal) == pytest.approx(normal, abs=1e-9)
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_fold_of_exactly_the_crease_angle(sign: float) -> None:
     """Fold of two plates by exactly crease_angle; a crease, smooth 1e-12 above, the same force."""
@@ -141,26 +127,6 @@ def test_fold_of_exactly_the_crease_angle(sign: float) -> None:
         center = [x, y, abs(x) * np.tan(0.15) + sign * (1 - DEPTH)]
         forces = [push(shell, center) for shell in shells]
         assert np.ptp(forces, axis=0).max() <= 1e-9
-
-
-@pytest.mark.parametrize("closed", [True, False])
-def test_cone(closed: bool) -> None:
-    """Closed and open cone; exact over its tip, and over its rim to the polygon that this is."""
-    shell = Shell.from_geometry(coal.Cone(2.0, 4.0), segments=96)
-    if not closed:
-        base = np.abs(shell.vertices[shell.triangles][:, :, 2] + 2).max(axis=1) < 1e-9
-        shell = Shell(shell.vertices, shell.triangles[~base], normals=shell.normals[~base])
-    assert shell.is_closed is closed
-    rng = np.random.default_rng(0)
-    for turn in rng.uniform(0, 2 * np.pi, 60):
-        out = np.array([np.cos(turn), np.sin(turn), 0.0])
-        lean = rng.uniform(0, 0.35)
-        over = np.cos(lean) * UP + np.sin(lean) * out
-        assert push(shell, 2 * UP + (1 - DEPTH) * over) == pytest.approx(over, abs=1e-6)
-        lean = rng.uniform(-0.3, 0.0)
-        beyond = np.cos(lean) * out + np.sin(lean) * UP
-        center = 2 * out - 2 * UP + (1 - DEPTH) * beyond
-        assert push(shell, center) == pytest.approx(beyond, abs=0.02)
 
 
 def moebius(steps: int = 48) -> Shell:
@@ -184,7 +150,7 @@ def along_strip(turn: float) -> tuple[Array, Array]:
 
 
 def test_moebius_strip() -> None:
-    """Moebius strip, sphere r = 0.3 twice round it; reported, pushed away from it everywhere."""
+    """Moebius strip, sphere r = 0.3 twice round it; reported, pushed away as by one."""
     shell = moebius()
     assert shell.health.one_sided_components == 1
     for turn in np.linspace(0, 4 * np.pi, 2001):
@@ -192,12 +158,4 @@ def test_moebius_strip() -> None:
         found = find(shell, place + 0.25 * normal, 0.3)
         assert len(found)
         assert (found.normal @ normal).min() > 0.999
-
-
-def test_force_on_a_moebius_strip() -> None:
-    """Moebius strip; one contact everywhere, on the seam and straight over vertices as well."""
-    shell = moebius()
-    for turn in np.linspace(0, 4 * np.pi, 2001):
-        place, normal = along_strip(turn)
-        force = force_sum(find(shell, place + 0.25 * normal, 0.3)) / 0.05**1.5
-        assert force @ normal == pytest.approx(1.0, abs=0.01)
+        assert force_sum(found) @ normal / 0.05**1.5 == pytest.approx(1.0, abs=0.01)

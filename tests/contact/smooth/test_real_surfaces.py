@@ -20,7 +20,8 @@ from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
-from sphshell_pin.shell.faces import Face
+from sphshell_pin.shell.curvature import points_at
+from sphshell_pin.shell.raw import random_places
 from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import mean_edge
 from tests.contact.walks import narrowed
@@ -87,47 +88,19 @@ class Spheres:
         return time.thread_time() - start
 
 
-def onto(face: Face, points: Array) -> Array:
-    """The places (n, 3) of a round face nearest to points."""
-    away = points - face.point
-    if face.axis is None:
-        return face.point + face.radius * away / np.linalg.norm(away, axis=1, keepdims=True)
-    along = (away @ face.axis)[:, None]
-    off = np.linalg.norm(away - along * face.axis, axis=1, keepdims=True)
-    outward = (away - along * face.axis) / off
-    if face.minor_radius is not None:
-        ring = face.point + face.radius * outward
-        away = points - ring
-        return ring + face.minor_radius * away / np.linalg.norm(away, axis=1, keepdims=True)
-    cosine, sine = np.cos(face.half_angle or 0.0), np.sin(face.half_angle or 0.0)
-    beyond = (off - face.radius) * cosine - along * sine
-    return points - beyond * (cosine * outward - sine * face.axis)
-
-
 def places(shell: Shell, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     """Places (n, 3) on the faces and curved elements, with the normals of the flat ones; half of
     them as the area is, half as the elements are; a tenth at corners, a tenth on sides."""
-    core = shell.core_for("smooth")
-    corners = core.vertices[core.triangles]
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(spans, axis=1)
-    by_area = rng.choice(len(areas), count, p=areas / areas.sum())
-    chosen = np.where(rng.random(count) < 0.5, by_area, rng.integers(len(areas), size=count))
+    by_area, _ = random_places(shell.vertices[shell.triangles], count, rng)
+    any_one = rng.integers(len(shell.triangles), size=count)
+    chosen = np.where(rng.random(count) < 0.5, by_area, any_one)
     weights, kind = rng.dirichlet([1.0, 1.0, 1.0], count), rng.random(count)
     weights[kind < 0.1] = np.eye(3)[rng.integers(3, size=(kind < 0.1).sum())]
     weights[(kind > 0.1) & (kind < 0.2), rng.integers(3)] = 0.0
     weights /= weights.sum(axis=1, keepdims=True)
-    w, u, v = weights.T
-    # Bernstein's polynomials of the control points, as `core.control_point_offsets` has them.
-    sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
-    lifts = core.control_point_offsets[chosen]
-    point = np.einsum("nk,nkx->nx", weights, corners[chosen])
-    point += np.einsum("bn,nbx->nx", np.stack([*sides, 6 * u * v * w]), lifts)
-    for face in shell.faces:
-        if face.exact and face.kind != "plane":
-            on = np.isin(shell.triangle_element[chosen], face.elements)
-            point[on] = onto(face, point[on])
-    return point, shell.triangle_normals[chosen]
+    near = [points_at(shell, chosen[i : i + 1], weights[i : i + 1])[0, 0] for i in range(count)]
+    # On exact faces a curved element is not quite on the surface.
+    return shell.closest_points(near).points, shell.triangle_normals[chosen]
 
 
 @cache
