@@ -81,11 +81,11 @@ AT_HAND = ("arm", "ball", "three_link_finger")
 
 
 @pytest.mark.parametrize(("robot", "surface", "options"), mostly_studies(CASES, FEW.__contains__))
-def test_what_is_written_works(robot, surface, options, tmp_path):
+def test_what_is_written_works(robot, surface, options, draft, tmp_path):
     if robot not in AT_HAND:
         pytest.importorskip("example_robot_data")
     name = arm_urdf(tmp_path) if robot == "arm" else robot
-    made = new_scenario(name, surface, out=tmp_path / "made.toml", **options)
+    made = draft(name, surface, **options)
     built = build(made.path)  # what stands in the file, read again
     assert len(built.scenario.expect) >= 2
     run_well(built)
@@ -96,11 +96,11 @@ def test_what_is_written_works(robot, surface, options, tmp_path):
 
 
 @pytest.mark.parametrize("robot", ["ball", "arm"])
-def test_a_cad_file_works_without_a_unit(robot, tmp_path):
+def test_a_cad_file_works_without_a_unit(robot, draft, tmp_path):
     pytest.importorskip("OCP")
     step = surface_file("trimesh_featuretype.STEP")
     name = arm_urdf(tmp_path) if robot == "arm" else robot
-    built = new_scenario(name, step, radius=0.012, out=tmp_path / "a.toml").built
+    built = draft(name, step, radius=0.012).built
     run_well(built)
     # The part measures 5 inches; its file says so.
     sizes = np.ptp(built.shells["trimesh_featuretype"].box, axis=0)
@@ -108,10 +108,8 @@ def test_a_cad_file_works_without_a_unit(robot, tmp_path):
 
 
 @pytest.mark.parametrize("place", ["below", "above", "+x", "-x", "+y", "-y"])
-def test_the_surface_stands_where_it_was_asked_for(place, tmp_path):
-    built = new_scenario(
-        arm_urdf(tmp_path), "plane", radius=0.01, place=place, out=tmp_path / "a.toml"
-    ).built
+def test_the_surface_stands_where_it_was_asked_for(place, draft, tmp_path):
+    built = draft(arm_urdf(tmp_path), "plane", radius=0.01, place=place).built
     (pair,) = built.scene.pairs
     tip = pose_of(built.scene.model, built.q0, "link_5").translation
     k = {"below": 2, "above": 2}.get(place, "xyz".find(place[-1]))
@@ -122,9 +120,9 @@ def test_the_surface_stands_where_it_was_asked_for(place, tmp_path):
     np.testing.assert_allclose(away, expected, atol=2e-6)
 
 
-def test_a_single_body_of_ones_own_floats(tmp_path):
+def test_a_single_body_of_ones_own_floats(draft, tmp_path):
     shutil.copy(robots.URDF_FOLDER / "ball.urdf", tmp_path / "mine.urdf")
-    made = new_scenario(tmp_path / "mine.urdf", "plane", out=tmp_path / "a.toml")
+    made = draft(tmp_path / "mine.urdf", "plane")
     assert made.built.scenario.robot[0].base == "floating"
     assert any("the base is floating" in one for one in made.why)
     assert made.built.scene.model.nv == 6
@@ -146,10 +144,8 @@ def test_files_are_named_relative_to_the_scenario(tmp_path):
     assert build(tmp_path / "new" / "a.toml").shells["my blade"].num_elements == 522
 
 
-def test_materials_give_hertzs_law(tmp_path):
-    made = new_scenario(
-        "ball", "plane", material="aluminium", against="rubber", out=tmp_path / "a.toml"
-    )
+def test_materials_give_hertzs_law(draft, tmp_path):
+    made = draft("ball", "plane", material="aluminium", against="rubber")
     (pair,) = made.built.scene.pairs
     softness = (1 - 0.33**2) / 7.0e10 + (1 - 0.49**2) / 1.0e7
     assert pair.law.stiffness == pytest.approx(4 / 3 * np.sqrt(0.012) / softness, rel=1e-12)
@@ -159,8 +155,8 @@ def test_materials_give_hertzs_law(tmp_path):
     assert turned.built.scene.pairs[0].friction == pair.friction
 
 
-def test_the_ball_comes_back_as_high_as_its_material_says(tmp_path):
-    built = new_scenario("ball", "plane", material="wood", out=tmp_path / "a.toml").built
+def test_the_ball_comes_back_as_high_as_its_material_says(draft):
+    built = draft("ball", "plane", material="wood").built
     result, _ = simulate(built)
     touched = float(result.contact_columns()["t [s]"][0])
     after = result.t > touched + 0.01
@@ -213,10 +209,10 @@ def test_the_ball_comes_back_as_high_as_its_material_says(tmp_path):
     ],
 )
 def test_what_cannot_be_found_out_is_asked_for_in_one_sentence(
-    arguments, options, error, match, tmp_path
+    arguments, options, error, match, draft, tmp_path
 ):
     with pytest.raises(error, match=match) as caught:
-        new_scenario(*arguments, out=tmp_path / "a.toml", **options)
+        draft(*arguments, **options)
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
 
