@@ -5,8 +5,8 @@ from pathlib import Path
 
 def inertial(mass: float = 1.0, moment: float = 1.0) -> str:
     return (
-        f'<inertial><mass value="{mass:g}"/><inertia ixx="{moment}" iyy="{moment}" izz="{moment}" '
-        'ixy="0" ixz="0" iyz="0"/></inertial>'
+        f'<inertial><mass value="{mass:g}"/><inertia ixx="{moment:g}" iyy="{moment:g}" '
+        f'izz="{moment:g}" ixy="0" ixz="0" iyz="0"/></inertial>'
     )
 
 

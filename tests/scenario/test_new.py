@@ -1,5 +1,6 @@
 """A new scenario works as it is written: it touches, presses as promised, and keeps its energy."""
 
+import re
 import shutil
 import tomllib
 from pathlib import Path
@@ -19,6 +20,7 @@ from sphshell_pin.errors import (
 from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
+from tests import urdf
 from tests.command import call, succeed
 from tests.scenario.files import pose_of, run_well
 from tests.shell.surfaces import surface_file
@@ -28,39 +30,21 @@ SURFACES = next(iter(shipped_scenarios().values())).parent / "surfaces"
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE, BOWL = SURFACES / "bladex_upper.stl", SURFACES / "bowl.shl"
 
-LINK = """
-  <link name="{name}">
-    <inertial>
-      <origin xyz="0 0 {half}"/><mass value="{mass}"/>
-      <inertia ixx="{i}" iyy="{i}" izz="{j}" ixy="0" ixz="0" iyz="0"/>
-    </inertial>
-  </link>"""
-JOINT = """
-  <joint name="joint_{k}" type="revolute">
-    <parent link="{parent}"/><child link="{child}"/><origin xyz="0 0 {up}"/><axis xyz="{axis}"/>
-    <limit lower="{low}" upper="2.8" effort="60" velocity="3"/>
-  </joint>"""
+AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 
 
-def arm_urdf(folder: Path, axes: str = "zyyzyz", low: float = -2.8) -> Path:
+def arm_urdf(folder: Path, axes: str = "zyyzyz") -> Path:
     """Write an arm of links of 0.2 m that stands straight up at zero; return its URDF file."""
-    parts = ['<robot name="arm"><link name="base"/>']
+    parts = [urdf.link("base")]
     for k, axis in enumerate(axes):
-        mass = 2.0 / (k + 1)
-        parts.append(LINK.format(name=f"link_{k}", half=0.1, mass=mass, i=mass / 250, j=mass / 900))
-        parts.append(
-            JOINT.format(
-                k=k,
-                parent=f"link_{k - 1}" if k else "base",
-                child=f"link_{k}",
-                up=0.2 if k else 0.0,
-                axis={"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}[axis],
-                low=low,
-            )
-        )
-    path = folder / "arm.urdf"
-    path.write_text("".join(parts) + "</robot>", encoding="utf-8")
-    return path
+        mass, ends = 2.0 / (k + 1), (f"link_{k - 1}" if k else "base", f"link_{k}")
+        inertial = urdf.inertial(mass, mass / 250).replace("<mass", '<origin xyz="0 0 0.1"/><mass')
+        inertial = re.sub('izz="[^"]*', f'izz="{mass / 900}', inertial)
+        at = "0 0 0.2" if k else "0 0 0"
+        joint = urdf.joint(f"joint_{k}", "revolute", *ends, at=at, axis=AXES[axis])
+        limit = 'lower="-2.8" upper="2.8" effort="60" velocity="3"'
+        parts += [urdf.link(ends[1], inertial), re.sub("lower=.*(?=/></joint>)", limit, joint)]
+    return urdf.write(folder / "arm.urdf", *parts)
 
 
 CASES = [

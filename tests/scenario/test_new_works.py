@@ -23,7 +23,7 @@ from sphshell_pin.scenario.drafting.plan import Plan, Press
 from sphshell_pin.scenario.drafting.pose_search import repaired
 from sphshell_pin.scenario.drafting.trial import Fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
-from tests import models
+from tests import models, urdf
 from tests.scenario.files import center_of, run_well
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
@@ -121,10 +121,8 @@ def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(draft)
 
 def test_a_body_without_joints_is_not_advised_to_be_held(draft, tmp_path):
     """Nothing moves then: the fall that failed is what is told."""
-    body = '<link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0"'
-    body += ' ixz="0" iyz="0"/></inertial><collision><geometry><box size="2 2 0.1"/></geometry>'
-    file = tmp_path / "body.urdf"
-    file.write_text(f'<robot name="body">{body}</collision></link></robot>')
+    plate = urdf.shape("collision", '<box size="2 2 0.1"/>')
+    file = urdf.write(tmp_path / "body.urdf", urdf.link("b", urdf.inertial(), plate))
     with pytest.raises(SphshellError, match=r"'b' is in the part .* can come down$"):
         draft(file, "bowl", radius=0.05)
 
