@@ -44,8 +44,8 @@ class BallPlayer:
         self.reset()
 
     def _make_scene(self):
-        pair = contact_pair(self.model, "ball", self.knob_values["radius"], self.plate, name="ball")
-        pair.friction = self.friction
+        ball = self.model, "ball", self.knob_values["radius"], self.plate
+        pair = contact_pair(*ball, name="ball", friction=self.friction)
         self.scene = SimpleNamespace(model=self.model, pairs=(pair,))
 
     @property
