@@ -7,6 +7,7 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.dynamics.result.run_stats import RunStats
+from tests import models
 
 
 def plate(size=1.0, name="plate"):
@@ -26,15 +27,8 @@ def contact_pair(
 
 def ball_model():
     """A ball that translates and turns freely, frame "ball", beside a turntable, frame "table"."""
-    model = pin.Model()
-    inertia = pin.Inertia.FromSphere(1.0, 0.05)
-    moves = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball_moves")
-    turns = model.addJoint(moves, pin.JointModelSpherical(), pin.SE3.Identity(), "ball_turns")
-    model.appendBodyToJoint(turns, inertia, pin.SE3.Identity())
-    table = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "table_turns")
-    model.appendBodyToJoint(table, inertia, pin.SE3.Identity())
-    for name, joint in (("ball", turns), ("table", table)):
-        model.addFrame(pin.Frame(name, joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+    model = models.ball()
+    models.add_body(model, "table", pin.JointModelRZ())
     return model
 
 
