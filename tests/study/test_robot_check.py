@@ -22,6 +22,7 @@ from sphshell_pin.testing.finding import Finding
 from tests import urdf
 from tests.command import call, refused
 from tests.studies import mostly_studies
+from tests.texts import text_of
 
 ROOT = Path(__file__).parents[2]
 TINY = Sizes(1, 1, 4)
@@ -215,31 +216,20 @@ REPORTS = [
 ]
 
 
-MESHED = """<robot name="meshed"><link name="base"/>
-<link name="rod">{mass}<collision><origin xyz="0 0 0.2"/>
-    <geometry><box size="0.05 0.05 0.4"/></geometry></collision></link>
-<joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/>
-    <axis xyz="0 1 0"/></joint></robot>"""
 URDF_MASS = """<inertial><mass value="1"/><origin xyz="0 0 0.2"/>
     <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>"""
-MESHED_MJCF = """<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0"/>{mass}
-    <geom type="box" size="0.025 0.025 0.2" pos="0 0 0.2"/>
-    <geom type="box" size="1 1 1" contype="0" conaffinity="0" group="2"/>
-    </body></worldbody></mujoco>"""
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "mass"),
+    ("name", "mass"),
     [
-        ("meshed.urdf", MESHED, URDF_MASS),
-        ("meshed.xml", MESHED_MJCF, '<inertial pos="0 0 0.2" mass="1" diaginertia="1 1 1"/>'),
+        ("meshed.urdf", URDF_MASS),
+        ("meshed.xml", '<inertial pos="0 0 0.2" mass="1" diaginertia="1 1 1"/>'),
     ],
 )
-def test_a_sphere_inside_the_last_mesh_is_used(
-    name: str, text: str, mass: str, tmp_path: Path
-) -> None:
+def test_a_sphere_inside_the_last_mesh_is_used(name: str, mass: str, tmp_path: Path) -> None:
     file = tmp_path / name
-    file.write_text(text.format(mass=mass))
+    file.write_text(text_of(f"robots/{name}").replace("<!-- MASS -->", mass))
     report = check_robot(file, sizes=TINY)
     assert report.verdict == PASS, report
     assert any("the outermost of 8 inside the collision mesh of 'rod'" in n for n in report.notes)
