@@ -124,7 +124,7 @@ def test_a_mesh_of_a_package_that_is_nowhere_is_found_beside_the_robot(
     assert len(robots.load_file(file).collision_model.geometryObjects) == 1
 
 
-@pytest.mark.parametrize("other", ["urdf/one.obj", "../arm_resources/one.obj"])
+@pytest.mark.parametrize("other", ["urdf/one.obj", "one.obj"])
 def test_a_mesh_of_another_folder_is_not_taken_for_a_missing_one(
     tmp_path: Path, other: str
 ) -> None:
