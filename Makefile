@@ -117,7 +117,6 @@ parts: $(VENV)/.test ## what STL files of 300 generated parts cost against their
 
 fuzz: $(VENV)/.test ## damaged files, folders of robots and results for every reader, until one breaks it (SECONDS=600 SEED=1)
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
-	$(BIN)/python -m tests.fuzz.cad --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 
 sanitize: $(VENV)/.test ## run tests with checks of memory, undefined behavior and data races
 	.ci/sanitize address

@@ -11,6 +11,13 @@ def call(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(one) for one in arguments])
 
 
+def succeed(*arguments: object) -> Result:
+    """Return what a command prints that ends with exit code 0."""
+    told = call(*arguments)
+    assert told.exit_code == 0, told.output
+    return told
+
+
 def refused(*arguments: object) -> str:
     """Return the one sentence on stderr of a command that fails with exit code 2."""
     told = call(*arguments)

@@ -92,12 +92,13 @@ def icosphere(subdivisions: int = 1, radius: float = 1.0) -> Mesh:
     return np.array(ball.vertices), np.array(ball.faces, dtype=np.int32)
 
 
-def revolved(profile: ArrayLike, columns: int) -> Mesh:
+def revolved(profile: ArrayLike, columns: int | NDArray[np.float64]) -> Mesh:
     """Surface of revolution round z through rows (k, 2) of radii and heights, rows of two triangles
-    a column; a radius of zero is one vertex. Wound outward where the heights rise."""
+    a column, of which the number or the angles are given; a radius of zero is one vertex. Wound
+    outward where the heights rise."""
     radius, height = np.transpose(profile)
-    turn = 2 * np.pi * np.arange(columns) / columns
-    ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    turn = 2 * np.pi * np.arange(columns) / columns if np.ndim(columns) == 0 else columns
+    ring, columns = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1), len(turn)
     size = np.where(radius > 0, columns, 1)
     points = [(r * ring + [0, 0, z])[:n] for r, z, n in zip(radius, height, size, strict=True)]
     number = (np.cumsum(size) - size)[:, None] + np.arange(columns) % size[:, None]

@@ -14,6 +14,7 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -148,10 +149,6 @@ def wrong_start(built: Built) -> str:
     return "the tip starts inside the part" if outside < 0 and shell.side != "inside" else ""
 
 
-def _asked(question: tuple[str, Path, str]) -> Case:
-    return ask(*question)
-
-
 def failure(built: Built) -> str:
     """Run a scenario as `run` does; say what it misses, "" if nothing."""
     result, stopped = simulate(built)
@@ -216,9 +213,9 @@ def main() -> int:
         files = [one for some in asked.folders for one in find_parts(some, asked.files)]
         parts = [read_once(one, Path(folder)) for one in files]
         questions = [(r, p, place) for r in asked.robots for p in parts for place in asked.places]
-        with multiprocessing.get_context("spawn").Pool(asked.processes) as pool:
-            cases = []
-            for case in pool.imap(_asked, questions):
+        context, cases = multiprocessing.get_context("spawn"), []
+        with ProcessPoolExecutor(asked.processes, context) as pool:
+            for case in pool.map(ask, *zip(*questions, strict=True)):
                 cases.append(case)
                 said = f"refused: {case.refused}" if case.refused else case.failed or case.word
                 where = f"{case.robot}  {case.part}  {case.place}  {case.seconds:.1f} s"
@@ -245,18 +242,13 @@ def sections(cases: Sequence[Case]) -> list[Measured]:
         f"in {floor} the part is on the floor. Seconds for an answer: median "
         f"{np.median(times):.1f}, most {max(times):.1f}."
     )
+    words: dict[tuple[str, str], Counter[str]] = {}
+    for case in cases:
+        words.setdefault((case.robot, case.part), Counter())[case.word] += 1
     rows = [["robot", *parts]]
     for robot in robots:
-        words = [
-            Counter(case.word for case in cases if (case.robot, case.part) == (robot, part))
-            for part in parts
-        ]
-        rows.append(
-            [
-                robot,
-                *(", ".join(f"{w} {n}" if n > 1 else w for w, n in one.items()) for one in words),
-            ]
-        )
+        found = [words.get((robot, part), Counter()).items() for part in parts]
+        rows.append([robot, *(", ".join(f"{w} {n}" if n > 1 else w for w, n in f) for f in found)])
     reasons = Counter(reason(case.refused) for case in cases if case.refused)
     counts = [[text, str(count)] for text, count in reasons.most_common()]
     return [

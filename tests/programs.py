@@ -1,7 +1,10 @@
-"""Programs in Python processes of their own."""
+"""Programs in Python processes of their own, and modules of files that are in no package."""
 
+import importlib.util
 import subprocess
 import sys
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 
@@ -13,3 +16,13 @@ def python(
     return subprocess.run(
         command, capture_output=True, text=True, check=check, timeout=timeout, **more
     )
+
+
+def module_of(file: Path) -> ModuleType:
+    """Return the module of a file."""
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

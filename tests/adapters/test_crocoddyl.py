@@ -6,7 +6,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
-from tests.models import ball, pose_of
+from tests import meshes, models
+from tests.models import pose_of
 
 crocoddyl = pytest.importorskip("crocoddyl")
 
@@ -22,50 +23,29 @@ LAW = sp.ImpactLaw(2e6, 1.5, damping=10.0, full_damping_depth=1e-4)
 SLIDING = sp.CoulombFriction(0.4, 0.3, 0.01, 0.1)
 
 
-def plate(bend: float = 0.0) -> sp.Shell:
-    """Return a plate of 0.4 m; `bend` lifts its corners."""
-    at = np.linspace(-0.2, 0.2, 5)
-    points = [[x, y, bend * (x * x + y * y)] for y in at for x in at]
-    quads = [
-        [5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5] for j in range(4) for i in range(4)
-    ]
-    return sp.Shell(points, quads)
+BENT = meshes.dome(4, 0.4, 1.0)
 
 
 def arm_on_moving_plate(joints: sp.JointComponents | None = None) -> tuple[sp.Scene, np.ndarray]:
-    """Return an arm whose tip touches a plate that slides and turns, and a state."""
-    model = pin.Model()
-    parent = 0
-    for k, axis in enumerate((pin.JointModelRZ(), pin.JointModelRY(), pin.JointModelRY())):
-        at = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3 if k else 0.4]))
-        parent = model.addJoint(parent, axis, at, f"arm{k}")
-        model.appendBodyToJoint(parent, pin.Inertia.FromCylinder(1.0, 0.03, 0.3), at)
-    tip = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3]))
-    model.addFrame(pin.Frame("tip", parent, tip, pin.FrameType.OP_FRAME))
-    slide = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
-    turn = model.addJoint(slide, pin.JointModelRY(), pin.SE3.Identity(), "turn")
-    model.appendBodyToJoint(turn, pin.Inertia.FromBox(2.0, 0.4, 0.4, 0.02), pin.SE3.Identity())
-    model.addFrame(pin.Frame("plate", turn, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    """Return an arm whose tip touches a bent plate that slides and turns, and a state."""
+    model = models.arm()
+    slide = models.add_body(model, "slide", pin.JointModelPX())
+    box = pin.Inertia.FromBox(2.0, 0.4, 0.4, 0.02)
+    models.add_body(model, "plate", pin.JointModelRY(), slide, inertia=box)
     q = np.array([0.2, 0.9, 1.2, 0.1, 0.05])
-    tip_in_plate = pose_of(model, q, "plate").actInv(pose_of(model, q, "tip").translation)
+    tip = pose_of(model, q, "plate").actInv(pose_of(model, q, "ball").translation)
     tilt = pin.rpy.rpyToMatrix(0.1, -0.2, 0.3)
-    scene = sp.Scene(model, joints=joints)
-    scene.add_contact(
-        sp.Sphere(0.02, "tip"),
-        plate(0.5),
-        "plate",
-        pin.SE3(tilt, tip_in_plate - tilt @ [0.02, 0.01, 0.0213]),
-        law=LAW,
-        friction=SLIDING,
-        name="touch",
-    )
+    scene, place = sp.Scene(model, joints=joints), pin.SE3(tilt, tip - tilt @ [0.02, 0.01, 0.0193])
+    more = {"law": LAW, "friction": SLIDING, "name": "touch"}
+    scene.add_contact(sp.Sphere(0.02, "ball"), sp.Shell(*BENT), "plate", place, **more)
     return pressed(scene, q, [0.1, -0.2, 0.15, 0.05, 0.1])
 
 
 def free_ball() -> tuple[sp.Scene, np.ndarray]:
     """Return a ball that rolls and slides on a plate, and a state: a free-flyer."""
-    scene = sp.Scene(ball(mass=0.3, radius=0.02))
-    scene.add_contact(sp.Sphere(0.02, "ball"), plate(), law=LAW, friction=SLIDING, name="touch")
+    scene = sp.Scene(models.ball(mass=0.3, radius=0.02))
+    more = {"law": LAW, "friction": SLIDING, "name": "touch"}
+    scene.add_contact(sp.Sphere(0.02, "ball"), models.plate(), **more)
     quaternion = pin.Quaternion(pin.rpy.rpyToMatrix(0.3, -0.5, 0.9)).coeffs()
     q = np.concatenate(([0.03, 0.04, 0.02 - 2e-4], quaternion))
     return pressed(scene, q, [0.2, -0.1, 0.05, 1.0, -2.0, 0.5])
@@ -73,15 +53,12 @@ def free_ball() -> tuple[sp.Scene, np.ndarray]:
 
 def ball_in_a_corner(joints: sp.JointComponents | None = None) -> tuple[sp.Scene, np.ndarray]:
     """Return a ball on slides that presses into two walls, and a state."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "slides")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.3, 0.02), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model, joints=joints)
+    slides = pin.JointModelTranslation()
+    scene = sp.Scene(models.ball(mass=0.3, radius=0.02, joint=slides), joints=joints)
     upright = pin.SE3(pin.rpy.rpyToMatrix(0.0, np.pi / 2, 0.0), np.zeros(3))
-    ball = sp.Sphere(0.02, "ball")
-    scene.add_contact(ball, plate(), placement=upright, law=LAW, friction=SLIDING, name="wall")
-    scene.add_contact(ball, plate(), law=LAW, friction=SLIDING, name="touch")
+    for name, placement in (("wall", upright), ("touch", None)):
+        more = {"law": LAW, "friction": SLIDING, "name": name}
+        scene.add_contact(sp.Sphere(0.02, "ball"), models.plate(), placement=placement, **more)
     return scene, np.array([0.02 - 3e-4, 0.03, 0.02 - 2e-4, 0.05, 0.1, -0.05])
 
 
@@ -93,9 +70,9 @@ def pressed(scene: sp.Scene, q: np.ndarray, v: list[float]) -> tuple[sp.Scene, n
     return scene, np.concatenate((q, v))
 
 
-def dynamics(scene: sp.Scene, actuation: str = "Full", frame: str = "tip") -> ContactDynamics:
+def dynamics(scene: sp.Scene, actuation: str = "Full") -> ContactDynamics:
     """Return a model with every residual of the adapter."""
-    return ContactDynamics(scene, *parts(scene, actuation, frame))
+    return ContactDynamics(scene, *parts(scene, actuation))
 
 
 def bare(scene: sp.Scene, actuation: str = "Full"):
@@ -105,7 +82,7 @@ def bare(scene: sp.Scene, actuation: str = "Full"):
     return state, actuated, crocoddyl.CostModelSum(state, actuated.nu)
 
 
-def parts(scene: sp.Scene, actuation: str = "Full", frame: str = "tip"):
+def parts(scene: sp.Scene, actuation: str = "Full"):
     """Return state, actuation, and costs with every residual of the adapter."""
     state, actuated, costs = bare(scene, actuation)
     nu = actuated.nu
@@ -113,8 +90,8 @@ def parts(scene: sp.Scene, actuation: str = "Full", frame: str = "tip"):
     residuals = {
         "normal": ContactForceResidual(scene, state, "touch", 3.0, nu),
         "world": ContactForceResidual(scene, state, "touch", [1.0, 0.5, 2.0], nu),
-        "place": FrameResidual(scene, state, frame, [0.3, 0.0, 0.1], nu),
-        "placement": FrameResidual(scene, state, frame, placement, nu),
+        "place": FrameResidual(scene, state, "ball", [0.3, 0.0, 0.1], nu),
+        "placement": FrameResidual(scene, state, "ball", placement, nu),
         "state": crocoddyl.ResidualModelState(state, nu),
     }
     if nu:
@@ -125,10 +102,10 @@ def parts(scene: sp.Scene, actuation: str = "Full", frame: str = "tip"):
 
 
 CASES = {
-    "arm": (arm_on_moving_plate, "Full", "tip"),
-    "corner": (ball_in_a_corner, "Full", "ball"),
-    "ball": (free_ball, "Full", "ball"),
-    "ball-without-motors": (free_ball, "FloatingBase", "ball"),
+    "arm": (arm_on_moving_plate, "Full"),
+    "corner": (ball_in_a_corner, "Full"),
+    "ball": (free_ball, "Full"),
+    "ball-without-motors": (free_ball, "FloatingBase"),
 }
 
 
@@ -153,13 +130,13 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_are_those_of_differences(case, kind):
-    make, actuation, frame = CASES[case]
+    make, actuation = CASES[case]
     scene, x = make()
     if KINDS[kind] is None:
-        model = dynamics(scene, actuation, frame)
+        model = dynamics(scene, actuation)
     else:
         simulation = sp.Simulation(scene, KINDS[kind])
-        model = ContactStep(simulation, *parts(scene, actuation, frame))
+        model = ContactStep(simulation, *parts(scene, actuation))
     u = np.linspace(-1.0, 2.0, model.nu)
     data, other = model.createData(), model.createData()
     model.calc(data, x, u)
@@ -194,12 +171,12 @@ def test_derivatives_are_those_of_differences(case, kind):
     close(data.Lx, differences(lambda x: at(lambda d: [d.cost], x), model.state, x)[0])
 
 
-@pytest.mark.parametrize("joints", [None, sp.JointComponents(damping={"slides": 7.0})])
+@pytest.mark.parametrize("joints", [None, sp.JointComponents(damping={"ball_joint": 7.0})])
 def test_forces_of_several_pairs_and_of_joints(joints):
     """Each pair has its own force; the acceleration is ABA's with the scene's forces."""
     scene, x = ball_in_a_corner(joints)
     q, v = x[:3], x[3:]
-    state, actuation, costs = parts(scene, "Full", "ball")
+    state, actuation, costs = parts(scene)
     force = ContactForceResidual(scene, state, "wall", [0.0, 0.0, 0.0])
     costs.addCost("wall", crocoddyl.CostModelResidual(state, force), 1.0)
     model = ContactDynamics(scene, state, actuation, costs)
@@ -226,7 +203,7 @@ def test_forces_of_several_pairs_and_of_joints(joints):
 
 
 def test_dry_friction_of_joints_is_refused_as_bristles_are():
-    dry = sp.JointComponents(friction={"slide": sp.JointFriction(1.0)})
+    dry = sp.JointComponents(friction={"slide_joint": sp.JointFriction(1.0)})
     scene, _ = arm_on_moving_plate(dry)
     with pytest.raises(InvalidParameter, match="dry friction in its joints"):
         dynamics(scene)
@@ -235,7 +212,7 @@ def test_dry_friction_of_joints_is_refused_as_bristles_are():
 def test_where_nothing_touches_forces_and_derivatives_are_zero():
     scene, x = free_ball()
     x[2] += 0.1
-    model = dynamics(scene, "Full", "ball")
+    model = dynamics(scene)
     data = model.createData()
     model.calc(data, x, np.zeros(model.nu))
     model.calcDiff(data, x, np.zeros(model.nu))
@@ -296,13 +273,9 @@ def test_its_steps_are_those_of_a_simulation(integrator, wrap):
 
 def test_a_solver_presses_with_a_force_within_bounds_of_its_motor():
     """SolverBoxFDDP brings a ball on a slide to 5 N; the law says at which depth."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, 0.02), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    scene = sp.Scene(model)
+    scene = sp.Scene(models.slider(mass=0.5))
     law = sp.ImpactLaw(2e5, 1.5, damping=30.0, full_damping_depth=1e-4)
-    scene.add_contact(sp.Sphere(0.02, "ball"), plate(), law=law, name="touch")
+    scene.add_contact(sp.Sphere(0.02, "ball"), models.plate(), law=law, name="touch")
     state, actuation, _ = bare(scene)
     x0, dt, steps = np.array([0.02 + 1e-4, 0.0]), 1e-3, 60
 
@@ -358,16 +331,16 @@ def test_a_step_has_the_costs_of_its_start():
 def test_a_step_needs_a_fixed_length():
     scene, _ = free_ball()
     with pytest.raises(InvalidParameter, match=r"RungeKutta4\(dt\)"):
-        ContactStep(sp.Simulation(scene, sp.Adaptive()), *parts(scene, "Full", "ball"))
+        ContactStep(sp.Simulation(scene, sp.Adaptive()), *parts(scene))
     with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Simulation"):
-        ContactStep(scene, *parts(scene, "Full", "ball"))
+        ContactStep(scene, *parts(scene))
 
 
 def test_bristles_are_refused_unless_told_otherwise():
     scene, x = free_ball()
     scene.replace_pair("touch", friction=sp.BristleFriction(0.4, 0.3, 0.01))
     with pytest.raises(InvalidParameter, match=r"bristles in the friction of touch.*Coulomb"):
-        dynamics(scene, "Full", "ball")
+        dynamics(scene)
     model = ContactDynamics(scene, *bare(scene), without_history=True)
     data = model.createData()
     u = np.zeros(model.nu)

@@ -9,7 +9,7 @@ from mcap.reader import make_reader
 import sphshell_pin as sp
 from sphshell_pin.cli.export import beside, nanoseconds
 from sphshell_pin.errors import InvalidParameter
-from tests.command import call, refused
+from tests.command import call, refused, succeed
 from tests.scenario.files import without_pictures, write
 
 
@@ -17,8 +17,7 @@ from tests.scenario.files import without_pictures, write
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     with without_pictures():
-        printed = call("run", write(folder), "--out", folder / "drop", "--no-recording")
-    assert printed.exit_code == 0, printed.output
+        succeed("run", write(folder), "--out", folder / "drop", "--no-recording")
     return folder
 
 
@@ -34,8 +33,7 @@ def test_files_are_written_beside_the_run(folder, monkeypatch):
     assert about["command"] == command
     assert Path(about["scenario"]).name == "drop.toml"
     for format in ("csv", "parquet"):
-        printed = call("export", "drop/run.npz", "--to", format)
-        assert printed.exit_code == 0, printed.output
+        printed = succeed("export", "drop/run.npz", "--to", format)
         assert printed.stdout.split()[0] == f"drop_{format}/rows.{format}"
     assert "q.root_joint.2 [m]" in Path("drop_csv/rows.csv").read_text().partition("\n")[0]
 
@@ -79,8 +77,7 @@ def test_faults(folder, tmp_path, monkeypatch):
 def test_without_a_scenario_a_run_has_numbered_joints(folder, tmp_path):
     run = tmp_path / "own.npz"
     replace(sp.Result.load(folder / "drop" / "run.npz"), origin=None).save(run)
-    printed = call("export", run, "--to", "csv")
-    assert printed.exit_code == 0
+    printed = succeed("export", run, "--to", "csv")
     assert "warning: joints have numbers instead of names" in printed.stderr
     assert (tmp_path / "own_csv" / "rows.csv").read_text().startswith("t [s],q.0,q.1")
     assert "give its scenario with --scenario" in refused("export", run, "--to", "mcap")

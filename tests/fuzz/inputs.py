@@ -9,9 +9,10 @@ from pathlib import Path
 
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.plain_mesh import FORMATS
-from tests.fuzz import folders, readers, strangers, tables
+from tests.fuzz import cad, folders, readers, strangers, tables
 from tests.fuzz.folders import STRUCTURES, Structure, damaged
 from tests.fuzz.meshes import SHAPES, WRITERS
+from tests.fuzz.mutate import damage
 from tests.fuzz.special import read_special
 
 CORPUS = Path(__file__).parents[1] / "data" / "corpus"
@@ -98,6 +99,10 @@ KINDS: dict[str, Kind] = {
             4,
         )
         for suffix in FORMATS
+    },
+    **{
+        suffix[1:]: Kind(suffix, functools.partial(cad.corpus, suffix), damage, cad.read, 1)
+        for suffix in cad.SUFFIXES
     },
     # A process for each takes a second.
     "xacro": _folder("xacro", folders.xacro_corpus, readers.read_robot_in, 1),

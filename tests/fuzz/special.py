@@ -53,7 +53,7 @@ def read_special(path: Path) -> None:
     drawn = path.read_bytes()
     rng = random.Random(drawn)
     names = [name for name in KINDS if not name.startswith(("drawn", "expression"))]
-    kinds = [name for name in names if name not in ("special", "xacro")]
+    kinds = [name for name in names if KINDS[name].turns > 1 and name != "special"]
     kind = KINDS[rng.choice([*kinds, "xacro"] if rng.random() < 0.02 else kinds)]
     data, read = rng.choice(kind.corpus()), kind.read
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:

@@ -15,6 +15,7 @@ from sphshell_pin.robots import xacro_expressions
 from sphshell_pin.robots.plain_mesh import plain_mesh
 from sphshell_pin.view.meshes import lit_facets, pack_facets, take_out_numbers
 from tests.fuzz.meshes import SHAPES, WRITERS
+from tests.texts import text_of
 
 _ATOMS = (
     *("0", "1", "-3", "2.5", "1e300", "1000", "True", "None", "'a'", "'{0.real}'", "'%9d'", "a"),
@@ -91,19 +92,9 @@ def mesh_corpus(suffix: str) -> tuple[bytes, ...]:
     if suffix != ".dae":
         writers = [write for one, write in WRITERS.values() if one == suffix]
         return tuple(write(shape()) for write in writers for shape in SHAPES)
-    numbers = "<float_array id='a' count='9'>0 0 0 1 0 0 0 1 0</float_array>"
-    accessor = "<accessor source='#a' count='3' stride='3'><param name='X' type='float'/>"
-    accessor += "<param name='Y' type='float'/><param name='Z' type='float'/></accessor>"
-    source = f"<source id='s'>{numbers}<technique_common>{accessor}</technique_common></source>"
-    points = "<vertices id='v'><input semantic='POSITION' source='#s'/></vertices>"
-    faces = "<triangles count='1'><input semantic='VERTEX' source='#v' offset='0'/><p>0 1 2</p>"
-    mesh = f"<geometry id='g'><mesh>{source}{points}{faces}</triangles></mesh></geometry>"
-    scene = "<library_visual_scenes><visual_scene id='w'><node><instance_geometry url='#g'/>"
-    scene += "</node></visual_scene></library_visual_scenes>"
-    end = "<scene><instance_visual_scene url='#w'/></scene></COLLADA>"
     images = "<library_images><image><init_from>/dev/zero</init_from></image></library_images>"
-    head = "<COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'>"
-    return (f"{head}{images}<library_geometries>{mesh}</library_geometries>{scene}{end}".encode(),)
+    mark = "<library_geometries"
+    return (text_of("robots/tetrahedron.dae").replace(mark, images + mark).encode(),)
 
 
 def read_drawn(suffix: str) -> Callable[[Path], None]:

@@ -189,41 +189,21 @@ def toml_corpus() -> tuple[bytes, ...]:
 def damaged_toml(rng: random.Random, data: bytes) -> bytes:
     """Return a scenario some of whose keys and values were changed."""
     tree = alter(rng, tomllib.loads(data.decode()))
-    rows = [f"{_key(k)} = {_toml(v)}" for k, v in tree.items()] if isinstance(tree, dict) else []
+    rows = (
+        [f"{json.dumps(k)} = {_toml(v)}" for k, v in tree.items()] if isinstance(tree, dict) else []
+    )
     return "\n".join(rows or [_toml(tree)]).encode("utf-8", "surrogatepass")
 
 
-def _key(key: str) -> str:
-    return json.dumps(key)
-
-
 def _toml(value: Any) -> str:
-    """Return `value` as TOML writes it; deep ones without the help of the stack."""
-    pieces: list[str] = []
-    waiting: list[Any] = [("value", value)]
-    while waiting:
-        kind, one = waiting.pop()
-        if kind == "text":
-            pieces.append(one)
-        elif isinstance(one, dict):
-            pieces.append("{")
-            waiting.append(("text", "}"))
-            for n, (k, v) in enumerate(reversed(one.items())):
-                waiting += [("text", ", " if n else ""), ("value", v), ("text", f"{_key(k)} = ")]
-        elif isinstance(one, list):
-            pieces.append("[")
-            waiting.append(("text", "]"))
-            for v in reversed(one):
-                waiting += [("text", ", "), ("value", v)]
-        elif isinstance(one, bool):
-            pieces.append("true" if one else "false")
-        elif isinstance(one, float):
-            pieces.append(repr(one))
-        elif isinstance(one, int):
-            pieces.append(str(one))
-        else:
-            pieces.append(json.dumps(one if isinstance(one, str) else ""))
-    return "".join(pieces)
+    """Return `value` as TOML writes it; of what has no form in it, an empty text."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{json.dumps(k)} = {_toml(v)}' for k, v in value.items())}}}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, int | float):
+        return repr(value).lower()
+    return json.dumps(value if isinstance(value, str) else "")
 
 
 def urdf_corpus() -> tuple[bytes, ...]:

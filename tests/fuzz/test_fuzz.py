@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz import folders, tables
+from tests.fuzz import cad, folders, tables
 from tests.fuzz.inputs import KINDS, TURNS, make_input, read
 from tests.fuzz.tables import prepare
 from tests.fuzz.watch import Report, Task, watch
@@ -24,7 +24,8 @@ def test_a_file_that_once_broke_its_reader(file, tmp_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_undamaged_files_are_read(kind, tmp_path):
+def test_undamaged_files_are_read(kind, tmp_path, monkeypatch):
+    monkeypatch.setattr(cad, "LIMIT", 300.0)
     prepare(tmp_path)
     for data in KINDS[kind].corpus():
         path = tmp_path / f"input{KINDS[kind].suffix}"

@@ -7,10 +7,12 @@ python -m tests.joints --files part.step ... [--count 4000]
 """
 
 import argparse
+import itertools
 import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,68 +20,47 @@ import numpy as np
 from tests.joints.boxes import BOXES
 from tests.joints.running import TRIMMED, walk_file, walk_part
 from tests.joints.solids import FAMILIES
-from tests.joints.verdict import ALLOWED, FAULTS, Verdict
+from tests.joints.verdict import ALLOWED, Verdict
 from tests.parts.occ import OccFailed
 
 NAMES = [*FAMILIES, *BOXES]
 
 
 def main() -> int:
-    """Walk, print the faults by part and by kind of joint; return 1 if there are any."""
+    """Walk, print the faults of each part and of all; return 1 if there are any."""
     options = arguments()
-    begin = time.perf_counter()
-    counts: dict[str, Counter[str]] = {}
-    if options.files:
-        asked = 0
-        for path in options.files:
-            rng = np.random.default_rng(options.seed)
-            asked += take(walk_file(path, path.name, options.count, rng), options.show, counts)
-        number = len(options.files)
-    else:
-        number, asked = walk_families(options, counts)
-    print(f"\n{number} parts, {asked} spheres, {time.perf_counter() - begin:.0f} s")
-    return 1 if table(counts) else 0
+    begin, number, asked = time.perf_counter(), 0, 0
+    total: Counter[str] = Counter()
+    for verdict in of_files(options) if options.files else of_families(options):
+        counts = Counter({name: len(rows) for name, rows in verdict.faults.items() if rows})
+        found = ", ".join(f"{name} {count}" for name, count in counts.items())
+        spheres = len(verdict.radii)
+        print(f"{verdict.part:60s} {spheres:6d}  {verdict.worst:.0e}  {found}", flush=True)
+        for name, rows in verdict.found().items():
+            for text in rows[: options.show]:
+                print(f"    {name} at {text}")
+        number, asked, total = number + 1, asked + spheres, total + counts
+        if not options.files and asked >= options.count:
+            break
+    print(f"\n{number} parts, {asked} spheres, {time.perf_counter() - begin:.0f} s; {dict(total)}")
+    return 1 if any(name not in ALLOWED for name in total) else 0
 
 
-def walk_families(options: argparse.Namespace, counts: dict[str, Counter[str]]) -> tuple[int, int]:
-    """Walk over random parts until enough spheres were asked."""
-    names, number, asked = options.only or NAMES, 0, 0
+def of_files(options: argparse.Namespace) -> Iterator[Verdict]:
+    for path in options.files:
+        yield walk_file(path, path.name, options.count, np.random.default_rng(options.seed))
+
+
+def of_families(options: argparse.Namespace) -> Iterator[Verdict]:
+    """Walk over random parts without end."""
     with tempfile.TemporaryDirectory() as folder:
-        while asked < options.count:
-            family = names[number % len(names)]
+        for number, family in enumerate(itertools.cycle(options.only or NAMES)):
             rng = np.random.default_rng([options.seed, number])
-            number += 1
+            given = family, Path(folder), rng, options.stl, options.moved, options.count
             try:
-                verdict = walk_part(
-                    family, Path(folder), rng, options.stl, options.moved, options.count
-                )
+                yield walk_part(*given)
             except OccFailed as failure:
                 print(f"{family}: {failure}")
-                continue
-            asked += take(verdict, options.show, counts)
-    return number, asked
-
-
-def take(verdict: Verdict, show: int, counts: dict[str, Counter[str]]) -> int:
-    """Print the faults of one part, and the first spheres of each; return how many were asked."""
-    found = ", ".join(f"{name} {len(rows)}" for name, rows in verdict.faults.items() if rows)
-    print(f"{verdict.part:60s} {len(verdict.radii):6d}  {verdict.worst:.0e}  {found}", flush=True)
-    for name, rows in verdict.found().items():
-        for text in rows[:show]:
-            print(f"    {name} at {text}")
-    for joint, own in verdict.by_joint().items():
-        counts[joint] = counts.get(joint, Counter()) + own
-    return len(verdict.radii)
-
-
-def table(counts: dict[str, Counter[str]]) -> int:
-    """Print the faults by joint; return how many are not allowed."""
-    columns = ("spheres", *FAULTS)
-    total: Counter[str] = sum(counts.values(), Counter())
-    print(f"{'joint':32s}" + "".join(f"{name:>9s}" for name in columns))
-    for joint, own in [*sorted(counts.items()), ("all", total)]:
-        print(f"{joint:32s}" + "".join(f"{own[name]:9d}" for name in columns))
-    return sum(total[name] for name in FAULTS if name not in ALLOWED)
 
 
 def arguments() -> argparse.Namespace:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
@@ -16,23 +15,18 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_Transform,
 )
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.BRepPrimAPI import (
-    BRepPrimAPI_MakeBox,
-    BRepPrimAPI_MakeCylinder,
-    BRepPrimAPI_MakePrism,
-    BRepPrimAPI_MakeRevol,
-    BRepPrimAPI_MakeTorus,
-)
+from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
 from OCP.BRepTools import BRepTools
 from OCP.GC import GC_MakeArcOfCircle
-from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.Message import Message
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from OCP.StlAPI import StlAPI_Writer
 
 from sphshell_pin.base.arrays import Array
 from tests.joints.profile import Piece, Profile, outline
-from tests.parts.occ import Rng, Solid, checked
+from tests.parts import occ
+from tests.parts.occ import Rng, Solid, checked, rough_size
 
 
 @dataclass(frozen=True)
@@ -228,30 +222,29 @@ def d_shaft(radius: float, cut: float) -> Part:
 
 
 FAMILIES: dict[str, Callable[[Rng], Part]] = {
-    "disc": lambda rng: disc(_size(rng, 12, 200), _size(rng, 0.05, 5.5)),
-    "disc off": lambda rng: disc(_size(rng, 12, 200), _size(rng, 0.05, 5.5), _miss(rng)),
-    "pocket": lambda rng: pocket(_size(rng, 25, 200), _size(rng, 0.05, 10), _size(rng, 0.05, 10)),
-    "shaft": lambda rng: shaft(_size(rng, 5, 100), _size(rng, 0.05, 10)),
-    "shaft off": lambda rng: shaft(_size(rng, 5, 100), _size(rng, 0.05, 10), _miss(rng)),
-    "ring": lambda rng: ring(_size(rng, 35, 200), _size(rng, 0.05, 10)),
-    "cones": lambda rng: cones(_size(rng, 20, 100), rng.uniform(0.02, 0.6)),
+    "disc": lambda rng: disc(rough_size(rng, 12, 200), rough_size(rng, 0.05, 5.5)),
+    "disc off": lambda rng: disc(rough_size(rng, 12, 200), rough_size(rng, 0.05, 5.5), _miss(rng)),
+    "pocket": lambda rng: pocket(
+        rough_size(rng, 25, 200), rough_size(rng, 0.05, 10), rough_size(rng, 0.05, 10)
+    ),
+    "shaft": lambda rng: shaft(rough_size(rng, 5, 100), rough_size(rng, 0.05, 10)),
+    "shaft off": lambda rng: shaft(rough_size(rng, 5, 100), rough_size(rng, 0.05, 10), _miss(rng)),
+    "ring": lambda rng: ring(rough_size(rng, 35, 200), rough_size(rng, 0.05, 10)),
+    "cones": lambda rng: cones(rough_size(rng, 20, 100), rng.uniform(0.02, 0.6)),
     "cones filleted": lambda rng: cones(
-        _size(rng, 20, 100), rng.uniform(0.1, 0.6), _size(rng, 0.1, 10)
+        rough_size(rng, 20, 100), rng.uniform(0.1, 0.6), rough_size(rng, 0.1, 10)
     ),
-    "dome": lambda rng: dome(_size(rng, 5, 50), 120.0),
-    "slot": lambda rng: slot(_size(rng, 25, 100), _size(rng, 1, 10)),
-    "bar": lambda rng: bar(_size(rng, 25, 80), (_size(rng, 0.05, 5), _size(rng, 0.05, 10)), 0.0),
+    "dome": lambda rng: dome(rough_size(rng, 5, 50), 120.0),
+    "slot": lambda rng: slot(rough_size(rng, 25, 100), rough_size(rng, 1, 10)),
+    "bar": lambda rng: bar(
+        rough_size(rng, 25, 80), (rough_size(rng, 0.05, 5), rough_size(rng, 0.05, 10)), 0.0
+    ),
     "bar off": lambda rng: bar(
-        _size(rng, 25, 80), (_size(rng, 0.05, 5), _size(rng, 0.05, 10)), _miss(rng)
+        rough_size(rng, 25, 80), (rough_size(rng, 0.05, 5), rough_size(rng, 0.05, 10)), _miss(rng)
     ),
-    "d-shaft": lambda rng: d_shaft(_size(rng, 3, 40), _size(rng, 0.005, 1.0)),
+    "d-shaft": lambda rng: d_shaft(rough_size(rng, 3, 40), rough_size(rng, 0.005, 1.0)),
 }
 """Random parts of a family."""
-
-
-def _size(rng: Rng, low: float, high: float) -> float:
-    """A length with few digits, as people state them."""
-    return float(f"{np.exp(rng.uniform(*np.log([low, high]))):.2g}")
 
 
 def _miss(rng: Rng) -> float:
@@ -264,13 +257,10 @@ def tube_on_equator(inner: float, tube: float, other: float) -> Solid:
 
     The first lies about z with a tube of radius `tube` [mm]; the bore bends on a radius `other`.
     """
-    ring = BRepPrimAPI_MakeTorus(inner + tube, tube).Shape()
-    below = BRepPrimAPI_MakeBox(gp_Pnt(-500.0, -500.0, -500.0), gp_Pnt(500.0, 500.0, 0.0)).Shape()
-    block = BRepPrimAPI_MakeCylinder(inner + 2 * tube, 0.4 * other).Shape()
-    about = gp_Ax2(gp_Pnt(0.0, other, 0.0), gp_Dir(1.0, 0.0, 0.0))
-    bent = BRepPrimAPI_MakeTorus(about, other, inner).Shape()
-    half = BRepAlgoAPI_Common(ring, below).Shape()
-    return checked(BRepAlgoAPI_Fuse(half, BRepAlgoAPI_Cut(block, bent).Shape()).Shape())
+    ring, below = occ.torus(inner + tube, tube), occ.box([-500, -500, -500], [500, 500, 0])
+    block = occ.cylinder(inner + 2 * tube, 0.4 * other)
+    bent = occ.torus(other, inner, (0, other, 0), (1, 0, 0))
+    return checked(occ.fuse(occ.common(ring, below), occ.cut(block, bent)))
 
 
 def shift_planes(path: Path, by: float) -> None:

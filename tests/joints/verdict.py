@@ -1,6 +1,5 @@
 """What is wrong with the contacts of spheres."""
 
-from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -61,16 +60,6 @@ class Verdict:
     def describe(self, row: int) -> str:
         where = f"center {self.centers[row].tolist()}, radius {float(self.radii[row])}"
         return f"{self.joints[row]}: {where}: {self.details[row]}"
-
-    def by_joint(self) -> dict[str, Counter[str]]:
-        """Return the number of spheres and of faults of each kind of joint."""
-        counts: dict[str, Counter[str]] = {}
-        for joint in self.joints:
-            counts.setdefault(joint, Counter())["spheres"] += 1
-        for name, rows in self.faults.items():
-            for row in rows:
-                counts[self.joints[row]][name] += 1
-        return counts
 
 
 def exact_share(shell: sp.Shell) -> float:

@@ -1,9 +1,5 @@
 """The normals of a shell, and the faces that it finds in a mesh, against those of the CAD."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 import numpy as np
 
 from sphshell_pin import Shell
@@ -16,33 +12,12 @@ LEAST_SINE = 0.5
 """Of the angle at a corner whose normal is compared."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """Triangles of each kind in KINDS (6,), by the CAD face they lie on.
-
-    Attributes
-    ----------
-    triangles : how many
-    recognized : of these in a face that was found; same : of the right kind
-    off : with a corner normal off by more than one degree; recognized_off : of the recognized
-    recognized_exact : of the recognized, with all corner normals within 0.05 degrees
-    faces : CAD faces of which a triangle is recognized; pieces : faces found on them, counted again
-        on each CAD face
-    """
-
-    triangles: Ints
-    recognized: Ints
-    same: Ints
-    off: Ints
-    recognized_off: Ints
-    recognized_exact: Ints
-    faces: Ints
-    pieces: Ints
-
-    def __add__(self, other: Found) -> Found:
-        return Found(
-            *(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True))
-        )
+COUNTS = ("triangles", "recognized", "same", "off", "recognized off", "recognized exact")
+COUNTS += ("faces", "pieces")
+"""Rows of what is found, columns the kinds in KINDS of the CAD faces: triangles; those of them in a
+face that was found; of the right kind; with a corner normal off by more than a degree; both; in one
+with all normals within 0.05 degrees; CAD faces of which a triangle is recognized; faces found on
+them, counted again on each CAD face."""
 
 
 def recognized_faces(shell: Shell) -> Ints:
@@ -58,8 +33,8 @@ def share_recognized(shell: Shell) -> float:
     return float((recognized_faces(shell) >= 0).mean())
 
 
-def faces_found(shell: Shell, mesh: CadMesh, rows: Ints) -> Found:
-    """Compare normals, and faces if there are any, with the CAD's."""
+def faces_found(shell: Shell, mesh: CadMesh, rows: Ints) -> Ints:
+    """Compare normals, and faces if there are any, with the CAD's: COUNTS by KINDS."""
     source = rows[shell.source_element[shell.triangle_element]]
     cad = mesh.kind[source]
     face = recognized_faces(shell)
@@ -72,16 +47,10 @@ def faces_found(shell: Shell, mesh: CadMesh, rows: Ints) -> Found:
     def count(which: np.ndarray) -> Ints:
         return np.bincount(cad[which], minlength=len(KINDS))
 
-    return Found(
-        triangles=count(cad >= 0),
-        recognized=count(there),
-        same=count(kinds[face] == cad),
-        off=count(cosine < OFF),
-        recognized_off=count(there & (cosine < OFF)),
-        recognized_exact=count(there & (cosine >= EXACT)),
-        faces=np.bincount(pieces[2, first], minlength=len(KINDS)),
-        pieces=np.bincount(pieces[2], minlength=len(KINDS)),
-    )
+    of_faces = [np.bincount(one, minlength=len(KINDS)) for one in (pieces[2, first], pieces[2])]
+    which = (cad >= 0, there, kinds[face] == cad, cosine < OFF)
+    which += (there & (cosine < OFF), there & (cosine >= EXACT))
+    return np.array([*map(count, which), *of_faces])
 
 
 def turns(shell: Shell, mesh: CadMesh, source: Ints) -> Array:

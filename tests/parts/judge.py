@@ -9,11 +9,11 @@ import numpy as np
 
 from sphshell_pin import ImpactLaw, Shell
 from sphshell_pin.base.arrays import Array
-from tests.parts.cad_mesh import MM, CadMesh, Ints, coarse_enough, joined
+from tests.parts.cad_mesh import MM, CadMesh, Ints, coarse_enough, joined, meshed_faces
 from tests.parts.files import KINDS_OF_FILE
-from tests.parts.found import Found, faces_found, share_recognized
+from tests.parts.found import faces_found, share_recognized
 from tests.parts.solids import family_of, random_solid
-from tests.parts.truth import ExactFaces, Places, Touches
+from tests.parts.truth import Places, Touches, places_beside, touches_of
 
 METHODS = ("smooth", "facets")
 LAW = ImpactLaw(1.0, exponent=1.5)
@@ -24,7 +24,10 @@ DEFLECTIONS = tuple(np.geomspace(1e-4, 1e-2, 5).tolist())
 ANGLES = 0.1, 0.6
 """Largest angles between neighboring triangles [rad]: a part has one between these."""
 
-PLACES, TOUCHES = 400, 24
+FINE, FINE_ANGLE = 2e-4, 0.2
+"""Deflection of the finer mesh, over the size; its angle [rad]."""
+
+PLACES, TOUCHES = 200, 24
 
 FLOOR = 2e-7
 """Mean errors over the size below that of single precision count as that."""
@@ -38,9 +41,6 @@ PLANE_MARGIN = 0.01
 
 SPOILED = 0.02
 """A file whose flat elements are farther from the solid, over the size, is left out."""
-
-SAME_DISTANCE = 0.05
-"""Relative difference of a distance whose sign is wrong from the exact one, at most."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,13 @@ class Verdict:
     Attributes
     ----------
     number, family, file, triangles, deflection, touches : of the part and its file
-    largest, mean : errors of distances; wrong_signs : distances right but for their sign
+    largest, mean : errors of distances
     off_plane : touches of planes whose curved force is off by more than the flat one's
     forces : smallest and largest on planes
     lost : touches of planes that are not found
     ok : what `health` says; seconds : of processor time to load and curve it
     recognized : share of the triangles in faces that were found
-    found : by CAD face; None of a file with other triangles
+    found : COUNTS by CAD face; None of a file with other triangles
     """
 
     number: int
@@ -79,7 +79,6 @@ class Verdict:
     deflection: float
     largest: dict[str, float]
     mean: dict[str, float]
-    wrong_signs: dict[str, int]
     touches: int
     off_plane: int
     forces: dict[str, tuple[float, float]]
@@ -87,7 +86,7 @@ class Verdict:
     ok: bool
     seconds: float
     recognized: float
-    found: Found | None = field(default=None, repr=False)
+    found: Ints | None = field(default=None, repr=False)
 
     @property
     def worse(self) -> bool:
@@ -109,29 +108,26 @@ def random_part(number: int, seed: int = 1) -> Part:
     """Return the part of a number; raises where OpenCASCADE fails on it."""
     solid = random_solid(number, seed)
     rng = np.random.default_rng([seed, number, 1])
-    exact = ExactFaces(solid)
-    places = exact.places(PLACES, rng)
+    size = joined(meshed_faces(solid, 1.0, 0.5)).size
+    fine = joined(meshed_faces(solid, FINE * size, FINE_ANGLE))
     share, angle = float(rng.choice(DEFLECTIONS)), float(rng.uniform(*ANGLES))
-    faces, deflection = coarse_enough(solid, share * exact.size, angle)
-    # A sphere that touches a plane alone has the facets of its neighbors out of reach, too.
-    touches = exact.touches(TOUCHES, rng, 2.0 * deflection)
+    faces, deflection = coarse_enough(solid, share * size, angle)
     return Part(
         number=number,
         family=family_of(number),
-        deflection=deflection / exact.size,
+        deflection=deflection / size,
         mesh=joined(faces),
-        fine=exact.mesh,
-        places=places,
-        touches=touches,
+        fine=fine,
+        places=places_beside(solid, size, PLACES, rng),
+        # A sphere that touches a plane alone has the facets of its neighbors out of reach, too.
+        touches=touches_of(fine, TOUCHES, rng, 2.0 * deflection + FINE * size),
     )
 
 
 def judged(part: Part, kind: str) -> Verdict:
     """Write the file of that kind, load and measure it."""
     shell, rows, seconds = loaded(part, kind)
-    errors, signs = {}, {}
-    for method in METHODS:
-        errors[method], signs[method] = distance_errors(shell, part, method)
+    errors = {method: distance_errors(shell, part, method) for method in METHODS}
     forces = {method: forces_on_planes(shell, part.touches, method) for method in METHODS}
     off = {method: np.abs(forces[method] - 1.0) for method in METHODS}
     return Verdict(
@@ -142,7 +138,6 @@ def judged(part: Part, kind: str) -> Verdict:
         deflection=part.deflection,
         largest={method: float(error.max()) for method, error in errors.items()},
         mean={method: float(error.mean()) for method, error in errors.items()},
-        wrong_signs=signs,
         touches=len(part.touches.depths),
         off_plane=int((off["smooth"] > FACTOR * off["facets"] + PLANE_MARGIN).sum()),
         forces={m: (float(f.min(initial=1)), float(f.max(initial=1))) for m, f in forces.items()},
@@ -167,16 +162,10 @@ def loaded(part: Part, kind: str) -> tuple[Shell, Ints, float]:
         return shell, rows, time.process_time() - begin
 
 
-def distance_errors(shell: Shell, part: Part, method: str) -> tuple[Array, int]:
-    """Errors (n,) of the distances of a part's places over the size, and how many signs are wrong.
-
-    A place that the surface swallows has a negative distance; a sign is wrong where the distance
-    is right but for it.
-    """
+def distance_errors(shell: Shell, part: Part, method: str) -> Array:
+    """Errors (n,) of the distances of a part's places over the size."""
     found = shell.closest_points(part.places.points * MM, method=method).distances / MM
-    exact = part.places.distances
-    flipped = (found < 0.0) & (np.abs(-found - exact) <= SAME_DISTANCE * exact)
-    return np.abs(np.where(flipped, -found, found) - exact) / part.mesh.size, int(flipped.sum())
+    return np.abs(np.abs(found) - part.places.distances) / part.mesh.size
 
 
 def forces_on_planes(shell: Shell, touches: Touches, method: str) -> Array:

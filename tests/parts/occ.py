@@ -68,6 +68,11 @@ def area_and_volume(shape: Any) -> tuple[float, float]:
     return surface.Mass(), inside.Mass()
 
 
+def rough_size(rng: Rng, low: float, high: float) -> float:
+    """A length with few digits, as people state them."""
+    return float(f"{np.exp(rng.uniform(*np.log([low, high]))):.2g}")
+
+
 class OccFailed(Exception):
     """OpenCASCADE made no valid solid."""
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tests.parts.cad_mesh import KINDS
-from tests.parts.found import Found
+from tests.parts.found import COUNTS
 from tests.parts.judge import MARGIN, Verdict
 
 FILE_COLUMNS = (
@@ -18,7 +18,6 @@ FILE_COLUMNS = (
     "force on them, curved",
     "flat",
     "touches lost, curved / flat",
-    "wrong signs, curved / flat",
     "health not ok (of the worse)",
     "recognized",
     "ms per 1000 triangles",
@@ -76,8 +75,6 @@ def summary(verdicts: list[Verdict]) -> list[str]:
         forces(planes, "facets"),
         f"{sum(v.lost['smooth'] for v in kept)} / {sum(v.lost['facets'] for v in kept)}"
         f" of {sum(v.touches for v in kept)}",
-        f"{sum(v.wrong_signs['smooth'] for v in kept)} / "
-        f"{sum(v.wrong_signs['facets'] for v in kept)}",
         f"{not_ok} ({sum(not verdict.ok for verdict in worse)})",
         f"{np.mean([v.recognized for v in kept]):.2f}",
         f"{1e6 * seconds / triangles:.1f}",
@@ -101,19 +98,19 @@ def by_face(verdicts: list[Verdict]) -> Rows:
     found = [v.found for v in verdicts if v.found is not None and not v.spoiled]
     if not found:
         return []
-    whole = sum(found[1:], start=found[0])
-    return [FACE_COLUMNS, *([kind, *_faces(whole, k)] for k, kind in enumerate(KINDS))]
+    columns = zip(KINDS, np.sum(found, axis=0).T.tolist(), strict=True)
+    return [FACE_COLUMNS, *([kind, *_faces(*counts)] for kind, counts in columns)]
 
 
-def _faces(found: Found, k: int) -> list[str]:
+def _faces(*counts: int) -> list[str]:
     def share(part: int, whole: int, digits: int = 4) -> str:
         return f"{part / whole:.{digits}f}" if whole else "-"
 
-    count, taken = int(found.triangles[k]), int(found.recognized[k])
-    cells = [str(count), share(int(found.off[k]), count)]
-    parts = (found.same, found.recognized_off, found.recognized_exact)
-    pieces = share(int(found.pieces[k]), int(found.faces[k]), 2)
-    return [*cells, share(taken, count), *(share(int(part[k]), taken) for part in parts), pieces]
+    of = dict(zip(COUNTS, counts, strict=True))
+    count, taken = of["triangles"], of["recognized"]
+    parts = (of["same"], of["recognized off"], of["recognized exact"])
+    cells = [str(count), share(of["off"], count), share(taken, count)]
+    return [*cells, *(share(one, taken) for one in parts), share(of["pieces"], of["faces"], 2)]
 
 
 def line(verdict: Verdict) -> str:

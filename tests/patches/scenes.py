@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from tests import meshes, models
 
 RADIUS = 0.01
 LAW = sp.ImpactLaw(1e7, 1.5)
@@ -11,21 +12,15 @@ LAW = sp.ImpactLaw(1e7, 1.5)
 
 def slider(mass=1.0, placement=None):
     """A body, frame "ball", that moves along x, y, z without turning."""
-    model = pin.Model()
-    joint = model.addJoint(
-        0, pin.JointModelTranslation(), placement or pin.SE3.Identity(), "slides"
-    )
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(mass, RADIUS), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.BODY))
+    model = models.ball(mass=mass, radius=RADIUS, joint=pin.JointModelTranslation())
+    model.jointPlacements[1] = placement or pin.SE3.Identity()
     return model
 
 
 def plate(half=0.05, cells=1, height=lambda x, y: 0.0):
     """A square of cells x cells quads, at height(x, y)."""
-    at = np.linspace(-half, half, cells + 1)
-    corners = [[x, y, height(x, y)] for y in at for x in at]
-    first = [i + (cells + 1) * j for j in range(cells) for i in range(cells)]
-    elements = [[k, k + 1, k + cells + 2, k + cells + 1] for k in first]
+    corners, elements = meshes.grid_plate(cells, cells, 2 * half, quads=True)
+    corners[:, 2] = [height(x, y) for x, y, _ in corners]
     return sp.Shell(corners, elements, name="plate")
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 import sphshell_pin as sp
-from tests.command import call
+from tests.command import call, succeed
 from tests.scenario.files import DROP, write
 
 
@@ -13,14 +13,12 @@ def test_a_scenario_writes_patches_and_taxels(tmp_path):
         'friction = { type = "coulomb", mu_static = 0.3 }\n[run]\nrecord = ["patch"]',
     ).replace("[robot]", "[robot]\nspeed = { root_joint = [0.2, 0, 0, 0, 0, 0] }")
     out = tmp_path / "out"
-    told = call("run", write(tmp_path, text), "--out", out)
-    assert told.exit_code == 0, told.output
+    succeed("run", write(tmp_path, text), "--out", out)
     result = sp.Result.load(out / "run.npz")
     assert len(result.patches) == len(result.contacts) > 0
     assert "pressure of patches" in (out / "recording.html").read_text(encoding="utf-8")
 
-    told = call("taxels", out, "--contact", "ball-plate", "--axis", 0, 0, -1, "--shape", 4, 6)
-    assert told.exit_code == 0, told.output
+    succeed("taxels", out, "--contact", "ball-plate", "--axis", 0, 0, -1, "--shape", 4, 6)
     with np.load(out / "taxels.npz") as file:
         assert file["forces"].shape == (len(result.t), 4, 6)
         pressed = np.bincount(result.contacts.row, result.contacts.normal_force, len(result.t))
@@ -34,7 +32,7 @@ def test_a_scenario_writes_patches_and_taxels(tmp_path):
 
 def test_a_run_without_patches_has_no_taxels(tmp_path, no_pictures):
     out = tmp_path / "out"
-    assert call("run", write(tmp_path), "--out", out, "--no-recording").exit_code == 0
+    succeed("run", write(tmp_path), "--out", out, "--no-recording")
     told = call("taxels", out, "--contact", "ball-plate")
     assert told.exit_code == 2
     assert "has no patches" in told.stderr

@@ -5,11 +5,10 @@
 Each folder in CLONES is a repository (a link is another name of one). Up to `--most` of its files
 of a whole robot (URDF, xacro, MJCF) are loaded and go through check-robot, in a process with a time
 limit, first without options, then with those that the refusals name. `--pairs` of them are asked
-for a scenario, too. `--kept` are rows of earlier runs: files in it are not asked again.
+for a scenario, too.
 """
 
 import argparse
-import json
 import multiprocessing
 import re
 import resource
@@ -218,44 +217,29 @@ def main() -> int:
     parser.add_argument("clones", type=Path)
     parser.add_argument("--most", type=int, default=4, help="files of a repository")
     parser.add_argument("--pairs", type=int, default=0, help="files that `new` is asked for")
-    parser.add_argument("--only", default="", help="a regular expression of repositories' names")
-    parser.add_argument("--kept", type=Path, help="a file of rows, which are not asked again")
     parser.add_argument("--write", action="store_true", help="write docs/measured/census.json")
     asked = parser.parse_args()
     questions = []
     for repository in sorted(asked.clones.iterdir()):
-        if repository.is_symlink() or not re.search(asked.only, repository.name):
-            continue
-        if repository.is_dir():
+        if repository.is_dir() and not repository.is_symlink():
             files = list(robot_files(repository))
             chosen = np.linspace(0, len(files) - 1, min(asked.most, len(files))).astype(int)
             questions += [(rank, repository, files[k]) for rank, k in enumerate(chosen)]
     parts = [one for one in sorted(PARTS.iterdir()) if one.suffix.lower() in (".step", ".stl")]
     drafted = set(np.linspace(0, len(questions) - 1, asked.pairs).astype(int))
-    old = json.loads(asked.kept.read_text()) if asked.kept and asked.kept.exists() else []
-    kept = {(one["repository"], one["file"]): Row(**one) for one in old}
     rows = []
     for k, (_, repository, file) in enumerate(sorted(questions)):
         row = Row(repository.name.replace("+", "/"), str(file.relative_to(repository)))
-        part = parts[k % len(parts)] if k in drafted else None
-        found = kept.get((row.repository, row.file))
-        if found is None or (part is not None and found.new is None and not found.load):
-            found = kept[row.repository, row.file] = _asked(file, part, row)
-            print(found, flush=True)
-        if "but there is no such link" not in (
-            found.load or ""
-        ):  # that is a tool for another robot
-            rows.append(found)
-        if asked.kept:
-            asked.kept.write_text(json.dumps([vars(one) for one in kept.values()], indent=1))
+        row = _asked(file, parts[k % len(parts)] if k in drafted else None, row)
+        print(row, flush=True)
+        if "but there is no such link" not in (row.load or ""):  # that is a tool for another robot
+            rows.append(row)
     sections = tables(rows)
     for section in sections:
         print(section.text, *(" | ".join(one) for one in section.table), sep="\n")
     if asked.write:
         command = f"python -m tests.robots.census CLONES --most {asked.most}"
-        command += f" --pairs {asked.pairs}" if asked.pairs else ""
-        command += f" --only '{asked.only}'" if asked.only else ""
-        command += " --kept rows.json --write" if asked.kept else " --write"
+        command += f" --pairs {asked.pairs} --write" if asked.pairs else " --write"
         print(f"wrote {write('census', command, sections)}")
     return 1 if any("FOREIGN" in f"{row.load}{row.check}{row.new}" for row in rows) else 0
 

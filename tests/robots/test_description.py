@@ -4,23 +4,17 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.study.robot_check.models import load_subject
-
-INERTIA = (
-    "<inertial><mass value='1'/>"
-    "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
-)
+from tests import urdf
 
 
 def joint(number, parent, kind="fixed"):
-    return (
-        f"<link name='l{number}'>{INERTIA}</link>"
-        f"<joint name='j{number}' type='{kind}'><parent link='l{parent}'/>"
-        f"<child link='l{number}'/><axis xyz='1 0 0'/><limit effort='1' velocity='1'/></joint>"
-    )
+    """A link and the joint that moves it."""
+    own = urdf.link(f"l{number}", urdf.inertial())
+    return own + urdf.joint(f"j{number}", kind, f"l{parent}", f"l{number}")
 
 
 def robot(inside):
-    return f"<robot name='r'><link name='l0'/>{inside}</robot>"
+    return urdf.robot(urdf.link("l0"), inside)
 
 
 ENTITIES = "".join(f"<!ENTITY e{k} '{f'&e{k - 1};' * 10 if k else 'x' * 99}'>" for k in range(9))
@@ -40,12 +34,12 @@ REFUSED = {
     # urdfdom reads the first of both: a chain that the last ones hide.
     "'j1' has 2 <parent> elements": robot(
         "".join(
-            joint(k, k - 1).replace("</joint>", "<parent link='l0'/></joint>")
+            joint(k, k - 1).replace("</joint>", '<parent link="l0"/></joint>')
             for k in range(1, 4900)
         )
     ),
     # A loop; pinocchio says that a body is missing.
-    "not a URDF": robot(joint(1, 0) + joint(2, 1) + joint(3, 2).replace("'l3'", "'l1'", 2)),
+    "not a URDF": robot(joint(1, 0) + joint(2, 1) + joint(3, 2).replace('"l3"', '"l1"', 2)),
 }
 
 

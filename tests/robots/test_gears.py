@@ -1,6 +1,5 @@
 """The gears' meshes and the scenario's own routine describe the same teeth."""
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -8,21 +7,14 @@ import pytest
 
 from sphshell_pin import robots, scenarios
 from tests.models import pose_of
+from tests.programs import module_of
 
-
-def loaded(file):
-    spec = importlib.util.spec_from_file_location(file.stem, file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-gear_mesh = loaded(Path(__file__).parents[2] / "docs" / "site" / "gear_mesh.py")
+gear_mesh = module_of(Path(__file__).parents[2] / "docs" / "site" / "gear_mesh.py")
 
 
 @pytest.fixture(scope="module")
 def gears():
-    return loaded(Path(scenarios.__file__).parent / "gear_contact.py")
+    return module_of(Path(scenarios.__file__).parent / "gear_contact.py")
 
 
 def poses(model, angle_1, angle_2):

@@ -11,31 +11,21 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, RobotWarning
 from sphshell_pin.robots.mending import mended
 from sphshell_pin.study.robot_check import QUICK, check_robot
-from tests import meshes
+from tests import meshes, urdf
 from tests.command import call
 from tests.texts import text_of
 
-JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
-<origin xyz="0.1 0 0.2"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" velocity="2"/>
-{more}</joint>"""
 
-
-def arm(folder: Path, geometry: str, *, name: str = "arm") -> Path:
+def arm(folder: Path, geometry: str) -> Path:
     """Write an arm of two links of which none has a mass."""
-    links = "".join(
-        f'<link name="{one}"><collision><origin xyz="0.05 0 0" rpy="0 0 0.3"/><geometry>{geometry}'
-        "</geometry></collision></link>"
-        for one in ("upper", "lower")
+    part = urdf.shape("collision", geometry, "0.05 0 0").replace("<origin", '<origin rpy="0 0 0.3"')
+    return urdf.write(
+        folder / "arm.urdf",
+        *(urdf.link("base"), urdf.link("upper", part), urdf.link("lower", part)),
+        urdf.joint("j1", "revolute", "base", "upper", at="0.1 0 0.2"),
+        urdf.joint("j2", "revolute", "upper", "lower", at="0.1 0 0.2"),
+        *(urdf.link("tool0"), urdf.joint("flange", "fixed", "lower", "tool0", at="0.1 0 0")),
     )
-    joints = JOINT.format(name="j1", kind="revolute", parent="base", child="upper", more="")
-    joints += JOINT.format(name="j2", kind="revolute", parent="upper", child="lower", more="")
-    joints += (
-        '<link name="tool0"/><joint name="flange" type="fixed"><parent link="lower"/>'
-        '<child link="tool0"/><origin xyz="0.1 0 0"/></joint>'
-    )
-    file = folder / f"{name}.urdf"
-    file.write_text(f'<robot name="{name}"><link name="base"/>{links}{joints}</robot>')
-    return file
 
 
 def write_obj(path: Path, vertices: Array, elements: Array) -> None:
@@ -52,7 +42,7 @@ def test_links_get_the_inertia_of_their_solid(tmp_path: Path, what: str) -> None
         vertices, elements = meshes.cube(size)
         kept = elements if what == "mesh" else elements[:-1]
         write_obj(tmp_path / "cube.obj", vertices, kept)
-        geometry = '<mesh filename="cube.obj"/>'
+        geometry = urdf.mesh("cube.obj")
     robot = robots.load_file(arm(tmp_path, geometry), density=density)
     mass = density * size**3
     placed = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 0.3), np.array([0.05, 0.0, 0.0]))
@@ -66,8 +56,7 @@ def test_links_get_the_inertia_of_their_solid(tmp_path: Path, what: str) -> None
 
 def test_a_stated_mass_stays(tmp_path: Path) -> None:
     file = arm(tmp_path, '<sphere radius="0.1"/>')
-    stated = '<link name="upper"><inertial><mass value="3"/><inertia ixx="1" iyy="1" izz="1" '
-    stated += 'ixy="0" ixz="0" iyz="0"/></inertial>'
+    stated = urdf.link("upper", urdf.inertial(3)).removesuffix("</link>")
     file.write_text(file.read_text().replace('<link name="upper">', stated))
     robot = robots.load_file(file, density=1000.0)
     assert robot.model.inertias[1].mass == 3.0
@@ -95,10 +84,8 @@ def test_masses_without_moments_of_inertia_get_those_of_the_geometry(tmp_path: P
 
 def test_without_masses_one_sentence_lists_the_links(tmp_path: Path) -> None:
     file = arm(tmp_path, '<box size="0.1 0.1 0.1"/>')
-    for command in (
-        ["check-robot", str(file), "--quick"],
-        ["new", "--robot", str(file), "--out", str(tmp_path / "a.toml")],
-    ):
+    out = "--out", tmp_path / "a.toml"
+    for command in (["check-robot", file, "--quick"], ["new", "--robot", file, *out]):
         done = call(*command)
         assert done.exit_code == 2
         said = " ".join(done.output.split())
@@ -106,8 +93,8 @@ def test_without_masses_one_sentence_lists_the_links(tmp_path: Path) -> None:
         assert "--density 2700" in said
     with pytest.raises(InvalidParameter, match="density"):
         robots.load_file(file, density=-1.0)
-    file = arm(tmp_path, '<mesh filename="lost.stl"/>')
-    done = call("new", "--robot", str(file), "--density", "2700", "--out", str(tmp_path / "a.toml"))
+    file = arm(tmp_path, urdf.mesh("lost.stl"))
+    done = call("new", "--robot", file, "--density", "2700", *out)
     assert "whose meshes are missing or broken" in " ".join(done.output.split())
 
 
@@ -116,12 +103,12 @@ def test_a_mended_file_needs_no_options(tmp_path: Path) -> None:
     (folder / "meshes").mkdir(parents=True)
     (folder / "package.xml").write_text("<package><name>pkg</name></package>")
     write_obj(folder / "meshes" / "cube.obj", *meshes.cube(0.05))
-    file = arm(folder, '<mesh filename="package://pkg/meshes/cube.obj"/>')
-    text = file.read_text()
+    file = arm(folder, urdf.mesh("package://pkg/meshes/cube.obj"))
+    ball = urdf.shape("collision", '<sphere radius="0.02"/>')
+    third = urdf.link("last", ball, urdf.shape("visual", urdf.mesh("gone.stl")))
     mimic = '<mimic joint="j2" multiplier="-0.5"/>'
-    third = '<link name="last"><collision><geometry><sphere radius="0.02"/></geometry></collision>'
-    third += '<visual><geometry><mesh filename="gone.stl"/></geometry></visual></link>'
-    third += JOINT.format(name="j3", kind="continuous", parent="lower", child="last", more=mimic)
+    third += urdf.joint("j3", "continuous", "lower", "last", mimic, at="0.1 0 0.2")
+    text = file.read_text()
     file.write_text(text.replace("</robot>", f'{third}<gazebo:plugin name="x"/></robot>'))
     made, changes = mended(file, density=2700.0)
     assert made.count("<!--") == len(changes)
@@ -141,8 +128,8 @@ def test_a_mended_file_needs_no_options(tmp_path: Path) -> None:
 def test_a_broken_visual_mesh_is_left_out_with_a_warning(tmp_path: Path) -> None:
     (tmp_path / "bad.stl").write_text("solid")
     file = arm(tmp_path, '<sphere radius="0.1"/>')
-    bad = '<visual><geometry><mesh filename="bad.stl"/></geometry></visual>'
-    bad += '<visual><geometry><box size="1 1 1"/></geometry></visual>'
+    bad = urdf.shape("visual", urdf.mesh("bad.stl"))
+    bad += urdf.shape("visual", '<box size="1 1 1"/>')
     file.write_text(file.read_text().replace('<link name="upper">', f'<link name="upper">{bad}'))
     with pytest.warns(RobotWarning, match=r"bad\.stl"):
         robot = robots.load_file(file)
@@ -165,18 +152,15 @@ def test_a_continuous_joint_mimics_by_its_whole_angle(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ixz", "refused"), [("0.01\n", ""), (" 1e-2", ""), ("0,01", "has ixz = '0,01'")]
+    ("ixz", "fault"), [("0.01\n", ""), (" 1e-2", ""), ("0,01", "has ixz = '0,01'")]
 )
-def test_an_inertia_is_never_dropped(tmp_path: Path, ixz: str, refused: str) -> None:
-    file = tmp_path / "arm.urdf"
-    file.write_text(
-        '<!-- a license -->\n<?xml version="1.0"?><robot name="arm"><link name="a"/>'
-        f'<link name="b"><inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
-        f'ixz="{ixz}" iyz="0"/></inertial></link><joint name="j" type="continuous"><parent '
-        'link="a"/><child link="b"/></joint></robot>'
-    )
-    if refused:
-        with pytest.raises(robots.RobotError, match=f"inertia of link 'b' {refused}"):
+def test_an_inertia_is_never_dropped(tmp_path: Path, ixz: str, fault: str) -> None:
+    stated = urdf.inertial(2).replace('ixz="0"', f'ixz="{ixz}"')
+    links = urdf.link("a"), urdf.link("b", stated)
+    file = urdf.write(tmp_path / "arm.urdf", *links, urdf.joint("j", "continuous", "a", "b"))
+    file.write_text(f'<!-- a license -->\n<?xml version="1.0"?>{file.read_text()}')
+    if fault:
+        with pytest.raises(robots.RobotError, match=f"inertia of link 'b' {fault}"):
             robots.load_file(file)
     else:
         assert robots.load_file(file).model.inertias[1].inertia[0, 2] == 0.01
@@ -189,27 +173,19 @@ def test_a_collada_mesh_has_the_unit_that_it_states(tmp_path: Path, kind: str) -
     numbers = "0 0 0 1 0 0 0 1 0 0 0 1"
     assert numbers in text
     (tmp_path / "part.dae").write_text(text.replace(numbers, numbers.replace("1", "50")))
-    file = tmp_path / "arm.urdf"
-    file.write_text(
-        f'<robot name="arm"><link name="a"/><link name="b"><{kind}><geometry><mesh '
-        f'filename="part.dae" scale="1 1 2"/></geometry></{kind}></link><joint name="j" '
-        'type="continuous"><parent link="a"/><child link="b"/></joint></robot>'
-    )
+    part = urdf.shape(kind, '<mesh filename="part.dae" scale="1 1 2"/>')
+    links = urdf.link("a"), urdf.link("b", part)
+    file = urdf.write(tmp_path / "arm.urdf", *links, urdf.joint("j", "continuous", "a", "b"))
     mass = robots.load_file(file, density=2700.0).model.inertias[1].mass
     assert mass == pytest.approx(2 * 2700.0 * 0.05**3 / 6, rel=1e-6)
 
 
 def test_a_speck_of_collision_geometry_is_no_mass_where_the_link_is_drawn(tmp_path: Path) -> None:
-    box = '<geometry><box size="{0} {0} {0}"/></geometry>'
-    links = "".join(
-        f'<link name="{name}"><collision>{box.format(size)}</collision>'
-        f"<visual>{box.format(0.1)}</visual></link>"
-        for name, size in (("a", 1.0), ("b", 1e-3))
-    )
-    file = tmp_path / "arm.urdf"
-    file.write_text(
-        f'<robot name="arm">{links}<joint name="j" type="continuous"><parent link="a"/>'
-        '<child link="b"/></joint></robot>'
-    )
+    drawn = urdf.shape("visual", '<box size="0.1 0.1 0.1"/>')
+    solids = [
+        urdf.shape("collision", f'<box size="{size} {size} {size}"/>') for size in (1.0, 1e-3)
+    ]
+    links = [urdf.link(*parts, drawn) for parts in zip("ab", solids, strict=True)]
+    file = urdf.write(tmp_path / "arm.urdf", *links, urdf.joint("j", "continuous", "a", "b"))
     model = robots.load_file(file, density=1000.0).model
     assert model.inertias[1].mass == pytest.approx(1.0)

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 from pathlib import Path
 from urllib.parse import quote
 
@@ -11,37 +12,16 @@ from sphshell_pin import robots
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.finding import find_robots
 from sphshell_pin.robots.packages import Folders
+from tests import urdf
 from tests.command import call
-
-XACRO = """<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro">
-<xacro:include filename="$(find arm_resources)/urdf/length.xacro"/>
-<link name="base"/><link name="tip"><inertial><origin xyz="${L} 0 0"/><mass value="1"/>
-<inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial><collision>
-<geometry><mesh filename="package://arm_resources/meshes/one.obj"/></geometry></collision></link>
-<joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 1 0"/>
-<limit lower="-2" upper="2" effort="50" velocity="2"/></joint></robot>"""
-
-
-def package(folder: Path) -> Path:
-    (folder / "urdf").mkdir(parents=True)
-    (folder / "package.xml").write_text(f"<package><name>{folder.name}</name></package>")
-    return folder
+from tests.texts import DATA
 
 
 def workspace(root: Path, resources: str) -> Path:
     """Write an arm that needs a package at root/`resources`; return its file."""
-    other = package(root / resources)
-    (other / "urdf" / "length.xacro").write_text(
-        '<robot xmlns:xacro="http://wiki.ros.org/xacro"><xacro:property name="L" value="0.3"/>'
-        "</robot>"
-    )
-    (other / "meshes").mkdir()
-    (other / "meshes" / "one.obj").write_text(
-        "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
-    )
-    file = package(root / "src" / "vendor" / "arm_support") / "urdf" / "arm.xacro"
-    file.write_text(XACRO)
-    return file
+    shutil.copytree(DATA / "workspace" / "arm_resources", root / resources)
+    support = root / "src" / "vendor" / "arm_support"
+    return Path(shutil.copytree(DATA / "workspace" / "arm_support", support)) / "urdf" / "arm.xacro"
 
 
 @pytest.mark.parametrize(
@@ -85,25 +65,18 @@ def test_a_uri_of_a_file_is_that_file_wherever_it_is(tmp_path: Path) -> None:
 
 def test_a_workspace_lists_its_robots(tmp_path: Path) -> None:
     file = workspace(tmp_path, "src/vendor/arm_resources")
-    bare = file.with_name("bare.urdf")
-    bare.write_text(
-        '<robot name="bare"><link name="a"/><link name="b"><visual><geometry>'
-        '<sphere radius="1"/></geometry></visual></link><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/></joint></robot>'
-    )
+    links = urdf.link("a"), urdf.link("b", urdf.shape("visual", '<sphere radius="1"/>'))
+    urdf.write(file.with_name("bare.urdf"), *links, urdf.joint("j", "continuous", "a", "b"))
     asking = file.with_name("asking.xacro")
-    asking.write_text(
-        XACRO.replace("<link", '<xacro:include filename="$(find far)/a.xacro"/><link', 1)
-    )
+    far = '<xacro:include filename="$(find far)/a.xacro"/>'
+    asking.write_text(file.read_text().replace("<link", f"{far}<link", 1))
     found = {one.file.name: one for one in find_robots(tmp_path)}
     assert sorted(found) == ["arm.xacro", "asking.xacro", "bare.urdf"]
     assert found["arm.xacro"].frames == ("tip",)
     assert not found["arm.xacro"].missing
     assert "--density" in found["bare.urdf"].missing
     assert "there is no package 'far'" in found["asking.xacro"].missing
-    told = call("new", "--robot", tmp_path)
-    assert told.exit_code == 2
-    assert "say which of these 3 robots" in told.output
+    assert "say which of these 3 robots" in call("new", "--robot", tmp_path).output
 
 
 def test_names_of_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -151,7 +124,7 @@ def test_a_mesh_of_a_package_that_is_nowhere_is_found_beside_the_robot(
     assert len(robots.load_file(file).collision_model.geometryObjects) == 1
 
 
-@pytest.mark.parametrize("other", ["urdf/one.obj", "../arm_resources/one.obj"])
+@pytest.mark.parametrize("other", ["urdf/one.obj", "one.obj"])
 def test_a_mesh_of_another_folder_is_not_taken_for_a_missing_one(
     tmp_path: Path, other: str
 ) -> None:
@@ -219,8 +192,10 @@ def test_an_argument_that_names_a_file_takes_one_that_is_there(tmp_path: Path) -
 def test_an_argument_has_the_default_of_the_launch_file_that_names_the_robot(
     tmp_path: Path,
 ) -> None:
-    arm = package(tmp_path / "src" / "arm")
-    launches = package(tmp_path / "src" / "bringup") / "launch"
+    arm, launches = tmp_path / "src" / "arm", tmp_path / "src" / "bringup" / "launch"
+    for folder in (arm, launches.parent):
+        folder.mkdir(parents=True)
+        (folder / "package.xml").write_text(f"<package><name>{folder.name}</name></package>")
     launches.mkdir()
     for name, names, value in (("a", "other.xacro", "mk1"), ("b", "arm.xacro", "mk2")):
         declared = f'DeclareLaunchArgument("model",\n  default_value="{value}")  # {names}'
@@ -278,7 +253,8 @@ def test_a_package_whose_meshes_were_put_into_more_folders_and_the_nearer_of_two
     tmp_path: Path,
 ) -> None:
     file = workspace(tmp_path, "src/vendor/arm_resources")
-    package(tmp_path / "src" / "another" / "arm_resources")
+    nearer = tmp_path / "src" / "another" / "arm_resources"
+    shutil.copytree(DATA / "workspace" / "arm_resources", nearer)
     mesh = tmp_path / "src" / "vendor" / "arm_resources" / "meshes" / "one.obj"
     for name in ("collision/large/one.obj", "visual/large/one.obj"):
         (mesh.parent / name).parent.mkdir(parents=True)

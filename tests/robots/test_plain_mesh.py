@@ -15,6 +15,7 @@ from sphshell_pin import robots
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.mesh_faults import mesh_fault
 from sphshell_pin.robots.plain_mesh import FORMATS, plain_mesh
+from tests import urdf
 
 HEAD = '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">'
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2//1 3\n"
@@ -67,12 +68,9 @@ def test_what_a_mesh_names_is_a_regular_file(name, content, kind, tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / name).write_bytes(content)
     os.mkfifo(tmp_path / ("m.mtl" if content == OBJ else "other"))
-    mesh = f"<geometry><mesh filename='{name}'/></geometry>"
-    (tmp_path / "r.urdf").write_text(
-        f"<robot name='r'><link name='a'><{kind}>{mesh}</{kind}></link></robot>"
-    )
+    drawn = urdf.link("a", urdf.shape(kind, urdf.mesh(name)))
     with pytest.warns(RobotWarning, match=f"missing or broken: {name}"):
-        robot = robots.load_file(tmp_path / "r.urdf")
+        robot = robots.load_file(urdf.write(tmp_path / "r.urdf", drawn))
     assert robot.visual_model.ngeoms == robot.collision_model.ngeoms == 0
 
 

@@ -13,7 +13,7 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.cad_audit import _counts, audit_cad
 from sphshell_pin.shell.cad import CadOptions, require_kernel
-from tests.command import call
+from tests.command import call, succeed
 from tests.scenario.files import DROP, write
 from tests.shell import cad_shapes as shapes
 
@@ -109,8 +109,7 @@ def test_trimmed_faces_edges_and_corners_are_found(center, contact, foot, tmp_pa
 def test_files_and_table_have_the_audit(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     out = tmp_path / "out"
-    told = call("run", path, "--out", out, "--no-recording", "--audit-cad")
-    assert told.exit_code == 0, told.output
+    told = succeed("run", path, "--out", out, "--no-recording", "--audit-cad")
     assert "exact CAD faces" in told.output
     figures = json.loads((out / "summary.json").read_text())["cad_audit"]["ball-plate"]
     with (out / "contacts.csv").open() as file:

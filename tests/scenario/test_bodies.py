@@ -1,7 +1,5 @@
 """Several robots in one model: names, placements, start values, locked joints."""
 
-from pathlib import Path
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,7 +11,7 @@ from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restric
 from sphshell_pin.scenario.format.reading import read_scenario
 from tests.models import pose_of
 from tests.scenario.files import write
-from tests.texts import text_of
+from tests.texts import DATA, text_of
 
 TWO = text_of("scenarios/finger_and_ball.toml")
 
@@ -103,18 +101,11 @@ def test_faults_name_the_key(fault, tmp_path):
     assert words in str(caught.value)
 
 
-DATA = Path(__file__).parents[1] / "data"
-GRIPPER = f"""title = "x"
-[robot]
-file = "{DATA / "mjcf/gripper.xml"}"
-KEYS
-[run]
-duration = 1
-"""
+GRIPPER = text_of("scenarios/gripper.toml").replace("FILE", f"{DATA}/mjcf/gripper.xml")
 
 
 def gripper(tmp_path, keys=""):
-    return assembled(tmp_path, GRIPPER.replace("KEYS", keys))
+    return assembled(tmp_path, GRIPPER.replace("# KEYS", keys))
 
 
 def test_mimic_joints_are_exact_unless_they_are_not_wanted(tmp_path):

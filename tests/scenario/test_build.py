@@ -7,6 +7,7 @@ from sphshell_pin import Adaptive, ImpactLaw, RungeKutta4, SemiImplicitEuler
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
 from tests.scenario.files import DROP, write
+from tests.texts import text_of
 
 LAW_LINE = next(line for line in DROP.splitlines() if line.startswith("law"))
 
@@ -70,21 +71,7 @@ def test_a_python_controller_is_found_beside_the_file(tmp_path):
 
 
 def test_a_gain_spares_the_free_bodies(tmp_path):
-    text = """
-title = "x"
-[[robot]]
-name = "three_link_finger"
-[[robot]]
-name = "ball"
-[controller]
-type = "joint-pd"
-kp = 2.0
-kd = { "three_link_finger/knuckle" = 0.1 }
-q_ref = { "three_link_finger/knuckle" = 0.5 }
-[run]
-duration = 1
-"""
-    built = build(write(tmp_path, text))
+    built = build(write(tmp_path, text_of("scenarios/finger_and_free_ball.toml")))
     model, controller = built.scene.model, built.controller
     driven = controller.actuated(model)
     np.testing.assert_allclose(driven * controller.gain("kp", model), [2, 2, 2, 0, 0, 0, 0, 0, 0])
@@ -93,19 +80,8 @@ duration = 1
 
 
 PD = '[controller]\ntype = "joint-pd"\nkp = {}\nkd = 1\nq_ref = {}\n[run]'
-IMPEDANCE = """[controller]
-type = "cartesian-impedance"
-frame = "x"
-path = [[0, 0, 0]]
-stiffness = 1
-damping = 1
-[run]"""
-SOURCE = """[[source]]
-name = "s"
-find = "a.py:b"
-frame_i = "ball"
-law.type = "adams"
-[run]"""
+IMPEDANCE = text_of("scenarios/impedance.toml") + "[run]"
+SOURCE = text_of("scenarios/source_table.toml") + "[run]"
 BOX = 'primitive = { type = "box", size = [0.2, 0.2, 0.02] }'
 FAULTS = {
     # What is put in: old text, new text, the key that is told, words that are told.

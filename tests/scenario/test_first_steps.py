@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.drafting.new import new_scenario
 from tests.command import call
 from tests.scenario.files import DROP, write
 from tests.scenario.test_new import arm_urdf
@@ -17,10 +16,10 @@ def told(*arguments):
 
 
 @pytest.mark.parametrize("axes", ["zyyy", "zyyzyz", "zyzyyy"])
-def test_no_joint_stands_behind_the_surface(axes, tmp_path):
+def test_no_joint_stands_behind_the_surface(axes, draft, tmp_path):
     """A surface under an arm that stands upright would be pierced by the arm itself."""
     urdf = arm_urdf(tmp_path, axes)
-    built = new_scenario(urdf, "plane", radius=0.01, out=tmp_path / "a.toml").built
+    built = draft(urdf, "plane", radius=0.01).built
     (pair,), model = built.scene.pairs, built.scene.model
     data = model.createData()
     pin.framesForwardKinematics(model, data, built.q0)
@@ -49,8 +48,8 @@ def test_a_key_without_its_table_is_recognised(tmp_path):
     assert "did you mean 'run.duration'?" in output
 
 
-def test_another_integrator_leaves_the_old_ones_settings_behind(tmp_path):
-    made = new_scenario("three_link_finger", out=tmp_path / "a.toml")
+def test_another_integrator_leaves_the_old_ones_settings_behind(draft):
+    made = draft("three_link_finger")
     built = build(made.path, {"run.integrator": "semi-implicit-euler", "run.dt": "1e-4"})
     assert (built.scenario.run.dt, built.scenario.run.rtol) == (1e-4, None)
     again = build(made.path, {"run.integrator": "adaptive"})

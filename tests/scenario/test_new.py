@@ -1,5 +1,6 @@
 """A new scenario works as it is written: it touches, presses as promised, and keeps its energy."""
 
+import re
 import shutil
 import tomllib
 from pathlib import Path
@@ -20,7 +21,8 @@ from sphshell_pin.errors import (
 from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
-from tests.command import call
+from tests import urdf
+from tests.command import call, succeed
 from tests.scenario.files import pose_of, run_well
 from tests.shell.surfaces import surface_file
 from tests.studies import mostly_studies
@@ -29,39 +31,21 @@ SURFACES = next(iter(shipped_scenarios().values())).parent / "surfaces"
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE, BOWL = SURFACES / "bladex_upper.stl", SURFACES / "bowl.shl"
 
-LINK = """
-  <link name="{name}">
-    <inertial>
-      <origin xyz="0 0 {half}"/><mass value="{mass}"/>
-      <inertia ixx="{i}" iyy="{i}" izz="{j}" ixy="0" ixz="0" iyz="0"/>
-    </inertial>
-  </link>"""
-JOINT = """
-  <joint name="joint_{k}" type="revolute">
-    <parent link="{parent}"/><child link="{child}"/><origin xyz="0 0 {up}"/><axis xyz="{axis}"/>
-    <limit lower="{low}" upper="2.8" effort="60" velocity="3"/>
-  </joint>"""
+AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 
 
-def arm_urdf(folder: Path, axes: str = "zyyzyz", low: float = -2.8) -> Path:
+def arm_urdf(folder: Path, axes: str = "zyyzyz") -> Path:
     """Write an arm of links of 0.2 m that stands straight up at zero; return its URDF file."""
-    parts = ['<robot name="arm"><link name="base"/>']
+    parts = [urdf.link("base")]
     for k, axis in enumerate(axes):
-        mass = 2.0 / (k + 1)
-        parts.append(LINK.format(name=f"link_{k}", half=0.1, mass=mass, i=mass / 250, j=mass / 900))
-        parts.append(
-            JOINT.format(
-                k=k,
-                parent=f"link_{k - 1}" if k else "base",
-                child=f"link_{k}",
-                up=0.2 if k else 0.0,
-                axis={"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}[axis],
-                low=low,
-            )
-        )
-    path = folder / "arm.urdf"
-    path.write_text("".join(parts) + "</robot>", encoding="utf-8")
-    return path
+        mass, ends = 2.0 / (k + 1), (f"link_{k - 1}" if k else "base", f"link_{k}")
+        inertial = urdf.inertial(mass, mass / 250).replace("<mass", '<origin xyz="0 0 0.1"/><mass')
+        inertial = re.sub('izz="[^"]*', f'izz="{mass / 900}', inertial)
+        at = "0 0 0.2" if k else "0 0 0"
+        joint = urdf.joint(f"joint_{k}", "revolute", *ends, at=at, axis=AXES[axis])
+        limit = 'lower="-2.8" upper="2.8" effort="60" velocity="3"'
+        parts += [urdf.link(ends[1], inertial), re.sub("lower=.*(?=/></joint>)", limit, joint)]
+    return urdf.write(folder / "arm.urdf", *parts)
 
 
 CASES = [
@@ -82,11 +66,11 @@ AT_HAND = ("arm", "ball", "three_link_finger")
 
 
 @pytest.mark.parametrize(("robot", "surface", "options"), mostly_studies(CASES, FEW.__contains__))
-def test_what_is_written_works(robot, surface, options, tmp_path):
+def test_what_is_written_works(robot, surface, options, draft, tmp_path):
     if robot not in AT_HAND:
         pytest.importorskip("example_robot_data")
     name = arm_urdf(tmp_path) if robot == "arm" else robot
-    made = new_scenario(name, surface, out=tmp_path / "made.toml", **options)
+    made = draft(name, surface, **options)
     built = build(made.path)  # what stands in the file, read again
     assert len(built.scenario.expect) >= 2
     run_well(built)
@@ -97,11 +81,11 @@ def test_what_is_written_works(robot, surface, options, tmp_path):
 
 
 @pytest.mark.parametrize("robot", ["ball", "arm"])
-def test_a_cad_file_works_without_a_unit(robot, tmp_path):
+def test_a_cad_file_works_without_a_unit(robot, draft, tmp_path):
     pytest.importorskip("OCP")
     step = surface_file("trimesh_featuretype.STEP")
     name = arm_urdf(tmp_path) if robot == "arm" else robot
-    built = new_scenario(name, step, radius=0.012, out=tmp_path / "a.toml").built
+    built = draft(name, step, radius=0.012).built
     run_well(built)
     # The part measures 5 inches; its file says so.
     sizes = np.ptp(built.shells["trimesh_featuretype"].box, axis=0)
@@ -109,10 +93,8 @@ def test_a_cad_file_works_without_a_unit(robot, tmp_path):
 
 
 @pytest.mark.parametrize("place", ["below", "above", "+x", "-x", "+y", "-y"])
-def test_the_surface_stands_where_it_was_asked_for(place, tmp_path):
-    built = new_scenario(
-        arm_urdf(tmp_path), "plane", radius=0.01, place=place, out=tmp_path / "a.toml"
-    ).built
+def test_the_surface_stands_where_it_was_asked_for(place, draft, tmp_path):
+    built = draft(arm_urdf(tmp_path), "plane", radius=0.01, place=place).built
     (pair,) = built.scene.pairs
     tip = pose_of(built.scene.model, built.q0, "link_5").translation
     k = {"below": 2, "above": 2}.get(place, "xyz".find(place[-1]))
@@ -123,9 +105,9 @@ def test_the_surface_stands_where_it_was_asked_for(place, tmp_path):
     np.testing.assert_allclose(away, expected, atol=2e-6)
 
 
-def test_a_single_body_of_ones_own_floats(tmp_path):
+def test_a_single_body_of_ones_own_floats(draft, tmp_path):
     shutil.copy(robots.URDF_FOLDER / "ball.urdf", tmp_path / "mine.urdf")
-    made = new_scenario(tmp_path / "mine.urdf", "plane", out=tmp_path / "a.toml")
+    made = draft(tmp_path / "mine.urdf", "plane")
     assert made.built.scenario.robot[0].base == "floating"
     assert any("the base is floating" in one for one in made.why)
     assert made.built.scene.model.nv == 6
@@ -147,21 +129,17 @@ def test_files_are_named_relative_to_the_scenario(tmp_path):
     assert build(tmp_path / "new" / "a.toml").shells["my blade"].num_elements == 522
 
 
-def test_materials_give_hertzs_law(tmp_path):
-    made = new_scenario(
-        "ball", "plane", material="aluminium", against="rubber", out=tmp_path / "a.toml"
-    )
+def test_materials_give_hertzs_law(draft):
+    made = draft("ball", "plane", material="aluminium", against="rubber")
     (pair,) = made.built.scene.pairs
     softness = (1 - 0.33**2) / 7.0e10 + (1 - 0.49**2) / 1.0e7
     assert pair.law.stiffness == pytest.approx(4 / 3 * np.sqrt(0.012) / softness, rel=1e-12)
-    turned = new_scenario(
-        "ball", "plane", material="rubber", against="aluminium", out=tmp_path / "b.toml"
-    )
+    turned = draft("ball", "plane", material="rubber", against="aluminium")
     assert turned.built.scene.pairs[0].friction == pair.friction
 
 
-def test_the_ball_comes_back_as_high_as_its_material_says(tmp_path):
-    built = new_scenario("ball", "plane", material="wood", out=tmp_path / "a.toml").built
+def test_the_ball_comes_back_as_high_as_its_material_says(draft):
+    built = draft("ball", "plane", material="wood").built
     result, _ = simulate(built)
     touched = float(result.contact_columns()["t [s]"][0])
     after = result.t > touched + 0.01
@@ -214,10 +192,10 @@ def test_the_ball_comes_back_as_high_as_its_material_says(tmp_path):
     ],
 )
 def test_what_cannot_be_found_out_is_asked_for_in_one_sentence(
-    arguments, options, error, match, tmp_path
+    arguments, options, error, match, draft, tmp_path
 ):
     with pytest.raises(error, match=match) as caught:
-        new_scenario(*arguments, out=tmp_path / "a.toml", **options)
+        draft(*arguments, **options)
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
 
@@ -258,8 +236,7 @@ def test_the_command(tmp_path, monkeypatch):
         "--radius",
         "12mm",
     ]
-    result = call(*command)
-    assert result.exit_code == 0, result.output
+    result = succeed(*command)
     assert "sphshell-pin run ball_on_bowl.toml" in result.output
     assert "verdict" in result.output
     assert "Recommended dt" in result.output

@@ -47,9 +47,9 @@ def way(built):
     return np.array(built.scenario.controller.path)
 
 
-def test_a_part_lies_before_a_bent_arm_as_on_a_table(arm, plate, tmp_path):
+def test_a_part_lies_before_a_bent_arm_as_on_a_table(arm, plate, draft, tmp_path):
     """The arm stands straight up at zero: by default it does what `--place below` does."""
-    made = new_scenario(arm, plate, radius=0.01, out=tmp_path / "a.toml")
+    made = draft(arm, plate, radius=0.01)
     below = new_scenario(arm, plate, radius=0.01, place="below", out=tmp_path / "b.toml")
     assert made.text.replace("a.toml", "b.toml") == below.text
     corners, placement = placed(made.built)
@@ -79,18 +79,18 @@ def dome(tmp_path, *, up):
 
 
 @pytest.mark.parametrize("up", [True, False])
-def test_an_open_scan_is_touched_from_outside(up, arm, tmp_path):
+def test_an_open_scan_is_touched_from_outside(up, arm, draft, tmp_path):
     file = dome(tmp_path, up=up)
     np.testing.assert_array_equal(sides(sp.Shell.from_file(file))[0], [0, 0, 1 if up else -1])
-    built = new_scenario(arm, file, radius=0.01, out=tmp_path / "a.toml").built
+    built = draft(arm, file, radius=0.01).built
     assert np.linalg.norm(center_of(built, built.q0)) > 0.1
     # It lies on its rim.
     assert placed(built)[0][:, 2].min() == pytest.approx(0.0, abs=1e-5)
 
 
-def test_a_gantry_slides(plate, tmp_path):
+def test_a_gantry_slides(plate, draft):
     """Nothing can turn its tip, so that it needs no joints against rolling."""
-    made = new_scenario(GANTRY, plate, frame="probe", radius=0.01, out=tmp_path / "a.toml")
+    made = draft(GANTRY, plate, frame="probe", radius=0.01)
     control = made.built.scenario.controller
     assert len(control.path) > 2
     assert control.rotational_stiffness == 0.0
@@ -101,12 +101,10 @@ def test_a_gantry_slides(plate, tmp_path):
     )
 
 
-def test_a_point_of_the_part_is_touched(arm, plate, tmp_path):
+def test_a_point_of_the_part_is_touched(arm, plate, draft, tmp_path):
     at = (0.05, -0.06, 0.04)
     for text in (at, "0.05, -0.06, 0.04"):
-        built = new_scenario(
-            arm, plate, radius=0.01, at=text, out=tmp_path / "a.toml", force=True
-        ).built
+        built = draft(arm, plate, radius=0.01, at=text).built
         np.testing.assert_allclose(way(built)[0], at, atol=1e-5)
     # A side is turned up, as the tip presses down.
     built = new_scenario(arm, plate, radius=0.01, at=(0.15, 0, 0.02), out=tmp_path / "b.toml").built
@@ -148,13 +146,11 @@ def test_the_path_has_the_shape_and_length_asked_for(arm, plate, tmp_path):
     np.testing.assert_allclose(raster[:, 2], 0.04, atol=1e-6)
 
 
-def test_the_points_of_a_path_are_taken_over(arm, plate, tmp_path):
+def test_the_points_of_a_path_are_taken_over(arm, plate, draft):
     points = [[-0.02, 0, 0.04], [0.03, 0.0, 0.04], [0.03, 0.03, 0.04]]
     text = "; ".join(",".join(map(str, one)) for one in points)
     for path in (points, text):
-        built = new_scenario(
-            arm, plate, radius=0.01, path=path, out=tmp_path / "a.toml", force=True
-        ).built
+        built = draft(arm, plate, radius=0.01, path=path).built
         np.testing.assert_allclose(way(built), points, atol=1e-5)
     result, _ = simulate(built)
     center = center_of(built, result.q[-1])
@@ -173,8 +169,8 @@ def test_the_points_of_a_path_are_taken_over(arm, plate, tmp_path):
         ({"path": [[0, 0, 0.04]], "at": (0, 0, 0.04)}, InvalidParameter, "leave it out"),
     ],
 )
-def test_what_cannot_be_asked(options, error, match, arm, plate, tmp_path):
+def test_what_cannot_be_asked(options, error, match, arm, plate, draft, tmp_path):
     with pytest.raises(error, match=match) as caught:
-        new_scenario(arm, plate, radius=0.01, out=tmp_path / "a.toml", **options)
+        draft(arm, plate, radius=0.01, **options)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "a.toml").exists()

@@ -25,7 +25,7 @@ from sphshell_pin.scenario.drafting.plan import Press
 from sphshell_pin.scenario.drafting.pose_search import repaired
 from sphshell_pin.scenario.drafting.trial import Fault, _force_fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
-from tests import models
+from tests import models, urdf
 from tests.scenario.files import center_of, run_well
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
@@ -42,9 +42,9 @@ def held(built, result):
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, tmp_path):
+def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, draft):
     """The tip's sphere is 80 mm before its frame."""
-    made = new_scenario(PROBE, BLADE, unit="mm", place=place, out=tmp_path / "a.toml")
+    made = draft(PROBE, BLADE, unit="mm", place=place)
     built = build(made.path)
     result = run_well(built)
     control = built.scenario.controller
@@ -60,8 +60,8 @@ def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, tmp_pa
     assert np.linalg.norm(away - normal * (away @ normal)) < 0.25 * pair.side_i.sphere.radius
 
 
-def test_a_hard_tip_settles(tmp_path):
-    made = new_scenario(PROBE, "plane", material="steel", out=tmp_path / "a.toml")
+def test_a_hard_tip_settles(draft):
+    made = draft(PROBE, "plane", material="steel")
     result, _ = simulate(made.built)
     (figures,) = result.stats.pairs.values()
     force = made.built.scenario.controller.normal_force
@@ -75,8 +75,8 @@ def test_a_hard_tip_settles(tmp_path):
     ("surface", "side"),
     [("plane", "both"), ("box", "outside"), ("bowl", "inside"), ("sphere", "outside")],
 )
-def test_a_closed_body_has_one_side(surface, side, tmp_path):
-    built = new_scenario("ball", surface, out=tmp_path / "a.toml").built
+def test_a_closed_body_has_one_side(surface, side, draft):
+    built = draft("ball", surface).built
     assert built.shells[surface].side == side
     (pair,) = built.scene.explain(built.q0, built.v0).pairs
     assert 0 < pair.gap < 0.03
@@ -102,17 +102,17 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("robot", "surface", "options", "match"), REFUSED)
-def test_what_would_not_work_is_refused(robot, surface, options, match, tmp_path):
+def test_what_would_not_work_is_refused(robot, surface, options, match, draft, tmp_path):
     with pytest.raises(SphshellError, match=match) as caught:
-        new_scenario(robot, surface, out=tmp_path / "a.toml", **options)
+        draft(robot, surface, **options)
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(tmp_path):
+def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(draft):
     with pytest.raises(SphshellError, match=r"LEG' is in the part .* hold it with --base fixed"):
-        new_scenario("solo12", BLADE, unit="mm", base="floating", out=tmp_path / "a.toml")
-    made = new_scenario("solo12", BLADE, unit="mm", out=tmp_path / "a.toml")
+        draft("solo12", BLADE, unit="mm", base="floating")
+    made = draft("solo12", BLADE, unit="mm")
     assert "cannot stand on the surface: link 'FL_LOWER_LEG' is in the part" in made.why[0]
     built = build(made.path)
     # Three joints of the leg are left, of which none is the base.
@@ -142,14 +142,12 @@ def test_a_biped_whose_foot_is_beside_the_part_is_held(tmp_path):
     assert build(made.path).scene.model.nv <= 4
 
 
-def test_a_body_without_joints_is_not_advised_to_be_held(tmp_path):
+def test_a_body_without_joints_is_not_advised_to_be_held(draft, tmp_path):
     """Nothing moves then: the fall that failed is what is told."""
-    body = '<link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0"'
-    body += ' ixz="0" iyz="0"/></inertial><collision><geometry><box size="2 2 0.1"/></geometry>'
-    file = tmp_path / "body.urdf"
-    file.write_text(f'<robot name="body">{body}</collision></link></robot>')
+    plate = urdf.shape("collision", '<box size="2 2 0.1"/>')
+    file = urdf.write(tmp_path / "body.urdf", urdf.link("b", urdf.inertial(), plate))
     with pytest.raises(SphshellError, match=r"'b' is in the part .* can come down$"):
-        new_scenario(file, "bowl", radius=0.05, out=tmp_path / "a.toml")
+        draft(file, "bowl", radius=0.05)
 
 
 def test_efforts_that_do_not_carry_the_robot_are_left_out_and_said_so(tmp_path):
@@ -195,14 +193,14 @@ def test_links_in_a_part_are_found():
     assert links.within(q, pin.SE3.Identity(), whole=True) is not None
 
 
-def test_a_part_with_a_hole_is_pressed_beside_it(tmp_path):
+def test_a_part_with_a_hole_is_pressed_beside_it(draft, tmp_path):
     """A washer: its middle is a hole, as large as the sphere."""
     turns = np.linspace(0, 2 * np.pi, 49)[:-1]
     ring = np.array([np.cos(turns), np.sin(turns), 0 * turns]).T
     n = len(turns)
     quads = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
     sp.Shell(np.concatenate([0.06 * ring, 0.02 * ring]), quads).to_file(tmp_path / "washer.shl")
-    built = new_scenario(PROBE, tmp_path / "washer.shl", out=tmp_path / "a.toml").built
+    built = draft(PROBE, tmp_path / "washer.shl").built
     result, _ = simulate(built)
     assert held(built, result) == pytest.approx(built.scenario.controller.normal_force, rel=0.05)
     away = np.linalg.norm(np.array(built.scenario.controller.path)[:, :2], axis=1)
@@ -210,7 +208,7 @@ def test_a_part_with_a_hole_is_pressed_beside_it(tmp_path):
     assert re.search(r'side = "both"', (tmp_path / "a.toml").read_text())
 
 
-def test_what_the_file_states_of_the_joints_is_modelled(tmp_path):
+def test_what_the_file_states_of_the_joints_is_modelled(draft, tmp_path):
     """Motors make up for damping and dry friction, so that the tip slides as without them."""
     text = PROBE.read_text(encoding="utf-8")
     built = new_scenario(PROBE, out=tmp_path / "plain.toml").built
@@ -219,7 +217,7 @@ def test_what_the_file_states_of_the_joints_is_modelled(tmp_path):
     assert set(built.scene.joints.effort) == set(list(built.scene.model.names)[1:])
     stated = '<dynamics damping="1" friction="0.5"/></joint>'
     (tmp_path / "arm.urdf").write_text(text.replace("</joint>", stated), encoding="utf-8")
-    made = new_scenario(tmp_path / "arm.urdf", out=tmp_path / "a.toml").built
+    made = draft(tmp_path / "arm.urdf").built
     assert made.scenario.robot[0].joints == ["limits", "damping", "friction", "effort", "speed"]
     assert made.scenario.controller.friction_compensation
     path = made.scenario.controller.path
@@ -253,19 +251,17 @@ def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
             assert "a ball on the end of link 'link_5'" in tip.source
 
 
-def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
+def test_a_sphere_inside_its_link_is_refused_before_any_search(draft):
     began = time.perf_counter()
     with pytest.raises(SphshellError, match=r"inside link 'link_5', .* mm deep") as caught:
-        new_scenario(
-            PROBE, frame="link_5", offset=[0, 0, 0.05], radius=0.002, out=tmp_path / "a.toml"
-        )
+        draft(PROBE, frame="link_5", offset=[0, 0, 0.05], radius=0.002)
     assert time.perf_counter() - began < 2.0
     command = re.search(
         r"--frame (\S+) --offset (\S+) (\S+) (\S+) --radius (\S+)", str(caught.value)
     )
     frame, *offset, radius = command.groups()
     offset = [float(one) for one in offset]
-    new_scenario(PROBE, frame=frame, offset=offset, radius=float(radius), out=tmp_path / "a.toml")
+    draft(PROBE, frame=frame, offset=offset, radius=float(radius))
 
 
 def pressing(points, **changes):

@@ -16,7 +16,7 @@ from sphshell_pin.base.atomic.files import exchange
 from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running import run
-from tests.command import call
+from tests.command import call, succeed
 from tests.scenario.files import write
 
 LAST = "summary.json"
@@ -54,13 +54,13 @@ def test_a_second_run_is_told_who_writes_until_that_process_is_killed(
     assert "give another folder with --out" in told.stderr
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    assert call("run", path, "--out", out, "--no-recording").exit_code == 0
+    succeed("run", path, "--out", out, "--no-recording")
     assert sorted(os.listdir(tmp_path)) == ["drop.toml", "out"]
 
 
 def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
     arguments = ["run", write(tmp_path), "--out", tmp_path / "out", "--no-recording"]
-    assert call(*arguments).exit_code == 0
+    succeed(*arguments)
     before = (tmp_path / "out" / LAST).read_bytes()
 
     def full(*_, **__):

@@ -10,36 +10,16 @@ from sphshell_pin.scenario.format.reach import Reach, turn_between
 from tests import models
 from tests.scenario import files
 from tests.scenario.test_new import arm_urdf
+from tests.texts import text_of
 
-SCENARIO = """
-title = "an arm over a plane"
-
-[[robot]]
-urdf = "arm.urdf"
-start = {start}
-{more}
-
-[[shell]]
-name = "plane"
-primitive = {{ type = "half-space", extent = 1.0 }}
-
-[[contact]]
-name = "tip"
-sphere = {{ frame = "{sphere}", radius = 0.01, offset = [0.0, 0.0, 0.2] }}
-shell = "plane"
-law = {{ type = "hunt-crossley", stiffness = 1e6, dissipation = 0.5 }}
-
-[run]
-duration = 0.1
-"""
+SCENARIO = text_of("scenarios/tip_at.toml")
 XYZ = [0.4, 0.1, 0.0105]
 
 
 def scenario(folder, start, more="", sphere="link_5"):
     arm_urdf(folder)
-    path = folder / "a.toml"
-    path.write_text(SCENARIO.format(start=start, more=more, sphere=sphere), encoding="utf-8")
-    return path
+    text = SCENARIO.replace("START", start).replace("# MORE", more).replace("SPHERE", sphere)
+    return files.write(folder, text, "a.toml")
 
 
 def pose_of(built, frame="link_5"):

@@ -9,7 +9,6 @@ import pytest
 
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.plan import press_force
 from sphshell_pin.scenario.drafting.tip_contact import sticking
 
@@ -34,9 +33,9 @@ def test_bristles_are_as_stiff_as_the_contact_and_damped_by_a_tenth():
     assert damping / (2 * np.sqrt(stiffness * mass)) == pytest.approx(0.1, rel=0.1)
 
 
-def test_a_tip_that_is_led_is_damped_by_seven_tenths(tmp_path):
+def test_a_tip_that_is_led_is_damped_by_seven_tenths(draft):
     """Of critical, with the geometric mean of its masses along the normal and where it slides."""
-    built = new_scenario(PROBE, "plane", out=tmp_path / "a.toml").built
+    built = draft(PROBE, "plane").built
     control, model, tip = built.controller, built.scene.model, built.scene.pairs[0].spheres[0]
     frame = model.getFrameId(tip.frame)
     data = model.createData()

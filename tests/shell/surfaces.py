@@ -15,15 +15,9 @@ DATA = Path(__file__).parents[1] / "data" / "corpus"
 MORE_DATA = Path(os.environ.get("SPHSHELL_SURFACES", Path(__file__).parents[3] / "shared" / "data"))
 """Where further ones may be that are not in the repository: ../shared/data beside the clone."""
 
-CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-CUBE_QUADS = [
-    [0, 1, 3, 2],
-    [4, 6, 7, 5],
-    [0, 4, 5, 1],
-    [2, 3, 7, 6],
-    [0, 2, 6, 4],
-    [1, 5, 7, 3],
-]
+CUBE, _QUADS = meshes.cube(quads=True)
+CUBE = CUBE + 0.5
+CUBE_QUADS = _QUADS.tolist()
 
 
 def surface_file(name: str) -> Path:

@@ -21,7 +21,6 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad import process
 from sphshell_pin.shell.cad.messages import pack, unpack
 from tests.command import call
-from tests.fuzz.cad import KINDS, outcome
 from tests.shell import cad_shapes as shapes
 
 DAMAGED = sorted((Path(__file__).parents[1] / "data" / "damaged_cad").iterdir())
@@ -91,9 +90,14 @@ def test_what_becomes_of_the_child_is_told_in_a_sentence(job, told, box, monkeyp
 
 
 def test_files_on_which_opencascade_crashed_or_hung():
+    told = "makes OpenCASCADE (crash|fail)|time limit|memory limit|no valid answer"
+
+    def read(path):
+        with pytest.raises(ShellFileError, match=told):
+            Shell.from_file(path, "mm" if path.suffix == ".brep" else None, time_limit=1.5)
+
     with ThreadPoolExecutor(2) as pool:
-        found = pool.map(lambda path: outcome(path, time_limit=1.5), DAMAGED)
-        assert set(found) <= set(KINDS.values())
+        list(pool.map(read, DAMAGED))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])

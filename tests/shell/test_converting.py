@@ -11,7 +11,7 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError
 from sphshell_pin.shell import converting
 from sphshell_pin.shell.converting import convert
 from tests import meshes
-from tests.command import call
+from tests.command import call, succeed
 from tests.shell import cad_shapes as shapes
 
 
@@ -144,13 +144,11 @@ def test_what_cannot_be_is_refused(plate, tmp_path):
 
 def test_the_command_prints_what_it_measured(plate, tmp_path):
     target = tmp_path / "out.stl"
-    told = call("convert", plate, target, "--chord-error", "1e-4")
-    assert told.exit_code == 0, told.output
+    told = succeed("convert", plate, target, "--chord-error", "1e-4")
     assert "7 CAD faces" in told.output
     assert "deviation measured at" in told.output
     assert target.is_file()
-    told = call("check", plate, "--face", "7", "--chord-error", "1e-5")
-    assert told.exit_code == 0
+    told = succeed("check", plate, "--face", "7", "--chord-error", "1e-5")
     assert "1 CAD face, tolerance" in told.output
     told = call("convert", target, tmp_path / "out.obj")
     assert told.exit_code == 2

@@ -7,15 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.texts import text_of
+
 VALVE_BODY = Path(__file__).parents[2] / "scenarios" / "surfaces" / "valve_body.step"
-HIDE = """
-for name in libGL.so.1 libX11.so.6; do
-  for file in $(PATH="$PATH:/usr/sbin:/sbin" ldconfig -p | sed -n "s/.*$name .* => //p"); do
-    mount --bind /dev/null "$(readlink -f "$file")"
-  done
-done
-exec "$@"
-"""
+HIDE = text_of("hide_display.sh")
 READ = """
 import ctypes, sys
 import sphshell_pin as sp

@@ -7,6 +7,7 @@ import pytest
 
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
+from tests import urdf
 
 ROUND = {
     "sphere": coal.Sphere(0.3),
@@ -165,14 +166,11 @@ def test_geometry_object_gives_name_and_own_frame():
 
 def test_mesh_scale_of_a_urdf_is_applied_once(tmp_path):
     Shell.from_geometry(coal.Box(1.0, 1.0, 1.0)).to_file(tmp_path / "box.stl")
-    urdf = tmp_path / "robot.urdf"
-    urdf.write_text(
-        '<robot name="r"><link name="base"><collision><geometry>'
-        f'<mesh filename="{tmp_path}/box.stl" scale="2 3 4"/>'
-        "</geometry></collision></link></robot>"
-    )
-    model = pin.buildModelFromUrdf(str(urdf))
-    geometry = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
+    mesh = f'<mesh filename="{tmp_path}/box.stl" scale="2 3 4"/>'
+    part = urdf.link("base", urdf.shape("collision", mesh))
+    file = str(urdf.write(tmp_path / "robot.urdf", part))
+    model = pin.buildModelFromUrdf(file)
+    geometry = pin.buildGeomFromUrdf(model, file, pin.GeometryType.COLLISION)
     held = geometry.geometryObjects[0]
     assert held.meshScale.tolist() == [2, 3, 4]
     shell = Shell.from_geometry(held)

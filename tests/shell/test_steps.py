@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from tests import meshes
 from tests.meshes import random_rotation
 
 RADIUS, LENGTH = 0.005, 0.02
@@ -15,19 +16,8 @@ RADIUS, LENGTH = 0.005, 0.02
 
 def turned(angles, profile):
     """Return the shell (in single precision) of a closed profile (n, 2) turned by angles (m,)."""
-    angles, profile = np.asarray(angles), np.asarray(profile)
-    n, m = len(profile), len(angles)
-    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    points = np.concatenate(
-        [profile[:, None, :1] * ring[None], np.repeat(profile[:, None, 1:], m, axis=1)], axis=2
-    )
-    i, j = np.meshgrid(np.arange(n - 1), np.arange(m), indexing="ij")
-    k = (j + 1) % m
-    quads = np.stack([i * m + j, i * m + k, (i + 1) * m + k, (i + 1) * m + j], axis=2)
-    rows = quads.reshape(-1, 4)
-    triangles = np.concatenate([rows[:, [0, 1, 2]], rows[:, [0, 2, 3]]])
-    vertices = points.reshape(-1, 3).astype(np.float32).astype(float)
-    return sp.Shell(vertices, triangles)
+    vertices, triangles = meshes.revolved(profile, np.asarray(angles))
+    return sp.Shell(vertices.astype(np.float32).astype(float), triangles)
 
 
 def angles_with_flats(steps, flats):

@@ -18,35 +18,10 @@ from sphshell_pin.scenario import build
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.quantities import quantities_of
 from sphshell_pin.study.report.machine import machine
+from tests.texts import text_of
 
 NOISE, STEP = 0.02, 2e-4  # of the largest value of each column; between times [s]
-SCENARIO = """
-title = "A rubber ball, thrown at an angle, bounces on a plate"
-
-[robot]
-name = "ball"
-
-[robot.start]
-root_joint = [0.0, 0.0, 0.017, 0.0, 0.0, 0.0, 1.0]  # 5 mm above the plate
-
-[robot.speed]
-root_joint = [3.0, 0.0, -0.5, 0.0, 0.0, 0.0]  # it slides in all impacts
-
-[[shell]]
-name = "plate"
-primitive = { type = "half-space", extent = 2.0 }
-
-[[contact]]
-name = "tip"
-sphere = { frame = "ball", radius = 0.012 }
-shell = "plate"
-law = { type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }
-friction = { type = "coulomb", mu_static = 0.3, mu_dynamic = 0.2, v_static = 0.05, v_dynamic = 0.1 }
-
-[run]
-duration = 0.25
-rtol = 1e-7
-"""
+SCENARIO = text_of("scenarios/bounce.toml")
 LAW = "contact.tip.law."
 TRUTH = {f"{LAW}stiffness": 1e5, f"{LAW}dissipation": 0.3, "contact.tip.friction.mu_dynamic": 0.2}
 COLUMNS = {"pairs.tip.normal_force": "N", "pairs.tip.force_x": "N"}

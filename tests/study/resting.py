@@ -2,43 +2,12 @@
 
 from pathlib import Path
 
+from tests.texts import text_of
+
 RADIUS = 0.012
 GRAVITY = 9.81
 
-SCENARIO = f"""
-title = "a ball settles on a plate"
-
-[robot]
-name = "ball"
-start = {{ root_joint = [0.01, 0.02, {RADIUS}, 0, 0, 0, 1] }}
-
-[[shell]]
-name = "plate"
-primitive = {{ type = "half-space", extent = 1.0 }}
-
-[[contact]]
-name = "ball-plate"
-sphere = {{ frame = "ball", radius = {RADIUS} }}
-shell = "plate"
-
-[contact.law]
-type = "impact"
-stiffness = 1e4
-exponent = 1.5
-damping = 5.0
-full_damping_depth = 1e-9
-
-[run]
-duration = 1.0
-integrator = "implicit"
-record_dt = 0.1
-
-[figures]
-depth = "figures.py:depth"
-
-[expect]
-"figures.depth" = {{ max = 1e-4 }}
-"""
+SCENARIO = text_of("scenarios/resting.toml")
 
 FIGURES = """
 import os

@@ -10,7 +10,7 @@ import pytest
 from sphshell_pin import Shell
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.study.against import Against, compare_shells
-from tests.command import call, refused
+from tests.command import call, refused, succeed
 
 # An L without any symmetry, extruded [m].
 OUTLINE = np.array([[0, 0], [0.09, 0], [0.09, 0.02], [0.03, 0.02], [0.03, 0.05], [0, 0.05]])
@@ -106,7 +106,7 @@ def test_the_command_prints_the_faces_and_ends_with_1(tmp_path: Any) -> None:
     assert (figures["same"], figures["radius"]) == (False, 0.002)
     assert drawn.read_bytes().startswith(b"\x89PNG")
     assert 5e-4 < abs(figures["faces"][0]["worst"]) <= 1.001e-3
-    assert call("check", one, *units[:2], "--against", one, "--against-unit", "mm").exit_code == 0
+    succeed("check", one, *units[:2], "--against", one, "--against-unit", "mm")
     assert "--against-unit" in refused("check", one, *units[:2], "--against", two)
 
 

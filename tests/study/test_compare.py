@@ -10,7 +10,7 @@ from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.plot.compare import plot_compare
 from sphshell_pin.study.compare import Curve, Measured, compare, measured, tables_of
-from tests.command import call, refused
+from tests.command import refused, succeed
 from tests.export.runs import finger_run, turntable_run
 from tests.scenario.files import DROP, write
 
@@ -152,8 +152,7 @@ def test_the_picture_has_every_run_and_its_difference(finger, table):
 def drop(folder, name, **changes):
     out = folder / name
     set_ = [f"--set={key.replace('__', '.')}={value}" for key, value in changes.items()]
-    printed = call("run", write(folder), "--out", out, "--no-recording", *set_)
-    assert printed.exit_code == 0, printed.output
+    succeed("run", write(folder), "--out", out, "--no-recording", *set_)
     return out
 
 
@@ -161,8 +160,7 @@ def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     soft = drop(tmp_path, "soft")
     stiff = drop(tmp_path, "stiff", run__dt="5e-5", run__duration="0.04")
-    printed = call("compare", soft, stiff / "run.npz", "--out", tmp_path / "both")
-    assert printed.exit_code == 0, printed.output
+    printed = succeed("compare", soft, stiff / "run.npz", "--out", tmp_path / "both")
     for words in ("stiff beside soft", "run.duration", "pairs.ball-plate.peak_force [N]", " %"):
         assert words in printed.output
     names = ["compare.png", "curves.csv", "figures.csv"]
@@ -173,8 +171,7 @@ def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
     peaks = [one.pairs["ball-plate"].peak_force for one in stats]
     (line,) = (one for one in lines if one.startswith("stiff,pairs.ball-plate.peak_force,"))
     assert [float(one) for one in line.split(",")[3:5]] == peaks
-    printed = call("compare", soft, soft, "--out", tmp_path / "same", "--no-picture")
-    assert printed.exit_code == 0
+    printed = succeed("compare", soft, soft, "--out", tmp_path / "same", "--no-picture")
     assert "equal to the last bit" in printed.output
     assert "figure" not in printed.output.partition("equal to")[0]
 
@@ -188,8 +185,7 @@ def test_faults_of_compare(tmp_path, monkeypatch):
     told = refused("compare", soft, tmp_path / "bad.npz")
     assert "bad.npz: is not a file that Result.save wrote" in told
     other = DROP.replace("ball-plate", "elsewhere")
-    assert call("run", write(tmp_path, other), "--out", "other", "--no-recording").exit_code == 0
-    printed = call("compare", soft, "other", "--out", "x", "--no-picture")
-    assert printed.exit_code == 0
+    succeed("run", write(tmp_path, other), "--out", "other", "--no-recording")
+    printed = succeed("compare", soft, "other", "--out", "x", "--no-picture")
     assert "in soft alone: contact ball-plate" in printed.output
     assert "in other alone: contact elsewhere" in printed.output

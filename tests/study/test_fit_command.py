@@ -13,7 +13,7 @@ import sphshell_pin as sp
 from sphshell_pin.base.tables import csv_text
 from sphshell_pin.scenario import read_scenario
 from sphshell_pin.study.fit.parameters import parse_wanted
-from tests.command import call
+from tests.command import call, succeed
 from tests.study.fitted_sets import SCENARIO
 from tests.study.test_fit import DISSIPATION, FORCE, FRICTION, HEIGHT, STIFFNESS, columns_of, noisy
 
@@ -27,8 +27,7 @@ def test_the_command_writes_values_in_place(bounce, tmp_path, monkeypatch):
         Path(name).write_text(csv_text(data))
     command = ["fit", "drop.csv", bounce, f"--param={STIFFNESS}", f"--param={DISSIPATION}=0:1"]
     command += ["--experiment", f"fast.csv {fast}", "--set", f"{STIFFNESS}=8e4"]
-    done = call(*command)
-    assert done.exit_code == 0, done.output
+    done = succeed(*command)
     assert "2 experiments" in done.output
     out = Path("results/bounce")
     names = ["bounce.fitted.toml", "fit.json", "fit.png"]

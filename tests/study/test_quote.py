@@ -1,21 +1,17 @@
 """What the README and the documents quote is what was measured."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
 
 from sphshell_pin.study.report import making
 from sphshell_pin.study.report.contents import Column, Finding, Section, Table
+from tests.programs import module_of
 
 
 @pytest.fixture(scope="module")
 def quote():
-    file = Path(__file__).parents[2] / "docs" / "site" / "quote.py"
-    spec = importlib.util.spec_from_file_location("quote", file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_of(Path(__file__).parents[2] / "docs" / "site" / "quote.py")
 
 
 def report(folder, error=None):

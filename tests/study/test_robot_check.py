@@ -19,8 +19,10 @@ from sphshell_pin.study.robot_check.postures import massless_joints, random_post
 from sphshell_pin.study.robot_check.probe_spheres import find_sphere
 from sphshell_pin.study.robot_check.report import FAILED, NOT_CHECKED, PASS, as_json, remarks
 from sphshell_pin.testing.finding import Finding
+from tests import urdf
 from tests.command import call, refused
 from tests.studies import mostly_studies
+from tests.texts import text_of
 
 ROOT = Path(__file__).parents[2]
 TINY = Sizes(1, 1, 4)
@@ -29,30 +31,23 @@ JOINTS = ("revolute", "continuous", "prismatic", "planar", "floating")
 
 def chain(tmp_path: Path, joints: tuple[str, ...], extra: str = "", massless: str = "") -> Path:
     """A URDF of links on these joints in a row, each 0.2 m on, with meshes that are not there."""
+    shape = urdf.mesh("package://nowhere/absent.stl")
+    shapes = [urdf.shape(kind, shape) for kind in ("visual", "collision")]
     parts = []
     for k in range(len(joints) + 1):
         inertial = f"""<inertial><origin xyz="0.01 0.02 0.1"/><mass value="{1.0 + 0.3 * k}"/>
             <inertia ixx="0.01" iyy="0.012" izz="0.005" ixy="0.001" ixz="0" iyz="0"/></inertial>"""
-        mesh = """<geometry><mesh filename="package://nowhere/absent.stl"/></geometry>"""
-        parts.append(
-            f"""<link name="link{k}">{"" if f"link{k}" in massless.split() else inertial}
-            <visual>{mesh}</visual><collision>{mesh}</collision></link>"""
-        )
+        stated = "" if f"link{k}" in massless.split() else inertial
+        parts.append(urdf.link(f"link{k}", stated, *shapes))
     for k, kind in enumerate(joints):
-        limit = (
-            ""
-            if kind in ("continuous", "floating", "planar")
-            else ('<limit lower="-1" upper="1" effort="10" velocity="10"/>')
-        )
-        axis = "" if kind == "floating" else f'<axis xyz="{"1 0 0" if k % 2 else "0 1 0"}"/>'
         mimic = '<mimic joint="joint0"/>' if f"mimic{k}" in extra.split() else ""
-        parts.append(
-            f"""<joint name="joint{k}" type="{kind}"><parent link="link{k}"/>
-            <child link="link{k + 1}"/><origin xyz="0 0.02 0.2"/>{axis}{limit}{mimic}</joint>"""
-        )
-    file = tmp_path / "chain.urdf"
-    file.write_text(f'<robot name="chain">{"".join(parts)}</robot>')
-    return file
+        axis = "1 0 0" if k % 2 else "0 1 0"
+        ends = f"link{k}", f"link{k + 1}"
+        one = urdf.joint(f"joint{k}", kind, *ends, mimic, at="0 0.02 0.2", axis=axis)
+        if kind in ("continuous", "floating", "planar"):
+            one = re.sub("<limit[^>]*>", "", one)
+        parts.append(re.sub("<axis[^>]*>", "", one) if kind == "floating" else one)
+    return urdf.write(tmp_path / "chain.urdf", *parts)
 
 
 def passes(report: RobotReport) -> bool:
@@ -221,31 +216,20 @@ REPORTS = [
 ]
 
 
-MESHED = """<robot name="meshed"><link name="base"/>
-<link name="rod">{mass}<collision><origin xyz="0 0 0.2"/>
-    <geometry><box size="0.05 0.05 0.4"/></geometry></collision></link>
-<joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/>
-    <axis xyz="0 1 0"/></joint></robot>"""
 URDF_MASS = """<inertial><mass value="1"/><origin xyz="0 0 0.2"/>
     <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>"""
-MESHED_MJCF = """<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0"/>{mass}
-    <geom type="box" size="0.025 0.025 0.2" pos="0 0 0.2"/>
-    <geom type="box" size="1 1 1" contype="0" conaffinity="0" group="2"/>
-    </body></worldbody></mujoco>"""
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "mass"),
+    ("name", "mass"),
     [
-        ("meshed.urdf", MESHED, URDF_MASS),
-        ("meshed.xml", MESHED_MJCF, '<inertial pos="0 0 0.2" mass="1" diaginertia="1 1 1"/>'),
+        ("meshed.urdf", URDF_MASS),
+        ("meshed.xml", '<inertial pos="0 0 0.2" mass="1" diaginertia="1 1 1"/>'),
     ],
 )
-def test_a_sphere_inside_the_last_mesh_is_used(
-    name: str, text: str, mass: str, tmp_path: Path
-) -> None:
+def test_a_sphere_inside_the_last_mesh_is_used(name: str, mass: str, tmp_path: Path) -> None:
     file = tmp_path / name
-    file.write_text(text.format(mass=mass))
+    file.write_text(text_of(f"robots/{name}").replace("<!-- MASS -->", mass))
     report = check_robot(file, sizes=TINY)
     assert report.verdict == PASS, report
     assert any("the outermost of 8 inside the collision mesh of 'rod'" in n for n in report.notes)

@@ -16,7 +16,7 @@ from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError, Swe
 from sphshell_pin.plot.sweep import plot_sweep
 from sphshell_pin.study.sweep import plan_sweep, run_plan, sweep
 from sphshell_pin.study.sweep.worker import prepare
-from tests.command import call, refused
+from tests.command import call, refused, succeed
 from tests.programs import python
 from tests.study.resting import GRAVITY, RADIUS, write
 
@@ -88,8 +88,7 @@ def test_a_stopped_sweep_goes_on_to_the_same_bytes(scenario, serial, number):
         assert told.stderr.startswith(f"interrupted: {len(kept)} of 60 runs are done and kept in")
         assert told.stderr.strip().endswith(f"--workers 0 --out {out} --no-pictures")
         assert len(told.stderr.splitlines()) == 1
-    told = call(*options)
-    assert told.exit_code == 0, told.output
+    told = succeed(*options)
     assert f"60 runs, 60 done, 0 failed; {len(kept)} were done before" in told.output
     assert out.read_bytes() == serial.read_bytes()
 
@@ -273,8 +272,9 @@ def test_pictures_and_failed_runs_are_told(scenario):
     pytest.importorskip("matplotlib")
     out = scenario.parent / "failed.parquet"
     radii = ["--vary", "contact.sphere.radius=0.012,0.03", "--workers", "0", "--out", out]
-    told = call("sweep", scenario, *radii, "--plot", "figures.depth", "--plot", "energy.residual")
-    assert told.exit_code == 0
+    told = succeed(
+        "sweep", scenario, *radii, "--plot", "figures.depth", "--plot", "energy.residual"
+    )
     assert "2 runs, 1 done, 1 failed" in told.output
     words = "run 1 failed (contact.sphere.radius = 0.03 m): contact 'ball-plate' starts"
     assert words in told.output

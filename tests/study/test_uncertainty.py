@@ -17,7 +17,7 @@ from sphshell_pin.study.sweep import (
     sweep,
     tornado,
 )
-from tests.command import call
+from tests.command import succeed
 from tests.study.resting import GRAVITY
 
 pd = pytest.importorskip("pandas")
@@ -248,8 +248,7 @@ def test_a_sample_has_the_closed_form_of_rest_is_told_and_drawn(scenario):
     out = scenario.parent / "told.parquet"
     options = [f"--dist={key}={one}" for key, one in DIST.items()]
     options += ["--sample", "sobol", "--n", 32, "--indices", "--tornado"]
-    told = call("sweep", scenario, *options, "--workers", 0, "--out", out)
-    assert told.exit_code == 0, told.output
+    told = succeed("sweep", scenario, *options, "--workers", 0, "--out", out)
     table, words = pd.read_parquet(out), " ".join(told.output.split())
     assert table.columns[:6].tolist() == ["run", STIFFNESS, DAMPING, "status", "error", "design"]
     assert table["design"].value_counts().to_dict() == {

@@ -8,19 +8,11 @@ import pinocchio as pin
 from sphshell_pin.dynamics.scene.scene_contacts import ROW, SceneContacts
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.running.rows import Rows
+from tests import models
 from tests.view.stand_ins import contact_pair, plate
 
 RADIUS, MASS, GRAVITY = 0.05, 1.0, 9.81
 ROW_DT = 1e-3
-
-
-def sliding_ball_model():
-    """A ball that translates, frame "ball"."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball_moves")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(MASS, RADIUS), pin.SE3.Identity())
-    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
-    return model
 
 
 class BallPlayer:
@@ -34,7 +26,8 @@ class BallPlayer:
     planned = None
 
     def __init__(self, height=0.049, stiffness=5e3, friction=None, wall_per_second=0.0):
-        self.model, self.plate = sliding_ball_model(), plate()
+        joint = pin.JointModelTranslation()
+        self.model, self.plate = models.ball(GRAVITY, MASS, RADIUS, joint), plate()
         self.friction = friction
         self.height = height
         self.knob_values = {"stiffness": stiffness, "radius": RADIUS}
@@ -44,8 +37,8 @@ class BallPlayer:
         self.reset()
 
     def _make_scene(self):
-        pair = contact_pair(self.model, "ball", self.knob_values["radius"], self.plate, name="ball")
-        pair.friction = self.friction
+        ball = self.model, "ball", self.knob_values["radius"], self.plate
+        pair = contact_pair(*ball, name="ball", friction=self.friction)
         self.scene = SimpleNamespace(model=self.model, pairs=(pair,))
 
     @property

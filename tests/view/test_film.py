@@ -9,7 +9,7 @@ import pytest
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.view import film
 from sphshell_pin.view.film import render_film
-from tests.command import call
+from tests.command import succeed
 from tests.scenario.files import write
 from tests.studies import mostly_studies
 from tests.view.stand_ins import ball_on_plate
@@ -152,10 +152,8 @@ def test_without_chromium_one_sentence_says_how_to_get_it(run, tmp_path, monkeyp
 @pytest.mark.browser
 def test_the_command(request, tmp_path, no_pictures):
     request.getfixturevalue("browser")
-    run = call("run", write(tmp_path), "--out", tmp_path / "out", "--no-recording")
-    assert run.exit_code == 0, run.output
+    succeed("run", write(tmp_path), "--out", tmp_path / "out", "--no-recording")
     arguments = ["render", tmp_path / "out", "--size", "96x64", "--no-chart"]
-    done = call(*arguments, "--out", tmp_path / "end.png")
-    assert done.exit_code == 0, done.output
+    done = succeed(*arguments, "--out", tmp_path / "end.png")
     assert done.output.split() == [str(tmp_path / "end.png")]
     assert pixels(tmp_path / "end.png").shape == (64, 96, 3)

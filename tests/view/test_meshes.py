@@ -22,6 +22,7 @@ from sphshell_pin.view.meshes import (
     take_out_numbers,
 )
 from sphshell_pin.view.robot import GeometryRobot
+from tests import urdf
 from tests.view.drawn import Film
 
 PAGE = (
@@ -217,12 +218,10 @@ def test_files_with_normals_and_what_is_none_stay_as_they_are():
 def test_a_robot_s_mesh_is_sent_with_normals(tmp_path):
     corners = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 1, 0], [0, 0, 1]]]
     (tmp_path / "dark.stl").write_bytes(stl_of(np.zeros((2, 3)), corners)[0])
-    (tmp_path / "dark.urdf").write_text(
-        '<robot name="dark"><link name="base"><visual><geometry>'
-        f'<mesh filename="{tmp_path / "dark.stl"}"/></geometry></visual></link></robot>'
-    )
-    model = pin.buildModelFromUrdf(str(tmp_path / "dark.urdf"))
-    visual = pin.buildGeomFromUrdf(model, str(tmp_path / "dark.urdf"), pin.GeometryType.VISUAL)
+    part = urdf.link("base", urdf.shape("visual", urdf.mesh(tmp_path / "dark.stl")))
+    file = str(urdf.write(tmp_path / "dark.urdf", part))
+    model = pin.buildModelFromUrdf(file)
+    visual = pin.buildGeomFromUrdf(model, file, pin.GeometryType.VISUAL)
     film = Film()
     GeometryRobot(film.canvas, model, visual)
     (sent,) = [geometry for drawn in film.objects.values() for geometry in drawn["geometries"]]

@@ -1,23 +1,24 @@
+import coal
 import numpy as np
 
 import sphshell_pin as sp
 from sphshell_pin.view.surface import SurfaceMesh, great_circles, outlined_edges, tube
-from tests.view.stand_ins import CUBE_ELEMENTS, CUBE_VERTICES, quad_shell
+from tests import meshes
 
 
 def test_patches_share_no_vertices_and_keep_their_shape():
-    cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS)
+    cube = sp.Shell(*meshes.cube(quads=True))
+    assert len(outlined_edges(cube)) == 12  # no diagonals, which the file does not have
     mesh = SurfaceMesh.of(cube)
     assert len(mesh.vertices) == 24
     np.testing.assert_array_equal(mesh.vertices[mesh.triangles], cube.vertices[cube.triangles])
 
 
 def test_a_fine_shell_is_outlined_by_its_sharp_edges_only(monkeypatch):
-    cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS)
-    cube.edge_class[:7] = 0
-    assert len(outlined_edges(cube)) == 12
-    monkeypatch.setattr("sphshell_pin.view.surface.MOST_OUTLINED_EDGES", 11)
-    assert len(outlined_edges(cube)) == 5
+    rod = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3), segments=12)
+    assert len(outlined_edges(rod)) > 24
+    monkeypatch.setattr("sphshell_pin.view.surface.MOST_OUTLINED_EDGES", 24)
+    assert len(outlined_edges(rod)) == 24  # of both rims
 
 
 def test_a_tube_keeps_its_radius_round_a_helix():
@@ -43,10 +44,3 @@ def test_great_circles_lie_on_the_sphere_in_three_planes():
     assert np.linalg.matrix_rank(vertices) == 3
     steps = np.linalg.norm(vertices[segments[:, 0]] - vertices[segments[:, 1]], axis=1)
     np.testing.assert_allclose(steps, steps[0])
-
-
-def test_the_drawn_edges_are_those_of_the_file():
-    """A quad's diagonal is no edge of its shell, and is not drawn as one."""
-    cube = sp.Shell(CUBE_VERTICES, CUBE_ELEMENTS)
-    assert len(outlined_edges(cube)) == 12
-    assert len(SurfaceMesh.of(cube).vertices) == 24

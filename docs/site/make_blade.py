@@ -1,6 +1,6 @@
 """Make scenarios/surfaces/blade.step: the upper side of a propeller's blade, 0.41 m long.
 
-    python tests/data/make_blade.py
+    python docs/site/make_blade.py
 
 BladeX's model propeller has a face of 526 x 13 poles that runs round the blade's edges. Here a
 B-spline surface goes through a grid of its points between the edges, in 3.2 times the size; the
@@ -22,9 +22,9 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 
 from sphshell_pin.shell.cad.reading import read_model
 
-FOLDER = Path(__file__).parent
-MODEL = FOLDER / "corpus" / "bladex_upper.iges"
-STEP = FOLDER.parents[1] / "scenarios" / "surfaces" / "blade.step"
+ROOT = Path(__file__).parents[2]
+MODEL = ROOT / "tests" / "data" / "corpus" / "bladex_upper.iges"
+STEP = ROOT / "scenarios" / "surfaces" / "blade.step"
 SIZE = 3.2  # of the propeller, against its model
 GRID = 25, 9  # points along the chord and the span
 EDGES = 0.05  # of the chord left out at each

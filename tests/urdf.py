@@ -1,0 +1,49 @@
+"""Texts of small robots, for URDF files that tests write."""
+
+from pathlib import Path
+
+
+def inertial(mass: float = 1.0, moment: float = 1.0) -> str:
+    return (
+        f'<inertial><mass value="{mass:g}"/><inertia ixx="{moment:g}" iyy="{moment:g}" '
+        f'izz="{moment:g}" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+
+
+def shape(kind: str, geometry: str, at: str = "0 0 0") -> str:
+    """Return a `collision` or `visual` element."""
+    return f'<{kind}><origin xyz="{at}"/><geometry>{geometry}</geometry></{kind}>'
+
+
+def mesh(uri: object) -> str:
+    return f'<mesh filename="{uri}"/>'
+
+
+def link(name: str, *parts: str) -> str:
+    return f'<link name="{name}">{"".join(parts)}</link>'
+
+
+def joint(
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    *more: str,
+    at: str = "0 0 0",
+    axis: str = "0 1 0",
+) -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{at}"/><axis xyz="{axis}"/>'
+        f'<limit lower="-1" upper="1" effort="50" velocity="2"/>{"".join(more)}</joint>'
+    )
+
+
+def robot(*parts: str) -> str:
+    return f'<robot name="robot">{"".join(parts)}</robot>'
+
+
+def write(path: Path, *parts: str) -> Path:
+    """Write the file of a robot of these parts; return its path."""
+    path.write_text(robot(*parts), encoding="utf-8")
+    return path
