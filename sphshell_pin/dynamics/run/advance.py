@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import signal
@@ -171,6 +172,7 @@ def _peak_memory() -> float:
     return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
+@functools.cache  # reading a file of the system takes a fifth of a run of one step
 def _all_memory() -> float:
     """Return the memory of this machine or its container [bytes]; infinite where not known."""
     sizes = [math.inf]
