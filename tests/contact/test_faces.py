@@ -237,6 +237,17 @@ def test_a_ring_that_a_border_cuts_is_none(tmp_path):
     assert np.isclose(np.linalg.norm(found.normal[0]), 1)
 
 
+def test_saddles_are_where_three_faces_meet(tmp_path):
+    """Over the rim of a bore, and over the edge of two planes, of which no closed form is asked."""
+    plate = occ.cut(occ.box([0, 0, 0], [40, 20, 10]), occ.cylinder(4.0, 12.0, [20, 10, -1]))
+    shell = sp.Shell.from_file(written(plate, tmp_path / "plate.step"))
+    beside = np.hypot(0.5, 5.1) - 4
+    found = shell.contacts(np.array([19.5, 4.9, 9.2]) * MM, 5.5 * MM)
+    assert found.weight.tolist() == [1, 1, 1, -1, -1]
+    distances = [0.8, beside, 4.9, np.hypot(beside, 0.8), np.hypot(4.9, 0.8)]
+    assert found.depth == pytest.approx((5.5 - np.array(distances)) * MM, rel=1e-9)
+
+
 @pytest.mark.parametrize("friction", [None, sp.CoulombFriction()])
 def test_a_ball_that_falls_into_a_seat_rests_on_its_axis(friction, step):
     radius, shell = 6.0 * MM, sp.Shell.from_file(step)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import signal
@@ -131,7 +132,8 @@ class KeptRows:
         """`record_dt` [s] as for the run; None: a row at every step."""
         self._core, self._every, self._began = core, record_dt, core.time
         self._row = 8 * (scene.model.nq + scene.model.nv + 7)  # without contacts [bytes]
-        self._before, self._most = _peak_memory(), _MOST_MEMORY * _all_memory()
+        # Of the first look, when little is recorded yet: asking takes as long as a run of one step.
+        self._before = math.nan
         self._said = False
 
     def _rows(self) -> float:
@@ -155,8 +157,11 @@ class KeptRows:
 
     def full(self) -> str | None:
         """Say so where the run fills the memory."""
-        taken = _peak_memory() - self._before
-        if taken <= self._most or self._rows() < 2:
+        peak = _peak_memory()
+        if math.isnan(self._before):
+            self._before = peak
+        taken = peak - self._before
+        if taken <= _MOST_MEMORY * _all_memory() or self._rows() < 2:
             return None
         return f"its {self._rows():.3g} rows fill {taken / 1e9:.2g} GB of memory"
 
@@ -171,6 +176,7 @@ def _peak_memory() -> float:
     return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
+@functools.cache  # reading a file of the system takes a fifth of a run of one step
 def _all_memory() -> float:
     """Return the memory of this machine or its container [bytes]; infinite where not known."""
     sizes = [math.inf]

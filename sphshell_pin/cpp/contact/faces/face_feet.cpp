@@ -22,6 +22,8 @@ constexpr double kLeastSlope = 1e-7;
 void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, bool want_dn_dc,
                            std::vector<Minimum>& minima) {
   const CurvedShell& surface = *shell.curved();
+  const Region& region = surface.face_search()->of_face[face];
+  if (!region.holds(sphere.center, sphere.radius)) return;
   const Primitive& shape = surface.faces().shapes[face];
   Vec3 normal;  // as the shape has it
   const double distance = shape.distance(sphere.center, normal);
@@ -29,27 +31,24 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
   if (!(std::abs(distance) < sphere.radius) || !(shape.radius_at(point) > 0)) return;
   const bool anywhere = shape.singular(sphere.center, kOnAxis);
   const double slack = surface.face_search()->slack;
-  const Region& region = surface.face_search()->of_face[face];
   if (!anywhere && !region.holds(point, slack)) return;
   facets_.clear();
-  shell.bvh().find_overlapping(anywhere ? sphere.center : point,
-                               (anywhere ? sphere.radius : slack) + region.reach, facets_,
-                               [&](int first) { prefetch(&surface.cones()[first]); });
+  region.parts.find(anywhere ? sphere.center : point, anywhere ? sphere.radius : slack, facets_);
+  bool placed = !shape.has_parameters();
   Eigen::Vector2d place(0, 0);
-  if (!anywhere && shape.has_parameters()) place = shape.parameters(point, shell.size());
   for (const int f : facets_) {
     const NormalCone& cone = surface.cones()[f];
     const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
     if (anywhere) {
       shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
       point = sphere.center - distance * normal;
-      if (shape.has_parameters()) place = shape.parameters(point, shell.size());
+      placed = !shape.has_parameters();
     }
     // The facet's ball excludes most facets before the exact test.
     const double reach = cone.reach + slack;
     if ((point - middle).squaredNorm() > reach * reach) continue;
     const FaceCell& cell = surface.face_cells()[f];
-    if (!cell.closed || cell.face != face) continue;
+    if (!placed) place = shape.parameters(point, shell.size()), placed = true;
     const Vec3 outward = cell.sign < 0 ? Vec3(-normal) : normal;
     if (!holds(shell, f, {point, outward, sphere.center, place}, sphere.tolerance + surface.gap()))
       continue;

@@ -38,12 +38,13 @@ void BroadPhase::find(const Shell& shell, const FaceSearch& search, const Sphere
   if (!begin(shell, sphere, margin)) return;
   overlapping.clear(), candidates.clear(), faces.clear(), joints.clear(), corners.clear();
   const double reach = sphere.radius + margin;
+  search.things.find(sphere.center, reach, overlapping);
+  std::vector<int>* const lists[] = {&faces, &joints, &corners};
+  for (const int one : overlapping) lists[one % 3]->push_back(one / 3);
+  overlapping.clear();
   if (const Bvh* tree = search.facets.tree())
     find(shell, {*tree, search.cones, search.facets.items().data(), search.bulge}, sphere, margin,
          cells);
-  search.faces.find(sphere.center, reach, faces);
-  search.joints.find(sphere.center, reach, joints);
-  search.corners.find(sphere.center, reach, corners);
 }
 
 // At a minimum the plane's normal is among those of the features that the facet owns.

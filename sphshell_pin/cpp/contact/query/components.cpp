@@ -82,7 +82,7 @@ int FacetTable::find(int facet) {
 // which the tree of boxes was walked.
 template <class Probe>
 void Components::merge(const Shell& shell, const Probe& probe, bool want_dn_dc,
-                       std::vector<Minimum>& minima) {
+                       std::vector<Minimum>& minima, const std::vector<Way>* ways) {
   std::sort(minima.begin(), minima.end(), [](const Minimum& x, const Minimum& y) {
     const Contact &a = x.contact, &b = y.contact;
     return a.depth != b.depth       ? a.depth > b.depth
@@ -90,6 +90,7 @@ void Components::merge(const Shell& shell, const Probe& probe, bool want_dn_dc,
            : a.element != b.element ? a.element < b.element
                                     : x.facet < y.facet;
   });
+  const std::size_t found = minima.size();
   // Of what was found on one cell the deepest is its closest point.
   cells_.clear();
   level_.clear();
@@ -113,10 +114,36 @@ void Components::merge(const Shell& shell, const Probe& probe, bool want_dn_dc,
   for (std::size_t i = 0; i < minima.size(); ++i)
     components_[i].cells = 1, components_[i].open.clear();
   connect_equal_points(probe, minima);
-  for (int i = 0; i < static_cast<int>(minima.size()); ++i)
-    add_candidates(shell, probe, minima[i].facet, i, i);
-  grow_components(shell, probe, minima.size());
+  const bool apart = std::all_of(components_.begin(), components_.begin() + minima.size(),
+                                 [](const Component& one) { return one.open.empty(); });
+  if (ways && apart && minima.size() == found) {
+    for (const Way& way : *ways) tree_.push_back(candidate(shell, probe, way));
+  } else {
+    for (int i = 0; i < static_cast<int>(minima.size()); ++i)
+      add_candidates(shell, probe, minima[i].facet, i, i);
+    grow_components(shell, probe, minima.size());
+  }
   find_saddles(shell, probe, want_dn_dc, minima);
+}
+
+// At the closest point of the side.
+template <class Probe>
+Components::SaddleCandidate Components::candidate(const Shell& shell, const Probe& probe,
+                                                  const Way& way) {
+  const int h = way.half_edge;
+  const int beyond = shell.curved()->cells()[triangle_of(h)].beyond[side_of(h)];
+  const bool first =
+      shell.triangle_of_facet(triangle_of(h)) < shell.triangle_of_facet(triangle_of(beyond));
+  const int name = first ? h : beyond, f = triangle_of(name), k = side_of(name);
+  const SideFoot foot = nearest_on_side(shell, f, k, probe);
+  return {probe.depth(foot.point),
+          SaddleCandidate::Kind::Side,
+          cells_.find(way.from),
+          cells_.find(way.to),
+          f,
+          k,
+          foot.t,
+          0};
 }
 
 // By the number of the facet in cells_, if it has been reached.
@@ -373,7 +400,9 @@ void Components::group_if_nearly_one(std::vector<Minimum>& minima, int deeper, i
   leader_[root_of(leader_, shallower)] = root_of(leader_, deeper);
 }
 
-template void Components::merge(const Shell&, const Sphere&, bool, std::vector<Minimum>&);
-template void Components::merge(const Shell&, const Plane&, bool, std::vector<Minimum>&);
+template void Components::merge(const Shell&, const Sphere&, bool, std::vector<Minimum>&,
+                                const std::vector<Way>*);
+template void Components::merge(const Shell&, const Plane&, bool, std::vector<Minimum>&,
+                                const std::vector<Way>*);
 
 }  // namespace sphshell

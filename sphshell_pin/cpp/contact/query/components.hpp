@@ -30,6 +30,11 @@ class FacetTable {
   int count_ = 0;
 };
 
+// How two minima, named by their facets, are connected: over a side, a half-edge.
+struct Way {
+  int from, to, half_edge;
+};
+
 // The theorem of fixed cells (docs/contact.md, "Components and saddles"): with a_i the depth at the
 // closest point of cell i and p_ij that at the closest point of a side that cells i and j share,
 //
@@ -40,9 +45,10 @@ class FacetTable {
 class Components {
  public:
   // Leaves one minimum a cell, deepest first, and adds the saddles, of weight -1. The probe is a
-  // Sphere or a Plane.
+  // Sphere or a Plane. `ways`: all that connect the minima, where that is known.
   template <class Probe>
-  void merge(const Shell& shell, const Probe& probe, bool want_dn_dc, std::vector<Minimum>& minima);
+  void merge(const Shell& shell, const Probe& probe, bool want_dn_dc, std::vector<Minimum>& minima,
+             const std::vector<Way>* ways = nullptr);
 
  private:
   // Where two cells meet: over a side, at its closest point, first only bounded from above; or at
@@ -69,6 +75,8 @@ class Components {
   static bool lower(const SaddleCandidate& a, const SaddleCandidate& b);
   // Whether a facet is in a component, named by its first cell, already.
   bool belongs_to(int facet, int component);
+  template <class Probe>
+  SaddleCandidate candidate(const Shell& shell, const Probe& probe, const Way& way);
   void reset_components(std::size_t minima);
   // The ways out of a cell, onto the heap of its component.
   template <class Probe>

@@ -9,6 +9,9 @@
 
 namespace sphshell {
 
+// To look how more minima are connected takes longer than to search for it.
+constexpr std::size_t kMostWays = 8;
+
 template <class Probe>
 void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad, bool want_dn_dc,
                        std::vector<Minimum>& minima) {
@@ -19,7 +22,7 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
   // All zero: a facet whose element is its flat triangle.
   const CellBounds flat{};
   const LargeArray<FaceCell>& faces = surface.face_cells();
-  outlooks_.clear(), borders_.clear();
+  outlooks_.clear(), borders_.clear(), joints_.clear();
   if constexpr (sphere) {
     if (faces.empty()) {
       broad.find(shell, surface.cones(), surface.bulge(), probe, cells);
@@ -78,7 +81,11 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
     }
   if constexpr (sphere)
     if (!faces.empty() && !minima.empty()) find_rings(shell, probe, minima);
-  if (minima.size() > 1) components_.merge(shell, probe, want_dn_dc, minima);
+  bool known = false;
+  if constexpr (sphere)
+    if (!faces.empty() && minima.size() > 1) known = find_ways(task, broad);
+  if (minima.size() > 1)
+    components_.merge(shell, probe, want_dn_dc, minima, known ? &ways_ : nullptr);
 }
 
 template void CurvedQuery::find(const Shell&, const Sphere&, BroadPhase&, bool,
@@ -267,17 +274,116 @@ void CurvedQuery::add_joint(const Task<Sphere>& task, int joint) {
   const FaceSearch& search = *surface.face_search();
   const FaceJoint& curve = surface.faces().joints[joint];
   const Region& region = search.of_joint[joint];
+  if (!region.holds(sphere.center, sphere.radius)) return;
+  const bool one = curve.has_one_nearest(sphere.center);
+  const Vec3 point = one ? curve.nearest(sphere.center) : sphere.center;
+  if (!sphere.reaches(point)) return;
+  joints_.push_back(joint);
+  if (one && !region.holds(point, search.slack)) return;
+  // What add_edge() asks of each side, where that is the same of all.
+  for (int i = 0; i < 2; ++i)
+    if (falls(task, joint, i) > 0) return;
+  find_sides(task, joint);
+  for (const int h : sides_) add_edge(task, triangle_of(h), side_of(h));
+}
+
+// The sides near the closest point of a joint; about the axis of a circle, those near the sphere.
+void CurvedQuery::find_sides(const Task<Sphere>& task, int joint) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const FaceSearch& search = *shell.curved()->face_search();
+  const FaceJoint& curve = shell.curved()->faces().joints[joint];
+  const bool one = curve.has_one_nearest(sphere.center);
   sides_.clear();
-  if (!curve.has_one_nearest(sphere.center)) {
-    search.sides.find(sphere.center, sphere.radius + region.reach, sides_);
-  } else {
-    const Vec3 point = curve.nearest(sphere.center);
-    if (!sphere.reaches(point) || !region.holds(point, search.slack)) return;
-    search.sides.find(point, search.slack + region.reach, sides_);
+  search.of_joint[joint].parts.find(one ? curve.nearest(sphere.center) : sphere.center,
+                                    one ? search.slack : sphere.radius, sides_);
+}
+
+// How far inside face i of a joint the center is, beyond the overlap; 0: not, or not the same at
+// all of its sides.
+double CurvedQuery::falls(const Task<Sphere>& task, int joint, int i) const {
+  const CurvedShell& surface = *task.shell.curved();
+  const FaceJoint& curve = surface.faces().joints[joint];
+  const int turn = surface.face_search()->of_joint[joint].turn[i];
+  Vec3 away;
+  if (turn == 0) return 0;
+  return std::max(0.0, turn * curve.divide(curve.face[i], task.probe.center, away) -
+                           task.probe.tolerance - surface.gap());
+}
+
+// Inside the sphere a face whose whole border there is one joint goes on beyond that alone. A face
+// has one minimum at most, so where the distance falls from the joint's closest point into both
+// faces, it is there that this one's is connected with the others: with that of the face beyond,
+// or, from that, with those that are connected with it higher up. Where all minima but one are on
+// such faces, or on some without a border there, this says all.
+bool CurvedQuery::find_ways(const Task<Sphere>& task, const BroadPhase& broad) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const CurvedShell& surface = *shell.curved();
+  const FaceSearch& search = *surface.face_search();
+  ways_.clear();
+  if (!shell.topology().pinches.empty() || minima.size() > kMostWays) return false;
+  // Faces whose border is near a facet that is looked at by itself.
+  loose_.clear();
+  for (const int position : broad.overlapping) {
+    const int f = search.facets.items()[position];
+    loose_.push_back(surface.face_cells()[f].face);
+    for (const int beyond : surface.cells()[f].beyond) {
+      if (beyond < kBoundary) return false;
+      if (beyond >= 0) loose_.push_back(surface.face_cells()[triangle_of(beyond)].face);
+    }
   }
-  for (const int h : sides_)
-    if (surface.face_cells()[triangle_of(h)].joint[side_of(h)] == joint)
-      add_edge(task, triangle_of(h), side_of(h));
+  const auto is_enclosed = [&](int face) {
+    return face >= 0 && search.of_face[face].enclosed &&
+           std::find(loose_.begin(), loose_.end(), face) == loose_.end();
+  };
+  const auto face_of = [&](const Minimum& at) {
+    const FaceCell& cell = surface.face_cells()[at.facet];
+    return at.contact.feature == Feature::Face && cell.closed ? cell.face : -1;
+  };
+  const auto holder = [&](int face) {
+    return std::find_if(minima.begin(), minima.end(),
+                        [&](const Minimum& at) { return face_of(at) == face; });
+  };
+  int unknown = 0;
+  for (const Minimum& at : minima) {
+    const int face = face_of(at);
+    int count = 0, joint = -1;
+    for (const int j : joints_) {
+      const FaceJoint& curve = surface.faces().joints[j];
+      if (curve.face[0] == face || curve.face[1] == face) ++count, joint = j;
+    }
+    if (at.off_axis < 1) return false;
+    const bool enclosed = count < 2 && is_enclosed(face);
+    if (enclosed && count == 0) continue;
+    const int half_edge = enclosed ? saddle_side(task, joint) : -1;
+    auto other = minima.end();
+    if (half_edge >= 0) {
+      const FaceJoint& curve = surface.faces().joints[joint];
+      other = holder(curve.face[1 - curve.which(face)]);
+    }
+    if (other == minima.end()) {
+      if (++unknown > 1) return false;
+      continue;
+    }
+    const bool twice = std::any_of(ways_.begin(), ways_.end(), [&](const Way& way) {
+      return way.from == other->facet && way.to == at.facet;
+    });
+    if (!twice) ways_.push_back({at.facet, other->facet, half_edge});
+  }
+  return true;
+}
+
+// The side that holds the closest point of a joint, from which the distance falls into both faces,
+// or -1.
+int CurvedQuery::saddle_side(const Task<Sphere>& task, int joint) {
+  if (!task.shell.curved()->faces().joints[joint].has_one_nearest(task.probe.center) ||
+      !(falls(task, joint, 0) > 0 && falls(task, joint, 1) > 0))
+    return -1;
+  find_sides(task, joint);
+  for (const int h : sides_) {
+    const SideFoot foot = nearest_on_side(task.shell, triangle_of(h), side_of(h), task.probe);
+    if (foot.t > 0 && foot.t < 1) return h;
+  }
+  return -1;
 }
 
 // The closest point of a side between its ends, if the distance falls into none of the elements

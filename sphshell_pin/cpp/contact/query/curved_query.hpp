@@ -49,6 +49,11 @@ class CurvedQuery {
   template <class Probe>
   void add_border(const Task<Probe>& task, int facet);
   void add_joint(const Task<Sphere>& task, int joint);
+  void find_sides(const Task<Sphere>& task, int joint);
+  double falls(const Task<Sphere>& task, int joint, int i) const;
+  // Whether ways_ are all that connect the minima.
+  bool find_ways(const Task<Sphere>& task, const BroadPhase& broad);
+  int saddle_side(const Task<Sphere>& task, int joint);
   template <class Probe>
   void add_edge(const Task<Probe>& task, int facet, int side);
   template <class Probe>
@@ -56,7 +61,10 @@ class CurvedQuery {
 
   std::vector<Outlook> outlooks_;
   std::vector<int> borders_;  // facets that lie on faces
-  std::vector<int> sides_;    // half-edges of a joint
+  std::vector<int> joints_;   // that the sphere reaches
+  std::vector<int> sides_;    // half-edges of one of them
+  std::vector<int> loose_;    // faces
+  std::vector<Way> ways_;
   FaceFeet feet_;
   Components components_;
 };

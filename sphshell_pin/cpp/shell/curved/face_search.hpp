@@ -13,11 +13,12 @@ class CurvedShell;
 class BoxTree {
  public:
   using Boxes = std::vector<std::pair<Eigen::AlignedBox3d, int>>;
-  explicit BoxTree(const Boxes& boxes);
+  // Of so `few` or less there is no tree: all are found.
+  explicit BoxTree(const Boxes& boxes, std::size_t few = 0);
 
   // In the order of the tree.
   const std::vector<int>& items() const { return items_; }
-  // Null where there is nothing.
+  // Null where there is none.
   const Bvh* tree() const { return tree_ ? &*tree_ : nullptr; }
   std::size_t bytes() const;
   // Those whose box meets a ball, and some beside them.
@@ -28,12 +29,17 @@ class BoxTree {
   std::optional<Bvh> tree_;
 };
 
-// What holds a face or a joint, and how far from it its facets or chords are [m].
+// Where a face or a joint is.
 struct Region {
-  Eigen::AlignedBox3d box;
-  double reach = 0;
+  // Of the boxes of its parts, which hold it.
+  explicit Region(const BoxTree::Boxes& boxes);
 
-  void extend(const Eigen::AlignedBox3d& part, double bulge);
+  Eigen::AlignedBox3d box;
+  BoxTree parts;         // facets, or half-edges (3 facet + side)
+  bool enclosed = true;  // of a face: all of its border is looked for, as joints or with facets
+  int turn[2] = {0, 0};  // of a joint: FaceCell::turn of its sides on either face; 0: of both signs
+
+  // Whether it may have a point this near to x.
   bool holds(const Vec3& x, double slack) const {
     return box.squaredExteriorDistance(x) <= slack * slack;
   }
@@ -48,10 +54,10 @@ struct FaceSearch {
 
   std::vector<Region> of_face, of_joint;  // beside Faces::shapes and Faces::joints
   double slack;                           // more than rounding [m]
-  BoxTree faces;                          // in Faces::shapes
-  BoxTree joints;                         // in Faces::joints
-  BoxTree sides;                 // of joints that are lines or circles: half-edges (3 facet + side)
-  BoxTree corners;               // of faces: 3 facet + corner
+  // Faces and joints that are lines or circles by their numbers in Faces, and corners of faces as
+  // 3 facet + corner: each as 3 times that, plus its Kind.
+  enum Kind { Face = 0, Joint = 1, Corner = 2 };
+  BoxTree things;
   BoxTree facets;                // with an element, or another side
   LargeArray<NormalCone> cones;  // beside facets.items()
   double bulge = 0;              // the largest of facets [m]
