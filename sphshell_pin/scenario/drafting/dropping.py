@@ -10,7 +10,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.searching import CannotStand, NewScenario, Search
@@ -49,7 +49,7 @@ class DropSearch(Search):
             hold = ", or hold it with --base fixed" if model.njoints > 2 else ""
             raise SphshellError(f"{said}--place, --at and --path{hold}")
         lock = tuple[str, ...]()
-        if int(model.frames[find_frame(model, self.tips[0].frame)].parentJoint) == 1:
+        if joint_of(model, self.tips[0].frame) == 1:
             lock = joints_aside(model, self.tips[:1])
             plan = self._fall()
         elif asked.inside:

@@ -45,6 +45,11 @@ class Tip:
         )
 
 
+def joint_of(model: pin.Model, frame: str) -> int:
+    """Return the joint that carries a frame; FrameNotFound lists the names."""
+    return int(model.frames[find_frame(model, frame)].parentJoint)
+
+
 def gripper_joints(model: pin.Model) -> set[int]:
     """Return the joints of grippers: behind a joint, two ends or more that slide or are coupled.
 
