@@ -14,12 +14,7 @@ from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.searching import CannotStand, NewScenario, Search
-from sphshell_pin.scenario.drafting.tip_contact import (
-    GRAVITY,
-    Contact,
-    chosen_materials,
-    sticking,
-)
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Contact, chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
 from sphshell_pin.scenario.drafting.wording import mm, rounded
 from sphshell_pin.scenario.format.build import Built
@@ -107,7 +102,7 @@ class DropSearch(Search):
         motors = np.diag(mass_matrix(self.model, self.q0))[6:]
         inertia = float(np.median(motors)) + share * (0.5 * leg) ** 2
         speed = math.sqrt(2 * GRAVITY * gap)
-        contact = sticking(materials, tips[0].radius, speed, share * GRAVITY, share)
+        contact = materials.sticking(tips[0].radius, speed, share * GRAVITY, share)
         fall = "it will fall over: nothing but its sphere touches"
         why = (
             *(
