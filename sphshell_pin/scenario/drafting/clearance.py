@@ -87,8 +87,7 @@ class Links:
         return float(np.array([*middles, *joints])[:, 2].min())
 
     def _place(self, q: Array) -> None:
-        geometry = self._geometry, self._geometry_data
-        pin.updateGeometryPlacements(self.model, self._data, *geometry, q)
+        pin.updateGeometryPlacements(self.model, self._data, self._geometry, self._geometry_data, q)
 
     def within(self, q: Array, placement: pin.SE3, *, whole: bool = False) -> str | None:
         """Return a link that is in the part at `placement` with the robot at q (nq,).

@@ -37,12 +37,12 @@ class DropSearch(Search):
     def find(self) -> NewScenario:
         """Return the first draft that works; SphshellError if none does."""
         asked, model = self.asked, self.model
+        hold = ", or hold it with --base fixed" if model.njoints > 2 else ""
         if any(one is not None for one in (asked.press, asked.place, asked.at, asked.path)):
-            said = (
+            raise SphshellError(
                 "a robot that floats comes down on the surface by its weight: leave out --press, "
+                f"--place, --at and --path{hold}"
             )
-            hold = ", or hold it with --base fixed" if model.njoints > 2 else ""
-            raise SphshellError(f"{said}--place, --at and --path{hold}")
         lock = tuple[str, ...]()
         if joint_of(model, self.tips[0].frame) == 1:
             lock = joints_aside(model, self.tips[:1])
@@ -61,11 +61,9 @@ class DropSearch(Search):
             # What can stand has to stand.
             falls = fault.kind == "links" and (plan.control is None or len(plan.tips) < 3)
             if not falls or end < _SHORTEST or len(self.faults) >= _MOST_RUNS:
-                said = f"{self.failed()}; take a flatter or larger part, on which all spheres can "
-                said += "come down"
-                if model.njoints <= 2:
-                    raise SphshellError(said)
-                raise CannotStand(f"{said}, or hold it with --base fixed", fault.text)
+                large = "take a flatter or larger part, on which all spheres can come down"
+                said = f"{self.failed()}; {large}{hold}"
+                raise CannotStand(said, fault.text) if hold else SphshellError(said)
             down = f"before link '{fault.link}' comes down on the surface"
             note = f"the run ends after {end:g} s, {down}"
             plan = replace(plan, duration=end, why=(*plan.why, note))

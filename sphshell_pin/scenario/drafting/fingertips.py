@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -79,16 +80,14 @@ def find_tips(
 def other_ends(model: pin.Model, frame: str) -> list[str]:
     """Return the frames at the ends of other limbs than that of `frame`, the likeliest first."""
     held, used, found = gripper_joints(model), {joint_of(model, frame)}, list[str]()
-    while _leaves(model, held) - used:
-        limbs = set(range(1, model.njoints)) - used - held
-        try:
+    with suppress(SphshellError):  # it does not say which one
+        while _leaves(model, held) - used:
+            limbs = set(range(1, model.njoints)) - used - held
             name = _ends(model, held, limbs)[0][0]
-        except SphshellError:
-            break
-        if joint_of(model, name) in used:
-            break
-        used.add(joint_of(model, name))
-        found.append(name)
+            if joint_of(model, name) in used:
+                break
+            used.add(joint_of(model, name))
+            found.append(name)
     return found
 
 

@@ -42,20 +42,19 @@ _USED = 0.6
 
 @dataclass(frozen=True)
 class Grasp:
-    """A hand about a part, all in the world."""
+    """A hand about a part, all in the world.
+
+    q (nq,) is the configuration of the hand, in which all gaps are as asked, `placement` that of
+    the part. The `points` (k, 3) [m] on it are nearest to the tips, `normals` (k, 3) point out of
+    it. The `forces` (k, 3) [N] on the part balance its weight, with the coefficient `friction`.
+    """
 
     q: Array
-    """Configuration of the hand (nq,): all gaps are as asked."""
     placement: pin.SE3
-    """Placement of the part."""
     points: Array
-    """On the part (k, 3) [m], nearest to the tips."""
     normals: Array
-    """Unit (k, 3), out of the part."""
     forces: Array
-    """On the part (k, 3) [N]: they balance its weight."""
     friction: float
-    """Coefficient of friction that they need."""
 
     def normal_forces(self) -> Array:
         """Return the normal force (k,) [N] of each tip."""

@@ -132,21 +132,27 @@ class Press:
 
 @dataclass(frozen=True)
 class Hold:
-    """Joints held in the posture of the start."""
+    """Joints held in the posture of the start.
+
+    The load draws the springs by about `sag` [rad]. Those of fingers would take them where they are
+    `drawn`, by joint; the largest normal force of a finger is `force` [N].
+    """
 
     kp: float
     kd: float
     sag: float
-    """How far the load draws the springs, about [rad]."""
     drawn: Mapping[str, object] = field(default_factory=dict)
-    """Where the springs of fingers would take them, by joint."""
     force: float = 0.0
-    """Largest normal force of fingers [N]."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A scenario before it is text."""
+    """A scenario before it is text.
+
+    `placement` is that of the shell in the world. A free root starts at `root` (7,): x y z and
+    quaternion x y z w; a free `part` there carries the shell. `why` has one sentence for each
+    choice that was made for the user. The tip number `strongest` presses most, and is checked.
+    """
 
     tips: tuple[Tip, ...]
     contact: Contact
@@ -154,15 +160,10 @@ class Plan:
     duration: float
     gap: float
     placement: pin.SE3
-    """Placement of the shell in the world."""
     root: Array | None
-    """Where the free root starts: x y z and quaternion x y z w."""
     why: tuple[str, ...] = ()
-    """One sentence for each choice that was made for the user."""
     part: Part | None = None
-    """The free part that carries the shell, at `root`."""
     strongest: int = 0
-    """Which of the tips is checked, the one that presses most."""
 
 
 def press_force(stance: Stance, materials: Materials, press: float | None) -> float:
