@@ -23,6 +23,7 @@ from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.plan import Press
 from sphshell_pin.scenario.drafting.pose_search import repaired
+from sphshell_pin.scenario.drafting.tip_contact import Materials
 from sphshell_pin.scenario.drafting.trial import Fault, _force_fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
 from tests import models, urdf
@@ -271,7 +272,7 @@ def pressing(points, **changes):
         dict.fromkeys(("mass", "slide_mass", "fastest"), 1),
     )
     stance = SimpleNamespace(tip=tip, **ones, inertia=0.0, joints=4, joint_inertia=np.ones(4))
-    pair = find_material("rubber"), find_material("steel")
+    pair = Materials(find_material("rubber"), find_material("steel"))
     place = SimpleNamespace(stance=stance)
     return Press(place, Way(np.array(points)), pair, 1.0, 1e-3, **changes)
 

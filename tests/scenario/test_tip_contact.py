@@ -10,11 +10,11 @@ import pytest
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.plan import press_force
-from sphshell_pin.scenario.drafting.tip_contact import sticking
+from sphshell_pin.scenario.drafting.tip_contact import Materials
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 RADIUS = 0.01
-MATERIALS = find_material("rubber"), find_material("steel")
+MATERIALS = Materials(find_material("rubber"), find_material("steel"))
 
 
 def hertz(depth: float) -> float:
@@ -25,7 +25,7 @@ def hertz(depth: float) -> float:
 
 def test_bristles_are_as_stiff_as_the_contact_and_damped_by_a_tenth():
     mass, depth, step = 2.0, 4e-4, 1e-8
-    contact = sticking(MATERIALS, RADIUS, 0.1, hertz(depth), mass)
+    contact = MATERIALS.sticking(RADIUS, 0.1, hertz(depth), mass)
     stiffness, damping = contact.bristle
     slope = (hertz(depth + step) - hertz(depth - step)) / (2 * step)
     # Both are rounded to what one reads.

@@ -54,10 +54,11 @@ class Links:
         self._surface = _tree(shell)
         frames = [model.frames[find_frame(model, tip.frame)] for tip in tips]
         held = set(held_joints(model, tuple(lock)))
-        own = [_fixed_to(model, int(frame.parentJoint), held) for frame in frames]
         self._objects: list[tuple[int, tuple[int, ...]]] = []
         for i, one in enumerate(geometry.geometryObjects):
-            at = [k for k, joints in enumerate(own) if int(one.parentJoint) in joints]
+            # It does not move against the tips at these places.
+            mover = _mover(model, one.parentJoint, held)
+            at = [k for k, f in enumerate(frames) if _mover(model, f.parentJoint, held) == mover]
             if not any(_is_sphere(one, model, frames[k], tips[k]) for k in at):
                 self._objects.append((i, tuple(at)))
 
@@ -86,8 +87,7 @@ class Links:
         return float(np.array([*middles, *joints])[:, 2].min())
 
     def _place(self, q: Array) -> None:
-        geometry = self._geometry, self._geometry_data
-        pin.updateGeometryPlacements(self.model, self._data, *geometry, q)
+        pin.updateGeometryPlacements(self.model, self._data, self._geometry, self._geometry_data, q)
 
     def within(self, q: Array, placement: pin.SE3, *, whole: bool = False) -> str | None:
         """Return a link that is in the part at `placement` with the robot at q (nq,).
@@ -153,16 +153,11 @@ def _tree(shell: Shell) -> coal.BVHModelOBBRSS:
     return tree
 
 
-def _fixed_to(model: pin.Model, joint: int, held: set[int]) -> set[int]:
-    """Return the joints whose links do not move against that of `joint`; `held` ones are locked."""
-    top = joint
-    while top in held:
-        top = int(model.parents[top])
-    fixed = {top}
-    for one in range(top + 1, model.njoints):
-        if one in held and int(model.parents[one]) in fixed:
-            fixed.add(one)
-    return fixed
+def _mover(model: pin.Model, joint: int, held: set[int]) -> int:
+    """Return the joint that moves the links of `joint`; `held` ones are locked."""
+    while joint in held:
+        joint = int(model.parents[joint])
+    return int(joint)
 
 
 def _is_sphere(one: pin.GeometryObject, model: pin.Model, frame: pin.Frame, tip: Tip) -> bool:

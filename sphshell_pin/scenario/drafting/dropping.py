@@ -10,16 +10,11 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.searching import CannotStand, NewScenario, Search
-from sphshell_pin.scenario.drafting.tip_contact import (
-    GRAVITY,
-    Contact,
-    chosen_materials,
-    sticking,
-)
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Contact, chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
 from sphshell_pin.scenario.drafting.wording import mm, rounded
 from sphshell_pin.scenario.format.build import Built
@@ -42,14 +37,14 @@ class DropSearch(Search):
     def find(self) -> NewScenario:
         """Return the first draft that works; SphshellError if none does."""
         asked, model = self.asked, self.model
+        hold = ", or hold it with --base fixed" if model.njoints > 2 else ""
         if any(one is not None for one in (asked.press, asked.place, asked.at, asked.path)):
-            said = (
+            raise SphshellError(
                 "a robot that floats comes down on the surface by its weight: leave out --press, "
+                f"--place, --at and --path{hold}"
             )
-            hold = ", or hold it with --base fixed" if model.njoints > 2 else ""
-            raise SphshellError(f"{said}--place, --at and --path{hold}")
         lock = tuple[str, ...]()
-        if int(model.frames[find_frame(model, self.tips[0].frame)].parentJoint) == 1:
+        if joint_of(model, self.tips[0].frame) == 1:
             lock = joints_aside(model, self.tips[:1])
             plan = self._fall()
         elif asked.inside:
@@ -66,11 +61,9 @@ class DropSearch(Search):
             # What can stand has to stand.
             falls = fault.kind == "links" and (plan.control is None or len(plan.tips) < 3)
             if not falls or end < _SHORTEST or len(self.faults) >= _MOST_RUNS:
-                said = f"{self.failed()}; take a flatter or larger part, on which all spheres can "
-                said += "come down"
-                if model.njoints <= 2:
-                    raise SphshellError(said)
-                raise CannotStand(f"{said}, or hold it with --base fixed", fault.text)
+                large = "take a flatter or larger part, on which all spheres can come down"
+                said = f"{self.failed()}; {large}{hold}"
+                raise CannotStand(said, fault.text) if hold else SphshellError(said)
             down = f"before link '{fault.link}' comes down on the surface"
             note = f"the run ends after {end:g} s, {down}"
             plan = replace(plan, duration=end, why=(*plan.why, note))
@@ -107,7 +100,7 @@ class DropSearch(Search):
         motors = np.diag(mass_matrix(self.model, self.q0))[6:]
         inertia = float(np.median(motors)) + share * (0.5 * leg) ** 2
         speed = math.sqrt(2 * GRAVITY * gap)
-        contact = sticking(materials, tips[0].radius, speed, share * GRAVITY, share)
+        contact = materials.sticking(tips[0].radius, speed, share * GRAVITY, share)
         fall = "it will fall over: nothing but its sphere touches"
         why = (
             *(

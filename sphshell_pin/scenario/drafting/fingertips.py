@@ -3,22 +3,24 @@
 import math
 import re
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.contact import Sphere
 from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
-from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip, gripper_joints
+from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip, gripper_joints, joint_of
 
 # Points of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's
 # place, as meshes of fingertips stand out of the spheres that stand for them.
 AT_TIP = 1.5
-_ASKED = "as it was asked for"
+_ASKED, _OF_GEOMETRY = "as it was asked for", "the sphere of its collision geometry"
 # Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at
 # the end of a limb.
 _TOOL_WORDS = ("tcp", "tool", "ee", "eef", "effector", "grasp", "grip", "flange")
@@ -49,12 +51,16 @@ def find_tips(
         raise SphshellError("the robot has no joint: let its root float with --base floating")
     held = gripper_joints(robot.model)
     limbs = _limbs(robot.model, held)
-    known = [one for one in _known(robot, shipped) if _joint_of(robot.model, one.frame) not in held]
+    if shipped in TIPS:
+        known = _carried(fingertips(shipped), "a fingertip this package knows of")
+    else:
+        known = _carried(end_spheres(robot), _OF_GEOMETRY)
+    known = [one for one in known if joint_of(robot.model, one.frame) not in {0, *held}]
     if frame is not None:
         find_frame(robot.model, frame)
         known = [one for one in known if one.frame == frame]
     elif not floats(robot.model):
-        known = [one for one in known if _joint_of(robot.model, one.frame) in limbs][:1]
+        known = [one for one in known if joint_of(robot.model, one.frame) in limbs][:1]
     if known and offset is not None:
         known = [replace(known[0], offset=offset, source=_ASKED)]
     # A smaller sphere than that of the collision geometry would be inside it.
@@ -73,17 +79,15 @@ def find_tips(
 
 def other_ends(model: pin.Model, frame: str) -> list[str]:
     """Return the frames at the ends of other limbs than that of `frame`, the likeliest first."""
-    held, used, found = gripper_joints(model), {_joint_of(model, frame)}, list[str]()
-    while _leaves(model, held) - used:
-        limbs = set(range(1, model.njoints)) - used - held
-        try:
+    held, used, found = gripper_joints(model), {joint_of(model, frame)}, list[str]()
+    with suppress(SphshellError):  # it does not say which one
+        while _leaves(model, held) - used:
+            limbs = set(range(1, model.njoints)) - used - held
             name = _ends(model, held, limbs)[0][0]
-        except SphshellError:
-            break
-        if _joint_of(model, name) in used:
-            break
-        used.add(_joint_of(model, name))
-        found.append(name)
+            if joint_of(model, name) in used:
+                break
+            used.add(joint_of(model, name))
+            found.append(name)
     return found
 
 
@@ -105,10 +109,9 @@ def every_finger(robot: LoadedRobot) -> list[Tip]:
 
     A ball at the end of each link that has geometry and carries no further joint.
     """
-    model, spheres = robot.model, end_spheres(robot)
-    source = "the sphere of its collision geometry"
-    if len(spheres) > 1:
-        return [Tip(one.frame, one.radius, np.array(one.offset), source) for one in spheres]
+    model, tips = robot.model, _carried(end_spheres(robot), _OF_GEOMETRY)
+    if len(tips) > 1:
+        return tips
     tips = []
     for joint in sorted(_leaves(model)):
         frame = frame_on_joint(model, joint)
@@ -116,10 +119,6 @@ def every_finger(robot: LoadedRobot) -> list[Tip]:
         if link is not None and frame is not None and len(link.corners):
             tips.append(link.end())
     return tips
-
-
-def _joint_of(model: pin.Model, frame: str) -> int:
-    return int(model.frames[find_frame(model, frame)].parentJoint)
 
 
 def _at_end(
@@ -149,7 +148,7 @@ def _at_end(
 
 def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
     """Raise SphshellError for a sphere that is inside its own link, where it touches nothing."""
-    if int(robot.model.frames[find_frame(robot.model, tip.frame)].parentJoint) == 0:
+    if joint_of(robot.model, tip.frame) == 0:
         return
     link = LinkGeometry(robot, tip.frame)
     depth = link.depth(tip.offset)
@@ -164,26 +163,17 @@ def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
         )
 
 
-def _known(robot: LoadedRobot, shipped: str | None) -> list[Tip]:
-    if shipped in TIPS:
-        spheres, source = fingertips(shipped), "a fingertip this package knows of"
-    else:
-        spheres, source = end_spheres(robot), "the sphere of its collision geometry"
-    model = robot.model
-    return [
-        Tip(one.frame, one.radius, np.array(one.offset), source)
-        for one in spheres
-        if int(model.frames[find_frame(model, one.frame)].parentJoint) > 0
-    ]
+def _carried(spheres: Sequence[Sphere], source: str) -> list[Tip]:
+    return [Tip(one.frame, one.radius, np.array(one.offset), source) for one in spheres]
 
 
 def _sized(tip: Tip, radius: float | None) -> Tip:
-    if radius is not None:
-        # A center that stands one radius before the frame goes on touching it.
-        touching = tip.radius and abs(np.linalg.norm(tip.offset) - tip.radius) < 1e-9
-        offset = tip.offset * (radius / tip.radius) if touching else tip.offset
-        return Tip(tip.frame, radius, offset, tip.source)
-    return tip
+    if radius is None:
+        return tip
+    # A center that stands one radius before the frame goes on touching it.
+    touching = tip.radius and abs(np.linalg.norm(tip.offset) - tip.radius) < 1e-9
+    offset = tip.offset * (radius / tip.radius) if touching else tip.offset
+    return Tip(tip.frame, radius, offset, tip.source)
 
 
 def _leaves(model: pin.Model, held: Collection[int] = ()) -> set[int]:

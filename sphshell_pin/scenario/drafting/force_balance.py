@@ -44,12 +44,9 @@ def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: floa
 
     count = len(points)
     angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
-    edges = np.empty((count, _SIDES, 3))
-    for k, normal in enumerate(normals):
-        first, second = tangents(normal, np.zeros(3))
-        edges[k] = -normal + mu * (
-            np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
-        )
+    across = np.array([tangents(normal, np.zeros(3)) for normal in normals])
+    around = np.einsum("js,kji->ksi", [np.cos(angles), np.sin(angles)], across)
+    edges = mu * around - normals[:, None]
     middle = points.mean(axis=0)
     size = max(float(np.linalg.norm(points - middle, axis=1).max()), 1e-9)
     torques = np.cross((points - middle)[:, None], edges) / size

@@ -9,9 +9,8 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import leader_of, mimics
-from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.drafting.force_balance import least_friction
-from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.vectors import moved, unit
 from sphshell_pin.scenario.format.reach import Reach
@@ -43,20 +42,19 @@ _USED = 0.6
 
 @dataclass(frozen=True)
 class Grasp:
-    """A hand about a part, all in the world."""
+    """A hand about a part, all in the world.
+
+    q (nq,) is the configuration of the hand, in which all gaps are as asked, `placement` that of
+    the part. The `points` (k, 3) [m] on it are nearest to the tips, `normals` (k, 3) point out of
+    it. The `forces` (k, 3) [N] on the part balance its weight, with the coefficient `friction`.
+    """
 
     q: Array
-    """Configuration of the hand (nq,): all gaps are as asked."""
     placement: pin.SE3
-    """Placement of the part."""
     points: Array
-    """On the part (k, 3) [m], nearest to the tips."""
     normals: Array
-    """Unit (k, 3), out of the part."""
     forces: Array
-    """On the part (k, 3) [N]: they balance its weight."""
     friction: float
-    """Coefficient of friction that they need."""
 
     def normal_forces(self) -> Array:
         """Return the normal force (k,) [N] of each tip."""
@@ -69,7 +67,7 @@ class Hand:
     def __init__(self, model: pin.Model, tips: Sequence[Tip]) -> None:
         self.model, self.tips = model, tuple(tips)
         self.radii = np.array([tip.radius for tip in tips])
-        ends = [int(model.frames[find_frame(model, tip.frame)].parentJoint) for tip in tips]
+        ends = [joint_of(model, tip.frame) for tip in tips]
         rules = mimics(model)
         chains = [{model.names[j] for j in list(model.supports[end])[1:]} for end in ends]
         moving = {leader_of(rules, name) for name in set.union(*chains)}
@@ -88,16 +86,19 @@ class Hand:
         """Return the centers (k, 3) [m] of the tips' spheres."""
         return np.array([reach.center(q) for reach in self.reaches])
 
+    def against(self, q: Array, thumb: int) -> tuple[Array, Array, float]:
+        """Return the centers (k, 3) [m], way (3,) and distance [m] from a thumb to the others."""
+        centers = self.centers(q)
+        across = np.delete(centers, thumb, axis=0).mean(axis=0) - centers[thumb]
+        return centers, unit(across), float(np.linalg.norm(across))
+
     def limbs(self) -> Array:
         """Return unit vectors (k, 3) from the last joints to the `centers` that were asked last."""
-        out = np.array(
-            [
-                reach.data.oMf[reach.frame].act(reach.offset)
-                - reach.data.oMi[self.model.frames[reach.frame].parentJoint].translation
-                for reach in self.reaches
-            ]
-        )
-        return unit(out)
+        out = []
+        for tip, reach in zip(self.tips, self.reaches, strict=True):
+            joint = reach.data.oMi[joint_of(self.model, tip.frame)].translation
+            out.append(reach.data.oMf[reach.frame].act(reach.offset) - joint)
+        return unit(np.array(out))
 
     def jacobians(self, q: Array, beside: Array | float = 0.0) -> Array:
         """Return (k, 3, nv): velocities of the centers from those of the joints.
@@ -187,19 +188,18 @@ def _places(
     from scipy.spatial.transform import Rotation
 
     extent, middle = shell.box[1] - shell.box[0], shell.box.mean(axis=0)
-    root = _root(hand, q0)
+    data = hand.model.createData()
+    pin.forwardKinematics(hand.model, data, q0)
+    # Where the fingers begin.
+    root = np.mean([data.oMi[j].translation for j in hand.joints], axis=0)
     turns = np.round(Rotation.create_group("O").as_matrix())
     found: list[tuple[int, float, int, Array, pin.SE3]] = []
     for _, q, thumb in itertools.islice(_postures(hand, q0, free), _BEST):
-        centers = hand.centers(q)
-        others = np.delete(centers, thumb, axis=0)
-        across = others.mean(axis=0) - centers[thumb]
-        width = float(np.linalg.norm(across))
-        across = across / width
+        centers, across, width = hand.against(q, thumb)
         ahead = centers.mean(axis=0) - root
         ahead = unit(ahead - (ahead @ across) * across)
         frame = np.column_stack([across, ahead, np.cross(across, ahead)])
-        center = 0.5 * (others.mean(axis=0) + centers[thumb])
+        center = centers[thumb] + 0.5 * width * across
         room = width - 2 * float(hand.radii.mean())
         own: list[tuple[float, pin.SE3]] = []
         for turn in turns:
@@ -236,15 +236,12 @@ def _postures(
                 parts[chain] = alike[: len(chain)] + rng.normal(0, _ALIKE, len(chain))
         q = q0.copy()
         q[bounded] = low + np.clip(parts[bounded], _MARGIN, 1 - _MARGIN) * (high - low)
-        centers, limbs = hand.centers(q), hand.limbs()
-        others = np.delete(centers, thumb, axis=0)
-        across = others.mean(axis=0) - centers[thumb]
-        width = float(np.linalg.norm(across))
+        centers, across, width = hand.against(q, thumb)
         if width < 4 * hand.radii.max():
             continue
-        depth = (others - centers[thumb]) @ across / width
-        uneven = float(np.ptp(depth)) / width
-        inward = -limbs @ across / width
+        others = np.delete(centers, thumb, axis=0)
+        uneven = float(np.ptp(others @ across)) / width
+        inward = -hand.limbs() @ across
         inward[thumb] *= -1
         beside = np.linalg.norm(np.diff(others, axis=0), axis=1).min(initial=np.inf)
         apart = beside > 2 * hand.radii.max()
@@ -252,10 +249,3 @@ def _postures(
             found.append((uneven, q, thumb))
     found.sort(key=lambda one: one[0])
     yield from (one for one in found if free(one[1]))
-
-
-def _root(hand: Hand, q0: Array) -> Array:
-    """Return where the fingers begin (3,) [m]: the mean of the joints that move single tips."""
-    data = hand.model.createData()
-    pin.forwardKinematics(hand.model, data, q0)
-    return np.asarray(np.mean([data.oMi[j].translation for j in hand.joints], axis=0))

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.contact.materials import Material, find_material, friction_between
+from sphshell_pin.contact.materials import find_material
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, floats
@@ -21,7 +21,7 @@ from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT
 from sphshell_pin.scenario.drafting.searching import NewScenario, Search, coordinates
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, hertz_stiffness, sticking, too_deep
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Materials
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
 
@@ -87,13 +87,10 @@ class HoldSearch(Search):
     def _held(self, tips: Sequence[Tip]) -> NewScenario:
         """Return a scenario in which all of the `tips` hold the part; CannotHold if none works."""
         press, shell = self.asked.press, self.shell
-        materials = (
-            find_material(self.asked.material or "rubber"),
-            find_material(self.asked.against or "steel"),
-        )
-        part, hand = Part.of(shell, materials[1]), Hand(self.model, tips)
-        mu, _ = friction_between(*materials)
-        total = _SAFETY * part.mass * GRAVITY / mu if press is None else 2.0 * press
+        sphere = find_material(self.asked.material or "rubber")
+        materials = Materials(sphere, find_material(self.asked.against or "steel"))
+        part, hand = Part.of(shell, materials.surface), Hand(self.model, tips)
+        total = _SAFETY * part.mass * GRAVITY / materials.friction if press is None else 2.0 * press
         links, blocked = self.links(tips, hand.lock, self.q0), list[str]()
 
         def free(q: Array, placement: pin.SE3 | None = None) -> bool:
@@ -103,12 +100,12 @@ class HoldSearch(Search):
             blocked.extend([] if found is None else [found])
             return found is None
 
-        found = grasps(hand, self.q0, shell, part.weight, total, mu, GAP, free)
+        found = grasps(hand, self.q0, shell, part.weight, total, materials.friction, GAP, free)
         if not found:
             raise _no_grasp(shell, len(tips), blocked)
         said = ""
         for one in found[:_MOST_RUNS]:
-            grasp = _pressed(one, part, press, mu)
+            grasp = _pressed(one, part, press, materials.friction)
             plan = _planned(hand, grasp, shell, part, materials)
             if isinstance(plan, str):
                 said = plan
@@ -125,7 +122,7 @@ class HoldSearch(Search):
 
 
 def _planned(
-    hand: Hand, grasp: Grasp, shell: Shell, part: Part, materials: tuple[Material, Material]
+    hand: Hand, grasp: Grasp, shell: Shell, part: Part, materials: Materials
 ) -> Plan | str:
     """Plan a scenario with the grasp; what is wrong with it before anything is run."""
     model, forces, torques = hand.model, grasp.normal_forces(), hand.torques(grasp)
@@ -136,27 +133,27 @@ def _planned(
     over = np.flatnonzero(stated & (np.abs(torques + weight) > limits))
     if len(over):
         return f"the effort limit of {limits[over[0]]:g} N m allows no press of {press:.3g} N"
-    if said := too_deep(press, radius, materials):
+    if said := materials.too_deep(press, radius):
         return said
     kp = rounded(float(np.abs(torques).max()) / _DRAWN)
     inertia = np.diag(mass_matrix(model, grasp.q))[hand.reaches[0].columns]
     kd = rounded(1.4 * math.sqrt(kp * float(np.median(inertia))))
     # The springs are drawn from where the tips are as deep in the part as they press.
-    depths = (forces / [hertz_stiffness(float(one), *materials) for one in hand.radii]) ** (2 / 3)
+    depths = (forces / [materials.stiffness(float(one)) for one in hand.radii]) ** (2 / 3)
     pressed = hand.close_on(grasp.q, shell, grasp.placement, -depths)
     deep = grasp.q if pressed is None else pressed[0]
     drawn = _angles(hand, pin.integrate(model, deep, torques / kp), "hand/")
-    used = grasp.friction / friction_between(*materials)[0]
+    used = grasp.friction / materials.friction
     frames = ", ".join(f"'{tip.frame}'" for tip in hand.tips)
     why = (
         f"{len(hand.tips)} fingertips, {hand.tips[0].source}: {frames}",
-        f"the part is {materials[1].name} all through and weighs {part.mass:.3g} kg",
+        f"the part is {materials.surface.name} all through and weighs {part.mass:.3g} kg",
         f"the fingertips press with {press:.3g} N at most; its weight and their forces use "
         f"{100 * used:.0f} % of the friction",
     )
     return Plan(
         hand.tips,
-        sticking(materials, radius, 0.1, press, part.mass / len(hand.tips)),
+        materials.sticking(radius, 0.1, press, part.mass / len(hand.tips)),
         Hold(kp, kd, _DRAWN, drawn, press),
         DURATION,
         GAP,

@@ -46,6 +46,11 @@ class Tip:
         )
 
 
+def joint_of(model: pin.Model, frame: str) -> int:
+    """Return the joint that carries a frame; FrameNotFound lists the names."""
+    return int(model.frames[find_frame(model, frame)].parentJoint)
+
+
 def gripper_joints(model: pin.Model) -> set[int]:
     """Return the joints of grippers: behind a joint, two ends or more that slide or are coupled.
 
@@ -85,9 +90,10 @@ class LinkGeometry:
         self._joint = int(self._frame.parentJoint)
         self._jaws = gripper_joints(model) & {int(one) for one in model.subtrees[self._joint]}
         self._jaws -= {self._joint}
-        bodies = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
-        carried = [name for name in bodies if self._carries(name)]
-        self.link = carried[0] if carried else frame
+        both = robot.collision_model, robot.visual_model
+        shown = [int(one.parentFrame) for each in both for one in each.geometryObjects]
+        bodies = [k for k in sorted(shown) if model.frames[k].parentJoint == self._joint]
+        self.link = model.frames[bodies[0]].name if bodies else frame
         self.corners = moved(
             self._frame.placement.inverse(), self._corners(self._joint, self._jaws)
         )
@@ -127,15 +133,6 @@ class LinkGeometry:
         ball = rounded(_BALL * covers) if radius is None else radius
         front, source = center + (before + ball) * ahead, f"a ball on the end of link '{self.link}'"
         return Tip(name, ball, front, source, ahead if radius is None else None)
-
-    def _carries(self, link: str) -> bool:
-        """Whether `link` moves with the frame, and has geometry."""
-        k = find_frame(self._model, link)
-        return int(self._model.frames[k].parentJoint) == self._joint and any(
-            int(one.parentFrame) == k
-            for geometry in (self._robot.collision_model, self._robot.visual_model)
-            for one in geometry.geometryObjects
-        )
 
     def _ahead(self) -> Array:
         """Return the unit vector (3,) towards the end, in the frame.

@@ -32,15 +32,16 @@ _STROKES, _AROUND = 5, 24
 
 @dataclass(frozen=True)
 class Way:
-    """A path of the tip on the surface, or a single point."""
+    """A path of the tip on the surface, or a single point.
+
+    The `points` (k, 3) [m] are in the shell's frame; a `smooth` path has no corners. `why` says why
+    it is not longer; along an `even` one the sphere touches one face.
+    """
 
     points: Array
-    """(k, 3) [m] in the shell's frame."""
     smooth: bool = True
     why: str = ""
-    """Why it is not longer."""
     even: bool = True
-    """Whether the sphere touches one face all along."""
 
     @property
     def slides(self) -> bool:

@@ -30,18 +30,18 @@ _AT_FLOOR = 1e-6
 
 @dataclass(frozen=True)
 class Place:
-    """A posture of the robot and a part before its tip."""
+    """A posture of the robot and a part before its tip.
+
+    The part is at `placement` in the world, its `side` (3,) turned to the tip and its underside
+    `raised` [m] above the floor. `on_face` says whether the sphere touches one face there, once.
+    """
 
     stance: Stance
     touch: TouchPoint
     placement: pin.SE3
-    """Placement of the part in the world."""
     on_face: bool
-    """Whether the sphere touches one face there, and once."""
     raised: float
-    """How far the part's underside is above the floor [m]."""
     side: Array
-    """Side of the part (3,), which is turned to the tip."""
 
     def with_gap(self, gap: float) -> Place:
         """Return the place with the sphere at the `gap` [m] to the part, which stays if it can."""

@@ -10,20 +10,13 @@ from typing import Literal
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.placing import Place
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT, Stance
-from sphshell_pin.scenario.drafting.tip_contact import (
-    GRAVITY,
-    Contact,
-    bearable,
-    hertz_stiffness,
-    too_deep,
-)
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Contact, Materials
 from sphshell_pin.scenario.drafting.wording import axis_name, listed, mm, rounded
 
 # Gap of a tip at the start, as a part of its radius.
@@ -75,7 +68,7 @@ class Press:
 
     place: Place
     way: Way
-    materials: tuple[Material, Material]
+    materials: Materials
     force: float
     gap: float
     weak: bool = False
@@ -139,21 +132,27 @@ class Press:
 
 @dataclass(frozen=True)
 class Hold:
-    """Joints held in the posture of the start."""
+    """Joints held in the posture of the start.
+
+    The load draws the springs by about `sag` [rad]. Those of fingers would take them where they are
+    `drawn`, by joint; the largest normal force of a finger is `force` [N].
+    """
 
     kp: float
     kd: float
     sag: float
-    """How far the load draws the springs, about [rad]."""
     drawn: Mapping[str, object] = field(default_factory=dict)
-    """Where the springs of fingers would take them, by joint."""
     force: float = 0.0
-    """Largest normal force of fingers [N]."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A scenario before it is text."""
+    """A scenario before it is text.
+
+    `placement` is that of the shell in the world. A free root starts at `root` (7,): x y z and
+    quaternion x y z w; a free `part` there carries the shell. `why` has one sentence for each
+    choice that was made for the user. The tip number `strongest` presses most, and is checked.
+    """
 
     tips: tuple[Tip, ...]
     contact: Contact
@@ -161,42 +160,35 @@ class Plan:
     duration: float
     gap: float
     placement: pin.SE3
-    """Placement of the shell in the world."""
     root: Array | None
-    """Where the free root starts: x y z and quaternion x y z w."""
     why: tuple[str, ...] = ()
-    """One sentence for each choice that was made for the user."""
     part: Part | None = None
-    """The free part that carries the shell, at `root`."""
     strongest: int = 0
-    """Which of the tips is checked, the one that presses most."""
 
 
-def press_force(stance: Stance, materials: tuple[Material, Material], press: float | None) -> float:
+def press_force(stance: Stance, materials: Materials, press: float | None) -> float:
     """Return the normal force [N]; SphshellError where the joints cannot push as hard."""
     radius, most = stance.tip.radius, stance.force or NO_LIMIT
     if press is None:
         weights = MOST_WEIGHTS * stance.mass * GRAVITY
-        return rounded(min(MOST_FORCE, 0.1 * most, weights, bearable(radius, *materials)))
+        return rounded(min(MOST_FORCE, 0.1 * most, weights, materials.bearable(radius)))
     if press > most:
         raise SphshellError(
             f"the joints' effort limits allow a push of {rounded(most, 3):g} N along "
             f"{_direction(stance.approach)}, not {press:g} N"
         )
-    if said := too_deep(press, radius, materials):
+    if said := materials.too_deep(press, radius):
         raise SphshellError(f"{said}: a smaller --press, a larger --radius, or a harder --law")
     return press
 
 
-def press_gap(
-    radius: float, force: float, mass: float, materials: tuple[Material, Material]
-) -> float:
+def press_gap(radius: float, force: float, mass: float, materials: Materials) -> float:
     """Return the gap at the start [m]: in parts of the depth under `force` [N] at rest.
 
     One and a half; less of a large `mass` [kg], whose energy at the first touch, 4 gap^1.5
     sqrt(mass force) / rise by the motion in `Press`, is then a part of force times depth.
     """
-    rest = float((force / hertz_stiffness(radius, *materials)) ** (2 / 3))
+    rest = float((force / materials.stiffness(radius)) ** (2 / 3))
     calm = float((TOUCH_ENERGY * FORCE_RISE / (4 * math.sqrt(mass * rest / force))) ** (2 / 3))
     return min(TIP_GAP * radius, min(1.5, calm) * rest)
 

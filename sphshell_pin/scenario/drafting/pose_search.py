@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
 from sphshell_pin.scenario.drafting.asked_places import asked_touches
 from sphshell_pin.scenario.drafting.fingertips import other_ends
-from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, find_way
 from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
 from sphshell_pin.scenario.drafting.plan import (
@@ -82,7 +81,7 @@ class PressSearch(Search):
     def __init__(self, asked: Asked, built: Built, tips: Sequence[Tip], file: Path) -> None:
         super().__init__(asked, built, tips, file)
         self.tip = tip = tips[0]
-        if int(self.model.frames[find_frame(self.model, tip.frame)].parentJoint) == 0:
+        if joint_of(self.model, tip.frame) == 0:
             raise SphshellError(
                 f"no joint moves frame '{tip.frame}': name another with --frame, or let the root "
                 "float with --free-flyer"

@@ -9,8 +9,8 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
-from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
-from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.dynamics.scene.models import mass_matrix
+from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, unit
 from sphshell_pin.scenario.format.reach import Reach, turn_between
 
@@ -35,9 +35,9 @@ _HEIGHT, _ASTRAY, _TURNED, _FASTEST = 1e-4, 0.1, 0.02, 6.0
 
 def joints_aside(model: pin.Model, tips: Sequence[Tip]) -> tuple[str, ...]:
     """Return the joints that move none of the `tips`."""
-    ends = [int(model.frames[find_frame(model, tip.frame)].parentJoint) for tip in tips]
     # A joint that is held holds those that mimic it, and what it mimics.
-    on_way = {model.names[j] for end in ends for j in list(model.supports[end])[1:]}
+    chains = [list(model.supports[joint_of(model, tip.frame)])[1:] for tip in tips]
+    on_way = {model.names[j] for chain in chains for j in chain}
     moving = {one for name in on_way for one in group_of(model, name)}
     return tuple(name for name in list(model.names)[1:] if name not in moving)
 

@@ -98,8 +98,7 @@ class Search(ABC):
         """
         found = JointComponents.from_model(self.model).without(lock).kinds()
         kinds = [kind for kind in found if kind != leave]
-        update = {"lock": list(lock), "joints": kinds, **stated}
-        return self.section.model_copy(update=update)
+        return self.section.model_copy(update={"lock": list(lock), "joints": kinds, **stated})
 
     def run(self, section: RobotSection, plan: Plan, links: Links) -> NewScenario | None:
         """Write a draft and run it; None where it fails, as the last of the `faults` says."""

@@ -1,7 +1,10 @@
 """What a tip and a surface are made of, and the law and friction that follow."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from sphshell_pin.contact.materials import (
     Material,
@@ -16,8 +19,41 @@ from sphshell_pin.scenario.drafting.wording import mm, rounded
 GRAVITY = 9.81
 
 
+class Materials(NamedTuple):
+    """What a sphere and a surface are made of; lengths in [m], forces in [N]."""
+
+    sphere: Material
+    surface: Material
+
+    @property
+    def friction(self) -> float:
+        """Coefficient of static friction."""
+        return friction_between(*self)[0]
+
+    def stiffness(self, radius: float) -> float:
+        """Return Hertz's stiffness [N/m^1.5] of a sphere on a plane."""
+        return 4 / 3 * math.sqrt(radius) / sum((1 - one.poisson**2) / one.young for one in self)
+
+    def bearable(self, radius: float) -> float:
+        """Return the load that presses a sphere in by a fifteenth of its radius."""
+        return float(self.stiffness(radius) * (radius / 15) ** 1.5)
+
+    def too_deep(self, force: float, radius: float) -> str:
+        """Say that a force presses a sphere too far in; "" if it does not."""
+        if force <= self.stiffness(radius) * (0.5 * radius) ** 1.5:
+            return ""
+        ball = f"a {self.sphere.name} sphere of radius {mm(radius)}"
+        return f"{force:.3g} N would press {ball} in by more than half of it"
+
+    def sticking(self, radius: float, speed: float, load: float, mass: float) -> Contact:
+        """Return a contact whose friction sticks under a load, that of a `mass` [kg]."""
+        slope = 1.5 * self.stiffness(radius) ** (2 / 3) * load ** (1 / 3)
+        bristle = (rounded(slope), rounded(0.2 * math.sqrt(slope * mass)))
+        return Contact(self, speed, bristle=bristle)
+
+
 class Contact:
-    """Law and friction of a tip of `materials[0]` on `materials[1]`, as the scenario states them.
+    """Law and friction of a tip, as the scenario states them.
 
     The first touch is at `speed` [m/s], at which the restitution holds; friction is full at the
     slip speed `v_static` [m/s]. `bristle` is stiffness [N/m] and damping [N s/m] of bristles, for
@@ -26,7 +62,7 @@ class Contact:
 
     def __init__(
         self,
-        materials: tuple[Material, Material],
+        materials: Materials,
         speed: float,
         v_static: float = 0.005,
         bristle: tuple[float, float] | None = None,
@@ -44,42 +80,10 @@ class Contact:
         return f"law and friction of {pair}, typical values: --law and --against name others"
 
 
-def chosen_materials(asked: Asked, tips: Sequence[Tip], load: float) -> tuple[Material, Material]:
+def chosen_materials(asked: Asked, tips: Sequence[Tip], load: float) -> Materials:
     """Return what sphere and surface are made of; `load` [kg] rests on each, 0: it falls."""
-    other = find_material(asked.against or "steel")
-    if asked.material is not None:
-        return find_material(asked.material), other
-    if not load:
-        return find_material("steel"), other
+    rubber = Materials(find_material("rubber"), find_material(asked.against or "steel"))
     # A tip is of rubber, unless the mass behind it would press rubber in too far.
-    rubber, radius = find_material("rubber"), min(tip.radius for tip in tips)
-    bears = bearable(radius, rubber, other) >= load * GRAVITY
-    return rubber if bears else find_material("plastic"), other
-
-
-def hertz_stiffness(radius: float, one: Material, other: Material) -> float:
-    """Return Hertz's stiffness [N/m^1.5] of a sphere of `radius` [m] on a plane."""
-    softness = (1 - one.poisson**2) / one.young + (1 - other.poisson**2) / other.young
-    return 4 / 3 * math.sqrt(radius) / softness
-
-
-def bearable(radius: float, one: Material, other: Material) -> float:
-    """Return the load [N] that presses a sphere of `radius` [m] in by a fifteenth of it."""
-    return float(hertz_stiffness(radius, one, other) * (radius / 15) ** 1.5)
-
-
-def too_deep(force: float, radius: float, materials: tuple[Material, Material]) -> str:
-    """Say that a `force` [N] presses a sphere of `radius` [m] too far in; "" if it does not."""
-    if force <= hertz_stiffness(radius, *materials) * (0.5 * radius) ** 1.5:
-        return ""
-    ball = f"a {materials[0].name} sphere of radius {mm(radius)}"
-    return f"{force:.3g} N would press {ball} in by more than half of it"
-
-
-def sticking(
-    materials: tuple[Material, Material], radius: float, speed: float, load: float, mass: float
-) -> Contact:
-    """Return a contact whose friction sticks under a `load` [N], that of a `mass` [kg]."""
-    slope = 1.5 * hertz_stiffness(radius, *materials) ** (2 / 3) * load ** (1 / 3)
-    bristle = (rounded(slope), rounded(0.2 * math.sqrt(slope * mass)))
-    return Contact(materials, speed, bristle=bristle)
+    bears = rubber.bearable(min(tip.radius for tip in tips)) >= load * GRAVITY
+    name = asked.material or (("rubber" if bears else "plastic") if load else "steel")
+    return rubber._replace(sphere=find_material(name))

@@ -33,14 +33,15 @@ _DIRECTIONS = 8
 
 @dataclass(frozen=True)
 class TouchPoint:
-    """Where a sphere may stand on a shell; all in the shell's frame."""
+    """Where a sphere may stand on a shell; all in the shell's frame.
+
+    `point` (3,) [m] is on the surface, `normal` (3,) points to the sphere, `center` (3,) [m] is the
+    sphere's, whose gap to the surface is the one asked for.
+    """
 
     point: Array
-    """On the surface (3,) [m]."""
     normal: Array
-    """Unit (3,), from the surface to the sphere."""
     center: Array
-    """Center of the sphere (3,) [m], whose gap to the surface is the one asked for."""
 
 
 def find_touch_point(

@@ -12,6 +12,7 @@ from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.draft_text import HELD
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
+from sphshell_pin.scenario.drafting.vectors import unit
 from sphshell_pin.scenario.format.bodies import joint_spans, to_se3
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.reach import Reach
@@ -34,16 +35,17 @@ _LAST, _HELD, _CLOSED, _MOVED = 0.3, 0.9, 0.4, 0.2
 
 @dataclass(frozen=True)
 class Fault:
-    """What fails in a draft: `kind` is "run", "touch", "force", "links", "path" or "figure"."""
+    """What fails in a draft: `kind` is "run", "touch", "force", "links", "path" or "figure".
+
+    `text` is a clause that says it with its values, `t` [s] is when; `link` names a link that is in
+    the part, and `cut` says whether the effort limits cut what motors were to do.
+    """
 
     kind: str
     text: str
-    """A clause that says what fails, with its values."""
     t: float = 0.0
-    """When [s]."""
     link: str = ""
     cut: bool = False
-    """Whether the effort limits cut what motors were to do."""
 
 
 def try_out(built: Built, plan: Plan, links: Links) -> Fault | None:
@@ -162,10 +164,7 @@ def _forces(result: Result) -> Array:
     pushes = log.normal_force[:, None] * log.normal_world
     np.add.at(normal, log.row, pushes)
     np.add.at(total, log.row, pushes + log.friction_force_world)
-    size = np.linalg.norm(normal, axis=1)
-    along = np.einsum("ij,ij->i", normal, total)
-    sizes: Array = np.divide(along, size, out=np.zeros_like(size), where=size > 0)
-    return sizes
+    return np.asarray(np.einsum("ij,ij->i", unit(normal), total))
 
 
 def figure_fault(built: Built, result: Result) -> Fault | None:
