@@ -18,6 +18,8 @@ from sphshell_pin.shell.shell import Shell
 # How far a ball that covers an end may stand out before it, as a part of its radius: else the end
 # is flat, and gets a ball of this part of that radius. Without geometry: as a part of the reach.
 _STANDS_OUT, _BALL, _OF_REACH = 0.25, 1 / 3, 0.01
+COVERS = "it covers the end of link"
+"""How the source of a ball begins that is as large as a round end."""
 # Steps of the search for the ball that covers an end, and of that for the smallest ball.
 _DEPTHS, _STEPS = 40, 300
 # Distance of what is at the axis of a joint from it, as a part of the link's size.
@@ -122,7 +124,7 @@ class LinkGeometry:
         before = float(along.max() - center @ ahead)
         # Open jaws may lie in a ball, but are no round end.
         if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
-            return Tip(name, rounded(covers), center, f"it covers the end of link '{self.link}'")
+            return Tip(name, rounded(covers), center, f"{COVERS} '{self.link}'")
         ball = rounded(_BALL * covers) if radius is None else radius
         front, source = center + (before + ball) * ahead, f"a ball on the end of link '{self.link}'"
         return Tip(name, ball, front, source, ahead if radius is None else None)
