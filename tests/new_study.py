@@ -115,7 +115,7 @@ def ask(robot: str, part: Path, place: str) -> Case:
         path = Path(folder) / "made.toml"
         asked = options if place == "-" else {**options, "place": place}
         try:
-            new_scenario(name, part, out=path, **asked)  # type: ignore[arg-type]
+            new_scenario(name, part, out=path, **asked)
         except SphshellError as error:
             if path.exists():
                 return replace(case, failed=f"refused and written: {error}")

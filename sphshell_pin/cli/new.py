@@ -11,7 +11,7 @@ from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
 from sphshell_pin.errors import SphshellError, UnitMissing
 
 if TYPE_CHECKING:
-    from sphshell_pin.scenario.drafting.new import NewScenario
+    from sphshell_pin.scenario.drafting.searching import NewScenario
 
 
 _FRAMES = 8  # of a robot in a list

@@ -12,6 +12,7 @@ from sphshell_pin.errors import (
     FrameNotFound,
     InvalidParameter,
     NameNotFound,
+    ResultError,
     ScenarioError,
     SphshellError,
     UnitMissing,
@@ -235,7 +236,7 @@ def test_a_file_that_is_there_stays(tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr("os.replace", full)
-        with pytest.raises(ScenarioError, match="No space left"):
+        with pytest.raises(ResultError, match="No space left"):
             new_scenario("ball", out=path, force=True)
     assert path.read_text(encoding="utf-8") == "precious"
     assert list(tmp_path.iterdir()) == [path]

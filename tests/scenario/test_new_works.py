@@ -13,15 +13,17 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.fingertips import find_tips
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
-from sphshell_pin.scenario.drafting.plan import Plan, Press
+from sphshell_pin.scenario.drafting.paths import Way
+from sphshell_pin.scenario.drafting.plan import Press
 from sphshell_pin.scenario.drafting.pose_search import repaired
-from sphshell_pin.scenario.drafting.trial import Fault, _path_fault
+from sphshell_pin.scenario.drafting.trial import Fault, _force_fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
 from tests import models
 from tests.scenario.files import center_of, run_well
@@ -197,7 +199,7 @@ def test_links_in_a_part_are_found():
         place = pin.SE3(np.eye(3), np.array([x, 0, 0.5]))
         inside = links.within(q, place)
         assert (inside is not None) == found
-        assert not found or inside.link == "link_2"
+        assert not found or inside == "link_2"
     # The sphere itself, and what of its own link is near it, may touch; the rest of the link not.
     top = 1.0 + 0.08
     for z, found in ((top + 0.049, False), (top + 0.05 - 0.0201, True)):
@@ -283,34 +285,59 @@ def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
     new_scenario(PROBE, frame=frame, offset=offset, radius=float(radius), out=tmp_path / "a.toml")
 
 
-def pressing(points, posture=0.0):
-    """A tip that is pressed along a path of these points."""
-    values = dict.fromkeys(list(Press.__dataclass_fields__)[:11], 1.0)
-    values |= {"path": np.array(points), "even": True, "joint_damping": ()}
-    return Press(**values, posture_stiffness=(posture,))
+def pressing(points, **changes):
+    """A tip of radius 0.1 m that is pressed along a path of these points, at 0.3 m/s."""
+    tip, ones = (
+        Tip("tip", 0.1, np.zeros(3), ""),
+        dict.fromkeys(("mass", "slide_mass", "fastest"), 1),
+    )
+    stance = SimpleNamespace(tip=tip, **ones, inertia=0.0, joints=4, joint_inertia=np.ones(4))
+    pair = find_material("rubber"), find_material("steel")
+    place = SimpleNamespace(stance=stance)
+    return Press(place, Way(np.array(points)), pair, 1.0, 1e-3, **changes)
 
 
 PATH = [[0.0, 0.0, 0.0], [0.3, 0.1, 0.0]]
 
 
 @pytest.mark.parametrize(
-    ("kind", "before", "press", "repair"),
+    ("kind", "before", "path", "repair"),
     [
-        ("force", "", pressing(PATH, 1.0), "calmed"),
-        ("force", "calmed", pressing(PATH), None),
-        ("path", "", pressing(PATH[:1], 1.0), None),
-        ("path", "", pressing([[0.1 * k, 0.0, 0.0] for k in range(5)]), "cut"),
-        ("path", "cut", pressing(PATH, 1.0), None),
-        ("force", "", None, None),  # nothing is pressed
+        ("force", "", PATH, "calmed"),
+        ("force", "calmed", PATH, None),
+        ("path", "", PATH[:1], None),
+        ("path", "", [[0.1 * k, 0.0, 0.0] for k in range(5)], "cut"),
+        ("path", "cut", PATH, None),
     ],
 )
-def test_what_failed_decides_what_is_tried_next(kind, before, press, repair):
-    tip = Tip("tip", 0.1, np.zeros(3), "")
-    plan = Plan((tip,), None, press, 2.0, 0.0, pin.SE3.Identity(), None, repair=before)
-    found = repaired(plan, Fault(kind, "", 1.35))
-    if repair == "cut":  # four fifths of the 35 cm that the target has come in 0.35 s
-        assert (len(found.control.path), found.duration) == (3, pytest.approx(1.8))
+def test_what_failed_decides_what_is_tried_next(kind, before, path, repair):
+    press = pressing(path, repair=before)
+    found = repaired(press, Fault(kind, "it fails", press.lead_in + 0.35 / 0.3))
+    if repair == "cut":  # four fifths of the 35 cm that the target has come
+        assert found.way.length == pytest.approx(0.2)
+        assert found.way.why == "it fails"
+    if repair == "calmed":
+        assert found.damping == pytest.approx(4 * press.damping, rel=0.02)
+        assert any(press.posture_stiffness)
+        assert not found.posture_stiffness
     assert (None if found is None else found.repair) == repair
+
+
+@pytest.mark.parametrize("repair", ["", "calmed"])
+@pytest.mark.parametrize(("at", "told"), [(0.1, True), (0.8, True), (None, False)])
+def test_a_force_may_not_rise_by_half_again_while_the_tip_slides(at, told, repair):
+    """Nor at the first touch, but of a draft that was calmed: a hard tip may do no better."""
+    press, t = pressing(PATH, repair=repair), np.linspace(0.0, 1.0, 101)
+    rises = np.zeros(len(t), bool) if at is None else np.abs(t - at) < 0.015
+    log = SimpleNamespace(
+        row=np.arange(len(t)),
+        normal_force=np.where(rises, 1.6, 1.0),
+        normal_world=np.tile([0.0, 0.0, 1.0], (len(t), 1)),
+        friction_force_world=np.zeros((len(t), 3)),
+    )
+    fault = _force_fault(None, SimpleNamespace(control=press), SimpleNamespace(t=t, contacts=log))
+    assert (fault is not None) == (told and not (repair and at < press.lead_in))
+    assert fault is None or (fault.kind == "force" and fault.t == pytest.approx(at, abs=0.02))
 
 
 @pytest.mark.parametrize(("aside", "told"), [(0.55, False), (0.66, True)])

@@ -21,7 +21,6 @@ from sphshell_pin.cli import fit
 from sphshell_pin.errors import ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
-from sphshell_pin.scenario.drafting import new
 from sphshell_pin.scenario.running import run
 from sphshell_pin.shell.converting import convert
 from sphshell_pin.study.report import making
@@ -228,10 +227,7 @@ WRITERS = {
     "convert": tuple(
         lambda place, unit=unit: convert(MESH, place / "mesh.shl", unit) for unit in ("m", "mm")
     ),
-    "new": tuple(
-        lambda place, text=text: new._write(place / "new.toml", text) for text in ("old", "new")
-    ),
-    "recording": tuple(
+    "recording and new": tuple(
         lambda place, text=text: write_whole(place / "page.html", text.encode())
         for text in ("old", "new")
     ),

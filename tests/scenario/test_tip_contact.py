@@ -52,11 +52,11 @@ def test_a_tip_that_is_led_is_damped_by_seven_tenths(tmp_path):
 
 @pytest.mark.parametrize("share", [0.1, 0.49, 0.51, 0.79])
 def test_a_tip_is_pressed_in_by_half_its_radius_at_most(share):
-    stance = SimpleNamespace(force=1e9, approach=np.array([0.0, 0.0, -1.0]))
-    press = float(hertz(share * RADIUS))
     tip = SimpleNamespace(radius=RADIUS)
+    stance = SimpleNamespace(force=1e9, approach=np.array([0.0, 0.0, -1.0]), tip=tip)
+    press = float(hertz(share * RADIUS))
     if share < 0.5:
-        assert press_force(stance, tip, MATERIALS, press) == press
+        assert press_force(stance, MATERIALS, press) == press
     else:
         with pytest.raises(SphshellError, match="by more than half of it"):
-            press_force(stance, tip, MATERIALS, press)
+            press_force(stance, MATERIALS, press)

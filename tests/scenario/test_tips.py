@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from sphshell_pin import robots
-from sphshell_pin.scenario.drafting import new
 from sphshell_pin.scenario.drafting.fingertips import every_finger, find_tips, other_ends
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, gripper_joints
 from sphshell_pin.scenario.drafting.new import new_scenario
-from sphshell_pin.scenario.drafting.pose_search import find_working
-from sphshell_pin.scenario.drafting.refusals import CannotReach
+from sphshell_pin.scenario.drafting.pose_search import PressSearch
+from sphshell_pin.scenario.drafting.searching import CannotReach
 from sphshell_pin.scenario.format.reach import Reach
 
 
@@ -153,13 +152,16 @@ def test_where_one_limb_does_not_come_to_the_part_another_does(tmp_path: Path, m
     model, tried = robots.load_file(file).model, list[str]()
     (tip,) = find_tips(robots.load_file(file), shipped=None, frame=None, radius=None)
 
-    def search(asked, built, tips, draft):
-        tried.append(tips[0].frame)
-        if len(tried) == 1:
-            raise CannotReach("link 'x' would be in the part; take another --place", tips[0].frame)
-        return find_working(asked, built, tips, draft)
+    find = PressSearch.find
 
-    monkeypatch.setattr(new, "find_working", search)
+    def search(one):
+        tried.append(frame := one.tips[0].frame)
+        if len(tried) == 1:
+            said = "link 'x' would be in the part; take another --place"
+            raise CannotReach(said, frame, other_ends(model, frame))
+        return find(one)
+
+    monkeypatch.setattr(PressSearch, "find", search)
     made = new_scenario(file, "box", out=tmp_path / "new.toml")
     assert tried[0] == tip.frame != tried[1] == other_ends(model, tip.frame)[0]
     assert made.why[0] == f"frame '{tried[1]}', as with '{tried[0]}' link 'x' would be in the part"
@@ -181,6 +183,18 @@ def test_a_humanoid_without_feet_stands_on_its_ankles(tmp_path: Path) -> None:
     robot = robots.load_file(file, free_flyer=True)
     tips = find_tips(robot, shipped=None, frame=None, radius=None)
     assert {tip.frame for tip in tips} == {"left_ankle", "right_ankle"}
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_a_robot_on_fewer_than_three_feet_will_fall_over(tmp_path: Path, count: int) -> None:
+    file, out = tmp_path / "walker.urdf", link("body", ".2 .2 .1")
+    for k, angle in enumerate(2 * np.pi * np.arange(count) / count):
+        at = f"{0.2 * np.cos(angle):.6f} {0.2 * np.sin(angle):.6f} 0"
+        out += link(f"foot{k}", ".02 .02 .3", "0 0 -.15")
+        out += joint(f"hip{k}", "body", f"foot{k}", "revolute", at, "0 1 0")
+    file.write_text(f'<robot name="walker">{out}</robot>')
+    made = new_scenario(file, base="floating", out=tmp_path / "new.toml")
+    assert any("it will fall over" in one for one in made.why) == (count < 3)
 
 
 @pytest.mark.parametrize("tilts", [False, True])

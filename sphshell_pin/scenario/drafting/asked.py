@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -25,76 +25,118 @@ PLACES: dict[str, tuple[float, float, float]] = {
 }
 """Where the surface is placed, seen from the tip."""
 
+WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
+"""Surfaces that need no file."""
+
 SHAPES = ("line", "circle", "raster")
 
 
-@dataclass(frozen=True)
+@dataclass
 class Asked:
-    """The arguments of `new_scenario`, checked; None: that is chosen."""
+    """What is asked of `new_scenario`; None: that is chosen.
+
+    InvalidParameter or NameNotFound for what no robot and no surface can do.
+
+    Parameters
+    ----------
+    robot
+        Name of a shipped robot, or path of a URDF, xacro (`xacro_args`: its arguments) or MJCF file
+        (`package_dirs`: folders above the packages of its meshes).
+    surface
+        A surface file, its `unit` where the format has none, or a word of WORDS.
+    frame, radius, offset
+        Of the sphere: the frame that carries it, its radius [m], and its center (3,) [m] in the
+        frame, by default the origin; without a frame it is a known fingertip or foot.
+    bodies, faces
+        Of a CAD file: those to take, by name or number; by default all of it.
+    material, against
+        What the sphere and the surface are made of, names of MATERIALS; by default a free body is
+        of steel, any other sphere of rubber, or of plastic where rubber is too soft; the surface of
+        steel, or of plastic where a hand cannot hold it.
+    press
+        Normal force [N] of a robot with a fixed base.
+    place
+        Where the surface stands as seen from its tip, a key of PLACES; by default below, where the
+        joints allow it.
+    at
+        Where on the surface to touch: a point (3,) [m] in its own coordinates, or a kind of its
+        faces, with a radius where there are several ("cylinder 5.5 mm").
+    path, length
+        Of the tip: points (k, 3) [m] on the surface in its own coordinates, or one of SHAPES from
+        the place that is touched, over `length` [m].
+    tips
+        "all": all fingertips of a hand hold the surface, which then is a free part, of `against`
+        all through; its URDF is written beside the scenario, as NAME_part.urdf.
+    base
+        "fixed" or "floating"; by default as its file states it, but a single limb on a free base is
+        an arm, which is fixed, and so is a robot that cannot stand on the surface.
+    density
+        Of the links of a URDF that state no mass [kg/m^3]: they get that of their geometry.
+    mimic
+        Whether joints that mimic others do so exactly; else they move freely.
+    out
+        The file to write, by default ROBOT_on_SURFACE.toml here; an existing one is replaced with
+        `force` only, and only when all went well.
+    tell
+        Called with a sentence for each draft that failed, while others are tried.
+    """
 
     robot: str | PathLike[str]
-    surface: str | PathLike[str]
-    frame: str | None
-    radius: float | None
-    offset: Array | None
-    unit: str | None
-    bodies: Sequence[str] | None
-    faces: Sequence[str | int] | None
-    material: str | None
-    against: str | None
-    press: float | None
-    place: str | None
-    at: Array | str | None
-    """A point of the part (3,) [m], or a kind of its faces, with a radius where there are more."""
-    path: Array | str | None
-    """Points on the part (k, 3) [m], or one of SHAPES."""
-    length: float | None
-    """Length of a path of SHAPES [m]."""
-    tips: Literal["one", "all"]
-    base: Literal["fixed", "floating"] | None
-    package_dirs: Sequence[str | PathLike[str]]
-    xacro_args: Mapping[str, str] | None
-    density: float | None
-    """Density of the links whose mass the robot's file does not state [kg/m^3]."""
-    mimic: bool
-    out: str | PathLike[str] | None
-    force: bool
-    tell: Callable[[str], None] | None
-    """Called with what failed, while the search goes on."""
+    surface: str | PathLike[str] = "plane"
+    frame: str | None = None
+    radius: float | None = None
+    offset: Array | None = None
+    unit: str | None = None
+    bodies: Sequence[str] | None = None
+    faces: Sequence[str | int] | None = None
+    material: str | None = None
+    against: str | None = None
+    press: float | None = None
+    place: str | None = None
+    at: Array | str | None = None
+    path: Array | str | None = None
+    length: float | None = None
+    tips: Literal["one", "all"] = "one"
+    base: Literal["fixed", "floating"] | None = None
+    package_dirs: Sequence[str | PathLike[str]] = ()
+    xacro_args: Mapping[str, str] | None = None
+    density: float | None = None
+    mimic: bool = True
+    out: str | PathLike[str] | None = None
+    force: bool = False
+    tell: Callable[[str], None] | None = None
 
-    @classmethod
-    def checked(cls, **given: Any) -> Asked:
-        """Return what is asked; InvalidParameter or NameNotFound for what nothing can be."""
+    def __post_init__(self) -> None:
         for name, unit in (("radius", "m"), ("press", "N"), ("length", "m"), ("density", "kg/m^3")):
-            if given[name] is not None:
-                check_positive(name, given[name], unit)
-        if given["place"] is not None and given["place"] not in PLACES:
-            raise NameNotFound("place", given["place"], "a surface", PLACES)
-        for one in (given["material"], given["against"]):
+            if getattr(self, name) is not None:
+                check_positive(name, getattr(self, name), unit)
+        if self.place is not None and self.place not in PLACES:
+            raise NameNotFound("place", self.place, "a surface", PLACES)
+        for one in (self.material, self.against):
             if one is not None:
                 find_material(one)
-        at, path = given["at"], given["path"]
-        if given["length"] is not None and (not isinstance(path, str) or path not in SHAPES):
+        if self.offset is not None:
+            self.offset = check_vector("offset", self.offset, 3, " [m]")
+        if isinstance(self.at, str):
+            point = _numbers(self.at)
+            self.at = self.at.strip() if point is None else point
+        elif self.at is not None:
+            self.at = check_vector("at", self.at, 3, " [m]")
+        if self.length is not None and not (isinstance(self.path, str) and self.path in SHAPES):
             why = f"belongs to a path of {', '.join(SHAPES)}: name one"
-            raise InvalidParameter("length", given["length"], why)
-        if isinstance(at, str):
-            point = _numbers(at)
-            at = at.strip() if point is None else point
-        elif at is not None:
-            at = check_vector("at", at, 3, " [m]")
-        if isinstance(path, str) and path not in SHAPES:
-            rows = [_numbers(one) for one in path.split(";") if one.strip()]
+            raise InvalidParameter("length", self.length, why)
+        if isinstance(self.path, str) and self.path not in SHAPES:
+            rows = [_numbers(one) for one in self.path.split(";") if one.strip()]
             if not rows or any(one is None for one in rows):
                 why = f"must be {', '.join(SHAPES)}, or points [m] of the part: 'x,y,z; x,y,z'"
-                raise InvalidParameter("path", path, why)
-            path = np.array(rows)
-        elif path is not None and not isinstance(path, str):
-            path = check_points("path", path)
-        if isinstance(path, np.ndarray) and at is not None:
-            raise InvalidParameter("at", at, "the first point of the path says it: leave it out")
-        offset = given["offset"]
-        offset = None if offset is None else check_vector("offset", offset, 3, " [m]")
-        return cls(**{**given, "at": at, "path": path, "offset": offset})
+                raise InvalidParameter("path", self.path, why)
+            self.path = np.array(rows)
+        elif self.path is not None and not isinstance(self.path, str):
+            self.path = check_points("path", self.path)
+        if isinstance(self.path, np.ndarray) and self.at is not None:
+            raise InvalidParameter(
+                "at", self.at, "the first point of the path says it: leave it out"
+            )
 
     @property
     def word(self) -> str | None:
@@ -109,7 +151,7 @@ class Asked:
     @property
     def slides(self) -> bool:
         """Whether a path is asked for."""
-        return self.path is not None and len(self.path) > 1
+        return isinstance(self.path, str) or (self.path is not None and len(self.path) > 1)
 
     @property
     def whole(self) -> bool:

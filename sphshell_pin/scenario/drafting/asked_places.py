@@ -7,7 +7,7 @@ import numpy as np
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.asked import Asked
-from sphshell_pin.scenario.drafting.touch_points import TouchPoint, come_down
+from sphshell_pin.scenario.drafting.touch_points import TouchPoint, come_down, facet_areas
 from sphshell_pin.scenario.drafting.wording import listed
 from sphshell_pin.shell.faces import Face, described
 from sphshell_pin.shell.raw import KINDS
@@ -63,9 +63,7 @@ def touch_from_outside(shell: Shell, point: Array, radius: float, gap: float) ->
 def _on_face(shell: Shell, text: str, radius: float, gap: float) -> list[TouchPoint]:
     """Return touch points on the faces that `text` describes, the largest face first."""
     faces = _described_faces(shell, text)
-    corners = shell.vertices[shell.triangles]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas, middles = 0.5 * np.linalg.norm(cross, axis=1), corners.mean(axis=1)
+    areas, middles = facet_areas(shell), shell.vertices[shell.triangles].mean(axis=1)
     carriers = np.asarray(shell.triangle_element)
     masks = [np.isin(carriers, face.elements) for face in faces]
     # The upper one of faces alike.

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import cached_property
 
 import coal
 import numpy as np
@@ -16,14 +16,6 @@ from sphshell_pin.shell.shell import Shell
 
 # Contacts of the tip's own link that are looked at.
 _MOST_CONTACTS = 1000
-
-
-@dataclass(frozen=True)
-class Intrusion:
-    """A link that is in the part, at `point` (3,) [m] in the world."""
-
-    link: str
-    point: Array
 
 
 class Links:
@@ -51,14 +43,15 @@ class Links:
             if q is not None and one != other and other != parents[one] and one != parents[other]:
                 self._geometry.addCollisionPair(pin.CollisionPair(i, j))
         self._geometry_data = pin.GeometryData(self._geometry)
+        for one in self._geometry.geometryObjects:
+            one.geometry.computeLocalAABB()
         if q is not None:
-            self._collide(q, first=False)
+            self.crossed(q, all_pairs=True)
         for k, result in enumerate(self._geometry_data.collisionResults):
             if result.isCollision():
                 self._geometry_data.deactivateCollisionPair(k)
         self.shell, self._tips = shell, tuple(tips)
         self._surface = _tree(shell)
-        self._box = shell.box
         frames = [model.frames[find_frame(model, tip.frame)] for tip in tips]
         held = set(held_joints(model, tuple(lock)))
         own = [_fixed_to(model, int(frame.parentJoint), held) for frame in frames]
@@ -68,21 +61,41 @@ class Links:
             if not any(_is_sphere(one, model, frames[k], tips[k]) for k in at):
                 self._objects.append((i, tuple(at)))
 
-    def _collide(self, q: Array, *, first: bool = True) -> bool:
-        geometry = self._geometry, self._geometry_data
-        return bool(pin.computeCollisions(self.model, self._data, *geometry, q, first))
-
-    def crossed(self, q: Array) -> bool:
+    def crossed(self, q: Array, *, all_pairs: bool = False) -> bool:
         """Whether links touch each other at q (nq,) that may not."""
-        return self._collide(q)
+        geometry = self._geometry, self._geometry_data
+        return bool(pin.computeCollisions(self.model, self._data, *geometry, q, not all_pairs))
 
-    def within(self, q: Array, placement: pin.SE3, *, whole: bool = False) -> Intrusion | None:
+    @cached_property
+    def floor(self) -> float:
+        """Height [m] under what of the robot is fixed to the world, 0 at most."""
+        lowest = [0.0]
+        for one in self._geometry.geometryObjects:
+            if not one.parentJoint:
+                box, turn = one.geometry.aabb_local, np.abs(one.placement.rotation)
+                middle = one.placement.act(one.geometry.aabb_center)
+                lowest.append((middle - 0.5 * turn @ (box.max_ - box.min_))[2])
+        return float(min(lowest))
+
+    def lowest(self, q: Array) -> float:
+        """Return the height [m] of the lowest joint or middle of a link that moves, at q (nq,)."""
+        self._place(q)
+        objects = zip(self._geometry.geometryObjects, self._geometry_data.oMg, strict=True)
+        middles = [pose.act(a.geometry.aabb_center) for a, pose in objects if a.parentJoint]
+        joints = [joint.translation for joint in list(self._data.oMi)[1:]]
+        return float(np.array([*middles, *joints])[:, 2].min())
+
+    def _place(self, q: Array) -> None:
+        geometry = self._geometry, self._geometry_data
+        pin.updateGeometryPlacements(self.model, self._data, *geometry, q)
+
+    def within(self, q: Array, placement: pin.SE3, *, whole: bool = False) -> str | None:
         """Return a link that is in the part at `placement` with the robot at q (nq,).
 
         With `whole` a link that is inside as a whole, and touches nothing, counts too.
         """
         model, geometry = self.model, self._geometry
-        pin.updateGeometryPlacements(model, self._data, geometry, self._geometry_data, q)
+        self._place(q)
         pin.updateFramePlacements(model, self._data)
         centers = [
             self._data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in self._tips
@@ -90,36 +103,34 @@ class Links:
         part = coal.Transform3s(placement.rotation, placement.translation)
         for k, (i, at) in enumerate(self._objects):
             one, pose = geometry.geometryObjects[i], self._geometry_data.oMg[i]
-            found = self._touch(one, pose, part, [(centers[k], self._tips[k].radius) for k in at])
-            if found is None and whole and self._inside(one, pose, placement):
-                found = pose.translation
-            if found is not None:
+            spheres = [(centers[k], self._tips[k].radius) for k in at]
+            if self._touches(one, pose, part, spheres) or (
+                whole and self._inside(one, pose, placement)
+            ):
                 # What is in the way here will be so in the next place, too.
                 self._objects.insert(0, self._objects.pop(k))
-                return Intrusion(_link_of(model, one), np.array(found))
+                return _link_of(model, one)
         return None
 
-    def _touch(
+    def _touches(
         self,
         one: pin.GeometryObject,
         pose: pin.SE3,
         part: coal.Transform3s,
         spheres: Sequence[tuple[Array, float]],
-    ) -> Array | None:
-        """Return where a geometry touches the surface beside the spheres; None if it does not."""
+    ) -> bool:
+        """Whether a geometry touches the surface beside the spheres."""
         place = coal.Transform3s(pose.rotation, pose.translation)
-        request = coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, 1)
-        if spheres:
-            request.num_max_contacts = _MOST_CONTACTS
-        result = coal.CollisionResult()
-        if not coal.collide(one.geometry, place, self._surface, part, request, result):
-            return None
-        for contact in result.getContacts():
-            point = np.array(contact.pos)
-            away = [float(np.linalg.norm(point - c)) / radius for c, radius in spheres]
-            if not away or min(away) > AT_TIP:
-                return point
-        return None
+        most = _MOST_CONTACTS if spheres else 1
+        request, result = (
+            coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, most),
+            coal.CollisionResult(),
+        )
+        coal.collide(one.geometry, place, self._surface, part, request, result)
+        return any(
+            all(np.linalg.norm(contact.pos - c) > AT_TIP * radius for c, radius in spheres)
+            for contact in result.getContacts()
+        )
 
     def _inside(self, one: pin.GeometryObject, pose: pin.SE3, placement: pin.SE3) -> bool:
         """Whether a point of a geometry is behind the surface, where that is closed."""
@@ -128,7 +139,7 @@ class Links:
         mesh = isinstance(one.geometry, coal.BVHModelBase)
         point = np.array(one.geometry.vertices()[0]) if mesh else np.zeros(3)
         at = placement.actInv(pose.act(point))
-        if (at < self._box[0]).any() or (at > self._box[1]).any():
+        if (at < self.shell.box[0]).any() or (at > self.shell.box[1]).any():
             return False
         return bool(self.shell.closest_points(at[None], method="facets").distances[0] < 0)
 

@@ -68,10 +68,10 @@ def draft_text(name: str, title: str, robot: RobotSection, shell: ShellSection, 
         path = _rounded(control.path, digits)
         offset = _rounded(plan.tips[0].offset, digits)
         moves = "follows a path on the surface and presses on it"
-        told = f"The tip {moves if len(path) > 1 else 'presses on one place of the surface'}."
+        told = f"The tip {moves if control.slides else 'presses on one place of the surface'}."
         values = {"offset": offset, "path": path, "told": told, "brakes": brakes}
         text += _fill("press", tip=tips[0], shell=shell, press=control, **values)
-        if control.even:
+        if control.way.even:
             # Over the time of contact; while the force comes on, half of it on average.
             full = plan.duration - 0.5 * control.force_rise
             mean = control.force * full / (plan.duration - control.first_touch)
@@ -85,8 +85,13 @@ def draft_text(name: str, title: str, robot: RobotSection, shell: ShellSection, 
     # others, and ten times faster than fixed steps that resolve the contact.
     record_dt, slow = (1e-3, 0.5) if control is None else (5e-3, None)
     text += _fill("run", plan=plan, record_dt=record_dt, slow=slow)
-    for key, limits in _parameters(plan, f"contact.{group}").items():
-        text += f"[[knob]]\nkey = {toml(key)}\n{_table(limits)}\n"
+    text += _fill("knobs", group=group, contact=contact)
+    keys = [] if control is None else ["kp", "kd"]
+    if isinstance(control, Press):
+        keys = ["normal_force", *(["speed"] if control.slides else []), "stiffness", "damping"]
+    else:
+        text += _fill("knob of gravity")
+    text += "".join(_fill("knob", key=key) for key in keys)
     return text + _fill("expect", pair=pair, mean_force=mean_force)
 
 
@@ -101,12 +106,9 @@ def _contact_text(group: str, shell: ShellSection, plan: Plan, label: str, digit
     one, several = (spheres[0], None) if len(tips) == 1 else (None, spheres)
     radius = min(tip.radius for tip in tips)
     values = {"sphere": one, "spheres": several, "shell": shell, "radius": radius}
-    materials = f"{contact.material.name} on {contact.against.name}"
-    slip = float(f"{10 * contact.v_static:.2g}")
-    friction = {"materials": materials, "v_dynamic": slip, "torsional": plan.part is not None}
     kind = "coulomb" if contact.bristle is None else "bristle"
     text = _fill("contact", pair=group, plan=plan, **values)
-    return text + _fill(kind, contact=contact, **friction)
+    return text + _fill(kind, contact=contact, torsional=plan.part is not None)
 
 
 def _pair_name(group: str, tips: Sequence[Tip], label: str, k: int) -> str:
@@ -123,30 +125,10 @@ def decimals(gap: float) -> int:
     return max(4, math.ceil(-math.log10(gap / 200)))
 
 
-def _parameters(plan: Plan, at: str) -> dict[str, dict[str, float]]:
-    """Return the keys of the parameters that get a slider, and its ends where they are stated.
-
-    `at` is the key of the contact.
-    """
-    contact, control = plan.contact, plan.control
-    keys = [] if control is None else ["kp", "kd"]
-    if isinstance(control, Press):
-        speed = ["speed"] if len(control.path) > 1 else []
-        keys = ["normal_force", *speed, "stiffness", "damping"]
-    return {
-        f"{at}.law.young": {},
-        f"{at}.law.restitution": {"min": 0.05, "max": 1.0},
-        f"{at}.friction.mu_static": {"min": contact.mu_dynamic, "max": 1.5},
-        f"{at}.friction.mu_dynamic": {"min": 0.0, "max": contact.mu_static},
-        **({} if isinstance(control, Press) else {"gravity.2": {"min": -20.0, "max": 0.0}}),
-        **{f"controller.{key}": {} for key in keys},
-    }
-
-
 def _fill(part: str, **values: object) -> str:
     """Return a part of the template with `values` in place of the {names}.
 
-    Where a value stands, it is as TOML writes it, else plain text.
+    Where a value stands, it is as TOML writes it; marked !s, and elsewhere, plain text.
     """
     formatter, lines = Formatter(), list[str]()
     for line in _TEMPLATES[part].splitlines():
@@ -162,7 +144,8 @@ def _fill(part: str, **values: object) -> str:
                 not value or (isinstance(value, list | tuple) and not any(value))
             ):
                 break
-            text += literal if name is None else literal + toml(value)
+            plain = str if conversion == "s" else toml
+            text += literal if name is None else literal + plain(value)
         else:
             start = formatter.format(key, **values)
             text = f"{start} = {text}"

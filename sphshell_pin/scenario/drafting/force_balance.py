@@ -3,6 +3,7 @@
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.scenario.drafting.vectors import tangents
 
 # Sides of the pyramid that stands for a friction cone, inscribed in it.
 _SIDES = 8
@@ -45,10 +46,7 @@ def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: floa
     angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
     edges = np.empty((count, _SIDES, 3))
     for k, normal in enumerate(normals):
-        aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
-        first = np.cross(normal, aside)
-        first /= np.linalg.norm(first)
-        second = np.cross(normal, first)
+        first, second = tangents(normal, np.zeros(3))
         edges[k] = -normal + mu * (
             np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
         )
@@ -72,5 +70,4 @@ def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: floa
     if residual > _BALANCED * max(total, float(np.linalg.norm(wrench[:3]))):
         return None
     shares = shares[: count * _SIDES].reshape(count, _SIDES, 1)
-    forces: Array = (shares * edges).sum(axis=1)
-    return forces
+    return np.asarray((shares * edges).sum(axis=1))

@@ -12,6 +12,8 @@ from sphshell_pin.dynamics.scene.mimic import leader_of, mimics
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.poses import joints_aside
+from sphshell_pin.scenario.drafting.vectors import moved, unit
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.shell.shell import Shell
 
@@ -58,8 +60,7 @@ class Grasp:
 
     def normal_forces(self) -> Array:
         """Return the normal force (k,) [N] of each tip."""
-        forces: Array = -np.einsum("ki,ki->k", self.forces, self.normals)
-        return forces
+        return np.asarray(-np.einsum("ki,ki->k", self.forces, self.normals))
 
 
 class Hand:
@@ -74,7 +75,7 @@ class Hand:
         moving = {leader_of(rules, name) for name in set.union(*chains)}
         self.joints = tuple(sorted(int(model.getJointId(name)) for name in moving))
         """Joints that move a tip, without those that mimic them."""
-        self.lock = tuple(n for n in list(model.names)[1:] if leader_of(rules, n) not in moving)
+        self.lock = joints_aside(model, tips)
         self.reaches = [Reach(model, tip.frame, tip.offset, self.lock) for tip in tips]
         self.ranks = []
         """The coordinates that move each tip alone, from the tip on."""
@@ -96,8 +97,7 @@ class Hand:
                 for reach in self.reaches
             ]
         )
-        unit: Array = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-        return unit
+        return unit(out)
 
     def jacobians(self, q: Array, beside: Array | float = 0.0) -> Array:
         """Return (k, 3, nv): velocities of the centers from those of the joints.
@@ -114,8 +114,7 @@ class Hand:
     def torques(self, grasp: Grasp) -> Array:
         """Return the joint torques (nv,) [N m], beside those against gravity, of its forces."""
         touching = self.jacobians(grasp.q, -self.radii[:, None] * grasp.normals)
-        torques: Array = np.einsum("kij,ki->j", touching, grasp.forces)
-        return torques
+        return np.asarray(np.einsum("kij,ki->j", touching, grasp.forces))
 
     def close_on(
         self, q: Array, shell: Shell, placement: pin.SE3, gap: float | Array
@@ -132,7 +131,7 @@ class Hand:
             normals = near.normals @ placement.rotation.T
             error = near.distances - (self.radii + gap)
             if np.abs(error).max() < _CLOSE:
-                return q, placement.translation + near.points @ placement.rotation.T, normals
+                return q, moved(placement, near.points), normals
             rows = np.einsum("ki,kij->kj", normals, self.jacobians(q))
             square = rows @ rows.T + _DAMPING * np.eye(len(rows))
             step = -rows.T @ np.linalg.solve(square, error)
@@ -198,8 +197,7 @@ def _places(
         width = float(np.linalg.norm(across))
         across = across / width
         ahead = centers.mean(axis=0) - root
-        ahead = ahead - (ahead @ across) * across
-        ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-9)
+        ahead = unit(ahead - (ahead @ across) * across)
         frame = np.column_stack([across, ahead, np.cross(across, ahead)])
         center = 0.5 * (others.mean(axis=0) + centers[thumb])
         room = width - 2 * float(hand.radii.mean())
@@ -260,5 +258,4 @@ def _root(hand: Hand, q0: Array) -> Array:
     """Return where the fingers begin (3,) [m]: the mean of the joints that move single tips."""
     data = hand.model.createData()
     pin.forwardKinematics(hand.model, data, q0)
-    root: Array = np.mean([data.oMi[j].translation for j in hand.joints], axis=0)
-    return root
+    return np.asarray(np.mean([data.oMi[j].translation for j in hand.joints], axis=0))

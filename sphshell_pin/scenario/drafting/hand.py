@@ -13,21 +13,16 @@ from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, floats
 from sphshell_pin.scenario.drafting.asked import Asked
-from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.fingertips import every_finger
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.part import Part, part_file
+from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
-from sphshell_pin.scenario.drafting.pose_search import Draft, Working, stated_kinds
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, bearable, hertz_stiffness, sticking
-from sphshell_pin.scenario.drafting.trial import try_out
-from sphshell_pin.scenario.drafting.wording import mm, rounded
-from sphshell_pin.scenario.format.bodies import joint_spans
-from sphshell_pin.scenario.format.build import Built
-from sphshell_pin.scenario.format.schema import RobotSection
+from sphshell_pin.scenario.drafting.searching import NewScenario, Search, coordinates
+from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, hertz_stiffness, sticking, too_deep
+from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
 
 GAP, DURATION = 1e-4, 1.5
@@ -64,82 +59,69 @@ def every_tip(robot: LoadedRobot, asked: Asked) -> list[Tip]:
     return tips
 
 
-def hold_in_hand(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Working:
-    """Return a scenario in which the `tips` of a robot hold the surface of `built`.
+class HoldSearch(Search):
+    """The search for a grasp in which the tips of a hand hold the surface.
 
-    The largest normal force of a tip is what is asked for; `draft(section, plan)` writes and builds
-    one. Each is run; the first that holds the part is taken. Where all tips cannot, those do
-    without the fingers of the fewest joints, three at least.
-
-    Raises
-    ------
-    SphshellError
-        None does; the text says why, and what to change.
+    Where all tips cannot, those do without the fingers of the fewest joints, three at least.
     """
-    if floats(built.assembly.model):
-        raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
-    ranks = Hand(built.assembly.model, tips).ranks
-    order = sorted(range(len(tips)), key=lambda k: -len(ranks[k]))
-    refused, last = "", CannotHold()
-    for count in range(len(tips), min(len(tips), 3) - 1, -1):
-        some = [tips[k] for k in sorted(order[:count])]
-        try:
-            found = _held(asked, built, some, draft)
-        except CannotHold as error:
-            refused, last = refused or str(error), error
-            continue
-        if refused:
-            note = f"{count} of {len(tips)} fingertips hold it: {refused.partition(';')[0]}"
-            found = found._replace(why=(note, *found.why))
-        return found
-    raise last
 
+    def find(self) -> NewScenario:
+        """Return the first draft that holds the part; SphshellError if none does."""
+        if floats(self.model):
+            raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
+        tips, refused, last = self.tips, "", CannotHold()
+        ranks = Hand(self.model, tips).ranks
+        order = sorted(range(len(tips)), key=lambda k: -len(ranks[k]))
+        for count in range(len(tips), min(len(tips), 3) - 1, -1):
+            try:
+                found = self._held([tips[k] for k in sorted(order[:count])])
+            except CannotHold as error:
+                refused, last = refused or str(error), error
+                continue
+            if refused:
+                note = f"{count} of {len(tips)} fingertips hold it: {refused.partition(';')[0]}"
+                found = replace(found, why=(note, *found.why))
+            return found
+        raise last
 
-def _held(asked: Asked, built: Built, tips: Sequence[Tip], draft: Draft) -> Working:
-    """Return a scenario in which all of the `tips` hold the surface; CannotHold if none works."""
-    materials = find_material(asked.material or "rubber"), find_material(asked.against or "steel")
-    model, q0, press = built.assembly.model, built.assembly.q0, asked.press
-    (shell,) = built.shells.values()
-    part, hand = Part.of(shell, materials[1]), Hand(model, tips)
-    mu, _ = friction_between(*materials)
-    total = _SAFETY * part.mass * GRAVITY / mu if press is None else 2.0 * press
-    geometry = built.assembly.loaded[0].collision_model
-    links = Links(model, geometry, shell, tips, hand.lock, q0)
-    blocked: list[str] = []
+    def _held(self, tips: Sequence[Tip]) -> NewScenario:
+        """Return a scenario in which all of the `tips` hold the part; CannotHold if none works."""
+        press, shell = self.asked.press, self.shell
+        materials = (
+            find_material(self.asked.material or "rubber"),
+            find_material(self.asked.against or "steel"),
+        )
+        part, hand = Part.of(shell, materials[1]), Hand(self.model, tips)
+        mu, _ = friction_between(*materials)
+        total = _SAFETY * part.mass * GRAVITY / mu if press is None else 2.0 * press
+        links, blocked = self.links(tips, hand.lock, self.q0), list[str]()
 
-    def free(q: Array, placement: pin.SE3 | None = None) -> bool:
-        if placement is None:
-            return not links.crossed(q)
-        found = links.within(q, placement, whole=True)
-        blocked.extend([] if found is None else [found.link])
-        return found is None
+        def free(q: Array, placement: pin.SE3 | None = None) -> bool:
+            if placement is None:
+                return not links.crossed(q)
+            found = links.within(q, placement, whole=True)
+            blocked.extend([] if found is None else [found])
+            return found is None
 
-    found = grasps(hand, q0, shell, part.weight, total, mu, GAP, free)
-    if not found:
-        raise _no_grasp(shell, len(tips), blocked)
-    kinds, said = stated_kinds(model, hand.lock), ""
-    for one in found[:_MOST_RUNS]:
-        grasp = _pressed(one, part, press, mu)
-        stated = {
-            "label": "hand",
-            "lock": list(hand.lock),
-            "joints": kinds,
-            "start": _angles(hand, grasp.q, ""),
-        }
-        section = built.scenario.robot[0].model_copy(update=stated)
-        plan = _planned(hand, grasp, shell, part, materials)
-        if isinstance(plan, str):
-            said = plan
-            continue
-        text, made = draft(section, plan)
-        fault = try_out(made, plan, links)
-        if fault is None:
-            return Working(text, made, (*plan.why, plan.contact.note), part.urdf())
-        said = fault.text
-    raise TooHeavy(
-        f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {said}; a lighter "
-        "--against, another --press, or a smaller part"
-    )
+        found = grasps(hand, self.q0, shell, part.weight, total, mu, GAP, free)
+        if not found:
+            raise _no_grasp(shell, len(tips), blocked)
+        said = ""
+        for one in found[:_MOST_RUNS]:
+            grasp = _pressed(one, part, press, mu)
+            plan = _planned(hand, grasp, shell, part, materials)
+            if isinstance(plan, str):
+                said = plan
+                continue
+            section = self.locked(hand.lock, label="hand", start=_angles(hand, grasp.q))
+            works = self.run(section, plan, links)
+            if works is not None:
+                return works
+            said = self.faults[-1].text
+        raise TooHeavy(
+            f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {said}; a lighter "
+            "--against, another --press, or a smaller part"
+        )
 
 
 def _planned(
@@ -154,11 +136,8 @@ def _planned(
     over = np.flatnonzero(stated & (np.abs(torques + weight) > limits))
     if len(over):
         return f"the effort limit of {limits[over[0]]:g} N m allows no press of {press:.3g} N"
-    if press > bearable(radius, *materials) * 7.5**1.5:
-        return (
-            f"{press:.3g} N would press a {materials[0].name} sphere of radius {mm(radius)} in by "
-            "more than half of it"
-        )
+    if said := too_deep(press, radius, materials):
+        return said
     kp = rounded(float(np.abs(torques).max()) / _DRAWN)
     inertia = np.diag(mass_matrix(model, grasp.q))[hand.reaches[0].columns]
     kd = rounded(1.4 * math.sqrt(kp * float(np.median(inertia))))
@@ -189,11 +168,10 @@ def _planned(
     )
 
 
-def _angles(hand: Hand, q: Array, prefix: str) -> dict[str, object]:
+def _angles(hand: Hand, q: Array, prefix: str = "") -> dict[str, object]:
     """Return the coordinates of the joints that move the tips."""
-    names = [hand.model.names[j] for j in hand.joints]
-    at = {prefix + name: q[joint_spans(hand.model, name)[0]].round(6).tolist() for name in names}
-    return {name: one[0] if len(one) == 1 else one for name, one in at.items()}
+    found, names = coordinates(hand.model, q), [hand.model.names[j] for j in hand.joints]
+    return {prefix + name: found[name] for name in names}
 
 
 def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> CannotHold:
@@ -209,14 +187,6 @@ def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> CannotHold:
         "touch it with forces inside their friction cones; take a part of another size, or its "
         "--unit"
     )
-
-
-def with_part(built: Built, part: Part, name: str) -> Built:
-    """Return `built` with the part as a second robot, so that neither is read from files."""
-    loaded = (built.assembly.loaded[0], part.loaded())
-    section = RobotSection(urdf=part_file(name), free_flyer=True, label="part")
-    scenario = built.scenario.model_copy(update={"robot": [*built.scenario.robot, section]})
-    return replace(built, scenario=scenario, assembly=replace(built.assembly, loaded=loaded))
 
 
 def _pressed(grasp: Grasp, part: Part, press: float | None, mu: float) -> Grasp:

@@ -12,6 +12,7 @@ from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.robots import LoadedRobot
+from sphshell_pin.scenario.drafting.vectors import moved, unit
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
 
@@ -89,7 +90,7 @@ class LinkGeometry:
         bodies = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
         carried = [name for name in bodies if self._carries(name)]
         self.link = carried[0] if carried else frame
-        self.corners = _moved(
+        self.corners = moved(
             self._frame.placement.inverse(), self._corners(self._joint, self._jaws)
         )
 
@@ -147,8 +148,8 @@ class LinkGeometry:
         model, place = self._model, self._frame.placement.inverse()
         here = _middle(self.corners)
         if self._jaws:
-            away = here - _middle(_moved(place, self._corners(self._joint)))
-            return np.asarray(away / max(float(np.linalg.norm(away)), 1e-12))
+            away = here - _middle(moved(place, self._corners(self._joint)))
+            return unit(away)
         joint = model.joints[self._joint]
         if joint.nv == 6:
             return np.asarray(place.rotation @ np.array([0.0, 0.0, -1.0]))
@@ -164,8 +165,7 @@ class LinkGeometry:
             size = float(np.linalg.norm(np.ptp(self.corners, axis=0)))
             near = np.linalg.norm(aside) < _AT_AXIS * size
             away = axis * np.sign(axis @ away or 1.0) if near else aside
-        ahead: Array = away / max(float(np.linalg.norm(away)), 1e-12)
-        return ahead
+        return unit(away)
 
     def _corners(self, joint: int, jaws: Collection[int] = ()) -> Array:
         """Return the corners (k, 3) [m] of the geometry of joints, in the first one's frame."""
@@ -173,7 +173,7 @@ class LinkGeometry:
         pin.forwardKinematics(self._model, data, self._robot.q0)
         for geometry in (self._robot.collision_model, self._robot.visual_model):
             found = [
-                _moved(
+                moved(
                     data.oMi[joint].actInv(data.oMi[one.parentJoint] * one.placement),
                     _vertices(one),
                 )
@@ -193,14 +193,10 @@ def _vertices(geometry: pin.GeometryObject) -> Array:
         return np.zeros((0, 3))
 
 
-def _moved(place: pin.SE3, points: Array) -> Array:
-    moved: Array = points @ place.rotation.T + place.translation
-    return moved
-
-
 def _middle(points: Array) -> Array:
-    middle: Array = 0.5 * (points.min(axis=0) + points.max(axis=0)) if len(points) else np.zeros(3)
-    return middle
+    if not len(points):
+        return np.zeros(3)
+    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
 
 
 def _smallest_ball(points: Array) -> tuple[Array, float]:

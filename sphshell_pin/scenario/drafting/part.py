@@ -1,10 +1,8 @@
-"""A free part in the fingertips of a hand: its mass, its URDF, and words for such parts."""
+"""A free part in the fingertips of a hand: its mass and its URDF."""
 
 from __future__ import annotations
 
-import tempfile
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -13,9 +11,10 @@ from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots import LoadedRobot, load_file
+from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
-from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, Primitive
+from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.scenario.format.schema import RobotSection
 from sphshell_pin.shell.shell import Shell
 
 
@@ -63,30 +62,21 @@ class Part:
 
     def loaded(self) -> LoadedRobot:
         """Return it as a robot with a free root."""
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "part.urdf"
-            file.write_text(self.urdf())
-            return load_file(file, free_flyer=True, mimic=True, name="part")
+        model = pin.buildModelFromXML(self.urdf(), pin.JointModelFreeFlyer())
+        bare = pin.GeometryModel()
+        return LoadedRobot("part", model, bare, bare, pin.neutral(model))
+
+    def beside(self, built: Built, name: str) -> Built:
+        """Return `built` with it as a second robot, so that neither is read from files."""
+        loaded = (built.assembly.loaded[0], self.loaded())
+        section = RobotSection(urdf=part_file(name), free_flyer=True, label="part")
+        scenario = built.scenario.model_copy(update={"robot": [*built.scenario.robot, section]})
+        return replace(built, scenario=scenario, assembly=replace(built.assembly, loaded=loaded))
 
     def weight(self, placement: pin.SE3) -> Array:
         """Return its weight at `placement` (6,): force [N], torque about the world's origin."""
         force = np.array([0.0, 0.0, -GRAVITY * self.mass])
         return np.concatenate([force, np.cross(placement.act(self.center), force)])
-
-
-def word_primitive(word: str, radius: float) -> Primitive:
-    """Return what a word stands for between fingertips of `radius` [m]; SphshellError if nothing.
-
-    It is five radii wide.
-    """
-    sizes: dict[str, Primitive] = {
-        "sphere": Ball(2.5 * radius),
-        "cylinder": Cylinder(radius=2.5 * radius, length=10 * radius),
-        "box": Box([5 * radius, 5 * radius, 10 * radius]),
-    }
-    if word not in sizes:
-        raise SphshellError(f"a hand cannot hold a {word}: --tips all takes {', '.join(sizes)}")
-    return sizes[word]
 
 
 def part_file(name: str) -> str:

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -15,9 +14,9 @@ from sphshell_pin.scenario.drafting.placing import Place, nearer
 from sphshell_pin.scenario.drafting.touch_points import (
     TouchPoint,
     paths_on_surface,
-    tangents,
     touches_once,
 )
+from sphshell_pin.scenario.drafting.vectors import moved, tangents
 from sphshell_pin.scenario.drafting.wording import mm
 from sphshell_pin.shell.shell import Shell
 
@@ -33,14 +32,20 @@ _STROKES, _AROUND = 5, 24
 
 @dataclass(frozen=True)
 class Way:
-    """A path of the tip on the surface; why it is none, where it is a single point."""
+    """A path of the tip on the surface, or a single point."""
 
     points: Array
     """(k, 3) [m] in the shell's frame."""
     smooth: bool = True
     why: str = ""
+    """Why it is not longer."""
     even: bool = True
     """Whether the sphere touches one face all along."""
+
+    @property
+    def slides(self) -> bool:
+        """Whether it is more than a single point."""
+        return len(self.points) > 1
 
     @property
     def length(self) -> float:
@@ -70,15 +75,14 @@ def find_way(
     direction = place.placement.rotation.T @ stance.slide
     for points, smooth in _tried(asked, shell, touch, direction, radius, length):
         fine = points if smooth else _fine(points, 0.5 * radius)
-        count = _even_part(shell, place, fine, radius, gap)
-        if asked.path is None:  # not down the side of the part
-            tilted = np.abs(shell.closest_points(fine[:count]).normals @ touch.normal) < _TILTED
-            count = int(np.argmax(tilted)) if tilted.any() else count
-        most_on_surface = max(most_on_surface, Way(fine[:count]).length)
+        count = max(1, touches_once(shell, touch, fine, radius, 2 * gap))
         normals = shell.closest_points(fine[:count]).normals
-        signs = np.sign(normals @ touch.normal)
-        centers = fine[:count] + (radius + gap) * normals * np.where(signs, signs, 1.0)[:, None]
-        world = np.array([place.placement.act(one) for one in centers])
+        facing = normals @ touch.normal
+        if asked.path is None:  # not down the side of the part
+            count = int(next(iter(np.flatnonzero(np.abs(facing) < _TILTED)), count))
+        most_on_surface = max(most_on_surface, Way(fine[:count]).length)
+        normals = normals * np.where(facing < 0, -1.0, 1.0)[:, None]
+        world = moved(place.placement, fine[:count] + (radius + gap) * normals[:count])
         count, why = stance.follows(world, lambda q: links.within(q, part) is None)
         reason = why or reason
         if asked.whole and count < len(fine):
@@ -129,14 +133,3 @@ def _fine(points: Array, spacing: float) -> Array:
         steps = max(1, math.ceil(float(np.linalg.norm(other - one)) / spacing))
         parts.append(one + np.arange(1, steps + 1)[:, None] / steps * (other - one))
     return np.concatenate(parts)
-
-
-def _even_part(shell: Shell, place: Place, points: Array, radius: float, gap: float) -> int:
-    """Return how many of `points` (k, 3) the sphere touches one after the other, each once."""
-
-    def fails(count: int) -> bool:
-        return not touches_once(shell, place.touch, points[:count], radius, 2 * gap)
-
-    if not fails(len(points)):
-        return len(points)
-    return bisect_left(range(len(points)), True, lo=2, key=fails) - 1

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario.drafting.clearance import Links
-from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.poses import Stance, stances
+from sphshell_pin.scenario.drafting.poses import Limb, Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
+from sphshell_pin.scenario.drafting.vectors import nearest_axis, turned_to
 from sphshell_pin.scenario.drafting.wording import axis_name
-from sphshell_pin.scenario.format.build import Built
 
 # Turns of the part about the approach, tried in this order [rad].
 _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
@@ -71,31 +71,19 @@ class Place:
         )
 
 
-@dataclass
-class Searched:
-    """What a search for places came across, for the sentence that refuses."""
-
-    postures: int = 0
-    places: int = 0
-    blocked: list[str] = field(default_factory=list)
-
-
 class Bench:
-    """The robot of `built` and a part that is put before its `tip`, on the floor of its base.
+    """A robot and a part that is put before the tip of a `limb`, on the floor of the robot's base.
 
     `links` are held against the part; q (nq,) is the posture to start from; the sphere may come
     into the part by `depth` [m].
     """
 
-    def __init__(
-        self, built: Built, tip: Tip, links: Links, q: Array, depth: float, searched: Searched
-    ) -> None:
-        self._model, self._geometry = built.assembly.model, built.assembly.loaded[0].collision_model
-        self._data, self._at = self._model.createData(), pin.GeometryData(self._geometry)
-        self._q, self._tip, self._links, self._shell = q, tip, links, links.shell
-        self._depth, self._searched = depth, searched
-        self._floor = _floor(self._geometry)
+    def __init__(self, links: Links, limb: Limb, q: Array, depth: float) -> None:
+        self.q, self._limb, self._links, self._shell = q, limb, links, links.shell
+        self._depth = depth
         self._found: dict[tuple[float | None, ...], list[Stance]] = {}
+        # What was come across: postures, places that were tried, and links that were in the part.
+        self.postures, self.tried, self.blocked = 0, 0, Counter[str]()
 
     def places(
         self,
@@ -114,17 +102,20 @@ class Bench:
         facing = turned_to(side, -approach)
         lowest = float((self._shell.vertices @ facing.T)[:, 2].min())
         uneven: list[Place] = []
-        most = self._searched.places + (_FEWER if self._searched.places > _MANY else _MOST_TRIED)
+        most = self.tried + (_FEWER if self.tried > _MANY else _MOST_TRIED)
 
         def height(spot: TouchPoint) -> float | None:
-            return self._floor - lowest + float(facing[2] @ spot.center) if on_floor else None
+            return self._links.floor - lowest + float(facing[2] @ spot.center) if on_floor else None
 
         for posture in self._stances(approach, height(spots[0])):
-            self._searched.postures += 1
+            self.postures += 1
             offered = 0
             for spot in spots:
-                on_face = bool(spot.normal @ side > _STEEP) and touches_once(
-                    self._shell, spot, spot.point[None], self._tip.radius, self._depth
+                on_face = bool(
+                    spot.normal @ side > _STEEP
+                    and touches_once(
+                        self._shell, spot, spot.point[None], self._limb.tip.radius, self._depth
+                    )
                 )
                 z = height(spot)
                 at = posture.center if z is None else np.array([*posture.center[:2], z])
@@ -134,15 +125,15 @@ class Bench:
                 for angle in _YAWS:
                     turned = pin.AngleAxis(angle, approach).toRotationMatrix() @ facing
                     placement = pin.SE3(turned, stance.center - turned @ spot.center)
-                    self._searched.places += 1
+                    self.tried += 1
                     # With a little room, as the tip yields when it is pressed on and slides.
                     part = nearer(placement, room * stance.approach)
                     found = self._links.within(stance.q, part, whole=True)
                     if found is not None:
-                        self._searched.blocked.append(found.link)
+                        self.blocked[found] += 1
                         continue
                     bottom = float((self._shell.vertices @ turned.T)[:, 2].min())
-                    raised = bottom + float(placement.translation[2]) - self._floor
+                    raised = bottom + float(placement.translation[2]) - self._links.floor
                     place = Place(stance, spot, placement, on_face, raised, side)
                     if on_face:
                         yield place
@@ -150,9 +141,9 @@ class Bench:
                     else:
                         uneven.append(place)
                     break
-                if offered >= _MOST_OF_STANCE or self._searched.places >= most:
+                if offered >= _MOST_OF_STANCE or self.tried >= most:
                     break
-            if self._searched.places >= most:
+            if self.tried >= most:
                 break
         yield from uneven
 
@@ -160,9 +151,9 @@ class Bench:
         """Return postures for an approach, at a `height` [m] above the floor if it is given."""
         key = (*approach, height)
         if key not in self._found:
-            limit = None if height is None else self._floor
+            limit = None if height is None else self._links.floor
             self._found[key] = stances(
-                self._model, self._q, self._tip, approach, height, lambda q: self._usable(q, limit)
+                self._limb, self.q, approach, height, lambda q: self._usable(q, limit)
             )
         return self._found[key]
 
@@ -170,27 +161,7 @@ class Bench:
         """Whether links are free of each other and above the `floor` [m] at q (nq,)."""
         if self._links.crossed(q):
             return False
-        pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._at, q)
-        heights = [
-            pose.act(one.geometry.aabb_center)[2]
-            for one, pose in zip(self._geometry.geometryObjects, self._at.oMg, strict=True)
-            if one.parentJoint
-        ]
-        heights += [joint.translation[2] for joint in list(self._data.oMi)[1:]]
-        return floor is None or min(heights) > floor - _AT_FLOOR
-
-
-def _floor(geometry: pin.GeometryModel) -> float:
-    """Return the height [m] under what of the robot is fixed to the world, 0 at most."""
-    lowest = 0.0
-    for one in geometry.geometryObjects:
-        one.geometry.computeLocalAABB()
-        if not one.parentJoint:
-            box = one.geometry.aabb_local
-            corners = np.array(np.meshgrid(*zip(box.min_, box.max_, strict=True))).reshape(3, -1).T
-            heights = corners @ one.placement.rotation[2] + one.placement.translation[2]
-            lowest = min(lowest, float(heights.min()))
-    return lowest
+        return floor is None or self._links.lowest(q) > floor - _AT_FLOOR
 
 
 def nearer(placement: pin.SE3, way: Array) -> pin.SE3:
@@ -200,20 +171,5 @@ def nearer(placement: pin.SE3, way: Array) -> pin.SE3:
 
 def nearest_side(normal: Array) -> Array:
     """Return the axis (3,) nearest to `normal` (3,), or the normal itself if that is oblique."""
-    k = int(np.argmax(np.abs(normal)))
-    axis: Array = np.sign(normal[k]) * np.eye(3)[k]
-    return axis if abs(normal[k]) > _STEEP else normal
-
-
-def turned_to(side: Array, target: Array) -> Array:
-    """Return the rotation (3, 3) that turns `side` to `target` by the shortest way, upright ones.
-
-    Those that are opposite to each other are turned about a horizontal axis across them, or z.
-    """
-    if side @ target < -0.999:
-        about = np.array([0.0, 0.0, 1.0]) if abs(side[2]) < 0.5 else np.array([1.0, 0.0, 0.0])
-        rotation: Array = 2.0 * np.outer(about, about) - np.eye(3)
-        return rotation
-    rotation = pin.Quaternion.FromTwoVectors(side, target).toRotationMatrix()
-    rounded = np.round(rotation)
-    return rounded + 0.0 if np.abs(rotation - rounded).max() < 1e-9 else rotation
+    axis = nearest_axis(normal)
+    return axis if axis @ normal > _STEEP else normal

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Literal
 
-import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
@@ -21,20 +21,13 @@ from sphshell_pin.scenario.drafting.tip_contact import (
     GRAVITY,
     Contact,
     bearable,
-    contact_of,
     hertz_stiffness,
-    sticking,
+    too_deep,
 )
-from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
 from sphshell_pin.scenario.drafting.wording import axis_name, listed, mm, rounded
-from sphshell_pin.shell import Shell
 
-UP = np.array([0.0, 0.0, 1.0])
-
-# Gap of a tip at the start, as a part of its radius; of a body that falls, and of feet.
-TIP_GAP, FALL_GAP, FOOT_GAP = 0.02, 2.0, 0.1
-# How far from the middle a body falls, as a part of the surface's box.
-FALL_BESIDE = 0.1
+# Gap of a tip at the start, as a part of its radius.
+TIP_GAP = 0.02
 # How far friction and force may turn a tip that is to keep its orientation [rad].
 TIP_TURN = 0.02
 # Largest normal force by default [N], and in weights of the tip's effective mass.
@@ -51,68 +44,97 @@ RAMP = 0.25
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
 # radii.
 TIP_RATE, TIP_LAG = 20.0, 0.2
+# Damping as a part of the critical one, and how much more there is of it where that failed.
+DAMPED, CALM = 0.7, 4.0
 WEAK = (
     "the effort limits that the robot's file states for its joints are not modeled, because they "
     "do not bear its own weight, friction and this motion"
 )
-# Sag of a standing robot's joints under its weight [rad].
-SAG = 0.05
 
 
-@dataclass(frozen=True)
+@dataclass
 class Press:
-    """A tip that is moved along a path and pressed on the surface."""
+    """A tip of a robot with a fixed base that is moved along a `way` and pressed on the surface.
 
+    The sphere begins with the `gap` [m] at the first point of the way and presses with `force` [N],
+    from `lead_in` [s] on while it slides. The efforts of motors that are too `weak` are not
+    modeled. A `calm` one has more damping, and joints that nothing pulls to a posture. `repair` is
+    what was changed of a draft that failed; "" of the first draft.
+
+    Attributes
+    ----------
+    first_touch
+        When the sphere has crossed the gap, about [s].
+    slides
+        Whether the tip moves; then the robot's inertia is to be kept from the surface.
+    spline
+        Whether the path is one smooth curve.
+    acceleration, jerk
+        Limits of the target's [m/s2, m/s3], where it moves.
+    """
+
+    place: Place
+    way: Way
+    materials: tuple[Material, Material]
     force: float
-    path: Array
-    """Points (k, 3) in the shell's frame [m]."""
-    speed: float
-    lead_in: float
-    force_rise: float
-    first_touch: float
-    """When the sphere has crossed the gap, about [s]."""
-    stiffness: float
-    damping: float
-    rotational_stiffness: float
-    rotational_damping: float
-    even: bool
-    """Whether the sphere touches one face along the whole path: all of `force` acts there."""
-    posture_stiffness: tuple[float, ...]
-    joint_damping: tuple[float, ...]
-    smooth: bool = True
-    """Whether a path of more than two points bends, and has no corners."""
-    damped: float = 0.7
-    """Damping as a part of the critical one."""
+    gap: float
+    weak: bool = False
+    lead_in: float = LEAD_IN
+    calm: bool = False
+    repair: Literal["", "calmed", "cut", "stays"] = ""
 
-    @property
-    def spline(self) -> bool:
-        """Whether the path is one smooth curve."""
-        return self.smooth and len(self.path) > 2
+    def __post_init__(self) -> None:
+        stance, force, self.path = self.place.stance, self.force, self.way.points
+        radius, self.force_rise, self.slides = stance.tip.radius, FORCE_RISE, self.way.slides
+        self.speed = rounded(min(PATH_RATE * radius, NO_LIMIT if self.weak else stance.fastest))
+        self.spline = self.way.smooth and len(self.path) > 2
+        self.acceleration = rounded(self.speed / RAMP) if self.slides else None
+        self.jerk = rounded(self.speed / RAMP**2) if self.slides else None
+        # Over the gap the mass is moved by 3 force (t / rise)^2, the beginning of the rise: the gap
+        # is force t^4 / (4 mass rise^2), the speed four times that by t.
+        self.first_touch = (4 * stance.mass * FORCE_RISE**2 * self.gap / force) ** 0.25
+        self.contact = Contact(self.materials, 4 * self.gap / self.first_touch, 0.1 * self.speed)
+        self.damped = DAMPED * (CALM if self.calm else 1.0)
+        friction = self.contact.mu_static * force
+        stiffness = max(stance.slide_mass * TIP_RATE**2, friction / (TIP_LAG * radius))
+        mass = math.sqrt(stance.mass * stance.slide_mass)
+        turning = 0.0
+        if stance.inertia:
+            turning = max(stance.inertia * TIP_RATE**2, friction * radius / TIP_TURN)
+        self.stiffness, self.rotational_stiffness = rounded(stiffness), rounded(turning)
+        self.damping = rounded(2 * self.damped * math.sqrt(stiffness * mass))
+        self.rotational_damping = rounded(2 * self.damped * math.sqrt(turning * stance.inertia))
+        # The posture's pull may take a fiftieth of the normal force at the end of the path.
+        pull = min(0.02 * force / (stance.mass * max(self.way.length, radius)), 100.0)
+        pull = pull if stance.joints > (6 if turning else 3) else 0.0
+        joints = stance.joint_inertia
+        self.posture_stiffness = [] if self.calm else [rounded(pull * one) for one in joints]
+        self.joint_damping = [rounded(0.7 * math.sqrt(pull) * one) for one in joints]
 
-    def calmed(self) -> Press:
-        """Return it with four times the damping, and joints that nothing pulls to a posture."""
-        return replace(
-            self,
-            posture_stiffness=(),
-            damping=rounded(4.0 * self.damping),
-            rotational_damping=rounded(4.0 * self.rotational_damping),
-            damped=4.0 * self.damped,
+    def plan(self) -> Plan:
+        """Return the scenario."""
+        place, way, stance, tip = self.place, self.way, self.place.stance, self.place.stance.tip
+        lock, farther = stance.limb.lock, f": farther {way.why}" if way.why else ""
+        why = (
+            f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
+            f"the surface is {mm(self.gap)} in front of the sphere, which presses along "
+            f"{_direction(stance.approach)}",
+            "the joints are bent to a posture in which the tip moves well and can press",
+            place.told,
+            lock and f"joints that do not move the tip are locked: {len(lock)}",
+            f"normal force {self.force:g} N, for an effective mass of {stance.mass:.3g} kg at the "
+            "tip",
+            self.weak and WEAK,
+            not way.even and "the force on the surface is the resultant of several",
+            f"the tip slides over {mm(way.length)}{farther}"
+            if self.slides
+            else f"the tip presses in one place and does not slide: {way.why}",
         )
-
-    @property
-    def slides(self) -> bool:
-        """Whether the tip moves; then the robot's inertia is to be kept from the surface."""
-        return len(self.path) > 1
-
-    @property
-    def acceleration(self) -> float | None:
-        """Limit of the target's acceleration [m/s2], where it moves."""
-        return rounded(self.speed / RAMP) if self.slides else None
-
-    @property
-    def jerk(self) -> float | None:
-        """Limit of the target's jerk [m/s3], where it moves."""
-        return rounded(self.speed / RAMP**2) if self.slides else None
+        corners = 0 if not self.slides else 1 if self.spline else len(self.path) - 1
+        moving = way.length / self.speed + 2 * RAMP * corners
+        duration = math.ceil(10 * (self.lead_in + moving + 0.5)) / 10
+        said = tuple(one for one in why if one)
+        return Plan((tip,), self.contact, self, duration, self.gap, place.placement, None, said)
 
 
 @dataclass(frozen=True)
@@ -121,7 +143,7 @@ class Hold:
 
     kp: float
     kd: float
-    sag: float = SAG
+    sag: float
     """How far the load draws the springs, about [rad]."""
     drawn: Mapping[str, object] = field(default_factory=dict)
     """Where the springs of fingers would take them, by joint."""
@@ -148,27 +170,21 @@ class Plan:
     """The free part that carries the shell, at `root`."""
     strongest: int = 0
     """Which of the tips is checked, the one that presses most."""
-    repair: str = ""
-    """What was changed of a draft that failed; "" of the first draft."""
 
 
-def press_force(
-    stance: Stance, tip: Tip, materials: tuple[Material, Material], press: float | None
-) -> float:
+def press_force(stance: Stance, materials: tuple[Material, Material], press: float | None) -> float:
     """Return the normal force [N]; SphshellError where the joints cannot push as hard."""
+    radius, most = stance.tip.radius, stance.force or NO_LIMIT
     if press is None:
-        return rounded(_suitable_force(stance, tip.radius, materials))
-    if press > stance.force:
+        weights = MOST_WEIGHTS * stance.mass * GRAVITY
+        return rounded(min(MOST_FORCE, 0.1 * most, weights, bearable(radius, *materials)))
+    if press > most:
         raise SphshellError(
-            f"the joints' effort limits allow a push of {rounded(stance.force, 3):g} N along "
+            f"the joints' effort limits allow a push of {rounded(most, 3):g} N along "
             f"{_direction(stance.approach)}, not {press:g} N"
         )
-    deepest = hertz_stiffness(tip.radius, *materials) * (0.5 * tip.radius) ** 1.5
-    if press > deepest:
-        raise SphshellError(
-            f"{press:g} N would press a {materials[0].name} sphere of radius {mm(tip.radius)} in "
-            "by more than half of it: a smaller --press, a larger --radius, or a harder --law"
-        )
+    if said := too_deep(press, radius, materials):
+        raise SphshellError(f"{said}: a smaller --press, a larger --radius, or a harder --law")
     return press
 
 
@@ -178,170 +194,12 @@ def press_gap(
     """Return the gap at the start [m]: in parts of the depth under `force` [N] at rest.
 
     One and a half; less of a large `mass` [kg], whose energy at the first touch, 4 gap^1.5
-    sqrt(mass force) / rise by the motion in `press_plan`, is then a part of force times depth.
+    sqrt(mass force) / rise by the motion in `Press`, is then a part of force times depth.
     """
     rest = float((force / hertz_stiffness(radius, *materials)) ** (2 / 3))
     calm = float((TOUCH_ENERGY * FORCE_RISE / (4 * math.sqrt(mass * rest / force))) ** (2 / 3))
     return min(TIP_GAP * radius, min(1.5, calm) * rest)
 
 
-def press_plan(
-    tip: Tip,
-    place: Place,
-    way: Way,
-    materials: tuple[Material, Material],
-    force: float,
-    gap: float,
-    weak: bool,
-) -> Plan:
-    """Plan a scenario in which a tip of a robot with a fixed base presses with `force` [N].
-
-    The sphere begins with the `gap` [m] at the first point of the `way`; the efforts of motors that
-    are too `weak` are not modeled.
-    """
-    stance, path = place.stance, way.points
-    rate = rounded(min(PATH_RATE * tip.radius, NO_LIMIT if weak else stance.fastest))
-    # Over the gap the mass is moved by 3 force (t / rise)^2, the beginning of the rise: the gap is
-    # force t^4 / (4 mass rise^2), the speed four times that by t.
-    crossing = (4 * stance.mass * FORCE_RISE**2 * gap / force) ** 0.25
-    contact = contact_of(materials, 4 * gap / crossing, 0.1 * rate)
-    softest = contact.mu_static * force / (TIP_LAG * tip.radius)
-    stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
-    mass = math.sqrt(stance.mass * stance.slide_mass)
-    turning = 0.0
-    if stance.inertia:
-        moment = contact.mu_static * force * tip.radius
-        turning = max(stance.inertia * TIP_RATE**2, moment / TIP_TURN)
-    spare = stance.joints > (6 if turning else 3)
-    # The posture's pull may take a fiftieth of the normal force at the end of the path.
-    pull = min(0.02 * force / (stance.mass * max(way.length, tip.radius)), 100.0) if spare else 0.0
-    control = Press(
-        force=force,
-        path=path,
-        even=way.even,
-        speed=rate,
-        lead_in=LEAD_IN,
-        force_rise=FORCE_RISE,
-        first_touch=crossing,
-        stiffness=rounded(stiffness),
-        damping=rounded(1.4 * math.sqrt(stiffness * mass)),
-        rotational_stiffness=rounded(turning),
-        rotational_damping=rounded(1.4 * math.sqrt(turning * stance.inertia)),
-        posture_stiffness=tuple(rounded(pull * one) for one in stance.joint_inertia),
-        joint_damping=tuple(rounded(0.7 * math.sqrt(pull) * one) for one in stance.joint_inertia),
-        smooth=way.smooth,
-    )
-    why = [f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}"]
-    why.append(
-        f"the surface is {mm(gap)} in front of the sphere, which presses along "
-        f"{_direction(stance.approach)}"
-    )
-    why.append("the joints are bent to a posture in which the tip moves well and can press")
-    why.append(place.told)
-    if stance.lock:
-        why.append(f"joints that do not move the tip are locked: {len(stance.lock)}")
-    why.append(
-        f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
-    )
-    why += [WEAK] if weak else []
-    if not way.even:
-        why.append("the force on the surface is the resultant of several")
-    if len(path) < 2:
-        why.append(f"the tip presses in one place and does not slide: {way.why}")
-    else:
-        why.append(f"the tip slides over {mm(way.length)}")
-    corners = 0 if len(path) < 2 else 1 if control.spline else len(path) - 1
-    duration = math.ceil(10 * (LEAD_IN + way.length / rate + 2 * RAMP * corners + 0.5)) / 10
-    return Plan((tip,), contact, control, duration, gap, place.placement, None, tuple(why))
-
-
-def plan_fall(
-    shell: Shell,
-    tip: Tip,
-    center: Array,
-    root: Array,
-    materials: tuple[Material, Material],
-    *,
-    inside: bool = False,
-) -> Plan:
-    """Plan a scenario in which a free body falls on the surface, which is placed as in its file.
-
-    `center` (3,) [m] is the sphere's in the world when the root is at `root` (7,).
-    """
-    gap = FALL_GAP * tip.radius
-    # Beside the middle: a ball in a bowl rolls then.
-    beside = FALL_BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
-    touch = find_touch_point(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
-    start = root.copy()
-    start[:3] += touch.center - center
-    speed = math.sqrt(2 * GRAVITY * gap)
-    why = (
-        f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
-        f"it falls {mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
-    )
-    contact = contact_of(materials, speed, 0.005)
-    return Plan((tip,), contact, None, 1.0, gap, pin.SE3.Identity(), start, why)
-
-
-def plan_stand(
-    shell: Shell,
-    tips: tuple[Tip, ...],
-    centers: Array,
-    mass: float,
-    joint_inertia: Array,
-    leg: float,
-    materials: tuple[Material, Material],
-) -> Plan:
-    """Plan a scenario in which a floating robot of `mass` [kg] stands on spheres.
-
-    `centers` (k, 3) [m] are those of the `tips` in the world, `joint_inertia` [kg m^2] the
-    diagonal of the mass matrix of its motors, `leg` [m] the distance of its root from the tips.
-    """
-    gap = FOOT_GAP * min(tip.radius for tip in tips)
-    place = _under(shell, centers, np.array([tip.radius for tip in tips]), gap)
-    load = mass * GRAVITY / len(tips)
-    kp = load * 0.5 * leg / SAG
-    # A leg turns the body above it as much as itself.
-    inertia = float(np.median(joint_inertia)) + mass / len(tips) * (0.5 * leg) ** 2
-    speed, share = math.sqrt(2 * GRAVITY * gap), mass / len(tips)
-    contact = sticking(materials, tips[0].radius, speed, load, share)
-    why = [
-        f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}"
-        for tip in tips
-    ]
-    why.append(f"the robot floats, {mm(gap)} above the surface, and its joints hold the posture")
-    if len(tips) < 3:
-        why.append("it will fall over: nothing but its sphere touches")
-    why.append("friction sticks, so that it can stand")
-    control = Hold(rounded(kp), rounded(1.4 * math.sqrt(kp * inertia)))
-    return Plan(tips, contact, control, 2.0, gap, place, None, tuple(why))
-
-
 def _direction(direction: Array) -> str:
     return axis_name(direction) or listed(direction, ".2f")
-
-
-def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Material]) -> float:
-    weights = MOST_WEIGHTS * stance.mass * GRAVITY
-    return min(MOST_FORCE, 0.1 * stance.force, weights, bearable(radius, *materials))
-
-
-def _under(shell: Shell, centers: Array, radii: Array, gap: float) -> pin.SE3:
-    """Return the placement of the shell so that the nearest of the spheres has the `gap` [m] to it.
-
-    Its center is under the center of the spheres; if none of them would then land on it, under the
-    first one.
-    """
-    touch = find_touch_point(shell, float(radii[0]), gap, toward=UP)
-    for anchor in (centers.mean(axis=0), centers[0]):
-        aside = anchor - touch.point
-        heights = []
-        for center, radius in zip(centers, radii, strict=True):
-            above = center - aside
-            above[2] = shell.box[1, 2] + 2 * (radius + gap)
-            down = come_down(shell, above, -UP, float(radius), gap).center[2]
-            if down > shell.box[0, 2] - radius:
-                heights.append(center[2] - down)
-        if heights:
-            return pin.SE3(np.eye(3), np.array([aside[0], aside[1], min(heights)]))
-    raise SphshellError("no sphere lands on the surface: it is too small")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +11,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.vectors import nearest_axis, unit
 from sphshell_pin.scenario.format.reach import Reach, turn_between
 
 # Mobility along the approach and across it, as a part of the best one: below the first a posture is
@@ -33,58 +33,140 @@ _AT_EASE = 0.2
 _HEIGHT, _ASTRAY, _TURNED, _FASTEST = 1e-4, 0.1, 0.02, 6.0
 
 
-@dataclass(frozen=True)
+def joints_aside(model: pin.Model, tips: Sequence[Tip]) -> tuple[str, ...]:
+    """Return the joints that move none of the `tips`."""
+    ends = [int(model.frames[find_frame(model, tip.frame)].parentJoint) for tip in tips]
+    # A joint that is held holds those that mimic it, and what it mimics.
+    on_way = {model.names[j] for end in ends for j in list(model.supports[end])[1:]}
+    moving = {one for name in on_way for one in group_of(model, name)}
+    return tuple(name for name in list(model.names)[1:] if name not in moving)
+
+
+class Limb(Reach):
+    """The joints that move a `tip`: the `chain` of them from the root, `lock` are all others."""
+
+    def __init__(self, model: pin.Model, tip: Tip) -> None:
+        self.tip, self.lock = tip, joints_aside(model, [tip])
+        super().__init__(model, tip.frame, tip.offset, self.lock)
+        self.chain = list(model.supports[model.frames[self.frame].parentJoint])[1:]
+
+    def direction(self) -> Array:
+        """Return the unit vector (3,) along the limb to the tip, from what is in `data`.
+
+        To a sphere before its frame as the frame points, else the frame would be dragged beside it;
+        to any other along the line from the last joint that is not inside it. Of a tip with a
+        single coordinate it is the direction of its motion: pressed along another one it jams by
+        friction.
+        """
+        pose, motion = self.data.oMf[self.frame], self.moves
+        if motion.shape[1] == 1 and motion.any():
+            return unit(motion[:, 0])
+        # A small ball on a flat end may be far beside the frame.
+        way = self.tip.offset if self.tip.ahead is None else self.tip.ahead
+        if way.any():
+            return unit(pose.rotation @ way)
+        for joint in reversed(self.chain):
+            away = pose.translation - self.data.oMi[joint].translation
+            if np.linalg.norm(away) > self.tip.radius:
+                return unit(away)
+        return np.array([0.0, 0.0, -1.0])
+
+
 class Stance:
-    """A robot at the start, seen from its tip; vectors and points in the world."""
+    """A robot at the start, seen from its tip; vectors and points in the world.
 
-    reach_of: Reach
-    """Which moves the joints that move the tip."""
-    tip: Tip
-    q: Array
-    """Configuration of the whole robot (nq,)."""
-    lock: tuple[str, ...]
-    """Joints that do not move the tip."""
-    center: Array
-    """Center of the tip's sphere (3,) [m]."""
-    approach: Array
-    """Unit (3,): where the tip presses."""
-    slide: Array | None
-    """Unit (3,) across the approach: where the tip moves best; None where it cannot."""
-    mass: float
-    """Effective mass along the approach [kg]."""
-    slide_mass: float
-    """Effective mass along the slide [kg]; that along the approach where there is none."""
-    inertia: float
-    """Mean effective inertia about the tip [kg m^2]; 0 where no joint is left to turn it."""
-    joint_inertia: Array
-    """Diagonal of the mass matrix (k,), of the joints that move."""
-    force: float
-    """Largest push along the approach that the joints' effort limits allow [N].
+    Attributes
+    ----------
+    limb, tip
+        The joints that move the tip.
+    q
+        Configuration of the whole robot (nq,).
+    center
+        Center of the tip's sphere (3,) [m].
+    approach
+        Unit (3,): where the tip presses.
+    slide
+        Unit (3,) across the approach: where the tip moves best; None where it cannot.
+    mass, slide_mass
+        Effective masses along the approach and the slide [kg]; both that along the approach where
+        there is no slide.
+    inertia
+        Mean effective inertia about the tip [kg m^2]; 0 where no joint is left to turn it.
+    joint_inertia
+        Diagonal of the mass matrix (k,), of the joints that move.
+    force
+        Largest push along the approach that the joints' effort limits allow [N]: 0 where they do
+        not carry the robot's own weight, NO_LIMIT where none is stated.
+    fastest
+        Speed along the slide [m/s] at which damping takes half of some motor's effort.
+    reach
+        From the tip to the farthest joint that moves it [m].
+    mobility
+        Along the approach, and across it where the tip slides, as a part of the best one.
+    dexterity
+        The least motion that joints make, turns of the tip included, as a part of the largest.
+    ahead
+        Cosine between the approach and the limb that carries the tip; below 0 it is in the way.
+    """
 
-    0 where they do not carry the robot's own weight, NO_LIMIT where none is stated."""
-    fastest: float
-    """Speed along the slide [m/s] at which damping takes half of some motor's effort."""
-    reach: float
-    """From the tip to the farthest joint that moves it [m]."""
-    mobility: float
-    """Along the approach, and across it where the tip slides, as a part of the best one."""
-    dexterity: float
-    """The least motion that joints make, turns of the tip included, as a part of the largest."""
-    ahead: float
-    """Cosine between the approach and the limb that carries the tip; below 0 it is in the way."""
+    def __init__(self, limb: Limb, q: Array, approach: Array) -> None:
+        self.limb, self.tip, self.q, self.approach = limb, limb.tip, q, approach
+        model, columns, jacobian = limb.model, limb.columns, limb.jacobian(q)
+        linear, angular = jacobian[:3], jacobian[3:]
+        self.center = limb.data.oMf[limb.frame].act(limb.offset)
+        away = [self.center - limb.data.oMi[j].translation for j in limb.chain]
+        self.reach = max((float(np.linalg.norm(one)) for one in away), default=0.0)
+        scaled = jacobian / np.repeat([max(self.reach, 1e-9), 1.0], 3)[:, None]
+        values = np.linalg.svd(scaled, compute_uv=False)
+        self.dexterity = float(values[-1] / values[0]) if values[0] > 0 else 0.0
+        ahead = float(limb.direction() @ approach)
+        self.ahead = ahead if len(columns) > 1 else abs(ahead)
+        mass = mass_matrix(model, q)[np.ix_(columns, columns)]
+        self.joint_inertia = np.diag(mass).copy()
+        response = np.linalg.solve(mass, jacobian.T)
+        mobility = linear @ response[:, :3]
+        top = max(float(np.linalg.eigvalsh(mobility)[-1]), 1e-300)
+        along = float(approach @ mobility @ approach)
+        across = np.eye(3) - np.outer(approach, approach)
+        sideways, slides = np.linalg.eigh(across @ mobility @ across)
+        easiest = float(sideways[-1])
+        self.slide = _upright(slides[:, -1]) if easiest > _MOBILE * top else None
+        self.mass = 1 / max(along, 1e-9)
+        self.slide_mass = self.mass if self.slide is None else 1 / max(easiest, 1e-9)
+        # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
+        self.mobility = (min(along, easiest) if len(columns) > 1 else along) / top
+        turning = float(np.trace(angular @ response[:, 3:]))
+        turns = int(np.linalg.matrix_rank(angular, tol=1e-6))
+        spare = len(columns) - int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max()))
+        self.inertia = turns / turning if spare and turning > 1e-9 else 0.0
+        efforts, dry = model.upperEffortLimit[columns], model.upperDryFrictionLimit[columns]
+        stated = (efforts < NO_LIMIT) & (efforts > 0)
+        # Motors bear the friction of their joints, too, and the weight of the links.
+        limits = efforts - np.where(dry < NO_LIMIT, dry, 0.0)
+        weight = pin.computeGeneralizedGravity(model, model.createData(), q)[columns]
+        pushes = linear.T @ approach
+        limited = stated & (np.abs(pushes) > 1e-9)
+        room = (limits - np.sign(pushes) * weight)[limited] / np.abs(pushes[limited])
+        carried = bool((np.abs(weight) <= limits)[stated].all())
+        self.force = carried * float(np.clip(room, 0, NO_LIMIT).min(initial=NO_LIMIT))
+        # Joint speeds by that of the tip along the slide, with the least kinetic energy.
+        along_slide = np.zeros(3) if self.slide is None else self.slide
+        rates = np.abs(response[:, :3] @ along_slide) / max(easiest, 1e-300)
+        taken = np.where(stated, model.damping[columns] * rates / np.maximum(limits, 1e-9), 0.0)
+        self.fastest = 0.5 / max(float(taken.max(initial=0.0)), 1e-9)
 
     @property
     def joints(self) -> int:
         """How many coordinates move the tip."""
-        return len(self.reach_of.columns)
+        return len(self.limb.columns)
 
     def at(self, center: Array) -> Stance | None:
         """Return the stance nearby with the sphere's center at `center` (3,); None if it cannot."""
         if abs(center - self.center).max() < 1e-12:
             return self
         held = self._held_rotation()
-        q, off = self.reach_of.solve(self.q, center, turn=held if self.joints >= 6 else None)
-        found = _stance(self.reach_of, q, self.lock, self.approach, self.tip)
+        q, off = self.limb.solve(self.q, center, turn=held if self.joints >= 6 else None)
+        found = Stance(self.limb, q, self.approach)
         return None if off > _HEIGHT * self.reach or found.mobility < _MOBILE else found
 
     def follows(self, centers: Array, free: Callable[[Array], bool]) -> tuple[int, str]:
@@ -93,12 +175,12 @@ class Stance:
         It ends before a limit of a joint, a singular posture, one that is not `free`, and, unless
         the tip's orientation follows from its place, before that changes.
         """
-        reach, q = self.reach_of, self.q
+        limb, q = self.limb, self.q
         held = self._held_rotation() if self.inertia else None
         for k in range(1, len(centers)):
             step = float(np.linalg.norm(centers[k] - centers[k - 1]))
-            to, off = reach.solve(q, centers[k], turn=held)
-            turn = float(np.abs(pin.difference(reach.model, q, to)).max())
+            to, off = limb.solve(q, centers[k], turn=held)
+            turn = float(np.abs(pin.difference(limb.model, q, to)).max())
             if held is not None and float(np.linalg.norm(held())) > _TURNED:
                 return k, "its joints cannot keep the tip from turning there"
             if off > _ASTRAY * step or turn > _FASTEST * step / self.reach + 1e-9:
@@ -109,42 +191,32 @@ class Stance:
         return len(centers), ""
 
     def _held_rotation(self) -> Callable[[], Array]:
-        reach = self.reach_of
-        reach.center(self.q)
-        start = reach.data.oMf[reach.frame].rotation.copy()
-        return lambda: np.asarray(pin.log3(start @ reach.data.oMf[reach.frame].rotation.T))
+        self.limb.center(self.q)
+        pose = self.limb.data.oMf[self.limb.frame]
+        start = pose.rotation.copy()
+        return lambda: np.asarray(pin.log3(start @ pose.rotation.T))
 
 
-def approaches(
-    model: pin.Model, q: Array, tip: Tip, directions: Sequence[Sequence[float]]
-) -> list[Array]:
+def approaches(limb: Limb, q: Array, directions: Sequence[Sequence[float]]) -> list[Array]:
     """Return where the tip may press, unit vectors (3,): the `directions` (k, 3) in turn.
 
     After the first one, the axis of the world along which the limb that carries the tip points at
     q. A tip of a single coordinate presses in the plane of its motion alone.
     """
-    reach = Reach(model, tip.frame, tip.offset, joints_aside(model, tip))
-    axis = reach.jacobian(q)[3:]
-    limb = _limb(reach, tip)
-    k = int(np.argmax(np.abs(limb)))
-    home = tuple(np.sign(limb[k]) * np.eye(3)[k] + 0.0)
+    axis, way = limb.jacobian(q)[3:], limb.direction()
+    home = tuple(nearest_axis(way))
     found = [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
     if axis.shape[1] > 1:
         return found
     if not axis.any():
-        return [limb, -limb]
-    normal = axis[:, 0] / np.linalg.norm(axis)
+        return [way, -way]
+    normal = unit(axis[:, 0])
     flat = [one - normal * (normal @ one) for one in found]
-    return [one / np.linalg.norm(one) for one in flat if np.linalg.norm(one) > 0.5]
+    return [unit(one) for one in flat if np.linalg.norm(one) > 0.5]
 
 
 def stances(
-    model: pin.Model,
-    q: Array,
-    tip: Tip,
-    approach: Array,
-    height: float | None,
-    usable: Callable[[Array], bool],
+    limb: Limb, q: Array, approach: Array, height: float | None, usable: Callable[[Array], bool]
 ) -> list[Stance]:
     """Return postures from which the tip can press along `approach` (3,), the best one first.
 
@@ -153,147 +225,43 @@ def stances(
     says whether links of the robot are free. The best is the one near q if it moves easily, else
     the one whose tip moves best with its joints away from their limits.
     """
-    lock = joints_aside(model, tip)
-    reach = Reach(model, tip.frame, tip.offset, lock)
     rng = np.random.default_rng(0)
     rows = np.eye(3)[2:] if height is not None else np.zeros((0, 3))
     place = np.array([0.0, 0.0, height or 0.0])
 
     def along() -> Array:
-        limb = _limb(reach, tip)
-        if len(reach.columns) == 1 and limb @ approach < 0:
-            limb = -limb
-        return turn_between(limb, approach)
+        way = limb.direction()
+        if len(limb.columns) == 1 and way @ approach < 0:
+            way = -way
+        return turn_between(way, approach)
 
-    least = _MOBILE if len(reach.columns) > 1 else _STRAIGHT
+    least = _MOBILE if len(limb.columns) > 1 else _STRAIGHT
     found: list[tuple[float, Stance]] = []
-    start = reach.into_limits(q)
+    start = limb.into_limits(q)
     for k in range(_SEEDS):
-        seed = reach.seed(start, rng) if k else start
-        at, off = reach.solve(seed, place, rows=rows, turn=along)
-        one = _stance(reach, at, lock, approach, tip)
+        seed = limb.seed(start, rng) if k else start
+        at, off = limb.solve(seed, place, rows=rows, turn=along)
+        one = Stance(limb, at, approach)
         if off > _HEIGHT * one.reach or one.mobility < least or one.ahead <= _BESIDE:
             continue
-        if any(np.abs(pin.difference(model, other.q, at)).max() < _APART for _, other in found):
+        away = [np.abs(pin.difference(limb.model, other.q, at)).max() for _, other in found]
+        if min(away, default=np.inf) < _APART or not usable(at):
             continue
-        if not usable(at):
-            continue
-        rank = one.mobility * one.ahead * _ease(reach, at) * one.dexterity
+        rank = one.mobility * one.ahead * _ease(limb, at) * one.dexterity
         rank += k == 0 and one.mobility > _EASY < one.dexterity
         found.append((rank * (one.force > 0), one))
     found.sort(key=lambda one: -one[0])
     return [one for _, one in found[:_MOST]]
 
 
-def _ease(reach: Reach, q: Array) -> float:
+def _ease(limb: Limb, q: Array) -> float:
     """Return 1 where all joints are away from their limits, less and less towards one."""
-    at = q[reach.bounded]
-    room = np.minimum(at - reach.low, reach.high - at) / (reach.high - reach.low)
+    at = q[limb.bounded]
+    room = np.minimum(at - limb.low, limb.high - at) / (limb.high - limb.low)
     return float(np.clip(room / _AT_EASE, 0.0, 1.0).min(initial=1.0))
-
-
-def joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
-    """Return the joints that do not move the tip."""
-    parent = int(model.frames[find_frame(model, tip.frame)].parentJoint)
-    # A joint that is held holds those that mimic it, and what it mimics.
-    moving = {
-        one for j in list(model.supports[parent])[1:] for one in group_of(model, model.names[j])
-    }
-    return tuple(name for name in list(model.names)[1:] if name not in moving)
-
-
-def _stance(reach: Reach, q: Array, lock: tuple[str, ...], approach: Array, tip: Tip) -> Stance:
-    """Return the stance at q, with its mobility along the approach as a part of the best one."""
-    model, columns = reach.model, reach.columns
-    jacobian = reach.jacobian(q)
-    center = reach.data.oMf[reach.frame].act(reach.offset)
-    limb = _limb(reach, tip)
-    joints = [reach.data.oMi[j].translation for j in _chain(reach)]
-    linear, angular = jacobian[:3], jacobian[3:]
-    reach_length = max((float(np.linalg.norm(center - one)) for one in joints), default=0.0)
-    scaled = jacobian / np.repeat([max(reach_length, 1e-9), 1.0], 3)[:, None]
-    values = np.linalg.svd(scaled, compute_uv=False)
-    mass = mass_matrix(model, q)[np.ix_(columns, columns)]
-    response = np.linalg.solve(mass, jacobian.T)
-    mobility = linear @ response[:, :3]
-    top = max(float(np.linalg.eigvalsh(mobility)[-1]), 1e-300)
-    along = float(approach @ mobility @ approach)
-    across = np.eye(3) - np.outer(approach, approach)
-    sideways, slides = np.linalg.eigh(across @ mobility @ across)
-    slide = _upright(slides[:, -1]) if sideways[-1] > _MOBILE * top else None
-    pushes = linear.T @ approach
-    efforts, dry = model.upperEffortLimit[columns], model.upperDryFrictionLimit[columns]
-    stated = (efforts < NO_LIMIT) & (efforts > 0)
-    # Motors bear the friction of their joints, too.
-    limits = efforts - np.where(dry < NO_LIMIT, dry, 0.0)
-    # What the weight of the links leaves of the efforts.
-    weight = pin.computeGeneralizedGravity(model, model.createData(), q)[columns]
-    limited = stated & (np.abs(pushes) > 1e-9)
-    room = (limits - np.sign(pushes) * weight)[limited]
-    carried = bool((np.abs(weight) <= limits)[stated].all())
-    # Joint speeds by that of the tip along the slide, with the least kinetic energy.
-    along_slide = np.zeros(3) if slide is None else slide
-    rates = np.abs(response[:, :3] @ along_slide) / max(float(sideways[-1]), 1e-300)
-    taken = np.where(stated, model.damping[columns] * rates / np.maximum(limits, 1e-9), 0.0)
-    turning = float(np.trace(angular @ response[:, 3:]))
-    turns = int(np.linalg.matrix_rank(angular, tol=1e-6))
-    spare = len(columns) - int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max()))
-    # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
-    usable = min(along, float(sideways[-1])) if len(columns) > 1 else along
-    return Stance(
-        reach_of=reach,
-        tip=tip,
-        q=q,
-        lock=lock,
-        center=center,
-        approach=approach,
-        slide=slide,
-        mass=1 / max(along, 1e-9),
-        slide_mass=1 / max(float(sideways[-1]) if slide is not None else along, 1e-9),
-        inertia=turns / turning if spare and turning > 1e-9 else 0.0,
-        joint_inertia=np.diag(mass).copy(),
-        force=carried
-        * float(np.clip(room / np.abs(pushes[limited]), 0, NO_LIMIT).min(initial=NO_LIMIT)),
-        fastest=0.5 / max(float(taken.max(initial=0.0)), 1e-9),
-        reach=reach_length,
-        mobility=usable / top,
-        dexterity=float(values[-1] / values[0]) if values[0] > 0 else 0.0,
-        ahead=float(limb @ approach) if len(columns) > 1 else abs(float(limb @ approach)),
-    )
-
-
-def _limb(reach: Reach, tip: Tip) -> Array:
-    """Return the unit vector (3,) along the limb to the tip, from what is in `reach`.
-
-    To a sphere before its frame as the frame points, else the frame would be dragged beside it; to
-    any other along the line from the last joint that is not inside it. Of a tip with a single
-    coordinate it is the direction of its motion: pressed along another one it jams by friction.
-    """
-    pose, motion = reach.data.oMf[reach.frame], reach.moves
-    if motion.shape[1] == 1 and motion.any():
-        only: Array = motion[:, 0]
-        return only / np.linalg.norm(only)
-    # A small ball on a flat end may be far beside the frame.
-    way = tip.offset if tip.ahead is None else tip.ahead
-    if way.any():
-        ahead: Array = pose.rotation @ way
-        return ahead / np.linalg.norm(ahead)
-    for joint in reversed(_chain(reach)):
-        limb: Array = pose.translation - reach.data.oMi[joint].translation
-        length = float(np.linalg.norm(limb))
-        if length > tip.radius:
-            return limb / length
-    return np.array([0.0, 0.0, -1.0])
-
-
-def _chain(reach: Reach) -> list[int]:
-    """Return the joints from the root to the tip."""
-    parent = reach.model.frames[reach.frame].parentJoint
-    return [int(j) for j in reach.model.supports[parent]][1:]
 
 
 def _upright(axis: Array) -> Array:
     """Return `axis` along the nearest coordinate axis, where it nearly is one, in its +."""
-    k = int(np.argmax(np.abs(axis)))
-    upright: Array = np.eye(3)[k] if abs(axis[k]) > 0.97 else axis * np.sign(axis[k])
-    return upright
+    nearest = nearest_axis(axis)
+    return np.abs(nearest) if nearest @ axis > 0.97 else axis * nearest.sum()

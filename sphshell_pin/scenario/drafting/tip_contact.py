@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 from sphshell_pin.contact.materials import (
     Material,
@@ -12,26 +11,31 @@ from sphshell_pin.contact.materials import (
 )
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.wording import rounded
+from sphshell_pin.scenario.drafting.wording import mm, rounded
 
 GRAVITY = 9.81
 
 
-@dataclass(frozen=True)
 class Contact:
-    """Law and friction of a tip, as the scenario states them."""
+    """Law and friction of a tip of `materials[0]` on `materials[1]`, as the scenario states them.
 
-    material: Material
-    against: Material
-    restitution: float
-    speed: float
-    """At which the restitution holds: of the first touch [m/s]."""
-    mu_static: float
-    mu_dynamic: float
-    v_static: float
-    """Slip speed [m/s] at which friction is full."""
-    bristle: tuple[float, float] | None = None
-    """Stiffness [N/m] and damping [N s/m] of bristles, for what has to stand."""
+    The first touch is at `speed` [m/s], at which the restitution holds; friction is full at the
+    slip speed `v_static` [m/s]. `bristle` is stiffness [N/m] and damping [N s/m] of bristles, for
+    what has to stand.
+    """
+
+    def __init__(
+        self,
+        materials: tuple[Material, Material],
+        speed: float,
+        v_static: float = 0.005,
+        bristle: tuple[float, float] | None = None,
+    ) -> None:
+        self.material, self.against = materials
+        self.restitution = restitution_between(*materials)
+        self.mu_static, self.mu_dynamic = (round(mu, 3) for mu in friction_between(*materials))
+        self.speed, self.v_static, self.bristle = rounded(speed), rounded(v_static), bristle
+        self.v_dynamic = rounded(10 * self.v_static)
 
     @property
     def note(self) -> str:
@@ -64,18 +68,12 @@ def bearable(radius: float, one: Material, other: Material) -> float:
     return float(hertz_stiffness(radius, one, other) * (radius / 15) ** 1.5)
 
 
-def contact_of(materials: tuple[Material, Material], speed: float, slip: float) -> Contact:
-    """Return a contact, first touched at `speed` [m/s]; its friction is full at `slip` [m/s]."""
-    static, dynamic = friction_between(*materials)
-    return Contact(
-        materials[0],
-        materials[1],
-        restitution_between(*materials),
-        rounded(speed),
-        round(static, 3),
-        round(dynamic, 3),
-        rounded(slip),
-    )
+def too_deep(force: float, radius: float, materials: tuple[Material, Material]) -> str:
+    """Say that a `force` [N] presses a sphere of `radius` [m] too far in; "" if it does not."""
+    if force <= hertz_stiffness(radius, *materials) * (0.5 * radius) ** 1.5:
+        return ""
+    ball = f"a {materials[0].name} sphere of radius {mm(radius)}"
+    return f"{force:.3g} N would press {ball} in by more than half of it"
 
 
 def sticking(
@@ -84,4 +82,4 @@ def sticking(
     """Return a contact whose friction sticks under a `load` [N], that of a `mass` [kg]."""
     slope = 1.5 * hertz_stiffness(radius, *materials) ** (2 / 3) * load ** (1 / 3)
     bristle = (rounded(slope), rounded(0.2 * math.sqrt(slope * mass)))
-    return replace(contact_of(materials, speed, 0.005), bristle=bristle)
+    return Contact(materials, speed, bristle=bristle)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.scenario.drafting.vectors import nearest_axis, tangents, unit
 
 if TYPE_CHECKING:
     from sphshell_pin.shell.shell import Shell
@@ -69,8 +70,7 @@ def sides(shell: Shell) -> list[Array]:
     """
     outward = _bulge(shell)
     if outward is not None:
-        k = int(np.argmax(np.abs(outward)))
-        return [np.sign(outward[k]) * np.eye(3)[k]]
+        return [nearest_axis(outward)]
     sizes = shell.box[1] - shell.box[0]
     broad = [float(np.prod(np.delete(sizes, k))) for k in range(3)]
     axes = [sign * np.eye(3)[k] for sign in (1.0, -1.0) for k in (2, 1, 0)]
@@ -103,9 +103,7 @@ def _roomy_places(shell: Shell, toward: Array) -> tuple[list[Array], float]:
     The best is the farthest from where the surface ends, or turns sharply: so far [m].
     """
     corners, rng = shell.vertices[shell.triangles], np.random.default_rng(0)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    normals = normals / np.maximum(areas, 1e-300)[:, None]
+    normals, areas = shell.triangle_normals, facet_areas(shell)
     facing = np.flatnonzero(normals @ toward > _FACING)
     if not len(facing):
         return [], 0.0
@@ -136,31 +134,28 @@ def _roomy_places(shell: Shell, toward: Array) -> tuple[list[Array], float]:
 
 def touches_once(
     shell: Shell, place: TouchPoint, points: Array, radius: float, depth: float
-) -> bool:
-    """Whether a sphere pressed in by `depth` [m] at `points` (k, 3) touches a face, and once.
+) -> int:
+    """Return at how many `points` (k, 3) a sphere pressed in by `depth` [m] touches a face, once.
 
-    In a groove it rests on several sides, each with a force of its own; on an edge the force turns
-    with the smallest step aside. `points` lead away from `place`.
+    One after the other, as they lead away from `place`. In a groove it rests on several sides, each
+    with a force of its own; on an edge the force turns with the smallest step aside.
     """
     first, second = tangents(place.normal, np.zeros(3))
     for aside in (0.1 * radius, 0.5 * radius):
-        near = shell.closest_points(
-            place.point + aside * np.array([first, -first, second, -second])
-        )
+        around = place.point + aside * np.array([first, -first, second, -second])
+        near = shell.closest_points(around)
         # Where it turns or ends, there is an edge or a hole.
         turns = np.abs(near.normals @ place.normal) < _SHARPEST
         if turns.any() or np.abs(near.distances).max() > 0.3 * aside:
-            return False
-    normal = place.normal
-    at = shell.closest_points(points)
-    for point, turned in zip(at.points, at.normals, strict=True):
+            return 0
+    normal, at = place.normal, shell.closest_points(points)
+    for k, (point, turned) in enumerate(zip(at.points, at.normals, strict=True)):
         before, normal = normal, turned if turned @ normal >= 0 else -turned
-        if before @ normal < _SHARPEST:
-            return False
         contacts = shell.contacts(point + (radius - depth) * normal, radius)
-        if len(contacts) != 1 or contacts.normal[0] @ normal < _ALIGNED:
-            return False
-    return True
+        alone = len(contacts) == 1 and contacts.normal[0] @ normal >= _ALIGNED
+        if before @ normal < _SHARPEST or not alone:
+            return k
+    return len(points)
 
 
 def paths_on_surface(
@@ -180,15 +175,6 @@ def paths_on_surface(
         yield _walk(shell, place, ahead, steps, spacing)
 
 
-def tangents(normal: Array, direction: Array) -> tuple[Array, Array]:
-    """Return unit vectors (3,) across `normal` and each other, the first along `direction`."""
-    first = direction - normal * (normal @ direction)
-    if np.linalg.norm(first) < 1e-6:
-        first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    first = first / np.linalg.norm(first)
-    return first, np.cross(normal, first)
-
-
 def _walk(shell: Shell, place: TouchPoint, direction: Array, steps: int, spacing: float) -> Array:
     points, normal = [place.point], place.normal
     for _ in range(steps + _SPARE):
@@ -201,8 +187,14 @@ def _walk(shell: Shell, place: TouchPoint, direction: Array, steps: int, spacing
         points.append(point)
         normal = turned
         ahead = moved - normal * (normal @ moved)
-        direction = ahead / np.linalg.norm(ahead)
+        direction = unit(ahead)
     return np.array(points[: max(1, len(points) - _SPARE)])
+
+
+def facet_areas(shell: Shell) -> Array:
+    """Return the areas (n,) [m2] of the triangles."""
+    a, b, c = np.moveaxis(shell.vertices[shell.triangles], 1, 0)
+    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
 
 
 def _bulge(shell: Shell) -> Array | None:
@@ -210,12 +202,10 @@ def _bulge(shell: Shell) -> Array | None:
 
     None of a body, be it with holes: its normals do not agree.
     """
-    corners = shell.vertices[shell.triangles]
-    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    mean, total = areas.sum(axis=0), float(np.linalg.norm(areas, axis=1).sum())
-    if shell.is_closed or float(np.linalg.norm(mean)) <= _SHEET * total:
+    mean = np.average(shell.triangle_normals, axis=0, weights=facet_areas(shell))
+    if shell.is_closed or np.linalg.norm(mean) <= _SHEET:
         return None
-    normal: Array = mean / np.linalg.norm(mean)
+    normal = unit(mean)
     heights = shell.vertices @ normal
     middle = shell.closest_points(shell.box.mean(axis=0)[None]).points[0] @ normal
     # The box of a dome is around its hollow.
@@ -227,7 +217,7 @@ def _bulge(shell: Shell) -> Array | None:
 
 def _above(shell: Shell, axis: Array, middle: Array) -> Array:
     """Return a place far out along `axis`, above the middle or, over a hole, beside it."""
-    far: Array = middle + 2 * shell.size * axis
+    far = middle + 2 * shell.size * axis
     if not _advance(shell, far, -axis, 0.0, 1e-6 * shell.size)[2]:
         beside = shell.closest_points(far[None]).points[0]
         far = beside + axis * (axis @ (far - beside))
@@ -242,8 +232,7 @@ def come_down(
     It stops at the `gap` [m] to the surface; `direction` is a unit vector (3,).
     """
     center, point, _ = _advance(shell, start, direction, radius + gap, 1e-3 * gap)
-    away = center - point
-    return TouchPoint(point, away / np.linalg.norm(away), center)
+    return TouchPoint(point, unit(center - point), center)
 
 
 def _advance(

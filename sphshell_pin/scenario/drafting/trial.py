@@ -95,14 +95,14 @@ def _link_fault(built: Built, plan: Plan, result: Result, links: Links) -> Fault
         whole = whole_posture(built, q, links.model)
         found = links.within(whole, placement, whole=k == 0)
         if found is not None:
-            return Fault("links", f"link '{found.link}' is in the part", float(t), found.link)
+            return Fault("links", f"link '{found}' is in the part", float(t), found)
     return None
 
 
 def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     """Say where the tip is behind the end of its path, if it is."""
     control = plan.control
-    if not isinstance(control, Press) or len(control.path) < 2:
+    if not isinstance(control, Press) or not control.slides:
         return None
     (tip,), (pair,) = plan.tips, built.scene.pairs
     reach = Reach(built.scene.model, tip.frame, tip.offset)
@@ -110,7 +110,7 @@ def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     behind = math.sqrt(max(float(away @ away) - tip.radius**2, 0.0))
     if behind < _BEHIND * tip.radius:
         return None
-    reached = float(np.linalg.norm(np.diff(control.path, axis=0), axis=1).sum()) - behind
+    reached = control.way.length - behind
     said = f"the tip stays {1e3 * behind:.2g} mm behind the end of its path"
     return Fault("path", said, control.lead_in + reached / control.speed)
 
@@ -138,19 +138,19 @@ def _force_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     else:
         return None
     forces = _forces(result)
-    held, peak = forces[after], float(forces.max())
+    held, times = forces[after], t[after]
     off, mean = np.abs(held / force - 1), float(held.mean())
     if abs(mean / force - 1) > HELD:
         return Fault("force", f"{what}: the surface bears {mean:.3g} N on average")
     if (off > HELD).mean() > _SHAKEN or not held.all():
-        k = int(np.argmax(off))
-        when = float(t[after][k])
-        return Fault(
-            "force", f"{what}: the surface bears {held[k]:.3g} N at t = {when:.3g} s", when
-        )
-    # A hard tip may do no better.
-    if peak > _PEAK * force and isinstance(control, Press) and not plan.repair:
-        return Fault("force", f"{what}: it rises to {peak:.3g} N")
+        when, worst = float(times[np.argmax(off)]), float(held[np.argmax(off)])
+        return Fault("force", f"{what}: the surface bears {worst:.3g} N at t = {when:.3g} s", when)
+    if isinstance(control, Press):
+        # When it first touches, a hard tip may do no better.
+        looked, times = (held, times) if control.repair else (forces, t)
+        peak, when = float(looked.max()), float(times[np.argmax(looked)])
+        if peak > _PEAK * force:
+            return Fault("force", f"{what}: it rises to {peak:.3g} N", when)
     return None
 
 

@@ -12,9 +12,10 @@ namespace sphshell {
 namespace {
 
 constexpr double kFineTolerance = 1e-7;  // of the steps that replace a fixed one
-// A contact that faces and edges share moves this far in a fixed step at most, as a share of the
-// shell's size.
-constexpr double kMostWandering = 3e-3;
+// What a contact that faces and edges share does in a fixed step of high order at most: it moves,
+// as a share of the shell's size; it goes through the depth in which damping comes on, as a share
+// of that, or comes or goes with so much of it; its friction turns, as a share of the load.
+constexpr double kMostWandering = 3e-3, kMostOfRamp = 0.1, kMostAtTouch = 0.003, kMostTurn = 0.05;
 constexpr double kFirstStep = 1e-5;  // of a run, and after a change [s]
 // A step ends behind its event by this share of its length at most, and of rtol; where it is aimed
 // at, as a share of that.
@@ -28,6 +29,35 @@ constexpr double kUsableError = 1e6;
 // is too small, and the error falls with a lower order.
 constexpr double kErrorAtKink = 0.05, kOrderAtKink = 2.5, kFirstShare = 0.15;
 constexpr int kMostKinkRejections = 3;  // in one step; then the error is taken as it is
+
+// The size of the shell whose flat parts lie on a plane; 0 of other pairs.
+double size_on_plane(const Pair& pair) {
+  const PlaneBelow* plane = std::get_if<PlaneBelow>(&pair.geometry);
+  return plane && plane->flats().any() ? plane->flats().size : 0;
+}
+
+// Friction without a state, as a share of the load.
+Vec3 sliding(const FrictionLaw& law, const ContactForce<double>& force) {
+  if (!law.active() || law.has_state()) return Vec3::Zero();
+  const double speed = force.slip.norm();
+  return law.coefficient(speed, force.normal) / std::max(speed, 1e-12) * force.slip;
+}
+
+// Whether a contact of `pair` has changed too much for one step between two evaluations, null where
+// it was not there: its shares, its damping and its friction have kinks and steep slopes, which a
+// step of high order must not pass. A contact moves by 1000 sizes a radian of tilt.
+bool changes(const Pair& pair, const ActiveContact* from, const ActiveContact* to) {
+  const double before = from ? from->contact.depth : 0, after = to ? to->contact.depth : 0;
+  const ImpactLaw* law = std::get_if<ImpactLaw>(&pair.law.law);
+  const double ramp = law && law->needs_rate() ? law->full_damping_depth : kInfinity;
+  if (std::min(before, after) < ramp &&
+      std::abs(after - before) > (from && to ? kMostOfRamp : kMostAtTouch) * ramp)
+    return true;
+  return from && to &&
+         ((from->contact.point - to->contact.point).norm() > kMostWandering * size_on_plane(pair) ||
+          (sliding(pair.friction, from->force) - sliding(pair.friction, to->force)).norm() >
+              kMostTurn);
+}
 
 // Of the numbers near t.
 double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::abs(t); }
@@ -66,25 +96,30 @@ void Stepping::begin() {
                       [](const ActiveContact& one) { return one.clamped; });
   detection_.begin(scene_);
   events_.begin();
-  places_.clear();
+  begun_.clear();
+  if (settings_.dt == 0 || active_->leaves_work() || active_->is_implicit()) return;
   for (const ActiveContact& one : active)
-    if (const PlaneBelow* plane = std::get_if<PlaneBelow>(&scene_.pair_of(one).geometry);
-        plane && plane->flats().any())
-      places_.emplace_back(one.pair, one.contact.point);
+    if (size_on_plane(scene_.pair_of(one)) > 0) begun_.push_back(one);
 }
 
-// Whether a contact on a plane has moved from corner to corner since the step began: its shares
-// have kinks, which a step of high order must not pass. It moves by 1000 sizes a radian of tilt.
+// Whether a contact on a plane has changed too much since the step began.
 bool Stepping::wanders() const {
   if (active_->leaves_work() || active_->is_implicit()) return false;
+  std::vector<bool> stays(begun_.size(), false);
   for (const ActiveContact& one : scene_.active()) {
+    const Pair& pair = scene_.pair_of(one);
+    if (size_on_plane(pair) == 0) continue;
+    const ActiveContact* from = nullptr;
     double least = kInfinity;
-    for (const auto& [pair, point] : places_)
-      if (pair == one.pair) least = std::min(least, (point - one.contact.point).norm());
-    if (least < kInfinity &&
-        least > kMostWandering * std::get<PlaneBelow>(scene_.pair_of(one).geometry).flats().size)
-      return true;
+    for (const ActiveContact& other : begun_) {
+      const double apart = (other.contact.point - one.contact.point).norm();
+      if (other.pair == one.pair && apart < least) least = apart, from = &other;
+    }
+    if (changes(pair, from, &one)) return true;
+    if (from) stays[from - begun_.data()] = true;
   }
+  for (std::size_t k = 0; k < begun_.size(); ++k)
+    if (!stays[k] && changes(scene_.pair_of(begun_[k]), &begun_[k], nullptr)) return true;
   return false;
 }
 

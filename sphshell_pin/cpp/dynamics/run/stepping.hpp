@@ -92,7 +92,7 @@ class Stepping {
   Events events_;
   State state_, next_;
   Powers last_;
-  std::vector<std::pair<int, Vec3>> places_;  // of contacts on planes where the step begins
+  std::vector<ActiveContact> begun_;  // contacts on planes where the step begins
   VectorX probe_, rate_;
   mutable VectorX sizes_, dense_;
   double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one
