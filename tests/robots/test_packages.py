@@ -249,6 +249,14 @@ def test_colors_of_a_missing_package_are_left_out(
         robots.load_file(file)
 
 
+def test_a_package_that_a_simulator_alone_needs_may_be_missing(tmp_path: Path) -> None:
+    file = tmp_path / "arm.xacro"
+    plugin = "<gazebo><plugin><parameters>$(find far)/a.yaml</parameters></plugin></gazebo>"
+    head = '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><link name="a"/>'
+    file.write_text(f"{head}{plugin}</robot>")
+    assert robots.load_file(file).model.existFrame("a")
+
+
 def test_a_property_may_be_stated_below_what_uses_it(tmp_path: Path) -> None:
     file = tmp_path / "arm.xacro"
     file.write_text(
