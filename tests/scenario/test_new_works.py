@@ -137,9 +137,14 @@ def test_a_biped_whose_foot_is_beside_the_part_is_held(tmp_path):
     )
     block = tmp_path / "block.stl"
     __import__("trimesh").creation.box((0.1, 0.1, 0.02)).export(block)
+    text = robot.read_text()
     made = new_scenario(robot, block, unit="m", out=tmp_path / "a.toml")
     assert "comes down beside the surface" in made.why[0]
     assert build(made.path).scene.model.nv <= 4
+    box = text.replace('type="sphere" size="0.02"', 'type="box" size="0.02 0.02 0.02"')
+    robot.write_text(box.replace("left", "one").replace("right", "two").replace("foot", "end"))
+    made = new_scenario(robot, block, unit="m", out=tmp_path / "b.toml")
+    assert "cannot stand on the surface: none of its ends is called a foot" in made.why[0]
 
 
 @pytest.mark.parametrize("geometry", ['<sphere radius="0.06"/>', '<box size="0.2 0.2 0.2"/>'])
