@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sphshell_pin.base.limits import limit_memory
-from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.packages import Folders, stated_source
 from sphshell_pin.robots.xacro_expressions import install
 
 MOST_TEXT, MOST_SAID = 100_000_000, 100_000
@@ -63,6 +63,7 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
             raise substitution_args.ArgException(
                 f"there is no package '{name}' in {folders.searched()}: give the folder above it "
                 "with --package-dir, or package_dirs in a scenario or in Python"
+                + stated_source(file.resolve().parent, name)
             )
         return str(folder)
 
