@@ -203,6 +203,19 @@ def including(file: Path) -> Path | None:
     return None
 
 
+def stated_source(folder: Path, name: str) -> str:
+    """Return where a file of the workspace says that the package `name` is to be had, or ""."""
+    stated = re.compile(
+        rf"^\s*(?:\S+/)?{re.escape(name)}:\s*\n(?:.*\n)??\s*url:\s*(\S+)", re.MULTILINE
+    )
+    for one in itertools.islice(workspaces(folder)[-1].rglob("*.repos"), _MOST_FOLDERS):
+        with contextlib.suppress(OSError, ValueError):
+            found = stated.search(read_bytes(one, MOST_TEXT).decode(errors="replace"))
+            if found is not None:
+                return f"; {one.name} says that it is in {found[1]}"
+    return ""
+
+
 def _below(root: Path, name: str) -> Iterator[Path]:
     """Yield the packages of that name anywhere below `root`, as rospack finds them."""
     for count, (place, folders, files) in enumerate(os.walk(root)):

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sphshell_pin.base.limits import limit_memory
-from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.packages import Folders, stated_source
 from sphshell_pin.robots.xacro_expressions import install
 
 MOST_TEXT, MOST_SAID = 100_000_000, 100_000
@@ -63,6 +63,7 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
             raise substitution_args.ArgException(
                 f"there is no package '{name}' in {folders.searched()}: give the folder above it "
                 "with --package-dir, or package_dirs in a scenario or in Python"
+                + stated_source(file.resolve().parent, name)
             )
         return str(folder)
 
@@ -86,10 +87,17 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
 
 
 def _processed(xacro: Any, file: Path, arguments: Mapping[str, str]) -> Any:
-    """Return the document; older versions of xacro knew all properties of a file from its top."""
+    """Return the document, where that fails without what is for simulators and drivers.
+
+    Older versions of xacro knew all properties of a file from its top.
+    """
     try:
         return xacro.process_file(str(file), mappings=dict(arguments))
     except xacro.XacroException as error:
+        if "there is no package" in str(error):
+            parse = xacro.parse
+            xacro.parse = lambda *given: _of_robot(parse(*given))
+            return xacro.process_file(str(file), mappings=dict(arguments))
         if "is not defined" not in str(error):
             raise
         xacro.init_stacks(str(file))
@@ -100,6 +108,14 @@ def _processed(xacro: Any, file: Path, arguments: Mapping[str, str]) -> Any:
                 root.insertBefore(one, root.firstChild)
         xacro.process_doc(document, mappings=dict(arguments))
         return document
+
+
+def _of_robot(document: Any) -> Any:
+    """Return a document without elements that state nothing of the robot itself."""
+    for tag in ("gazebo", "ros2_control"):
+        for one in document.getElementsByTagName(tag):
+            one.parentNode.removeChild(one)
+    return document
 
 
 def _without_missing_colors(xacro: Any, folders: Folders) -> None:

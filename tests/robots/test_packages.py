@@ -209,6 +209,19 @@ def test_an_argument_has_the_default_of_the_launch_file_that_names_the_robot(
         assert robots.load_file(file).model.existFrame("mk2")
 
 
+def test_the_source_of_a_missing_package_is_named(tmp_path: Path) -> None:
+    arm = package(tmp_path / "arm")
+    url = "https://example.org/far.git"
+    (tmp_path / "arms.repos").write_text(f"repositories:\n  far:\n    type: git\n    url: {url}\n")
+    file = arm / "arm.xacro"
+    file.write_text(
+        '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro">'
+        '<xacro:include filename="$(find far)/far.xacro"/></robot>'
+    )
+    with pytest.raises(robots.RobotError, match=f"package 'far' .*; arms.repos says .* in {url}$"):
+        robots.load_file(file)
+
+
 def test_colors_of_a_missing_package_are_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -222,6 +235,14 @@ def test_colors_of_a_missing_package_are_left_out(
     file.write_text(f'{head}"$(find far)/arm_macro.xacro"/>{body}')
     with pytest.raises(robots.RobotError, match="there is no package 'far'"):
         robots.load_file(file)
+
+
+def test_a_package_that_a_simulator_alone_needs_may_be_missing(tmp_path: Path) -> None:
+    file = tmp_path / "arm.xacro"
+    plugin = "<gazebo><plugin><parameters>$(find far)/a.yaml</parameters></plugin></gazebo>"
+    head = '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><link name="a"/>'
+    file.write_text(f"{head}{plugin}</robot>")
+    assert robots.load_file(file).model.existFrame("a")
 
 
 def test_a_property_may_be_stated_below_what_uses_it(tmp_path: Path) -> None:

@@ -138,9 +138,31 @@ def test_a_biped_whose_foot_is_beside_the_part_is_held(tmp_path):
     )
     block = tmp_path / "block.stl"
     __import__("trimesh").creation.box((0.1, 0.1, 0.02)).export(block)
+    text = robot.read_text()
     made = new_scenario(robot, block, unit="m", out=tmp_path / "a.toml")
     assert "comes down beside the surface" in made.why[0]
     assert build(made.path).scene.model.nv <= 4
+    box = text.replace('type="sphere" size="0.02"', 'type="box" size="0.02 0.02 0.02"')
+    robot.write_text(box.replace("left", "one").replace("right", "two").replace("foot", "end"))
+    made = new_scenario(robot, block, unit="m", out=tmp_path / "b.toml")
+    assert "cannot stand on the surface: none of its ends is called a foot" in made.why[0]
+
+
+@pytest.mark.parametrize("geometry", ['<sphere radius="0.06"/>', '<box size="0.2 0.2 0.2"/>'])
+@pytest.mark.parametrize("floats", [False, True])
+def test_an_end_larger_than_the_part_gets_a_smaller_ball(geometry, floats, tmp_path):
+    """Round ones too, and that of a body that falls."""
+    mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    visual = f"<visual><geometry>{geometry}</geometry></visual>"
+    link = f'<link name="b">{mass}</inertial>{visual}</link>'
+    joint = '<link name="a"/><joint name="j" type="prismatic"><parent link="a"/><child link="b"/>'
+    joint += '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="99" velocity="9"/></joint>'
+    robot = tmp_path / "robot.urdf"
+    robot.write_text(f'<robot name="r">{link}{"" if floats else joint}</robot>')
+    block = tmp_path / "block.stl"
+    __import__("trimesh").creation.box((0.02, 0.02, 0.02)).export(block)
+    made = new_scenario(robot, block, unit="m", out=tmp_path / "a.toml")
+    assert made.built.scenario.contact[0].sphere.radius <= (0.02 if floats else 0.005)
 
 
 def test_a_body_without_joints_is_not_advised_to_be_held(draft, tmp_path):

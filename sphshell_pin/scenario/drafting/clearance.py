@@ -10,8 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, held_joints
-from sphshell_pin.scenario.drafting.fingertips import AT_TIP
-from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.limb_ends import AT_TIP, Tip
 from sphshell_pin.shell.shell import Shell
 
 # Contacts of the tip's own link that are looked at.

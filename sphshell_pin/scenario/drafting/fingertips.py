@@ -15,11 +15,15 @@ from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
-from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip, gripper_joints, joint_of
+from sphshell_pin.scenario.drafting.limb_ends import (
+    AT_TIP,
+    LinkGeometry,
+    Tip,
+    gripper_joints,
+    joint_of,
+)
+from sphshell_pin.scenario.drafting.searching import CannotStand
 
-# Points of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's
-# place, as meshes of fingertips stand out of the spheres that stand for them.
-AT_TIP = 1.5
 _ASKED, _OF_GEOMETRY = "as it was asked for", "the sphere of its collision geometry"
 # Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at
 # the end of a limb.
@@ -245,9 +249,12 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
     if names and {model.names[j] for j in leaves} <= set(group_of(model, model.names[last])):
         return [(names[0], f"one of {len(leaves)} ends that move together")]
     if free or len(model.supports[last]) <= 2:
-        raise SphshellError(
+        said = (
             "the robot has several ends: state which frame carries the sphere with --frame, for "
             f"instance one of {', '.join(names[:8]) or ', '.join(f.name for f in model.frames)}"
+        )
+        raise (
+            CannotStand(said, "none of its ends is called a foot") if free else SphshellError(said)
         )
     which = "only limb" if len(leaves) == 1 else f"longest of {len(leaves)} limbs"
     return [(str(model.names[last]), f"the end of the {which}")]

@@ -19,6 +19,11 @@ from sphshell_pin.shell.shell import Shell
 # How far a ball that covers an end may stand out before it, as a part of its radius: else the end
 # is flat, and gets a ball of this part of that radius. Without geometry: as a part of the reach.
 _STANDS_OUT, _BALL, _OF_REACH = 0.25, 1 / 3, 0.01
+# Points of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's
+# place, as meshes of fingertips stand out of the spheres that stand for them.
+AT_TIP = 1.5
+COVERS = "it covers the end of link"
+"""How the source of a ball begins that is as large as a round end."""
 # Steps of the search for the ball that covers an end, and of that for the smallest ball.
 _DEPTHS, _STEPS = 40, 300
 # Distance of what is at the axis of a joint from it, as a part of the link's size.
@@ -129,7 +134,7 @@ class LinkGeometry:
         before = float(along.max() - center @ ahead)
         # Open jaws may lie in a ball, but are no round end.
         if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
-            return Tip(name, rounded(covers), center, f"it covers the end of link '{self.link}'")
+            return Tip(name, rounded(covers), center, f"{COVERS} '{self.link}'")
         ball = rounded(_BALL * covers) if radius is None else radius
         front, source = center + (before + ball) * ahead, f"a ball on the end of link '{self.link}'"
         return Tip(name, ball, front, source, ahead if radius is None else None)

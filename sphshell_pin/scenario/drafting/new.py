@@ -23,7 +23,7 @@ from sphshell_pin.scenario.drafting.asked import WORDS, Asked
 from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
 from sphshell_pin.scenario.drafting.hand import HoldSearch, TooHeavy, every_tip
-from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.limb_ends import COVERS, LinkGeometry, Tip
 from sphshell_pin.scenario.drafting.part import part_file
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
 from sphshell_pin.scenario.drafting.poses import joints_aside
@@ -148,13 +148,26 @@ def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
 
 
 def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
-    """Return the `tips`, balls of free size that press on a file's surface as it needs them."""
-    if asked.word is not None or asked.tips == "all" or floats(built.assembly.model):
+    """Return the `tips`, balls of free size that press on a file's surface as it needs them.
+
+    A round end that is larger than the surface gets a smaller ball on it.
+    """
+    if asked.word is not None or asked.tips == "all" or asked.radius is not None:
         return list(tips)
     (made,) = built.shells.values()
     middle = float(np.sort(np.ptp(made.box, axis=0))[1])
-    most = min(_BALL * middle, _OF_ROOM * widest_room(made))
-    return [tip.at_most(rounded(most)) if most else tip for tip in tips]
+    floating = floats(built.assembly.model)
+    most = rounded(
+        0.5 * made.size if floating else min(_BALL * middle, _OF_ROOM * widest_room(made))
+    )
+    sized = list[Tip]()
+    for tip in tips:
+        large = tip.radius > made.size
+        if most and large and COVERS in tip.source:
+            sized.append(LinkGeometry(built.assembly.loaded[0], tip.frame).end(most))
+        else:
+            sized.append(tip.at_most(most) if most and (large or not floating) else tip)
+    return sized
 
 
 def _sided(built: Built, tips: Sequence[Tip], *, inside: bool) -> Built:
