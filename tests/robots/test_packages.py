@@ -17,6 +17,12 @@ from tests.command import call
 from tests.texts import DATA
 
 
+def package(folder: Path) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "package.xml").write_text(f"<package><name>{folder.name}</name></package>")
+    return folder
+
+
 def workspace(root: Path, resources: str) -> Path:
     """Write an arm that needs a package at root/`resources`; return its file."""
     shutil.copytree(DATA / "workspace" / "arm_resources", root / resources)
@@ -192,10 +198,8 @@ def test_an_argument_that_names_a_file_takes_one_that_is_there(tmp_path: Path) -
 def test_an_argument_has_the_default_of_the_launch_file_that_names_the_robot(
     tmp_path: Path,
 ) -> None:
-    arm, launches = tmp_path / "src" / "arm", tmp_path / "src" / "bringup" / "launch"
-    for folder in (arm, launches.parent):
-        folder.mkdir(parents=True)
-        (folder / "package.xml").write_text(f"<package><name>{folder.name}</name></package>")
+    arm = package(tmp_path / "src" / "arm")
+    launches = package(tmp_path / "src" / "bringup") / "launch"
     launches.mkdir()
     for name, names, value in (("a", "other.xacro", "mk1"), ("b", "arm.xacro", "mk2")):
         declared = f'DeclareLaunchArgument("model",\n  default_value="{value}")  # {names}'
