@@ -4,6 +4,7 @@ import hashlib
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 import pinocchio as pin
@@ -292,10 +293,9 @@ class SensorSet:
         self.sensors = sensors
         self.core = [sensor._bind(scene) for sensor in sensors]
         self._columns = [sensor.columns(scene) for sensor in sensors]
-        self._widths = np.array([len(one) for one in self._columns], dtype=int)
+        widths = [len(one) for one in self._columns]
         self._spans = [
-            slice(end - width, end)
-            for end, width in zip(np.cumsum(self._widths), self._widths, strict=True)
+            slice(end - width, end) for end, width in zip(accumulate(widths), widths, strict=True)
         ]
 
     def readings(self, memory: bytes | bytearray) -> Readings:
