@@ -9,7 +9,7 @@ import numpy as np
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.base.checks import read_only
-from sphshell_pin.shell.raw import KINDS
+from sphshell_pin.shell.raw import KINDS, shape_distances
 
 MOST_GROUPS = 5  # in words
 
@@ -191,17 +191,10 @@ def not_exact(faces: Sequence[Face], shares: Array, off: Array) -> tuple[str, ..
 
 def distances_from(face: Face, points: Array) -> Array:
     """Distances (n,) [m] of points (n, 3) from a face."""
-    away = points - face.point
-    if face.axis is None:
-        return np.asarray(np.abs(np.linalg.norm(away, axis=1) - face.radius))
-    height = away @ face.axis
-    if face.radius is None:
-        return np.asarray(np.abs(height))
-    beside = np.linalg.norm(away - height[:, None] * face.axis, axis=1) - face.radius
-    if face.minor_radius is not None:
-        return np.asarray(np.abs(np.hypot(beside, height) - face.minor_radius))
-    angle = face.half_angle or 0.0
-    return np.asarray(np.abs(beside * np.cos(angle) - height * np.sin(angle)))
+    axis = np.zeros(3) if face.axis is None else face.axis
+    second = face.minor_radius or face.half_angle or 0.0
+    shape = np.array([*face.point, *axis, face.radius or 0.0, second])
+    return shape_distances(face.kind, shape, points)
 
 
 def _named(face: Face) -> tuple[str, str]:

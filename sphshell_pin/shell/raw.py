@@ -309,3 +309,20 @@ def _corner_normals(normals: object, points: Array, offsets: Longs, corners: Int
         f"normals must be one per vertex {points.shape} or one per corner of each element "
         f"({len(counts)}, {int(counts.max())}, 3); the array given has shape {given.shape}"
     )
+
+
+def shape_distances(kind: str, shape: Array, points: Array) -> Array:
+    """Distances (n,) of points (n, 3) from a shape (8,): point, axis, and two radii."""
+    axis, (radius, second) = shape[3:6], shape[6:]
+    from_point = points - shape[:3]
+    along = from_point @ axis
+    if kind == "plane":
+        return np.asarray(np.abs(along))
+    if kind == "sphere":
+        return np.asarray(np.abs(np.linalg.norm(from_point, axis=1) - radius))
+    outward = np.linalg.norm(from_point - along[:, None] * axis, axis=1) - radius
+    if kind == "cone":
+        outward = outward * np.cos(second) - along * np.sin(second)
+    elif kind == "torus":
+        outward = np.hypot(outward, along) - second
+    return np.asarray(np.abs(outward))

@@ -322,40 +322,18 @@ def _corners(knots: Array) -> NDArray[np.intp]:
 
 def _on_spline(points: Array, step: float) -> Array:
     """Divide the spline through `points` into parts of about `step`."""
+    from scipy.interpolate import CubicSpline
+
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     x = np.concatenate([[0.0], np.cumsum(np.sqrt(chords))])
-    slopes = _slopes(x, points)
-    pieces = [points[:1]]
-    for k, chord in enumerate(chords):
-        n = max(KNOTS_BETWEEN, int(np.ceil(chord / step)))
-        u = (np.arange(1, n + 1) / n)[:, None]
-        h, w, rise = x[k + 1] - x[k], 1 - u, points[k + 1] - points[k]
-        pieces.append(
-            points[k]
-            + u * (rise + w * (w * (h * slopes[k] - rise) - u * (h * slopes[k + 1] - rise)))
-        )
-    return np.concatenate(pieces)
+    parts = np.maximum(KNOTS_BETWEEN, np.ceil(chords / step).astype(int))
+    pieces = [a + (b - a) * np.arange(n) / n for (a, b), n in zip(pairwise(x), parts, strict=True)]
+    places = np.concatenate([*pieces, x[-1:]])
+    return np.asarray(CubicSpline(x, points, bc_type="natural")(places))
 
 
 def _slopes(x: Array, y: Array) -> Array:
-    """Return dy/dx (n, 3) at the knots of the natural cubic spline through y (n, 3) at x (n,).
+    """Return dy/dx (n, 3) at the knots of the natural cubic spline through y (n, 3) at x (n,)."""
+    from scipy.interpolate import CubicSpline
 
-    Continuous second derivatives, zero at the ends, give a tridiagonal system (de Boor, A Practical
-    Guide to Splines, 1978, chapter 4), solved by elimination.
-    """
-    h = np.diff(x)
-    rise = np.diff(y, axis=0) / h[:, None]
-    left, right = np.append(1 / h, 0.0), np.append(0.0, 1 / h)
-    diagonal = 2 * (np.append(1 / h, 0.0) + np.append(0.0, 1 / h))
-    target = np.zeros_like(y)
-    target[:-1] += 3 * rise / h[:, None]
-    target[1:] += 3 * rise / h[:, None]
-    for k in range(1, len(x)):
-        factor = right[k] / diagonal[k - 1]
-        diagonal[k] -= factor * left[k - 1]
-        target[k] -= factor * target[k - 1]
-    slopes = np.empty_like(y)
-    slopes[-1] = target[-1] / diagonal[-1]
-    for k in range(len(x) - 2, -1, -1):
-        slopes[k] = (target[k] - left[k] * slopes[k + 1]) / diagonal[k]
-    return slopes
+    return np.asarray(CubicSpline(x, y, bc_type="natural")(x, 1))

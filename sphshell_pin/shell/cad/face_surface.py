@@ -9,7 +9,7 @@ from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.raw import KINDS, NO_SHAPE
+from sphshell_pin.shell.raw import KINDS, NO_SHAPE, shape_distances
 
 
 class SplineSurface:
@@ -172,7 +172,7 @@ class FaceSurface:
         """
         kind, *shape = self._shape
         if kind >= 0:
-            return _distances_from(KINDS[int(kind)], np.array(shape), points)
+            return shape_distances(KINDS[int(kind)], np.array(shape), points)
         distance = np.full(len(points), np.inf)
         at, left = uv.copy(), np.arange(len(points))
         for _ in range(MOST_STEPS):
@@ -262,20 +262,3 @@ def stationary_parameters(
 def dot(a: Array, b: Array) -> Array:
     """Scalar products (n,) of vectors (n, k)."""
     return np.asarray(np.einsum("ij,ij->i", a, b))
-
-
-def _distances_from(kind: str, shape: Array, points: Array) -> Array:
-    """Distances (n,) of points (n, 3) from a shape (8,): point, axis, and two radii."""
-    axis, (radius, second) = shape[3:6], shape[6:]
-    from_point = points - shape[:3]
-    along = from_point @ axis
-    if kind == "plane":
-        return np.asarray(np.abs(along))
-    if kind == "sphere":
-        return np.asarray(np.abs(np.linalg.norm(from_point, axis=1) - radius))
-    outward = np.linalg.norm(from_point - along[:, None] * axis, axis=1) - radius
-    if kind == "cone":
-        outward = outward * np.cos(second) - along * np.sin(second)
-    elif kind == "torus":
-        outward = np.hypot(outward, along) - second
-    return np.asarray(np.abs(outward))
