@@ -15,6 +15,9 @@ constexpr double kFineTolerance = 1e-7;  // of the steps that replace a fixed on
 // A contact that faces and edges share moves this far in a fixed step at most, as a share of the
 // shell's size.
 constexpr double kMostWandering = 3e-3;
+// Of the depth over which the damping of a contact on a plane comes on, and of the slip over which
+// its friction does, a fixed step passes this share at most.
+constexpr double kMostRamp = 0.1;
 constexpr double kFirstStep = 1e-5;  // of a run, and after a change [s]
 // A step ends behind its event by this share of its length at most, and of rtol; where it is aimed
 // at, as a share of that.
@@ -42,7 +45,8 @@ Stepping::Stepping(SceneData& scene, Torques& torques, const StepSettings& setti
       detection_(scene),
       events_(scene),
       state_(std::move(start)),
-      next_(state_) {
+      next_(state_),
+      divides_(settings.dt > 0 && !stepper_->leaves_work() && !stepper_->is_implicit()) {
   set_fine(false);
 }
 
@@ -67,25 +71,44 @@ void Stepping::begin() {
   detection_.begin(scene_);
   events_.begin();
   places_.clear();
+  if (!divides_) return;
   for (const ActiveContact& one : active)
-    if (const PlaneBelow* plane = std::get_if<PlaneBelow>(&scene_.pair_of(one).geometry);
-        plane && plane->flats().any())
-      places_.emplace_back(one.pair, one.contact.point);
+    if (scene_.pair_of(one).on_plane())
+      places_.push_back({one.pair, one.contact.point, one.contact.depth, one.force.slip});
 }
 
-// Whether a contact on a plane has moved from corner to corner since the step began: its shares
-// have kinks, which a step of high order must not pass. It moves by 1000 sizes a radian of tilt.
-bool Stepping::wanders() const {
-  if (active_->leaves_work() || active_->is_implicit()) return false;
+// Whether the forces of what lies on a plane have had kinks since the step began, which a step of
+// high order must not pass: a contact has begun or ended, has moved from corner to corner, which it
+// does by 1000 sizes a radian of tilt, or has passed much of the depth over which damping comes on,
+// or of the slip over which friction does.
+bool Stepping::passes_kinks() const {
+  if (!divides_ || fine()) return false;
+  std::size_t left = places_.size();
   for (const ActiveContact& one : scene_.active()) {
-    double least = kInfinity;
-    for (const auto& [pair, point] : places_)
-      if (pair == one.pair) least = std::min(least, (point - one.contact.point).norm());
-    if (least < kInfinity &&
-        least > kMostWandering * std::get<PlaneBelow>(scene_.pair_of(one).geometry).flats().size)
-      return true;
+    const Pair& pair = scene_.pair_of(one);
+    const PlaneBelow* plane = std::get_if<PlaneBelow>(&pair.geometry);
+    if (!plane) continue;
+    const Place* before = nullptr;
+    double moved = kInfinity;
+    for (const Place& place : places_)
+      if (const double apart = (place.point - one.contact.point).norm();
+          place.pair == one.pair && apart < moved)
+        moved = apart, before = &place;
+    if (!before || left-- == 0) return true;
+    if (plane->flats().any() && moved > kMostWandering * plane->flats().size) return true;
+    if (const ImpactLaw* law = std::get_if<ImpactLaw>(&pair.law.law); law && law->needs_rate()) {
+      const double full = law->full_damping_depth;
+      if (std::abs(std::min(one.contact.depth, full) - std::min(before->depth, full)) >
+          kMostRamp * full)
+        return true;
+    }
+    if (const CoulombFriction* friction = std::get_if<CoulombFriction>(&pair.friction.law)) {
+      const double full = friction->v_static;
+      if ((in_ball(one.force.slip, full) - in_ball(before->slip, full)).norm() > kMostRamp * full)
+        return true;
+    }
   }
-  return false;
+  return left > 0;
 }
 
 void Stepping::close_loss(State& at) const {
@@ -143,7 +166,7 @@ bool Stepping::make_fixed(double end) {
   next_.t = end;
   active_->complete(chart_, next_);
   scene_.evaluate(next_.q, next_.v, next_.z);
-  if (detection_.allowed(scene_, state_, next_) >= 1 && !wanders()) return true;
+  if (detection_.allowed(scene_, state_, next_) >= 1 && !passes_kinks()) return true;
   scene_.restart();
   scene_.evaluate(state_.q, state_.v, state_.z);
   proposal_ = std::min(proposal_, 0.1 * (end - state_.t));
