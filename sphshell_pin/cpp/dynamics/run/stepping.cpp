@@ -11,7 +11,8 @@
 namespace sphshell {
 namespace {
 
-constexpr double kFineTolerance = 1e-7;  // of the steps that replace a fixed one
+// Of the steps that replace a fixed one; of those behind kinks of contacts on planes.
+constexpr double kFineTolerance = 1e-7, kKinkTolerance = 2e-8;
 // A contact that faces and edges share moves this far in a fixed step at most, as a share of the
 // shell's size.
 constexpr double kMostWandering = 3e-3;
@@ -152,7 +153,8 @@ void Stepping::resume(const double* from) {
 
 // Of the steps that replace a fixed one, or those asked for.
 Stepping::Tolerances Stepping::tolerances() const {
-  if (settings_.dt > 0) return {kFineTolerance, 1e-2 * kFineTolerance};
+  const double fine = places_.empty() ? kFineTolerance : kKinkTolerance;
+  if (settings_.dt > 0) return {fine, 1e-2 * fine};
   return {settings_.rtol, settings_.atol};
 }
 
