@@ -1,15 +1,24 @@
 #include "dynamics/run/stepping.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <utility>
+
 #include "dynamics/integrators/table.hpp"
 
 namespace sphshell {
 namespace {
 
-constexpr double kFineTolerance = 1e-7;  // of the steps that replace a fixed one
-// What a contact that faces and edges share does in a fixed step of high order at most: it moves,
-// as a share of the shell's size; it goes through the depth in which damping comes on, as a share
-// of that, or comes or goes with so much of it; its friction turns, as a share of the load.
-constexpr double kMostWandering = 3e-3, kMostOfRamp = 0.1, kMostAtTouch = 0.003, kMostTurn = 0.05;
+// Of the steps that replace a fixed one; of those behind kinks of contacts on planes.
+constexpr double kFineTolerance = 1e-7, kKinkTolerance = 2e-8;
+// A contact that faces and edges share moves this far in a fixed step at most, as a share of the
+// shell's size.
+constexpr double kMostWandering = 3e-3;
+// Of the depth over which the damping of a contact on a plane comes on, and of the slip over which
+// its friction does, a fixed step passes this share at most.
+constexpr double kMostRamp = 0.1;
 constexpr double kFirstStep = 1e-5;  // of a run, and after a change [s]
 // A step ends behind its event by this share of its length at most, and of rtol; where it is aimed
 // at, as a share of that.
@@ -24,35 +33,6 @@ constexpr double kUsableError = 1e6;
 constexpr double kErrorAtKink = 0.05, kOrderAtKink = 2.5, kFirstShare = 0.15;
 constexpr int kMostKinkRejections = 3;  // in one step; then the error is taken as it is
 
-// The size of the shell whose flat parts lie on a plane; 0 of other pairs.
-double size_on_plane(const Pair& pair) {
-  const PlaneBelow* plane = std::get_if<PlaneBelow>(&pair.geometry);
-  return plane && plane->flats().any() ? plane->flats().size : 0;
-}
-
-// Friction without a state, as a share of the load.
-Vec3 sliding(const FrictionLaw& law, const ContactForce<double>& force) {
-  if (!law.active() || law.has_state()) return Vec3::Zero();
-  const double speed = force.slip.norm();
-  return law.coefficient(speed, force.normal) / std::max(speed, 1e-12) * force.slip;
-}
-
-// Whether a contact of `pair` has changed too much for one step between two evaluations, null where
-// it was not there: its shares, its damping and its friction have kinks and steep slopes, which a
-// step of high order must not pass. A contact moves by 1000 sizes a radian of tilt.
-bool changes(const Pair& pair, const ActiveContact* from, const ActiveContact* to) {
-  const double before = from ? from->contact.depth : 0, after = to ? to->contact.depth : 0;
-  const ImpactLaw* law = std::get_if<ImpactLaw>(&pair.law.law);
-  const double ramp = law && law->needs_rate() ? law->full_damping_depth : kInfinity;
-  if (std::min(before, after) < ramp &&
-      std::abs(after - before) > (from && to ? kMostOfRamp : kMostAtTouch) * ramp)
-    return true;
-  return from && to &&
-         ((from->contact.point - to->contact.point).norm() > kMostWandering * size_on_plane(pair) ||
-          (sliding(pair.friction, from->force) - sliding(pair.friction, to->force)).norm() >
-              kMostTurn);
-}
-
 // Of the numbers near t.
 double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::abs(t); }
 
@@ -66,7 +46,8 @@ Stepping::Stepping(SceneData& scene, Torques& torques, const StepSettings& setti
       detection_(scene),
       events_(scene),
       state_(std::move(start)),
-      next_(state_) {
+      next_(state_),
+      divides_(settings.dt > 0 && !stepper_->leaves_work() && !stepper_->is_implicit()) {
   set_fine(false);
 }
 
@@ -90,31 +71,45 @@ void Stepping::begin() {
                       [](const ActiveContact& one) { return one.clamped; });
   detection_.begin(scene_);
   events_.begin();
-  begun_.clear();
-  if (settings_.dt == 0 || active_->leaves_work() || active_->is_implicit()) return;
+  places_.clear();
+  if (!divides_) return;
   for (const ActiveContact& one : active)
-    if (size_on_plane(scene_.pair_of(one)) > 0) begun_.push_back(one);
+    if (scene_.pair_of(one).on_plane())
+      places_.push_back({one.pair, one.contact.point, one.contact.depth, one.force.slip});
 }
 
-// Whether a contact on a plane has changed too much since the step began.
-bool Stepping::wanders() const {
-  if (active_->leaves_work() || active_->is_implicit()) return false;
-  std::vector<bool> stays(begun_.size(), false);
+// Whether the forces of what lies on a plane have had kinks since the step began, which a step of
+// high order must not pass: a contact has begun or ended, has moved from corner to corner, which it
+// does by 1000 sizes a radian of tilt, or has passed much of the depth over which damping comes on,
+// or of the slip over which friction does.
+bool Stepping::passes_kinks() const {
+  if (!divides_ || fine()) return false;
+  std::size_t left = places_.size();
   for (const ActiveContact& one : scene_.active()) {
     const Pair& pair = scene_.pair_of(one);
-    if (size_on_plane(pair) == 0) continue;
-    const ActiveContact* from = nullptr;
-    double least = kInfinity;
-    for (const ActiveContact& other : begun_) {
-      const double apart = (other.contact.point - one.contact.point).norm();
-      if (other.pair == one.pair && apart < least) least = apart, from = &other;
+    const PlaneBelow* plane = std::get_if<PlaneBelow>(&pair.geometry);
+    if (!plane) continue;
+    const Place* before = nullptr;
+    double moved = kInfinity;
+    for (const Place& place : places_)
+      if (const double apart = (place.point - one.contact.point).norm();
+          place.pair == one.pair && apart < moved)
+        moved = apart, before = &place;
+    if (!before || left-- == 0) return true;
+    if (plane->flats().any() && moved > kMostWandering * plane->flats().size) return true;
+    if (const ImpactLaw* law = std::get_if<ImpactLaw>(&pair.law.law); law && law->needs_rate()) {
+      const double full = law->full_damping_depth;
+      if (std::abs(std::min(one.contact.depth, full) - std::min(before->depth, full)) >
+          kMostRamp * full)
+        return true;
     }
-    if (changes(pair, from, &one)) return true;
-    if (from) stays[from - begun_.data()] = true;
+    if (const CoulombFriction* friction = std::get_if<CoulombFriction>(&pair.friction.law)) {
+      const double full = friction->v_static;
+      if ((in_ball(one.force.slip, full) - in_ball(before->slip, full)).norm() > kMostRamp * full)
+        return true;
+    }
   }
-  for (std::size_t k = 0; k < begun_.size(); ++k)
-    if (!stays[k] && changes(scene_.pair_of(begun_[k]), &begun_[k], nullptr)) return true;
-  return false;
+  return left > 0;
 }
 
 void Stepping::close_loss(State& at) const {
@@ -158,7 +153,8 @@ void Stepping::resume(const double* from) {
 
 // Of the steps that replace a fixed one, or those asked for.
 Stepping::Tolerances Stepping::tolerances() const {
-  if (settings_.dt > 0) return {kFineTolerance, 1e-2 * kFineTolerance};
+  const double fine = places_.empty() ? kFineTolerance : kKinkTolerance;
+  if (settings_.dt > 0) return {fine, 1e-2 * fine};
   return {settings_.rtol, settings_.atol};
 }
 
@@ -172,7 +168,7 @@ bool Stepping::make_fixed(double end) {
   next_.t = end;
   active_->complete(chart_, next_);
   scene_.evaluate(next_.q, next_.v, next_.z);
-  if (detection_.allowed(scene_, state_, next_) >= 1 && !wanders()) return true;
+  if (detection_.allowed(scene_, state_, next_) >= 1 && !passes_kinks()) return true;
   scene_.restart();
   scene_.evaluate(state_.q, state_.v, state_.z);
   proposal_ = std::min(proposal_, 0.1 * (end - state_.t));

@@ -1,6 +1,11 @@
 // One step of a run: of a given length, or as long as the error allows.
 #pragma once
 
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "dynamics/run/events.hpp"
 #include "dynamics/run/continuous_detection.hpp"
 #include "dynamics/integrators/stepper.hpp"
@@ -74,7 +79,7 @@ class Stepping {
   double first_step();
   double predicted_step(double h);
   void begin();
-  bool wanders() const;
+  bool passes_kinks() const;
   double step_to_event(double h, double left, bool is_met);
 
   const StepSettings settings_;
@@ -87,7 +92,16 @@ class Stepping {
   Events events_;
   State state_, next_;
   Powers last_;
-  std::vector<ActiveContact> begun_;  // contacts on planes where the step begins
+  // A contact on a plane where the step begins.
+  struct Place {
+    int pair;
+    Vec3 point;
+    double depth;
+    Vec3 slip;
+  };
+
+  bool divides_ = false;  // fixed steps of high order, which must not pass kinks
+  std::vector<Place> places_;
   VectorX probe_, rate_;
   mutable VectorX sizes_, dense_;
   double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one
