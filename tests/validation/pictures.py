@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sphshell_pin.plot.figure import png as png_of
 from sphshell_pin.study.report import drawing
 from sphshell_pin.study.report.contents import Picture
 
@@ -58,5 +59,5 @@ def draw(name: str, panels: Sequence[Panel], caption: str) -> Picture:
             axis.set_ylabel(panel.y)
             axis.grid(visible=True)
             axis.legend(fontsize=drawing.SMALL - 0.5, edgecolor="none", framealpha=0.85)
-        png = drawing.png_of(figure)
+        png = png_of(figure, 160)
     return Picture(name, png, caption, caption)
