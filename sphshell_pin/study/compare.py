@@ -16,6 +16,7 @@ from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.patches.placed import poses_along
 from sphshell_pin.scenario.running.figures import NOT_REPEATABLE, recorded_figures
 
 
@@ -263,28 +264,18 @@ def _curves(result: Result, titles: list[str], scene: Scene | None, count: int) 
             q = np.unwrap(np.arctan2(result.q[:count, joint.idx_q + 1], q))
         unit = "rad" if joint.nq == 2 else quantity_of(titles[joint.idx_q])[1]
         found[f"q.{name}"] = Curve(t, q, unit)
-    for name, path in _paths(result, scene, count).items():
-        for axis, values in zip("xyz", path.T, strict=True):
-            found[f"sphere.{name}.{axis}"] = Curve(t, values, "m")
-    return found
-
-
-def _paths(result: Result, scene: Scene, count: int) -> dict[str, Array]:
-    """Return where the center of each pair's sphere is in the world, (count, 3) [m]."""
-    model, data = scene.model, scene.model.createData()
-    carried = [pair for pair in scene.pairs if pair.spheres]
-    joints = sorted({pair.joint_i for pair in carried})
-    turned, moved = np.empty((count, len(joints), 3, 3)), np.empty((count, len(joints), 3))
-    for row, q in enumerate(result.q[:count]):
-        pin.forwardKinematics(model, data, q)
-        for k, joint in enumerate(joints):
-            turned[row, k], moved[row, k] = data.oMi[joint].rotation, data.oMi[joint].translation
-    at = {joint: k for k, joint in enumerate(joints)}
-    return {
-        pair.name: turned[:, at[pair.joint_i]] @ pair.placement_i.translation
-        + moved[:, at[pair.joint_i]]
-        for pair in carried
+    carried, rows = [one for one in scene.pairs if one.spheres], np.arange(count)
+    poses = {
+        joint: poses_along(result, scene, rows, joint, pin.SE3.Identity())
+        for joint in {one.joint_i for one in carried}
     }
+    for one in carried:
+        turned, moved = poses[one.joint_i]
+        for axis, values in zip(
+            "xyz", (turned @ one.placement_i.translation + moved).T, strict=True
+        ):
+            found[f"sphere.{one.name}.{axis}"] = Curve(t, values, "m")
+    return found
 
 
 def _flat(value: object, key: str = "") -> Iterator[tuple[str, object]]:

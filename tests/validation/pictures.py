@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sphshell_pin.plot.figure import png as png_of
 from sphshell_pin.study.report import drawing
 
 COLORS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.VIOLET, drawing.RED)
@@ -57,4 +58,4 @@ def draw(panels: Sequence[Panel]) -> bytes:
             axis.set_ylabel(panel.y)
             axis.grid(visible=True)
             axis.legend(fontsize=drawing.SMALL - 0.5, edgecolor="none", framealpha=0.85)
-        return drawing.png_of(figure)
+        return png_of(figure, 160)

@@ -19,6 +19,7 @@ import numpy as np
 
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.plot.figure import png as png_of
 from sphshell_pin.study.report import drawing
 from sphshell_pin.study.report.contents import (
     Finding,
@@ -212,7 +213,7 @@ def picture(names: tuple[str, ...], rows: list[Row]) -> Picture:
         panels[0].legend(fontsize=drawing.SMALL)
         figure.supxlabel("elements")
         figure.supylabel("mean error of the force / force")
-        png = drawing.png_of(figure)
+        png = png_of(figure, 160)
     best = number(error_at(of(rows, names[0], SMOOTH)))
     what = "Mean error of the force against the number of elements"
     at = f"; smooth reaches {best} on the {names[0]} at h/r = {AT}."

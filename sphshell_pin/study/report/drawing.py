@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -41,10 +40,3 @@ def canvas(width: float, height: float) -> Iterator[Figure]:
 
     with rc_context(_STYLE):  # type: ignore[arg-type]
         yield figure
-
-
-def png_of(figure: Figure) -> bytes:
-    """Return the figure as a png file."""
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=160)
-    return stream.getvalue()
