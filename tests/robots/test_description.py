@@ -63,7 +63,7 @@ def test_what_moves_nothing_is_mended(tmp_path):
     box = "<collision><geometry><box size='0 0 0.0'/></geometry></collision>"
     file = tmp_path / "arm.urdf"
     tool = "<joint name='t' type='fixed'><parent link='l1'/><child link='tool'/></joint>"
-    arm = joint(1, 0, "continuous").replace("effort='1'", "effort='-1'")
+    arm = joint(1, 0, "continuous").replace('effort="50"', 'effort="-1"')
     file.write_text(robot(arm.replace("</link>", f"{box}</link>") + tool))
     with pytest.warns(robots.RobotWarning) as said:
         loaded = robots.load_file(file)
