@@ -91,6 +91,14 @@ def _cylinder(z: Array, angle: Array) -> tuple[Array, Array]:
     return point, normal
 
 
+def used(
+    point: Array, normal: Array, triangles: NDArray[np.int32]
+) -> tuple[Array, Array, NDArray[np.int32]]:
+    """Leave out the vertices that no triangle uses."""
+    kept, mapped = np.unique(triangles, return_inverse=True)
+    return point[kept], normal[kept], mapped.reshape(-1, 3).astype(np.int32)
+
+
 def round_mesh(surface, ends: tuple[float, float], length: float, step: int):
     """Mesh of a surface that its second parameter closes; every `step`-th corner in turn."""
 
@@ -98,11 +106,8 @@ def round_mesh(surface, ends: tuple[float, float], length: float, step: int):
         rows, columns = round(1.15 * length / h), round(1.15 * 2 * np.pi * TUBE / h)
         along, turn, triangles = jittered_grid(ends, (0.0, 2 * np.pi), rows, columns, rows)
         triangles = closed_round(turn, triangles, columns)
-        # Without the vertices that no triangle uses.
-        kept, mapped = np.unique(triangles, return_inverse=True)
-        elements = mapped.reshape(-1, 3).astype(np.int32)[:, ::step]
-        point, normal = surface(along, turn)
-        return point[kept], elements.copy(), normal[kept]
+        point, normal, elements = used(*surface(along, turn), triangles)
+        return point, elements[:, ::step].copy(), normal
 
     return mesh
 
