@@ -265,3 +265,12 @@ def test_of_several_named_tips_the_one_that_stands_free_is_taken(load) -> None:
         out += joint(f"{name}_end", f"{name}_1", f"{name}_tip", "fixed", "0 0 .03", "0 0 1")
     (tip,) = tips_of(load(out))
     assert tip.frame == "thumb_tip"
+
+
+def test_an_end_that_is_a_corner_gets_a_ball(load) -> None:
+    tilted = shape("collision", '<box size=".02 .02 .02"/>', "0 0 .2").replace(
+        'xyz="0 0 .2"', 'xyz="0 0 .2" rpy="0.7854 0.6155 0"'
+    )
+    text = link("base", ".1 .1 .1") + link("arm", "", "", tilted)
+    (tip,) = tips_of(load(text + joint("a", "base", "arm", "revolute", "0 0 .1", "0 1 0")))
+    assert 0.001 < tip.radius < 0.02

@@ -129,7 +129,7 @@ class LinkGeometry:
         size = float(np.linalg.norm(np.ptp(self.corners, axis=0)))
         for reach in size * np.geomspace(0.02, 1.0, _DEPTHS):
             center, covers = _smallest_ball(self.corners[depth <= reach])
-            if covers <= reach:
+            if 0 < covers <= reach:  # not on a corner alone
                 break
         before = float(along.max() - center @ ahead)
         # Open jaws may lie in a ball, but are no round end.
