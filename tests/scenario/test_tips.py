@@ -274,3 +274,14 @@ def test_an_end_that_is_a_corner_gets_a_ball(load) -> None:
     text = link("base", ".1 .1 .1") + link("arm", "", "", tilted)
     (tip,) = tips_of(load(text + joint("a", "base", "arm", "revolute", "0 0 .1", "0 1 0")))
     assert 0.001 < tip.radius < 0.02
+
+
+def test_wheels_beside_an_arm_are_no_tip(load) -> None:
+    out = link("base", ".3 .3 .1")
+    for name, kind, at in (("caster", "continuous", ".1 0 -.1"), ("arm", "revolute", "0 0 .1")):
+        for k, parent in enumerate(("base", f"{name}0", f"{name}1")):
+            parts = [ball(".03")] if (name, k) == ("caster", 2) else []
+            out += link(f"{name}{k}", ".02 .02 .1" if name == "arm" else "", "0 0 .05", *parts)
+            out += joint(f"{name}{k}_j", parent, f"{name}{k}", kind, at, "0 1 0")
+    (tip,) = tips_of(load(out))
+    assert tip.frame.startswith("arm2")
