@@ -190,15 +190,19 @@ def _limbs(model: pin.Model, held: Collection[int]) -> set[int]:
     """Return the joints without `held` whose links may be a tip: not a head or a caster by an arm.
 
     From where it parts from the longest chain of joints, its own is more than half as long as what
-    is left of that one, and does not only turn without end; all joints of a robot that floats.
+    is left of that one, and unlike that one does not turn without end alone; all joints of a robot
+    that floats.
     """
     chains = {j: set(map(int, model.supports[j])) for j in range(1, model.njoints) if j not in held}
     longest = max(chains.values(), key=len, default=set())
 
+    def endless(chain: set[int]) -> bool:
+        return all("RUB" in model.joints[j].shortname() for j in chain)
+
     def is_limb(chain: set[int]) -> bool:
         own = chain - longest
-        stops = any("RUB" not in model.joints[j].shortname() for j in own)
-        return not own or (stops and 2 * len(own) > len(longest - chain))
+        wheels = endless(own) and not endless(longest)
+        return not own or (not wheels and 2 * len(own) > len(longest - chain))
 
     return {j for j, chain in chains.items() if floats(model) or is_limb(chain)}
 
