@@ -193,7 +193,9 @@ def _limbs(model: pin.Model, held: Collection[int]) -> set[int]:
     is left of that one, and unlike that one does not turn without end alone; all joints of a robot
     that floats.
     """
-    chains = {j: set(map(int, model.supports[j])) for j in range(1, model.njoints) if j not in held}
+    chains = {
+        j: set(map(int, model.supports[j])) - {0} for j in range(1, model.njoints) if j not in held
+    }
     longest = max(chains.values(), key=len, default=set())
 
     def endless(chain: set[int]) -> bool:
