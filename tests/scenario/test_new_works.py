@@ -10,6 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
 import sphshell_pin as sp
 from sphshell_pin import robots
@@ -137,15 +138,10 @@ def test_a_biped_whose_foot_is_beside_the_part_is_held(tmp_path):
         "</worldbody></mujoco>"
     )
     block = tmp_path / "block.stl"
-    __import__("trimesh").creation.box((0.1, 0.1, 0.02)).export(block)
-    text = robot.read_text()
+    trimesh.creation.box((0.1, 0.1, 0.02)).export(block)
     made = new_scenario(robot, block, unit="m", out=tmp_path / "a.toml")
     assert "comes down beside the surface" in made.why[0]
     assert build(made.path).scene.model.nv <= 4
-    box = text.replace('type="sphere" size="0.02"', 'type="box" size="0.02 0.02 0.02"')
-    robot.write_text(box.replace("left", "one").replace("right", "two").replace("foot", "end"))
-    made = new_scenario(robot, block, unit="m", out=tmp_path / "b.toml")
-    assert "cannot stand on the surface: none of its ends is called a foot" in made.why[0]
 
 
 @pytest.mark.parametrize("geometry", ['<sphere radius="0.06"/>', '<box size="0.2 0.2 0.2"/>'])
@@ -160,7 +156,7 @@ def test_an_end_larger_than_the_part_gets_a_smaller_ball(geometry, floats, tmp_p
     robot = tmp_path / "robot.urdf"
     robot.write_text(f'<robot name="r">{link}{"" if floats else joint}</robot>')
     block = tmp_path / "block.stl"
-    __import__("trimesh").creation.box((0.02, 0.02, 0.02)).export(block)
+    trimesh.creation.box((0.02, 0.02, 0.02)).export(block)
     made = new_scenario(robot, block, unit="m", out=tmp_path / "a.toml")
     assert made.built.scenario.contact[0].sphere.radius <= (0.02 if floats else 0.005)
 

@@ -22,7 +22,6 @@ from sphshell_pin.scenario.drafting.limb_ends import (
     gripper_joints,
     joint_of,
 )
-from sphshell_pin.scenario.drafting.searching import CannotStand
 
 _ASKED, _OF_GEOMETRY = "as it was asked for", "the sphere of its collision geometry"
 # Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at
@@ -257,12 +256,9 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
     if names and {model.names[j] for j in leaves} <= set(group_of(model, model.names[last])):
         return [(names[0], f"one of {len(leaves)} ends that move together")]
     if free or len(model.supports[last]) <= 2:
-        said = (
+        raise SphshellError(
             "the robot has several ends: state which frame carries the sphere with --frame, for "
             f"instance one of {', '.join(names[:8]) or ', '.join(f.name for f in model.frames)}"
-        )
-        raise (
-            CannotStand(said, "none of its ends is called a foot") if free else SphshellError(said)
         )
     which = "only limb" if len(leaves) == 1 else f"longest of {len(leaves)} limbs"
     return [(str(model.names[last]), f"the end of the {which}")]

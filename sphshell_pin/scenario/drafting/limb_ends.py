@@ -10,7 +10,6 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
-from sphshell_pin.errors import InvalidShell
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.drafting.vectors import moved, unit
 from sphshell_pin.scenario.drafting.wording import rounded
@@ -175,21 +174,13 @@ class LinkGeometry:
             found = [
                 moved(
                     data.oMi[joint].actInv(data.oMi[one.parentJoint] * one.placement),
-                    _vertices(one),
+                    np.asarray(Shell.from_geometry(one).vertices),
                 )
                 for one in geometry.geometryObjects
                 if int(one.parentJoint) in {joint, *jaws}
             ]
-            if any(map(len, found)):
+            if found:
                 return np.concatenate(found)
-        return np.zeros((0, 3))
-
-
-def _vertices(geometry: pin.GeometryObject) -> Array:
-    """Return the vertices (k, 3) [m]; none of a box of size 0, with which files mark a place."""
-    try:
-        return np.asarray(Shell.from_geometry(geometry).vertices)
-    except InvalidShell:
         return np.zeros((0, 3))
 
 
