@@ -124,6 +124,8 @@ def main() -> None:
     os.dup2(nothing, 0)
     os.dup2(nothing, 1)
     module, sys.path[:] = sys.argv[1], sys.argv[2:]
+    # NumPy's threads wait by turning in circles, and nothing here is large enough for two.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     confine()
     from importlib import import_module
 

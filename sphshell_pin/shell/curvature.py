@@ -28,11 +28,10 @@ def points_at(shell: ShellBase, rows: Longs, weights: Array) -> Array:
     w, u, v = weights.T
     # Bernstein's polynomials of the control points, with their offsets from the flat triangle.
     sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
-    inner = np.stack([*sides, 6 * u * v * w])
+    shares = np.stack([w, u, v, *sides, 6 * u * v * w])
     core = shell.core_for("smooth")
     corners, lifts = core.vertices[core.triangles[rows]], core.control_point_offsets[rows]
-    points = np.einsum("kc,tcx->tkx", weights, corners) + np.einsum("bk,tbx->tkx", inner, lifts)
-    return np.asarray(points)
+    return np.asarray(shares.T @ np.concatenate([corners, lifts], axis=1))
 
 
 def curved_mesh(shell: ShellBase, divisions: int = 4) -> tuple[Array, Ints, Ints]:
@@ -236,22 +235,21 @@ def _off_flat(shell: ShellBase, rows: Longs, divisions: int) -> tuple[Array, Arr
 
 
 def _to_triangles(points: Array, corners: Array) -> Array:
-    """Distances (n, k) of points (n, k, 3) from triangles (n, 3, 3)."""
-    normal = area_vectors(corners)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal /= np.where(length > 0.0, length, 1.0)
-    nearest = np.full(points.shape[:2], np.inf)
-    inside = np.broadcast_to(length > 0.0, points.shape[:2]).copy()
+    """Distances (n, k) of points (n, k, 3) from triangles (n, 3, 3), which all have an area."""
+    third, first = area_vectors(corners), corners[:, 1] - corners[:, 0]
+    first, third = (one / np.linalg.norm(one, axis=1, keepdims=True) for one in (first, third))
+    axes = np.stack([first, np.cross(third, first), third], axis=2)
+    x, y, height = np.moveaxis((points - corners[:, :1]) @ axes, 2, 0)
+    flat = (corners - corners[:, :1]) @ axes[:, :, :2]
+    aside, inside = np.full(x.shape, np.inf), np.ones(x.shape, np.bool_)
     for k in range(3):
-        start, span = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
-        offset = points - start[:, None]
-        square = np.maximum(np.einsum("nx,nx->n", span, span), np.finfo(float).tiny)
-        along = np.clip(np.einsum("nkx,nx->nk", offset, span) / square[:, None], 0.0, 1.0)
-        away = np.linalg.norm(offset - along[:, :, None] * span[:, None], axis=2)
-        nearest = np.minimum(nearest, away)
-        inside &= np.einsum("nkx,nx->nk", offset, np.cross(normal, span)) >= 0.0
-    height = np.abs(np.einsum("nkx,nx->nk", points - corners[:, :1], normal))
-    return np.asarray(np.where(inside, np.minimum(height, nearest), nearest))
+        u, v = flat[:, k, :, None].swapaxes(0, 1)
+        across, up = (flat[:, (k + 1) % 3] - flat[:, k])[:, :, None].swapaxes(0, 1)
+        u, v = x - u, y - v
+        along = np.clip((u * across + v * up) / (across**2 + up**2), 0.0, 1.0)
+        aside = np.minimum(aside, (u - along * across) ** 2 + (v - along * up) ** 2)
+        inside &= across * v >= up * u
+    return np.asarray(np.sqrt(height**2 + np.where(inside, 0.0, aside)))
 
 
 def _bending(shell: ShellBase) -> Bytes:

@@ -8,8 +8,13 @@ import pytest
 
 pytest.importorskip("OCP")
 
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+
 from sphshell_pin import Shell
 from sphshell_pin.shell.cad import require_kernel, tessellation
+from sphshell_pin.shell.cad.face_surface import FaceSurface
 from sphshell_pin.shell.curvature import curved_mesh
 from tests.oracle.cad import ExactShape, curved_places, deviation
 from tests.parts.occ import faces as occ_faces
@@ -162,10 +167,25 @@ def test_smooth_forces_are_or_converge_to_those_on_the_exact_surface(name, tmp_p
     assert found[1].max() < 4e-4
 
 
+@pytest.mark.parametrize("make", ["box", "cylinder", "cone", "ball", "ring"])
+def test_closed_forms_of_surfaces_are_those_of_opencascade(make):
+    """Points and derivatives at random parameters of faces that are turned and mirrored."""
+    turn, mirror = gp_Trsf(), gp_Trsf()
+    turn.SetRotation(gp_Ax1(gp_Pnt(1.0, 2.0, 3.0), gp_Dir(1.0, 2.0, -1.0)), 0.7)
+    mirror.SetMirror(gp_Ax2(gp_Pnt(), gp_Dir(0.0, 1.0, 1.0)))
+    for face in occ_faces(BRepBuilderAPI_Transform(getattr(shapes, make)(), turn * mirror).Shape()):
+        surface, judge = FaceSurface(face), BRepAdaptor_Surface(face)
+        assert surface.has_closed_form
+        uv = surface.low + (surface.high - surface.low) * np.random.default_rng(3).random((20, 2))
+        exact = gp_Pnt(), gp_Vec(), gp_Vec()
+        for at, *found in zip(uv.tolist(), *surface.derivatives(uv), strict=True):
+            judge.D1(*at, *exact)
+            np.testing.assert_allclose(found, [one.Coord() for one in exact], atol=1e-13)
+
+
 def test_a_face_that_gets_no_triangles_is_meshed_more_finely(monkeypatch):
     """OpenCASCADE finds none for some faces of real files until its deflection is smaller."""
-    shape = shapes.drilled_plate()
-    found = tuple(occ_faces(shape))
+    found = tuple(occ_faces(shapes.drilled_plate()))
     lay, count, laid = tessellation._lay, tessellation.count_laid, []
     monkeypatch.setattr(tessellation, "_lay", lambda *of: (laid.append(of[1]), lay(*of)))
     monkeypatch.setattr(
@@ -173,7 +193,7 @@ def test_a_face_that_gets_no_triangles_is_meshed_more_finely(monkeypatch):
         "count_laid",
         lambda face: 0 if face is found[0] and laid[-1] > 1e-2 else count(face),
     )
-    made = tessellation.tessellate(shape, found, 50.0, 5e-2, 1e-3)
+    made = tessellation.tessellate(found, 50.0, 5e-2, 1e-3)
     assert None not in made.meshes
     assert laid[-1] < 1e-2
     assert made.error <= 5e-2

@@ -99,14 +99,17 @@ class _Places:
         polygon = surface.source_element[surface.triangle_element]
         self.corners = surface.vertices[surface.triangles] / factor
         self._sides = _own_sides(surface.triangles, cad.found.face_of(polygon))
-        self._of_face: list[tuple[FaceMesh, Longs, Array]] = []
+        self._of_face: list[tuple[FaceMesh, Longs, Array | None]] = []
         self._curves = _Curves()
-        corner_rows = np.repeat(polygon, 3)
-        for face, mesh, rows, uv in cad.found.locate(corner_rows, self.corners.reshape(-1, 3)):
-            own = rows[::3] // 3
-            self._of_face.append((mesh, own, uv.reshape(-1, 3, 2)))
-            nodes = mesh.triangles[polygon[own] - cad.found.starts[face]]
-            self._find_curves(mesh, own, nodes, SAME_PLACE * cad.size)
+        for face, mesh, own in cad.found.by_face(polygon):
+            of_mesh = polygon[own] - cad.found.starts[face]
+            uv: Array | None = None
+            if not mesh.surface.has_closed_form:
+                corners = self.corners[own].reshape(-1, 3)
+                at = mesh.parameters_at(np.repeat(of_mesh, 3), corners).reshape(-1, 3, 2)
+                uv = np.einsum("kc,tcx->tkx", WEIGHTS, at)
+            self._of_face.append((mesh, own, uv))
+            self._find_curves(mesh, own, mesh.triangles[of_mesh], SAME_PLACE * cad.size)
         self._curves.seal()
         self._flat_points = np.einsum("kc,tcx->tkx", WEIGHTS, self.corners)
         # Measured last: where, nan where nowhere yet; and how far off.
@@ -140,14 +143,13 @@ class _Places:
         changed = ((points != before) & np.isfinite(points)).any(axis=(1, 2))
         on_sides = self._sides.first & changed[:, None]
         sides, middles, borders = known.sides.copy(), known.middles.copy(), known.borders.copy()
-        for mesh, own, corners_uv in self._of_face:
+        for mesh, own, uv in self._of_face:
             wanted = np.repeat(on_sides[own], len(ALONG), axis=1)
             wanted = np.column_stack([wanted, changed[own]])
             if not wanted.any():
                 continue
-            uv = np.einsum("kc,tcx->tkx", WEIGHTS, corners_uv)
-            found = np.zeros(wanted.shape)
-            found[wanted] = mesh.surface.distances(points[own][wanted], uv[wanted], self._tolerance)
+            found, near = np.zeros(wanted.shape), None if uv is None else uv[wanted]
+            found[wanted] = mesh.surface.distances(points[own][wanted], near, self._tolerance)
             largest = found[:, :-1].reshape(-1, 3, len(ALONG)).max(axis=2)
             sides[own] = np.where(on_sides[own], largest, sides[own])
             middles[own] = np.where(changed[own], found[:, -1], middles[own])
@@ -166,24 +168,28 @@ class _Places:
 
     def _find_curves(self, mesh: FaceMesh, own: Longs, nodes: Longs, near: float) -> None:
         """Find the exact curve of each side on the border of a face, and its parameters there."""
-        known = {}
-        for number, border in enumerate(mesh.borders):
-            ends = zip(border.nodes[:-1].tolist(), border.nodes[1:].tolist(), strict=True)
-            for k, (a, b) in enumerate(ends):
-                known[a, b] = number, (border.at[k], border.at[k + 1])
-                known[b, a] = number, (border.at[k + 1], border.at[k])
+        if not mesh.borders:
+            return
         away = np.linalg.norm(self.corners[own][:, :, None] - mesh.points[nodes][:, None], axis=3)
         node = np.take_along_axis(nodes, away.argmin(axis=2), axis=1)
         node[away.min(axis=2) > near] = -1  # a corner that cleaning has put into a side
-        found: list[list[tuple[tuple[int, int], tuple[float, float]]]] = [[] for _ in mesh.borders]
-        for row, side in np.argwhere(self._sides.on_border[own]).tolist():
-            pair = int(node[row, side]), int(node[row, (side + 1) % 3])
-            if pair in known:
-                number, at = known[pair]
-                found[number].append(((int(own[row]), side), at))
-        for border, sides in zip(mesh.borders, found, strict=True):
-            if sides:
-                self._curves.add(border.curve, *map(np.array, zip(*sides, strict=True)))
+        # The sides of all borders, either way, and the parameters of their ends.
+        ways = [way for one in mesh.borders for way in (one, one.turned())]
+        counts = [len(way.at) - 1 for way in ways]
+        number = np.repeat(np.arange(len(ways)) // 2, counts)
+        ends = np.concatenate([np.stack((way.at[:-1], way.at[1:]), axis=1) for way in ways])
+        pairs = np.concatenate([np.stack((way.nodes[:-1], way.nodes[1:]), axis=1) for way in ways])
+        row, side = np.nonzero(self._sides.on_border[own])
+        wanted = np.stack((node[row, side], node[row, (side + 1) % 3]), axis=1)
+        count = len(mesh.points)
+        keys, asked = (one[:, 0] * count + one[:, 1] for one in (pairs, wanted))
+        order = np.argsort(keys, kind="stable")
+        at = order[np.searchsorted(keys, asked, "right", sorter=order) - 1]
+        found = (keys[at] == asked) & (wanted >= 0).all(axis=1)
+        at, places = at[found], np.stack((own[row], side), axis=1)[found]
+        for k in np.unique(number[at]).tolist():
+            mine = number[at] == k
+            self._curves.add(mesh.borders[k].curve, places[mine], ends[at[mine]])
 
 
 @dataclass(frozen=True)

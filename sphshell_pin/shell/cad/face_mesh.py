@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.GeomAbs import GeomAbs_Line
+from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
@@ -42,6 +43,10 @@ class Border:
     at: Array
     curve: Occ
 
+    def turned(self) -> Border:
+        """Return the same sides, the other way."""
+        return replace(self, nodes=self.nodes[::-1], at=self.at[::-1])
+
     def error(self, points: Array) -> float:
         """Largest distance of the curve from the polyline through `points` of the nodes."""
         if self.curve.GetType() == GeomAbs_Line:
@@ -51,7 +56,7 @@ class Border:
         start, span = corners[:-1], np.diff(corners, axis=0)
         shares = np.array((0.0, *ALONG))[:, None]
         places = ((1.0 - shares) * self.at[:-1] + shares * self.at[1:]).ravel()
-        exact = np.array([self.curve.Value(t).Coord() for t in places.tolist()]).reshape(-1, 3)
+        exact = _curve_points(self.curve, places)
         own = np.tile(np.arange(len(start)), len(shares))
         away = _to_segments(exact, start[own], span[own])
         # Where curve and polyline run at different speeds, another side is the nearest. The
@@ -92,7 +97,7 @@ class FaceMesh:
     borders: tuple[Border, ...]
     reversed: bool
 
-    @property
+    @cached_property
     def border_nodes(self) -> Longs:
         """Nodes on the border, ascending."""
         rows = [border.nodes for border in self.borders]
@@ -177,12 +182,15 @@ class FaceMesh:
 
     def _errors(self, sides: Longs, tolerance: float) -> tuple[Array, Array]:
         """Largest distance to the surface along each side, and at the middle of each triangle."""
-        ends, between = self.points[sides], self.parameters(sides)
-        points = [(1.0 - share) * ends[:, 0] + share * ends[:, 1] for share in ALONG]
-        uv = [(1.0 - share) * between[:, 0] + share * between[:, 1] for share in ALONG]
-        points.append(self.points[self.triangles].mean(axis=1))
-        uv.append(self.parameters(self.triangles).mean(axis=1))
-        away = self.surface.distances(np.concatenate(points), np.concatenate(uv), tolerance)
+
+        def along(ends: Array, corners: Array) -> Array:
+            on_sides = [(1.0 - share) * ends[:, 0] + share * ends[:, 1] for share in ALONG]
+            return np.concatenate([*on_sides, corners.mean(axis=1)])
+
+        points, uv = along(self.points[sides], self.points[self.triangles]), None
+        if not self.surface.has_closed_form:
+            uv = along(self.parameters(sides), self.parameters(self.triangles))
+        away = self.surface.distances(points, uv, tolerance)
         count = len(ALONG) * len(sides)
         return away[:count].reshape(len(ALONG), -1).max(axis=0), away[count:]
 
@@ -242,8 +250,11 @@ def take_mesh(face: Occ) -> FaceMesh | None:
         return None
     location = TopLoc_Location()
     found = BRep_Tool.Triangulation_s(face, location)
-    place = location.Transformation()
     count = range(1, found.NbNodes() + 1)
+    nodes = [found.Node(k) for k in count]
+    if not location.IsIdentity():
+        place = location.Transformation()
+        nodes = [node.Transformed(place) for node in nodes]
     uv = np.array([found.UVNode(k).Coord() for k in count])
     rows = [found.Triangle(k).Get() for k in range(1, found.NbTriangles() + 1)]
     surface = FaceSurface(face)
@@ -251,7 +262,7 @@ def take_mesh(face: Occ) -> FaceMesh | None:
     lengths = np.stack([np.linalg.norm(by, axis=1) for by in along], axis=1)
     return FaceMesh(
         surface=surface,
-        points=np.array([found.Node(k).Transformed(place).Coord() for k in count]),
+        points=np.array([node.Coord() for node in nodes]),
         exact=exact,
         uv=uv,
         free=lengths <= SINGULAR * lengths.max(axis=0),
@@ -274,6 +285,19 @@ def _borders(face: Occ, found: Occ, location: Occ) -> Iterator[Border]:
             at=np.array([polygon.Parameter(k) for k in count]),
             curve=BRepAdaptor_Curve(edge, face),
         )
+
+
+def _curve_points(curve: Occ, at: Array) -> Array:
+    """Points (n, 3) of a curve at parameters (n,)."""
+    if curve.GetType() != GeomAbs_Circle:
+        return np.array([curve.Value(one).Coord() for one in at.tolist()]).reshape(-1, 3)
+    circle = curve.Circle()
+    place, x, y = (
+        np.array(one.Coord())
+        for one in (circle.Location(), circle.XAxis().Direction(), circle.YAxis().Direction())
+    )
+    cosine, sine = np.cos(at)[:, None], np.sin(at)[:, None]
+    return np.asarray(place + circle.Radius() * (cosine * x + sine * y))
 
 
 def _to_segments(point: Array, start: Array, span: Array) -> Array:

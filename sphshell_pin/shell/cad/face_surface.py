@@ -1,5 +1,6 @@
 """The surface below a CAD face, at many places at once."""
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -78,6 +79,49 @@ class _Basis:
         return numbers, np.stack(values, axis=1), degree * np.stack(slopes, axis=1)
 
 
+class TurnedSurface:
+    """Points and derivatives of the five kinds with closed forms, as OpenCASCADE's ElSLib has them.
+
+    u turns a profile about the third axis, along which v moves; a plane has u and v as coordinates.
+    """
+
+    def __init__(self, kind: str, surface: Occ) -> None:
+        self._kind, shape = kind, getattr(surface, kind.capitalize())()
+        place = shape.Position()
+        self._place, *self._axes = (
+            np.array(one.Coord())
+            for one in (place.Location(), place.XDirection(), place.YDirection(), place.Direction())
+        )
+        sizes = {"cone": ("RefRadius", "SemiAngle"), "torus": ("MajorRadius", "MinorRadius")}
+        names = sizes.get(kind, () if kind == "plane" else ("Radius",))
+        self._sizes = [getattr(shape, name)() for name in names]
+
+    def derivatives(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
+        """Points and derivatives by u and by v at parameters u, v (n,), (n, 3) each."""
+        x, y, z = self._axes
+        if self._kind == "plane":
+            point = u[:, None] * x + v[:, None] * y + self._place
+            return point, np.tile(x, (len(u), 1)), np.tile(y, (len(u), 1))
+        away, along, by_away, by_along = (
+            np.broadcast_to(one, v.shape)[:, None] for one in self._profile(v)
+        )
+        cosine, sine = np.cos(u)[:, None], np.sin(u)[:, None]
+        out, around = cosine * x + sine * y, cosine * y - sine * x
+        return away * out + along * z + self._place, away * around, by_away * out + by_along * z
+
+    def _profile(self, v: Array) -> tuple[Array | float, ...]:
+        """How far the profile is from the axis, and along it, and the derivatives of both by v."""
+        radius, *second = self._sizes
+        if self._kind == "cylinder":
+            return radius, v, 0.0, 1.0
+        if self._kind == "cone":
+            sine, cosine = math.sin(second[0]), math.cos(second[0])
+            return radius + v * sine, v * cosine, sine, cosine
+        middle, round_ = (0.0, radius) if self._kind == "sphere" else (radius, second[0])
+        cosine, sine = round_ * np.cos(v), round_ * np.sin(v)
+        return middle + cosine, sine, -sine, cosine
+
+
 MOST_STEPS = 8
 """Most steps of Newton's method to a closest point; it starts next to it."""
 
@@ -102,6 +146,7 @@ class FaceSurface:
         self._highest = np.where(endless, np.inf, self.high)
         self._scale = 0.0
         self._shape = self.shape()
+        self.has_closed_form = self._shape[0] >= 0
         self.flat = self._shape[0] == KINDS.index("plane")
         self.kinked = GeomAbs_C0 in (surface.UContinuity(), surface.VContinuity())
 
@@ -111,6 +156,11 @@ class FaceSurface:
         if surface.GetType() != GeomAbs_BSplineSurface or np.isinf(self._highest).any():
             return None
         return SplineSurface(surface.BSpline(), self.low, self.high)
+
+    @cached_property
+    def _turned(self) -> TurnedSurface | None:
+        kind = int(self._shape[0])
+        return TurnedSurface(KINDS[kind], self._surface) if self.has_closed_form else None
 
     def shape(self) -> list[float]:
         """Kind, point, axis and two radii of it, as `CleanedSurface.face_shapes` has them (9,)."""
@@ -156,6 +206,8 @@ class FaceSurface:
         """Points and derivatives by u and by v at parameters uv (n, 2), (n, 3) each."""
         if self._spline is not None:
             return self._spline.derivatives(uv)
+        if self._turned is not None:
+            return self._turned.derivatives(*uv.T)
         place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
         rows, first = [], self._surface.D1
         for u, v in uv.tolist():
@@ -164,15 +216,16 @@ class FaceSurface:
         table = np.array(rows).reshape(-1, 9)
         return table[:, :3], table[:, 3:6], table[:, 6:]
 
-    def distances(self, points: Array, uv: Array, tolerance: float) -> Array:
+    def distances(self, points: Array, uv: Array | None, tolerance: float) -> Array:
         """Distances (n,) of points next to the surface at uv (n, 2), without its trimming.
 
         Newton's steps go on while they are longer than `tolerance`: less changes the distance by
-        far less, as the surface is nearly flat within it. Five kinds have closed forms.
+        far less, as the surface is nearly flat within it. Closed forms need no `uv`.
         """
         kind, *shape = self._shape
-        if kind >= 0:
+        if self.has_closed_form:
             return shape_distances(KINDS[int(kind)], np.array(shape), points)
+        assert uv is not None
         distance = np.full(len(points), np.inf)
         at, left = uv.copy(), np.arange(len(points))
         for _ in range(MOST_STEPS):

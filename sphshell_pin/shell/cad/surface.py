@@ -203,5 +203,5 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     chord_error = options.chord_error
     stated = size * CHORD_ERROR if chord_error is None else chord_error / model.meters
     sewn = sew(model, size, None if options.sew is None else options.sew / model.meters)
-    found = tessellate(sewn.shape, sewn.faces, size, stated, model.meters)
+    found = tessellate(sewn.faces, size, stated, model.meters)
     return CadSurface(whole, model, size, taken, sewn, found, stated)

@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
+from OCP.GeomAbs import GeomAbs_Plane
 from OCP.GProp import GProp_GProps
 from OCP.IMeshTools import IMeshTools_Parameters
 from OCP.TopAbs import TopAbs_FACE
@@ -19,7 +21,7 @@ from OCP.TopoDS import TopoDS
 from sphshell_pin.base.arrays import Array, Ints, Longs
 from sphshell_pin.errors import InvalidParameter, InvalidShell
 from sphshell_pin.shell.cad.face_mesh import FaceMesh, count_laid, take_mesh
-from sphshell_pin.shell.cad.model import CadModel, count_open_edges
+from sphshell_pin.shell.cad.model import CadModel, compound, count_open_edges
 from sphshell_pin.shell.cad.options import Occ
 
 ANGLE = 0.35
@@ -78,31 +80,36 @@ class Tessellation:
         """(n,) face of each of the `triangles` (n,)."""
         return np.searchsorted(self.starts, triangles, side="right") - 1
 
+    def by_face(self, triangles: Ints | Longs) -> Iterator[tuple[int, FaceMesh, Longs]]:
+        """Yield each face of `triangles` (n,), its mesh, and the rows (k,) of `triangles` on it."""
+        faces = self.face_of(triangles)
+        order = np.argsort(faces, kind="stable")
+        for own in np.split(order, np.flatnonzero(np.diff(faces[order])) + 1):
+            if len(own):
+                mesh = self.meshes[face := int(faces[own[0]])]
+                assert mesh is not None  # it has triangles
+                yield face, mesh, own
+
     def locate(
         self, triangles: Ints | Longs, points: Array
     ) -> Iterator[tuple[int, FaceMesh, Longs, Array]]:
         """Find the parameters of points (n, 3) near `triangles` (n,) [units of the model].
 
-        Yields, face by face: the face, its mesh, the rows (k,) of the points on it, and the
-        parameters (k, 2) at which these rows are.
+        Yields, face by face, what `by_face` does and the parameters (k, 2) of these points.
         """
-        face = self.face_of(triangles)
-        for one in np.unique(face).tolist():
-            mesh = self.meshes[one]
-            assert mesh is not None  # it has triangles
-            own = np.flatnonzero(face == one)
-            yield one, mesh, own, mesh.parameters_at(triangles[own] - self.starts[one], points[own])
+        for face, mesh, own in self.by_face(triangles):
+            at = mesh.parameters_at(triangles[own] - self.starts[face], points[own])
+            yield face, mesh, own, at
 
 
 @dataclass(frozen=True)
 class Sewn:
     """Faces of a model with their borders joined.
 
-    `shape`, its `faces` in the order of the model, the `tolerance` taken (0 for none) [units of the
-    model], open edges of the faces `before` and `after`.
+    The `faces` in the order of the model, the `tolerance` taken (0 for none) [units of the model],
+    open edges of the faces `before` and `after`.
     """
 
-    shape: Occ
     faces: tuple[Occ, ...]
     tolerance: float
     before: int
@@ -118,7 +125,7 @@ def sew(model: CadModel, size: float, tolerance: float | None) -> Sewn:
     shape = model.shape
     faces = tuple(face.shape for face in model.faces)
     before = count_open_edges(shape)
-    best = Sewn(shape, faces, 0.0, before, before)
+    best = Sewn(faces, 0.0, before, before)
     if before == 0 or len(faces) < 2:
         return best
     ladder = [share * size for share in SEWING_TOLERANCES] if tolerance is None else [tolerance]
@@ -138,17 +145,16 @@ def sew(model: CadModel, size: float, tolerance: float | None) -> Sewn:
         rows = [found.FindIndex(sewing.ModifiedSubShape(face)) for face in faces]
         if after < best.after and 0 not in rows:
             images = tuple(TopoDS.Face(found.FindKey(row)) for row in rows)
-            best = Sewn(joined, images, step, before, after)
+            best = Sewn(images, step, before, after)
     return best
 
 
 def tessellate(
-    shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, meters: float
+    faces: tuple[Occ, ...], size: float, chord_error: float, meters: float
 ) -> Tessellation:
-    """Tessellate all faces; refine until they are as near as asked, or no nearer.
+    """Tessellate faces; refine until they are as near as asked, or no nearer.
 
-    shape : what holds the faces; size : its diagonal; chord_error : largest distance [its units];
-    meters : per unit
+    size : the diagonal of all; chord_error : largest distance [their units]; meters : per unit
 
     Raises
     ------
@@ -157,13 +163,13 @@ def tessellate(
     InvalidShell
         If no face can be given triangles.
     """
-    _check_count(shape, faces, size, chord_error, meters)
+    _check_count(faces, size, chord_error, meters)
     target = MARGIN * chord_error
     deflection = target
     best: Tessellation | None = None
     incomplete: list[tuple[int, float]] = []  # faces without triangles, and the deflection
     for _ in range(MOST_TRIES):
-        _lay(shape, deflection)
+        _lay(faces, deflection)
         missing = _missing(faces, target)
         if missing:
             incomplete.append((missing, deflection))
@@ -179,21 +185,28 @@ def tessellate(
             break
         deflection *= min(max(0.8 * target / found.error, 0.2), 0.7)
     if best is None:
-        _lay(shape, min(incomplete)[1])
+        _lay(faces, min(incomplete)[1])
         best = _measure(faces, target)
     if best.count == 0:
         raise InvalidShell("no face of the model can be given triangles: check it in its CAD")
     return best
 
 
-def _lay(shape: Occ, deflection: float) -> None:
+def _lay(faces: tuple[Occ, ...], deflection: float) -> None:
     parameters = IMeshTools_Parameters()
     parameters.Deflection = parameters.DeflectionInterior = deflection
     parameters.Angle = parameters.AngleInterior = ANGLE
     # Without it, splines are only measured along their isolines.
     parameters.ControlSurfaceDeflection = True
-    BRepTools.Clean_s(shape)
-    BRepMesh_IncrementalMesh(shape, parameters)
+    BRepTools.Clean_s(compound(faces))
+    flat = [BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane for face in faces]
+    # Planes need no nodes inside, and are laid several times as fast without: after the others,
+    # whose nodes along common edges they take.
+    for on_plane in (False, True):
+        held = [face for face, one in zip(faces, flat, strict=True) if one is on_plane]
+        parameters.InternalVerticesMode = not on_plane
+        if held:
+            BRepMesh_IncrementalMesh(compound(held), parameters)
 
 
 def _measure(faces: tuple[Occ, ...], target: float) -> Tessellation:
@@ -250,14 +263,12 @@ def _meet(meshes: list[FaceMesh | None]) -> list[FaceMesh | None]:
     return moved
 
 
-def _check_count(
-    shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, meters: float
-) -> None:
+def _check_count(faces: tuple[Occ, ...], size: float, chord_error: float, meters: float) -> None:
     """Refuse what would take too many triangles, judged by how a coarse mesh bends."""
     coarse = 2e-3 * size
     if chord_error >= coarse / 8:
         return
-    _lay(shape, coarse)
+    _lay(faces, coarse)
     meshes = [mesh for mesh in map(take_mesh, faces) if mesh is not None]
     expected = sum(_expected(mesh, chord_error) for mesh in meshes)
     if expected <= MOST_TRIANGLES:
