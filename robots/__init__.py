@@ -213,9 +213,12 @@ def load_file(
         assumed=assumed,
     )
     if missing:
+        hint = f"searched in {description.folders.searched()} (see --package-dir)"
+        if description.is_mjcf:
+            hint = "correct file= of the mesh, or meshdir= of <compiler>"
         warnings.warn(
             f"{path}: without these meshes, which are missing or broken: {few(missing)}{touch}; "
-            f"searched in {description.folders.searched()} (see --package-dir)",
+            f"{hint}",
             RobotWarning,
             stacklevel=2,
         )

@@ -11,7 +11,6 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -35,9 +34,6 @@ from sphshell_pin.robots.description import (
 from sphshell_pin.robots.mesh_faults import mesh_fault
 from sphshell_pin.robots.packages import Folders, including
 from sphshell_pin.robots.plain_mesh import collada_unit
-
-if TYPE_CHECKING:
-    from sphshell_pin.robots.mjcf import MjcfRobot
 
 
 class RobotError(SphshellError, ValueError):
@@ -202,14 +198,14 @@ def build_model(
 def build_geometry(
     description: Description, model: pin.Model, kind: pin.GeometryType, *, drawn: bool = True
 ) -> tuple[pin.GeometryModel, list[str]]:
-    """Return the geometry of a kind, and the meshes that are missing or, of a URDF, broken.
+    """Return the geometry of a kind, and the meshes that are missing or broken.
 
     Collada meshes are in meters, but for visual ones that are `drawn`: who draws them applies their
-    unit. Raises RobotError for other geometry that cannot be built, and for an MJCF's broken mesh.
+    unit. Raises RobotError for other geometry that cannot be built.
     """
     visual = kind == pin.GeometryType.VISUAL
     if description.mjcf is not None:
-        return _geometry_of_mjcf(description, description.mjcf, model, visual=visual)
+        return description.mjcf.geometry(model, visual=visual)
     root, missing = _with_meshes(description, visual=visual, meters=not (visual and drawn))
     with contextlib.suppress(RobotError):
         return _geometry(description, root, model, kind), missing
@@ -223,31 +219,6 @@ def _geometry(
     try:
         text = ET.tostring(root, encoding="unicode")
         return pin.buildGeomFromUrdfString(model, text, kind)
-    except (ValueError, RuntimeError) as error:
-        raise _cannot_load(description, _line(error)) from None
-
-
-def _geometry_of_mjcf(
-    description: Description, robot: MjcfRobot, model: pin.Model, *, visual: bool
-) -> tuple[pin.GeometryModel, list[str]]:
-    """Return the geometry without the meshes that are missing, and their files."""
-    missing: dict[str, None] = {}
-    for g in robot.geoms:
-        if (mesh := robot.mesh(g)) is None:
-            continue
-        path, _ = mesh
-        if os.path.isfile(path):
-            if reason := mesh_fault(path):
-                raise _cannot_load(description, reason)
-        elif not robot.touches(g) or description.folders.kept is not None:
-            missing[str(path)] = None
-        else:
-            raise RobotError(
-                f"{description.file}: a mesh cannot be loaded ({path} does not exist): correct "
-                "file= of the mesh, or meshdir= of <compiler>"
-            )
-    try:
-        return robot.geometry(model, visual=visual, without=missing), list(missing)
     except (ValueError, RuntimeError) as error:
         raise _cannot_load(description, _line(error)) from None
 

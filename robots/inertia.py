@@ -72,11 +72,26 @@ def with_density(description: Description, density: float) -> tuple[Description,
     return replace(description, root=root), "; ".join(told)
 
 
-def states_masses_alone(description: Description) -> bool:
-    """Whether a URDF states masses of links with meshes, and not one moment of inertia."""
-    links = [] if description.is_mjcf else description.root.findall("link")
+def lacks_masses(model: pin.Model, description: Description | None, *, floating: bool) -> bool:
+    """Whether geometry can give a URDF's moving bodies what its file does not state.
+
+    That is the mass of a body that has none, or every moment of inertia. With `floating` the root
+    link moves too, though it is fixed in `model`.
+    """
+    if description is None or description.is_mjcf:
+        return False
+    links = description.root.findall("link")
     stated = [one for one in links if _mass(one)]
-    return any(one.find(".//mesh") is not None for one in stated) and not any(map(_turns, stated))
+    if any(one.find(".//mesh") is not None for one in stated) and not any(map(_turns, stated)):
+        return True
+    bodies = {f.name: f.parentJoint for f in model.frames if f.type == pin.FrameType.BODY}
+    empty = (
+        one
+        for one in links
+        if ((joint := bodies.get(one.get("name"), 0)) or floating)
+        and not model.inertias[joint].mass > 0
+    )
+    return any(_has_geometry(one, description) for one in empty)
 
 
 def _turns(link: ET.Element) -> bool:

@@ -6,7 +6,7 @@ equalities, and makes one nameless joint of several.
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.errors import import_extra
 from sphshell_pin.robots import mjcf_compile
 from sphshell_pin.robots.description import Description
+from sphshell_pin.robots.mesh_faults import mesh_fault
 from sphshell_pin.robots.packages import Folders
 
 _KINDS = ("connect", "weld", "joint", "tendon")
@@ -202,15 +203,13 @@ class MjcfRobot:
         """Whether a geom is a sphere."""
         return _kind(self.m.geom_type[g]) == "sphere"
 
-    def geometry(
-        self, model: pin.Model, *, visual: bool, without: Collection[str] = ()
-    ) -> pin.GeometryModel:
-        """Return what is drawn, or what touches, `without` some mesh files."""
-        m, made = self.m, pin.GeometryModel()
+    def geometry(self, model: pin.Model, *, visual: bool) -> tuple[pin.GeometryModel, list[str]]:
+        """Return what is drawn, or what touches, and the mesh files that cannot be read."""
+        m, made, missing = self.m, pin.GeometryModel(), dict[str, None]()
         for g in self.geoms:
             mesh, body = self.mesh(g), self.body(g)
             drawn = m.geom_group[g] < _SHOWN_GROUPS or not self.touches(g)
-            if not (drawn if visual else self.touches(g)) or (mesh and str(mesh[0]) in without):
+            if not (drawn if visual else self.touches(g)):
                 continue
             place, path, scale = _pose(m.geom_pos[g], m.geom_quat[g]), "", np.ones(3)
             if mesh is None:
@@ -218,7 +217,13 @@ class MjcfRobot:
                 shape = _SHAPES[m.geom_type[g]][1](*m.geom_size[g].tolist())
             else:
                 path, scale = str(mesh[0]), mesh[1]
-                shape = coal.MeshLoader(coal.BV_OBBRSS).load(path, scale)
+                try:
+                    if mesh_fault(mesh[0]):
+                        raise ValueError
+                    shape = coal.MeshLoader(coal.BV_OBBRSS).load(path, scale)
+                except (ValueError, RuntimeError):
+                    missing[path] = None
+                    continue
                 # MuJoCo counts from the center of mass and the principal axes of a mesh.
                 k = m.geom_dataid[g]
                 place = place * _pose(m.mesh_pos[k], m.mesh_quat[k]).inverse()
@@ -232,7 +237,7 @@ class MjcfRobot:
             made.addGeometryObject(
                 pin.GeometryObject(name, joint, frame, place, shape, path, scale, False, color)
             )
-        return made
+        return made, list(missing)
 
     def start(self) -> dict[str, Array]:
         """Return where the file draws the joints that are not at zero there."""

@@ -85,17 +85,46 @@ def test_masses_without_moments_of_inertia_get_those_of_the_geometry(tmp_path: P
 def test_without_masses_one_sentence_lists_the_links(tmp_path: Path) -> None:
     file = arm(tmp_path, '<box size="0.1 0.1 0.1"/>')
     out = "--out", tmp_path / "a.toml"
-    for command in (["check-robot", file, "--quick"], ["new", "--robot", file, *out]):
-        done = call(*command)
-        assert done.exit_code == 2
-        said = " ".join(done.output.split())
-        assert "none of links upper, lower" in said
-        assert "--density 2700" in said
+    done = call("check-robot", file, "--quick")
+    assert done.exit_code == 2
+    said = " ".join(done.output.split())
+    assert "none of links upper, lower" in said
+    assert "--density 2700" in said
     with pytest.raises(InvalidParameter, match="density"):
         robots.load_file(file, density=-1.0)
     file = arm(tmp_path, urdf.mesh("lost.stl"))
     done = call("new", "--robot", file, "--density", "2700", *out)
     assert "whose meshes are missing or broken" in " ".join(done.output.split())
+
+
+def test_new_gives_links_without_masses_those_of_their_geometry(tmp_path: Path) -> None:
+    file, out = arm(tmp_path, '<box size="0.1 0.1 0.1"/>'), tmp_path / "a.toml"
+    done = call("new", "--robot", file, "--out", out)
+    assert done.exit_code == 0, done.output
+    said = " ".join(done.output.split())
+    assert "upper, lower are those of their geometry at 2700 kg/m^3" in said
+    assert "as the file states none: another with --density" in said
+    assert "density = 2700" in out.read_text()
+    assert "missing inertias from its geometry at 2700 kg/m^3" in out.read_text()
+
+
+def test_new_floats_a_root_without_a_mass(tmp_path: Path) -> None:
+    box, out = urdf.shape("collision", '<box size="0.2 0.2 0.1"/>'), tmp_path / "a.toml"
+    file = urdf.write(tmp_path / "box.urdf", urdf.link("box", box))
+    done = call("new", "--robot", file, "--base", "floating", "--out", out)
+    assert done.exit_code == 0, done.output
+    assert "link box are those of their geometry" in " ".join(done.output.split())
+
+
+@pytest.mark.parametrize("link", ["upper", "lower"])
+def test_new_gives_one_link_of_an_arm_the_mass_that_it_lacks(tmp_path: Path, link: str) -> None:
+    file, out = arm(tmp_path, '<box size="0.1 0.1 0.1"/>'), tmp_path / "a.toml"
+    stated = urdf.link(link, urdf.inertial(3)).removesuffix("</link>")
+    file.write_text(file.read_text().replace(f'<link name="{link}">', stated))
+    done = call("new", "--robot", file, "--out", out)
+    assert done.exit_code == 0, done.output
+    other = "lower" if link == "upper" else "upper"
+    assert f"the masses of link {other} are those" in " ".join(done.output.split())
 
 
 def test_a_mended_file_needs_no_options(tmp_path: Path) -> None:

@@ -330,13 +330,15 @@ def test_meshes_of_mjcf(tmp_path):
     text = text.replace('<geom type="mesh" mesh="w', f'{inertial}<geom type="mesh" mesh="w')
     text = text.replace('meshdir="assets"', f'meshdir="{FOLDER / "assets"}"')
     path = tmp_path / "r.xml"
-    path.write_text(text.replace("wedge.stl", "nix.stl"))
-    with pytest.raises(robots.RobotError, match=r"nix.stl does not exist.*meshdir"):
-        robots.load_file(path)
-    seen = 'mesh="wedge" contype="0" conaffinity="0"'
-    path.write_text(path.read_text().replace('mesh="wedge"', seen))
-    with pytest.warns(RobotWarning, match=r"meshes, which are missing or broken: .*nix.stl"):
-        assert robots.load_file(path).model.nv == 2
+    for name in ("nix.stl", "broken.stl"):
+        (tmp_path / "broken.stl").write_text("solid")
+        lost = text.replace('file="wedge.stl"', f'file="{tmp_path / name}"')
+        path.write_text(lost)
+        said = rf"meshes, which are missing or broken: .*{name}; what lacks .*meshdir="
+        with pytest.warns(RobotWarning, match=said):
+            robot = robots.load_file(path)
+        assert robot.model.nv == 2
+        assert 0 < len(robot.collision_model.geometryObjects) < 4
 
 
 SHOWN = text_of("robots/shown.xml").rstrip()

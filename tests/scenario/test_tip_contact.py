@@ -1,5 +1,6 @@
 """What is drafted for a tip that presses, against Hertz's law."""
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.plan import press_force
 from sphshell_pin.scenario.drafting.tip_contact import Materials
+from sphshell_pin.scenario.running.run import simulate
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 RADIUS = 0.01
@@ -59,3 +61,15 @@ def test_a_tip_is_pressed_in_by_half_its_radius_at_most(share):
     else:
         with pytest.raises(SphshellError, match="by more than half of it"):
             press_force(stance, MATERIALS, press)
+
+
+@pytest.mark.parametrize("heavier", [10, 50, 200])
+def test_the_first_touch_of_a_heavy_arm_on_rubber_is_soft(draft, tmp_path, heavier):
+    """The force comes on in periods of the mass on the contact: it would be a step beside them."""
+    file, text = tmp_path / "arm.urdf", PROBE.read_text()
+    number = r'((?:value|ixx|iyy|izz|ixy|ixz|iyz)|effort)="([^"]+)"'
+    file.write_text(re.sub(number, lambda m: f'{m[1]}="{heavier * float(m[2])}"', text))
+    built = draft(file, "plane", material="rubber", path="0,0,0").built
+    result, _ = simulate(built)
+    (pair,) = result.stats.pairs.values()
+    assert pair.peak_force < 1.25 * built.scenario.controller.normal_force

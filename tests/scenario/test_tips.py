@@ -15,8 +15,11 @@ from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
 from sphshell_pin.scenario.drafting.searching import CannotReach
 from sphshell_pin.scenario.format.reach import Reach
+from sphshell_pin.scenario.running.run import simulate
 from tests import urdf
 from tests.urdf import inertial, shape
+
+HINGE = "revolute", "0 0 1", "0 1 0"
 
 
 def link(name: str, size: str = "", at: str = "0 0 0", *parts: str) -> str:
@@ -285,3 +288,46 @@ def test_wheels_beside_an_arm_are_no_tip(load) -> None:
             out += joint(f"{name}{k}_j", parent, f"{name}{k}", kind, at, "0 1 0")
     (tip,) = tips_of(load(out))
     assert tip.frame.startswith("arm2")
+
+
+def test_the_ball_of_a_mechanism_in_a_plane_is_in_that_plane(load) -> None:
+    """Also where its last link lies around its hinge."""
+    parts = link("base") + link("cart") + link("body", ".2 .1 .2") + link("foot", ".3 .1 .06")
+    parts += joint("x", "base", "cart", "prismatic", "0 0 1", "1 0 0")
+    parts += joint("hip", "cart", "body", "revolute", "0 0 0", "0 1 0")
+    parts += joint("ankle", "body", "foot", "revolute", "0 0 -.2", "0 1 0")
+    (tip,) = tips_of(load(parts))
+    assert tip.offset == pytest.approx([0.0, 0.0, tip.offset[2]], abs=2e-3)
+    assert tip.offset[2] < -0.03
+
+
+def test_a_body_of_an_mjcf_is_no_tool_frame_where_its_joint_is_elsewhere(tmp_path: Path) -> None:
+    file = tmp_path / "leg.xml"
+    file.write_text(
+        '<mujoco><worldbody><body name="leg"><joint axis="0 1 0"/><geom type="capsule" size=".05" '
+        'fromto="0 0 0 0 0 -.4"/><body name="foot" pos="0 0 -.6"><joint axis="0 1 0" pos="0 0 .2"/>'
+        '<geom type="capsule" size=".06" fromto="-.1 0 .2 .2 0 .2"/></body></body></worldbody>'
+        "</mujoco>"
+    )
+    (tip,) = tips_of(robots.load_file(file))
+    assert tip.offset[2] > 0.1
+
+
+def test_a_heavy_body_that_gets_a_ball_comes_down_softly(draft, tmp_path: Path) -> None:
+    box = shape("collision", '<box size=".3 .2 .1"/>')
+    file = urdf.write(tmp_path / "robot.urdf", urdf.link("body", inertial(60, 1), box))
+    built = draft(file, "plane").built
+    result, _ = simulate(built)
+    (pair,) = result.stats.pairs.values()
+    assert 60 * 9.81 < pair.peak_force < 100 * 60 * 9.81
+
+
+def test_a_leg_that_starts_at_a_limit_of_its_knee_bends_it(draft, tmp_path: Path) -> None:
+    parts = link("base") + link("thigh", ".04 .04 .2", "0 0 -.1") + link("shank", "", "0 0 0")
+    parts += link("foot", "", "0 0 0", ball(".02")) + joint("hip", "base", "thigh", *HINGE)
+    knee = joint("knee", "thigh", "shank", "revolute", "0 0 -.2", "0 1 0")
+    parts += knee.replace('lower="-1" upper="1"', 'lower="0.5" upper="2.5"')
+    parts += joint("ankle", "shank", "foot", "fixed", "0 0 -.2", "0 1 0")
+    made = draft(urdf.write(tmp_path / "leg.urdf", parts), "plane")
+    _, knee = made.built.q0
+    assert 0.6 < knee < 2.4

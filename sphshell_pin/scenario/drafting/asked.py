@@ -71,7 +71,8 @@ class Asked:
         "fixed" or "floating"; by default as its file states it, but a single limb on a free base is
         an arm, which is fixed, and so is a robot that cannot stand on the surface.
     density
-        Of the links of a URDF that state no mass [kg/m^3]: they get that of their geometry.
+        Of the links of a URDF that state no mass [kg/m^3]: they get that of their geometry. By
+        default 2700, where a body that moves has geometry and no mass.
     mimic
         Whether joints that mimic others do so exactly; else they move freely.
     out

@@ -10,7 +10,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
+from sphshell_pin.scenario.drafting.limb_ends import COVERS, ON_END, Tip, joint_of
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.searching import CannotStand, NewScenario, Search
@@ -21,8 +21,8 @@ from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.shell import Shell
 
 _UP = np.array([0.0, 0.0, 1.0])
-# Gap at the start of a body that falls, and of feet, as a part of the sphere's radius; how far from
-# the middle a body falls, as a part of the surface's box.
+# Gap at the start of a ball that falls, and of feet and of bodies that got a ball, as a part of the
+# sphere's radius; how far from the middle a body falls, as a part of the surface's box.
 _FALL_GAP, _FOOT_GAP, _BESIDE = 2.0, 0.1, 0.1
 # Sag of a standing robot's joints under its weight [rad].
 _SAG = 0.05
@@ -71,7 +71,10 @@ class DropSearch(Search):
     def _fall(self) -> Plan:
         """Plan a run in which a free body falls on the surface, which is placed as in its file."""
         (tip, *_), shell = self.tips, self.shell
-        gap = _FALL_GAP * tip.radius
+        # A robot is heavier than the ball that it got.
+        given = COVERS in tip.source or ON_END in tip.source
+        gap = (_FOOT_GAP if given else _FALL_GAP) * tip.radius
+        load = given * float(pin.computeTotalMass(self.model))
         # Beside the middle: a ball in a bowl rolls then.
         beside = _BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
         touch = find_touch_point(
@@ -84,7 +87,7 @@ class DropSearch(Search):
             f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
             f"it falls {mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
         )
-        contact = Contact(chosen_materials(self.asked, self.tips, 0.0), speed)
+        contact = Contact(chosen_materials(self.asked, self.tips, load), speed)
         return Plan((tip,), contact, None, 1.0, gap, pin.SE3.Identity(), root, why)
 
     def _stand(self) -> Plan:

@@ -142,6 +142,7 @@ def _at_end(
     if offset is not None:
         return replace(end, offset=offset, source=_ASKED, ahead=None)
     placed = not robot.model.frames[find_frame(robot.model, frame)].placement.isIdentity()
+    placed = placed and link.link != frame  # a body of an MJCF may be anywhere beside its joint
     before = placed and -math.inf < link.depth(np.zeros(3)) < -0.5 * end.radius
     if before or (asked and radius):
         still = None if radius else np.zeros(3)

@@ -13,6 +13,7 @@ from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.drafting.vectors import moved, unit
 from sphshell_pin.scenario.drafting.wording import rounded
+from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.shell.shell import Shell
 
 # How far a ball that covers an end may stand out before it, as a part of its radius: else the end
@@ -21,10 +22,12 @@ _STANDS_OUT, _BALL, _OF_REACH = 0.25, 1 / 3, 0.01
 # Points of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's
 # place, as meshes of fingertips stand out of the spheres that stand for them.
 AT_TIP = 1.5
-COVERS = "it covers the end of link"
-"""How the source of a ball begins that is as large as a round end."""
+COVERS, ON_END = "it covers the end of link", "a ball on the end of link"
+"""How the source of a ball begins: one that is as large as a round end, and one on a flat end."""
 # Steps of the search for the ball that covers an end, and of that for the smallest ball.
 _DEPTHS, _STEPS = 40, 300
+# Motion of a frame per joint's [m/rad] that is none.
+_STILL = 1e-6
 # Distance of what is at the axis of a joint from it, as a part of the link's size.
 _AT_AXIS = 0.2
 
@@ -135,8 +138,8 @@ class LinkGeometry:
         if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
             return Tip(name, rounded(covers), center, f"{COVERS} '{self.link}'")
         ball = rounded(_BALL * covers) if radius is None else radius
-        front, source = center + (before + ball) * ahead, f"a ball on the end of link '{self.link}'"
-        return Tip(name, ball, front, source, ahead if radius is None else None)
+        front, still = center + (before + ball) * ahead, ahead if radius is None else None
+        return Tip(name, ball, front, f"{ON_END} '{self.link}'", still)
 
     def _ahead(self) -> Array:
         """Return the unit vector (3,) towards the end, in the frame.
@@ -162,9 +165,20 @@ class LinkGeometry:
             if joint.shortname().startswith("JointModelP"):
                 aside = np.zeros(3)
             size = float(np.linalg.norm(np.ptp(self.corners, axis=0)))
-            near = np.linalg.norm(aside) < _AT_AXIS * size
-            away = axis * np.sign(axis @ away or 1.0) if near else aside
+            if np.linalg.norm(aside) >= _AT_AXIS * size:
+                away = aside
+            elif self._moves_along(axis):
+                away = axis * np.sign(axis @ away or 1.0)
+            else:
+                away = away - axis * (axis @ away)
         return unit(away)
+
+    def _moves_along(self, axis: Array) -> bool:
+        """Whether the frame can move along an `axis` (3,): a mechanism in a plane does not."""
+        reach = Reach(self._model, self._frame.name, np.zeros(3))
+        q = pin.integrate(self._model, self._robot.q0, np.full(self._model.nv, 0.3))
+        jacobian, pose = reach.jacobian(q)[:3], reach.data.oMf[reach.frame]
+        return bool(np.abs(pose.rotation @ axis @ jacobian).max(initial=0.0) > _STILL)
 
     def _corners(self, joint: int, jaws: Collection[int] = ()) -> Array:
         """Return the corners (k, 3) [m] of the geometry of joints, in the first one's frame."""

@@ -18,7 +18,7 @@ from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import floats, is_path
-from sphshell_pin.robots.inertia import states_masses_alone
+from sphshell_pin.robots.inertia import lacks_masses
 from sphshell_pin.scenario.drafting.asked import WORDS, Asked
 from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
@@ -40,7 +40,7 @@ from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, HalfS
 _SIZE, _BALL, _OF_ROOM = 15.0, 0.1, 0.5
 # Such surfaces that a hand can hold; half their width there, in radii of a fingertip.
 HELD_WORDS, _IN_HAND = ("sphere", "cylinder", "box"), 2.5
-# Density that gives links with masses alone their moments of inertia [kg/m^3].
+# Density of links without masses whose geometry is known, that of aluminium [kg/m^3].
 _DENSITY = 2700.0
 # Ends of other limbs that are tried where one does not come to the part.
 _MOST_ENDS = 2
@@ -123,24 +123,27 @@ def _written(asked: Asked) -> NewScenario:
         write_whole(part, made.part.encode())
     write_whole(file, made.text.encode())
     shape = shaped and not in_hand and f"the base is {shaped}, by the robot's shape: or --base"
-    why = tuple(one for one in (shape, *made.why, loaded.assumed) if one)
+    masses = loaded.assumed
+    if masses and asked.density is None:
+        masses += ": another with --density"
+    why = tuple(one for one in (shape, *made.why, masses) if one)
     return replace(made, why=why)
 
 
 def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
     """Return the robot's table, the robot alone, and the base that its shape gives it if it does.
 
-    Links that state masses alone get moments of inertia.
+    Bodies that lack masses or moments of inertia get those of their geometry.
     """
     section = _robot_section(asked, file)
     bare = _build_bare(section, file)
-    description = bare.assembly.loaded[0].description
-    changed: dict[str, object] = {}
-    if not asked.density and description is not None and states_masses_alone(description):
-        changed["density"] = _DENSITY
+    loaded, changed = bare.assembly.loaded[0], dict[str, object]()
     shaped = None if asked.base is not None else _base(bare.assembly.model)
-    if shaped is not None:
-        changed["base"] = shaped
+    if (base := shaped or asked.base) != section.base:
+        changed["base"] = base
+    states = section.name is not None or asked.density is not None
+    if not states and lacks_masses(loaded.model, loaded.description, floating=base == "floating"):
+        changed["density"] = _DENSITY
     if changed:
         section = section.model_copy(update=changed)
         bare = _build_bare(section, file)
@@ -210,20 +213,22 @@ def _free_path(asked: Asked) -> Path:
 
 
 def _robot_section(asked: Asked, path: Path) -> RobotSection:
+    """Return the robot's table; what is to float loads as its file states, without masses too."""
     robot, file = asked.robot, Path(asked.robot)
+    base = None if asked.base == "floating" else asked.base
     if not is_path(robot):
         if asked.package_dirs or asked.xacro_args or asked.density:
             raise SphshellError(
                 f"mesh folders, xacro arguments and a density belong to a file, not to {robot}"
             )
-        return RobotSection(name=str(robot), base=asked.base, mimic=asked.mimic)
+        return RobotSection(name=str(robot), base=base, mimic=asked.mimic)
     place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
     return RobotSection(
         urdf=place if is_urdf else None,
         file=None if is_urdf else place,
         package_dirs=[_relative(Path(one), path) for one in asked.package_dirs],
         xacro_args=dict(asked.xacro_args or {}),
-        base=asked.base,
+        base=base,
         density=asked.density,
         mimic=asked.mimic,
     )

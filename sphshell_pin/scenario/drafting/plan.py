@@ -27,11 +27,12 @@ TIP_TURN = 0.02
 MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
 # Speed of the path across a surface: radii a second.
 PATH_RATE = 3.0
-LEAD_IN = 0.5
-FORCE_RISE = 0.25
+# The force comes on in that time [s] at least, and in so many periods of the mass on the contact,
+# beside which it would be a step; the tip stands still twice as long.
+FORCE_RISE, PERIODS = 0.25, 2.0
 # Energy of a mass that touches, as a part of force times depth at rest: it presses then less than
-# half as hard again.
-TOUCH_ENERGY = 0.3
+# a quarter as hard again.
+TOUCH_ENERGY = 0.15
 # Ramps of the target's speed and acceleration, each [s].
 RAMP = 0.25
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
@@ -72,20 +73,23 @@ class Press:
     force: float
     gap: float
     weak: bool = False
-    lead_in: float = LEAD_IN
+    lead_in: float = 0.0
     calm: bool = False
     repair: Literal["", "calmed", "cut", "stays"] = ""
 
     def __post_init__(self) -> None:
         stance, force, self.path = self.place.stance, self.force, self.way.points
-        radius, self.force_rise, self.slides = stance.tip.radius, FORCE_RISE, self.way.slides
+        radius, self.slides = stance.tip.radius, self.way.slides
+        rise = force_rise(radius, force, stance.mass, self.materials)
+        self.force_rise = max(0.5 * self.lead_in, rise)
+        self.lead_in = 2 * self.force_rise
         self.speed = rounded(min(PATH_RATE * radius, NO_LIMIT if self.weak else stance.fastest))
         self.spline = self.way.smooth and len(self.path) > 2
         self.acceleration = rounded(self.speed / RAMP) if self.slides else None
         self.jerk = rounded(self.speed / RAMP**2) if self.slides else None
         # Over the gap the mass is moved by 3 force (t / rise)^2, the beginning of the rise: the gap
         # is force t^4 / (4 mass rise^2), the speed four times that by t.
-        self.first_touch = (4 * stance.mass * FORCE_RISE**2 * self.gap / force) ** 0.25
+        self.first_touch = (4 * stance.mass * self.force_rise**2 * self.gap / force) ** 0.25
         self.contact = Contact(self.materials, 4 * self.gap / self.first_touch, 0.1 * self.speed)
         self.damped = DAMPED * (CALM if self.calm else 1.0)
         friction = self.contact.mu_static * force
@@ -125,7 +129,7 @@ class Press:
         )
         corners = 0 if not self.slides else 1 if self.spline else len(self.path) - 1
         moving = way.length / self.speed + 2 * RAMP * corners
-        duration = math.ceil(10 * (self.lead_in + moving + 0.5)) / 10
+        duration = math.ceil(10 * (self.lead_in + (moving or 0.5) + 0.5)) / 10
         said = tuple(one for one in why if one)
         return Plan((tip,), self.contact, self, duration, self.gap, place.placement, None, said)
 
@@ -182,14 +186,20 @@ def press_force(stance: Stance, materials: Materials, press: float | None) -> fl
     return press
 
 
+def force_rise(radius: float, force: float, mass: float, materials: Materials) -> float:
+    """Return how long the force [N] that moves a `mass` [kg] comes on [s]."""
+    slope = 1.5 * force / materials.depth(force, radius)
+    return max(FORCE_RISE, rounded(PERIODS * 2 * math.pi * math.sqrt(mass / slope)))
+
+
 def press_gap(radius: float, force: float, mass: float, materials: Materials) -> float:
     """Return the gap at the start [m]: in parts of the depth under `force` [N] at rest.
 
     One and a half; less of a large `mass` [kg], whose energy at the first touch, 4 gap^1.5
     sqrt(mass force) / rise by the motion in `Press`, is then a part of force times depth.
     """
-    rest = float((force / materials.stiffness(radius)) ** (2 / 3))
-    calm = float((TOUCH_ENERGY * FORCE_RISE / (4 * math.sqrt(mass * rest / force))) ** (2 / 3))
+    rest, rise = materials.depth(force, radius), force_rise(radius, force, mass, materials)
+    calm = float((TOUCH_ENERGY * rise / (4 * math.sqrt(mass * rest / force))) ** (2 / 3))
     return min(TIP_GAP * radius, min(1.5, calm) * rest)
 
 

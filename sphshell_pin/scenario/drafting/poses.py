@@ -247,8 +247,9 @@ def stances(
         away = [np.abs(pin.difference(limb.model, other.q, at)).max() for _, other in found]
         if min(away, default=np.inf) < _APART or not usable(at):
             continue
-        rank = one.mobility * one.ahead * _ease(limb, at) * one.dexterity
-        rank += k == 0 and one.mobility > _EASY < one.dexterity
+        ease = _ease(limb, at)
+        rank = one.mobility * one.ahead * ease * one.dexterity
+        rank += k == 0 and min(one.mobility, one.dexterity, ease) > _EASY
         found.append((rank * (one.force > 0), one))
     found.sort(key=lambda one: -one[0])
     return [one for _, one in found[:_MOST]]

@@ -34,13 +34,17 @@ class Materials(NamedTuple):
         """Return Hertz's stiffness [N/m^1.5] of a sphere on a plane."""
         return 4 / 3 * math.sqrt(radius) / sum((1 - one.poisson**2) / one.young for one in self)
 
+    def depth(self, force: float, radius: float) -> float:
+        """Return the depth [m] at which a force [N] holds a sphere."""
+        return float((force / self.stiffness(radius)) ** (2 / 3))
+
     def bearable(self, radius: float) -> float:
         """Return the load that presses a sphere in by a fifteenth of its radius."""
         return float(self.stiffness(radius) * (radius / 15) ** 1.5)
 
     def too_deep(self, force: float, radius: float) -> str:
         """Say that a force presses a sphere too far in; "" if it does not."""
-        if force <= self.stiffness(radius) * (0.5 * radius) ** 1.5:
+        if self.depth(force, radius) <= 0.5 * radius:
             return ""
         ball = f"a {self.sphere.name} sphere of radius {mm(radius)}"
         return f"{force:.3g} N would press {ball} in by more than half of it"
