@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
@@ -158,10 +158,16 @@ class ContactLog(SceneContacts):
     def _rows(self) -> None:
         return None  # its entries are those of many moments
 
+    def select(self, chosen: slice | Longs | Mask) -> Self:
+        """Return the entries that `chosen`, a slice, mask or indices, picks."""
+        columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        for name, one in columns.items():
+            columns[name] = None if one is None else one[chosen]
+        return type(self)(**columns)
+
     def of_pair(self, pair: int) -> ContactLog:
         """Return the entries of one pair."""
-        keep = self.pair == pair
-        return ContactLog(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
+        return self.select(self.pair == pair)
 
     def at_row(self, row: int) -> SceneContacts:
         """Return the contacts of one of the result's rows."""

@@ -209,12 +209,12 @@ def _feet(
     )
     scale = section.scale if isinstance(section.scale, int | float) else 1.0
     arguments = (file, section.unit, options, (scale, section.magnify), centers, points)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnitWarning)  # reported when the shell was made
-        points, normals, kinds = run_in_child(
+    # It was reported when the shell was made.
+    with warnings.catch_warnings(action="ignore", category=UnitWarning):
+        found: tuple[Array, Array, Ints] = run_in_child(
             "stationary_points", arguments, file, "--audit-cad", options
         )
-    return points, normals, kinds
+    return found
 
 
 def _largest_and_rms(values: Array) -> tuple[float, float]:

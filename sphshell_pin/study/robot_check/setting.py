@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, frame_along
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
@@ -200,14 +200,14 @@ class _Contact:
         normal = -way + rng.uniform(0.1, 0.5) * askew / np.linalg.norm(askew)
         xy = rng.uniform(-0.25, 0.25, 2) * _HALF * radius
         z, up = _wave(xy[0], xy[1], radius)
-        turn = _frame_along(up) @ pin.AngleAxis(rng.uniform(0, 2 * np.pi), np.eye(3)[2]).matrix()
+        turn = frame_along(up) @ pin.AngleAxis(rng.uniform(0, 2 * np.pi), np.eye(3)[2]).matrix()
         place = pin.SE3(turn, np.array([*xy, z]))
         return cls(normal / np.linalg.norm(normal), gap * radius, place, radius)
 
     def pose(self, model: pin.Model, data: pin.Data, sphere: Sphere) -> pin.SE3:
         """Return where the patch is in the world (SE3)."""
         point = self._point(model, data, sphere)[1]
-        return pin.SE3(_frame_along(self.normal), point) * self.place.inverse()
+        return pin.SE3(frame_along(self.normal), point) * self.place.inverse()
 
     def mass(
         self, model: pin.Model, data: pin.Data, q: Array, sphere: Sphere, other: int = 0
@@ -338,11 +338,3 @@ def _wave(x: Array, y: Array, radius: float) -> tuple[Array, Array]:
     slope = 0.5 * _HEIGHT * radius * k
     normal = np.stack(np.broadcast_arrays(-slope * np.cos(k * x), slope * np.sin(k * y), 1.0), -1)
     return z, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-
-
-def _frame_along(z: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is the unit vector `z`."""
-    least = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = np.cross(least, z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=1)

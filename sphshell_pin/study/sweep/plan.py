@@ -254,8 +254,7 @@ def _build_one(runs: list[Changes], scenario: Scenario, path: Path) -> tuple[Cha
     faults: list[SphshellError] = []
     for run in (runs[0], runs[-1]):
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with warnings.catch_warnings(action="ignore"):
                 return run, build_scenario(changed(scenario, run, path), path)
         except SphshellError as fault:
             faults.append(fault)
