@@ -112,11 +112,7 @@ def sweep(
                 update(completed=done, total=total, failures=failures)
 
             report = run_plan(
-                plan,
-                workers=workers,
-                scheduler=scheduler,
-                out=file,
-                progress=progress,
+                plan, workers=workers, scheduler=scheduler, out=file, progress=progress
             )
     except KeyboardInterrupt as stop:
         again = shlex.join(["sphshell-pin", *sys.argv[1:]])

@@ -329,10 +329,7 @@ class ShellHealth:
             ("surface", self.name),
             ("file", self.source or ""),
             ("unit", f"{self.unit}, {self.scale:.6g} m per file unit" if self.unit else ""),
-            (
-                "elements",
-                f"{self.elements} ({self._kinds()}), given {self.input_elements}",
-            ),
+            ("elements", f"{self.elements} ({self._kinds()}), given {self.input_elements}"),
             ("vertices", f"{self.vertices}, given {self.input_vertices}"),
             ("size", f"{self.size:.6g} m (box diagonal)"),
             ("area", f"{self.area:.6g} m^2"),

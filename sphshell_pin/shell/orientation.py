@@ -38,11 +38,7 @@ def unit_normals(raw: RawSurface, found: Found) -> Array | None:
 
 
 def settle_normals(
-    table: Array,
-    polygons: Polygons,
-    vertices: Array,
-    found: Found,
-    turn: bool = True,
+    table: Array, polygons: Polygons, vertices: Array, found: Found, turn: bool = True
 ) -> Array:
     """Return normals (t, 3, 3) of the triangle corners, on the side of their elements.
 

@@ -234,14 +234,7 @@ def _ball(radius: float) -> Callable[[int], float]:
 def _box(shape: coal.Box, _: float | None, __: int | None) -> RawSurface:
     half = np.array(shape.halfSide, np.float64)
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    elements = [
-        [0, 1, 3, 2],
-        [4, 6, 7, 5],
-        [0, 4, 5, 1],
-        [2, 3, 7, 6],
-        [0, 2, 6, 4],
-        [1, 5, 7, 3],
-    ]
+    elements = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     faces = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], float)
     return raw_surface(signs * half, elements, np.repeat(faces[:, None, :], 4, axis=1))
 

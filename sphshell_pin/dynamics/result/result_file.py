@@ -350,10 +350,7 @@ def _announced(archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str) -> _A
     return kind, shape
 
 
-def _check_shapes(
-    shapes: dict[str, tuple[int, ...]],
-    arrays: Mapping[str, Kind],
-) -> None:
+def _check_shapes(shapes: dict[str, tuple[int, ...]], arrays: Mapping[str, Kind]) -> None:
     sizes: dict[str | int, tuple[int, str]] = {2: (2, ""), 3: (3, "")}
     for name, (_, wanted) in arrays.items():
         shape = shapes[name]
@@ -427,6 +424,4 @@ def _check_sensitivities(arrays: Columns, names: list[str]) -> None:
         raise _Fault("it has no array 'sensitivities.q'")
     columns = 0 if rows is None else rows.shape[-1]
     if columns != len(names) or len(set(names)) < len(names):
-        raise _Fault(
-            f"header.sensitivities does not name each of {columns} columns once: {names}",
-        )
+        raise _Fault(f"header.sensitivities does not name each of {columns} columns once: {names}")

@@ -42,10 +42,7 @@ def check_record(record: Collection[str]) -> frozenset[str]:
 
 def patch_columns(patches: Patches) -> dict[str, Array]:
     """Return patches as named scalar columns, units in the names (for CSV, tables)."""
-    columns = {
-        "half_axis_a [m]": patches["half_axes"][:, 0],
-        "half_axis_b [m]": patches["half_axes"][:, 1],
-    }
+    columns = {f"half_axis_{a} [m]": patches["half_axes"][:, i] for i, a in enumerate("ab")}
     columns |= {f"patch_axis_{a} [1]": patches["axis_world"][:, i] for i, a in enumerate("xyz")}
     pressures = {f"{n} [Pa]": patches[n] for n in ("peak_pressure", "mean_pressure")}
     return columns | pressures | {"approach [m]": patches["approach"]}
@@ -225,14 +222,8 @@ class EnergyAudit(Summarized):
     @property
     def total(self) -> Array:
         """Energy stored and lost, less the controller's work (n,) [J]: it should not change."""
-        return (
-            self.kinetic
-            + self.potential
-            + self.elastic
-            + self.damping_loss
-            + self.friction_loss
-            - self.control_work
-        )
+        stored = self.kinetic + self.potential + self.elastic
+        return stored + self.damping_loss + self.friction_loss - self.control_work
 
     @property
     def residual(self) -> Array:

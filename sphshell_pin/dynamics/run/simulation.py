@@ -29,10 +29,7 @@ class Simulation(Summarized):
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        integrator: Integrator | None = None,
-        sensors: Iterable[Sensor] = (),
+        self, scene: Scene, integrator: Integrator | None = None, sensors: Iterable[Sensor] = ()
     ) -> None:
         if not isinstance(scene, Scene):
             raise errors.InvalidParameter(

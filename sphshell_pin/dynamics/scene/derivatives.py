@@ -179,11 +179,7 @@ def core_parameters(
 
 
 def _core_parameter(
-    scene: Scene,
-    column: str,
-    number: NamedNumber,
-    place: int,
-    start: tuple[Array, Array] | None,
+    scene: Scene, column: str, number: NamedNumber, place: int, start: tuple[Array, Array] | None
 ) -> _core.Parameter:
     if number.path in _PLACES:
         return _core.Parameter(number.at, _PLACES[number.path], place)

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.tables import quantity_of
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.dynamics.scene.scene import SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.result import Result
 
 FORCES = ("normal_force", "friction_force", "depth")
 
