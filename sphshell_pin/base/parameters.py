@@ -44,8 +44,6 @@ class Parameter:
     above: float | None = None
     at_least: float | None = None
     at_most: float | None = None
-    log: bool | None = None
-    """Whether a slider multiplies (else it adds); None: it follows from the range."""
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -91,7 +89,6 @@ def parameter(
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
-    log: bool | None = None,
     **more: object,
 ) -> Any:
     """Return the field of a dataclass that is a parameter.
@@ -100,7 +97,7 @@ def parameter(
     (`min_length`). A field that is not made by this function cannot be stated in a file. Without
     `help` its meaning stands in the section "Parameters" of the docstring of a Component.
     """
-    about = Parameter(unit, label, help, above, at_least, at_most, log)
+    about = Parameter(unit, label, help, above, at_least, at_most)
     return field(default=default, metadata=_metadata(about) | about.bounds | more)
 
 

@@ -9,22 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from sphshell_pin.cli.common import (
-    ERROR,
-    CompiledOption,
-    DtOption,
-    DurationOption,
-    PackageDirOption,
-    ScenarioArgument,
-    SetOption,
-    changes_of,
-    command,
-    echo,
-    if_installed,
-    print_table,
-    progress_bar,
-    say,
-)
+from sphshell_pin.cli import common
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 if TYPE_CHECKING:
@@ -36,10 +21,10 @@ if TYPE_CHECKING:
 _MOST_FAILURES = 5
 
 
-@command()
+@common.command()
 def sweep(
     *,
-    scenario: ScenarioArgument,
+    scenario: common.ScenarioArgument,
     vary: list[str] | None = None,
     together: bool = False,
     dist: list[str] | None = None,
@@ -53,11 +38,11 @@ def sweep(
     scheduler: str | None = None,
     plot: list[str] | None = None,
     pictures: bool = True,
-    dt: DtOption = None,
-    duration: DurationOption = None,
-    compiled: CompiledOption = False,
-    set_: SetOption = None,
-    package_dir: PackageDirOption = None,
+    dt: common.DtOption = None,
+    duration: common.DurationOption = None,
+    compiled: common.CompiledOption = False,
+    set_: common.SetOption = None,
+    package_dir: common.PackageDirOption = None,
 ) -> None:
     """Run a scenario with many values, over processes or a Dask cluster; write one table.
 
@@ -89,7 +74,7 @@ def sweep(
     plan = plan_sweep(
         scenario,
         vary,
-        changes=changes_of(set_, dt, duration, compiled),
+        changes=common.changes_of(set_, dt, duration, compiled),
         together=together,
         dist=dist,
         sample=sample,
@@ -105,18 +90,14 @@ def sweep(
     file = out or Path("results") / name / "sweep.parquet"
     columns = "MofNCompleteColumn", "[red]{task.fields[failures]}[/red]", "TimeRemainingColumn"
     try:
-        with progress_bar("runs", *columns, total=None, failures="") as update:
+        with common.progress_bar("runs", *columns, total=None, failures="") as update:
 
             def progress(done: int, failed: int, total: int) -> None:
                 failures = f"{failed} failed" if failed else ""
                 update(completed=done, total=total, failures=failures)
 
             report = run_plan(
-                plan,
-                workers=workers,
-                scheduler=scheduler,
-                out=file,
-                progress=progress,
+                plan, workers=workers, scheduler=scheduler, out=file, progress=progress
             )
     except KeyboardInterrupt as stop:
         again = shlex.join(["sphshell-pin", *sys.argv[1:]])
@@ -124,7 +105,7 @@ def sweep(
     total = len(plan.runs)
     before = f"; {report.resumed} were done before" if report.resumed else ""
     done = f"{total - report.failed} done, {report.failed} failed{before}"
-    say(f": {total} runs, {done}", bold=name)
+    common.say(f": {total} runs, {done}", bold=name)
     figures = plot or _first_figures(report.table)
     if plan.points.parts:
         _print_sample(plan, report.table)
@@ -135,9 +116,9 @@ def sweep(
         analyses = _analyses(report.table, figure)
         files += _draw(file, report.table, figure, analyses) if pictures else []
     _print_failures(plan, report)
-    say(f"files: {', '.join(map(str, files))}")
+    common.say(f"files: {', '.join(map(str, files))}")
     if report.failed == total:
-        raise typer.Exit(ERROR)
+        raise typer.Exit(common.ERROR)
 
 
 def _first_figures(table: pd.DataFrame) -> list[str]:
@@ -157,12 +138,12 @@ def _draw(
 
     path = file.with_name(f"{file.stem}.{figure.replace('/', '_')}.png")
     try:
-        with if_installed():
+        with common.if_installed():
             if "design" in table:
                 return [write_figure(path, plot_uncertainty(table, figure, **analyses))]
             return [write_figure(path, plot_sweep(table, figure))]
     except InvalidParameter as fault:
-        echo(f"no picture: {fault}", err=True)
+        common.echo(f"no picture: {fault}", err=True)
     return []
 
 
@@ -176,7 +157,7 @@ def _print_ranges(table: pd.DataFrame) -> None:
         if not name.startswith("final.") and column.nunique() > 1:
             low, high = column.idxmin(), column.idxmax()
             rows.append((name, f"{column[low]:.6g}", f"{low}", f"{column[high]:.6g}", f"{high}"))
-    print_table(("figure", "smallest", "in run", "largest", "in run"), rows)
+    common.print_table(("figure", "smallest", "in run", "largest", "in run"), rows)
 
 
 def _print_sample(plan: Plan, table: pd.DataFrame) -> None:
@@ -187,7 +168,7 @@ def _print_sample(plan: Plan, table: pd.DataFrame) -> None:
     for key, one in plan.points.dists.items():
         ends = (f"{end:.6g}" for end in one.ppf([0.05, 0.5, 0.95]))
         inputs.append((key, *ends, plan.units.get(key, "")))
-    print_table(("input", "5 %", "median", "95 %", "unit"), inputs)
+    common.print_table(("input", "5 %", "median", "95 %", "unit"), inputs)
     try:
         found = quantiles(table)
     except InvalidParameter:  # only a tornado
@@ -198,8 +179,8 @@ def _print_sample(plan: Plan, table: pd.DataFrame) -> None:
             met.append((name.removeprefix("met."), f"{100 * row['mean']:.4g} % of the runs"))
         elif not name.startswith("final.") and row[5] < row[95]:
             rows.append((name, *(f"{one:.6g}" for one in row.iloc[:5]), f"{row['runs']:.0f}"))
-    print_table(("figure", "5 %", "25 %", "median", "75 %", "95 %", "runs"), rows)
-    print_table(("expectation", "met in"), met)
+    common.print_table(("figure", "5 %", "25 %", "median", "75 %", "95 %", "runs"), rows)
+    common.print_table(("expectation", "met in"), met)
 
 
 def _analyses(table: pd.DataFrame, figure: str) -> dict[str, pd.DataFrame]:
@@ -219,11 +200,11 @@ def _analyses(table: pd.DataFrame, figure: str) -> dict[str, pd.DataFrame]:
         try:
             found[name] = compute(table, figure)
         except InvalidParameter as fault:
-            echo(f"no {name}: {fault}", err=True)
+            common.echo(f"no {name}: {fault}", err=True)
             continue
         titles = (f"{name} of {figure}", *map(str, found[name].columns))
         rows = ((str(key), *(f"{x:.6g}" for x in row)) for key, row in found[name].iterrows())
-        print_table(titles, rows)
+        common.print_table(titles, rows)
     return found
 
 
@@ -233,6 +214,6 @@ def _print_failures(plan: Plan, report: SweepReport) -> None:
         values = [
             f"{key} = {row[key]} {plan.units.get(key, '')}".rstrip() for key in plan.points.values
         ]
-        echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
+        common.echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
     if len(failed) > _MOST_FAILURES:
-        echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)
+        common.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 import numpy as np
 
@@ -233,35 +233,45 @@ class FunctionLaw(OwnFunctions, NormalLaw, kind="function"):
 
 
 @dataclass(frozen=True)
-class FunctionFile(Component, kind="function", of=NormalLaw):
-    """A law of one's own as a scenario states it.
+class _OfFunction(Component):
+    """What a scenario states of a function of one's own.
 
     Parameters
     ----------
     function : "file.py:name" of the force
-    energy : "file.py:name" of the energy
     parameters : numbers by name
     """
 
     function: str = parameter()
-    energy: str | None = parameter(None)
     parameters: Mapping[str, float] | None = parameter(None)
 
     @property
     def files(self) -> tuple[str, ...]:
         """The files of the functions."""
-        named = [one for one in (self.function, self.energy) if one]
-        return tuple(one.rpartition(":")[0] for one in named)
+        named = self.function, getattr(self, "energy", None)
+        return tuple(one.rpartition(":")[0] for one in named if one)
+
+    def _build(self, folder: Path = Path()) -> NoReturn:
+        """Raise InvalidParameter: where nothing touches, no code is executed."""
+        must = "must be no function here: functions of one's own are for contacts and sources"
+        raise InvalidParameter("function", self.function, must)
+
+
+@dataclass(frozen=True)
+class FunctionFile(_OfFunction, kind="function", of=NormalLaw):
+    """A law of one's own as a scenario states it.
+
+    Parameters
+    ----------
+    energy : "file.py:name" of the energy
+    """
+
+    energy: str | None = parameter(None)
 
     def loaded(self, load: Callable[[str, str], object]) -> FunctionLaw:
         """Return the law; `load("file.py:name", key)` gives a function, `key` is that of here."""
         energy = load(self.energy, "energy") if self.energy else None
         return FunctionLaw(load(self.function, "function"), energy, self.parameters)
-
-    def _build(self, folder: Path = Path()) -> FunctionLaw:
-        """Raise InvalidParameter: where a law is no contact's, no code is executed."""
-        must = "must be no function here: laws of one's own are for contacts and sources"
-        raise InvalidParameter("law", self.function, must)
 
 
 _SLOW = 1e-6  # a slower slip bears a force in proportion [m/s]
@@ -333,28 +343,9 @@ class FunctionFriction(OwnFunctions, Friction, kind="function"):
 
 
 @dataclass(frozen=True)
-class FunctionFrictionFile(Component, kind="function", of=Friction):
-    """Friction of one's own as a scenario states it.
-
-    Parameters
-    ----------
-    function : "file.py:name" of the force
-    parameters : numbers by name
-    """
-
-    function: str = parameter()
-    parameters: Mapping[str, float] | None = parameter(None)
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """The file of the function."""
-        return (self.function.rpartition(":")[0],)
+class FunctionFrictionFile(_OfFunction, kind="function", of=Friction):
+    """Friction of one's own as a scenario states it."""
 
     def loaded(self, load: Callable[[str, str], object]) -> FunctionFriction:
         """Return the friction; `load("file.py:name", key)` gives a function."""
         return FunctionFriction(load(self.function, "function"), self.parameters)
-
-    def _build(self, folder: Path = Path()) -> FunctionFriction:
-        """Raise InvalidParameter: where friction is no contact's, no code is executed."""
-        must = "must be no function here: friction of one's own is for contacts and sources"
-        raise InvalidParameter("friction", self.function, must)

@@ -53,10 +53,7 @@ class HertzLaw(materials.TwoMaterials, NormalLaw, kind="hertz"):
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value outside its bounds, and for one of a pair."""
         super().__post_init__()
-        for one, other in (
-            ("restitution", "speed"),
-            ("loss_tangent", "frequency"),
-        ):
+        for one, other in (("restitution", "speed"), ("loss_tangent", "frequency")):
             pair = getattr(self, one), getattr(self, other)
             if (pair[0] is None) != (pair[1] is None):
                 must = "must be given together, or neither"

@@ -16,7 +16,7 @@ from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import scene_of
 from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene import Scene
-from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
+from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
 from sphshell_pin.patches.placed import PlacedPatches, load_in_polygons, patches_on
 
@@ -124,7 +124,7 @@ class TaxelGrid:
         Raises ResultError without patches or a scene, NameNotFound for an unknown pair.
         """
         scene = scene_of(result, scene)
-        pair = _pair(scene, self.pair)
+        pair = scene.pair(self.pair)
         if not pair.spheres:
             raise InvalidParameter("pair", self.pair, "must have a sphere for taxels to be on")
         own = pair.spheres[0]
@@ -231,7 +231,7 @@ class ShellTaxels:
         Raises ResultError without patches or a scene, NameNotFound for an unknown pair.
         """
         scene = scene_of(result, scene)
-        pair = _pair(scene, self.pair)
+        pair = scene.pair(self.pair)
         if not pair.shells:
             raise InvalidParameter("pair", self.pair, "must have a shell for taxels to be on")
         shell = pair.shells[0].shell
@@ -272,10 +272,3 @@ def same_shell(scene: Scene, pair: ContactPair) -> list[int]:
     """Return the numbers of the pairs that have the shell of `pair` in the same place."""
     keys = [one.key for one in pair.shells]
     return [k for k, other in enumerate(scene.pairs) if [one.key for one in other.shells] == keys]
-
-
-def _pair(scene: Scene, name: str) -> ContactPair:
-    for pair in scene.pairs:
-        if pair.name == name:
-            return pair
-    raise NameNotFound("pair", name, "the scene", [pair.name for pair in scene.pairs])

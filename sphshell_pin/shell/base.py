@@ -15,6 +15,7 @@ from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.faces import Face, faces_of
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.options import SIDES, check_size
+from sphshell_pin.shell.raw import in_use
 
 _ARRAYS: dict[str, npt.DTypeLike] = {
     **dict.fromkeys(("elements", "source_element", "element_face"), np.int32),
@@ -87,9 +88,8 @@ class ShellBase(Summarized):
             setattr(self, one, owned)
         self.straight = None if surface.straight is None else read_only(surface.straight.copy())
         # Without cleaning there may be vertices no element uses.
-        in_use = np.zeros(len(vertices), np.bool_)
-        in_use[triangles] = True
-        corners = vertices if in_use.all() else vertices[in_use]
+        used = in_use(triangles, len(vertices))
+        corners = vertices if used.all() else vertices[used]
         self.box = read_only(np.stack([corners.min(axis=0), corners.max(axis=0)]))
         self.size = float(np.linalg.norm(self.box[1] - self.box[0]))
         check_size(self.size)

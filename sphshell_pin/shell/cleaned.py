@@ -6,18 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array, Ints, Mask
+from sphshell_pin.base.arrays import Array, Ints, Kind, Mask, misfit
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.raw import moved_shapes
 
 AnyArray: TypeAlias = NDArray[Any]
 Arrays = Mapping[str, AnyArray]
-Known: TypeAlias = dict[str, tuple[str, tuple[str | int, ...]]]
-"""Numbers and shape of arrays by name: letters stand for sizes that several of them share."""
+Known = dict[str, Kind]
 ARRAYS: Known = {
     "vertices": ("f8", ("n", 3)),
     "elements": ("i4", ("m", 4)),
@@ -80,16 +78,9 @@ class CleanedSurface:
 
 def check_arrays(given: Arrays, known: Known, always: tuple[str, ...]) -> None:
     """Raise InvalidShell unless arrays have numbers and shapes as `known`, those `always` there."""
-    sizes: dict[str | int, int] = {3: 3, 4: 4, 9: 9}
-    for name, (kind, wanted) in known.items():
+    for name in always:
         if name not in given:
-            if name in always:
-                raise InvalidShell(f"it has no {name}")
-            continue
-        array = given[name]
-        fits = array.dtype == np.dtype(kind) and array.ndim == len(wanted)
-        if not fits or any(
-            sizes.setdefault(letter, size) != size
-            for letter, size in zip(wanted, array.shape, strict=True)
-        ):
-            raise InvalidShell(f"its {name} are {array.dtype} {array.shape}, not {kind} {wanted}")
+            raise InvalidShell(f"it has no {name}")
+    wanted = {name: one for name, one in known.items() if name in given}
+    if fault := misfit({name: (given[name].dtype, given[name].shape) for name in wanted}, wanted):
+        raise InvalidShell(f"of its arrays {fault}")

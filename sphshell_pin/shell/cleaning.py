@@ -18,7 +18,7 @@ from sphshell_pin.shell import orientation
 from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.polygons import Polygons, examine_quads, without_area
-from sphshell_pin.shell.raw import RawSurface, raw_surface
+from sphshell_pin.shell.raw import RawSurface, in_use, raw_surface
 from sphshell_pin.shell.tangent_joints import settle_joints
 
 WELD_TOLERANCE = 1e-7
@@ -138,20 +138,13 @@ def box_diagonal(points: Array) -> float:
     return float(np.linalg.norm([np.ptp(np.ascontiguousarray(points[:, k])) for k in range(3)]))
 
 
-def _in_use(corners: Ints, count: int) -> Mask:
-    """(count,) which vertices are corners."""
-    in_use = np.zeros(count, np.bool_)
-    in_use[corners] = True
-    return in_use
-
-
 def _without_unused(polygons: Polygons, vertices: Array) -> tuple[Polygons, Array]:
     """Return the polygons over the vertices they use, in the same order, and those."""
-    in_use = _in_use(polygons.corners, len(vertices))
-    if in_use.all():
+    used = in_use(polygons.corners, len(vertices))
+    if used.all():
         return polygons, np.ascontiguousarray(vertices)
-    place = np.cumsum(in_use, dtype=np.int32) - np.int32(1)
-    return polygons.renumbered(place), vertices[in_use]
+    place = np.cumsum(used, dtype=np.int32) - np.int32(1)
+    return polygons.renumbered(place), vertices[used]
 
 
 def _mend(
@@ -320,27 +313,17 @@ def _assemble(
     else:
         place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
         elements[polygons.polygon_of_slot, place] = polygons.corners
-    in_use = _in_use(triangles, len(vertices))
-    borders = orientation.find_borders(oriented, vertices)
+    used = in_use(triangles, len(vertices))
     starts = np.arange(0, triangles.size + 1, 3)
     health = ShellHealth(
         **found,
-        **borders,
+        **oriented.found,
+        **orientation.find_borders(oriented, vertices),
         vertices=len(vertices),
         elements=len(polygons),
         triangles=len(triangles),
         quads=len(triangles) - len(polygons),
-        size=box_diagonal(vertices if in_use.all() else vertices[in_use]),
-        area=float(oriented.area.sum()),
-        volume=oriented.volume,
-        flipped_elements=int(oriented.flipped.sum()),
-        reversed_components=oriented.reversed_components,
-        components=len(oriented.closed),
-        closed_components=int(oriented.closed.sum()),
-        cavities=oriented.cavities,
-        overlapping_components=oriented.overlapping,
-        one_sided_components=int(oriented.one_sided.sum()),
-        euler_number=oriented.euler_number,
+        size=box_diagonal(vertices if used.all() else vertices[used]),
         worst_shape=float(_core.mend_shapes(starts, triangles.reshape(-1), vertices).min()),
     )
     return CleanedSurface(

@@ -139,18 +139,9 @@ class ContactSet(Summarized):
 
     def _rows(self) -> Detail:
         headings = ("depth [m]", "point [m]", "normal", "feature", "element", "weight")
-        shown = range(min(len(self), MOST_ROWS))
-        rows = [
-            (
-                self.depth[k],
-                self.point[k],
-                self.normal[k],
-                Feature(int(self.feature[k])).name.lower(),
-                self.element[k],
-                self.weight[k],
-            )
-            for k in shown
-        ]
+        features = [Feature(int(one)).name.lower() for one in self.feature[:MOST_ROWS]]
+        columns = self.depth, self.point, self.normal, features, self.element, self.weight
+        rows = list(zip(*(one[:MOST_ROWS] for one in columns), strict=True))
         return Detail(headings, rows, len(self))
 
     def force(self, law: ElasticLaw) -> Array:

@@ -10,7 +10,7 @@ from sphshell_pin.base.arrays import Array, Bytes, Ints, Longs, Mask
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.faces import ambiguous_band, described, distances_from, not_exact
 from sphshell_pin.shell.health import LARGE_OF_TURNS, CurvatureReport, Place
-from sphshell_pin.shell.raw import area_vectors
+from sphshell_pin.shell.raw import area_vectors, in_use
 
 
 def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Array:
@@ -200,9 +200,7 @@ def _limits(shell: ShellBase, longest: Array) -> Array:
 
 def _any_at(shell: ShellBase, vertices: Ints) -> Mask:
     """(t,) which triangles have one of `vertices`."""
-    found = np.zeros(len(shell.vertices), np.bool_)
-    found[vertices] = True
-    return np.asarray(found[shell.triangles].any(axis=1))
+    return np.asarray(in_use(vertices, len(shell.vertices))[shell.triangles].any(axis=1))
 
 
 def _has_faces(shell: ShellBase) -> bool:

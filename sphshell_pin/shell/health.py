@@ -24,83 +24,40 @@ _WRONG_NORMALS = (
 )
 
 _REPAIRS = (
-    (
-        "welded_vertices",
-        "{welded_vertices:vertex} merged with another within {weld_tolerance:.3g} m (farthest "
-        "{weld_distance:.3g} m)",
-    ),
-    ("unused_vertices", "{unused_vertices:vertex is} used by no element and dropped"),
-    ("degenerate_elements", "{degenerate_elements:element} without area dropped"),
-    (
-        "duplicate_elements",
-        "{duplicate_elements:duplicate element} dropped ({opposite_duplicates} of opposite "
-        "winding)",
-    ),
-    ("t_junctions", "{t_junctions:vertex} put into open edges on which they lie (T-junctions)"),
-    (
-        "split_quads",
-        "{split_quads:quad} split into triangles ({warped_quads} not planar, {concave_quads} not "
-        "convex)",
-    ),
-    ("polygons", "{polygons:polygon} of up to {largest_polygon} corners triangulated"),
-    (
-        "largest_warp",
-        "the largest warp of a split element is {largest_warp:.3g} m (its farthest corner from its "
-        "mean plane)",
-    ),
-    (
-        "flipped_elements",
-        "{flipped_elements:element} turned over, among them {reversed_components:whole component}",
-    ),
-    (
-        "cavities",
-        "{cavities:closed component} inside another taken as a cavity and wound toward its inside",
-    ),
-    (
-        "missing_normals",
-        "{missing_normals:normal} zero or not finite, replaced by the element's own",
-    ),
-    ("rescaled_normals", "{rescaled_normals:normal} not of unit length, made so"),
-    ("turned_normals", "{turned_normals:normal} turned to the side of their element"),
+    "{welded_vertices:vertex} merged with another within {weld_tolerance:.3g} m (farthest "
+    "{weld_distance:.3g} m)",
+    "{unused_vertices:vertex is} used by no element and dropped",
+    "{degenerate_elements:element} without area dropped",
+    "{duplicate_elements:duplicate element} dropped ({opposite_duplicates} of opposite winding)",
+    "{t_junctions:vertex} put into open edges on which they lie (T-junctions)",
+    "{split_quads:quad} split into triangles ({warped_quads} not planar, {concave_quads} not "
+    "convex)",
+    "{polygons:polygon} of up to {largest_polygon} corners triangulated",
+    "the largest warp of a split element is {largest_warp:.3g} m (its farthest corner from its "
+    "mean plane)",
+    "{flipped_elements:element} turned over, among them {reversed_components:whole component}",
+    "{cavities:closed component} inside another taken as a cavity and wound toward its inside",
+    "{missing_normals:normal} zero or not finite, replaced by the element's own",
+    "{rescaled_normals:normal} not of unit length, made so",
+    "{turned_normals:normal} turned to the side of their element",
 )
-"""A count, and the sentence about it where it is not zero."""
+"""Sentences, each for a surface whose field that it names first is not zero."""
 
 _PROBLEMS = (
-    (
-        "holes",
-        "{holes:hole} in the surface, the largest of {hole_edges} open edges and "
-        "{largest_hole_area:.3g} m^2 near {hole_at:place}: unless it is meant, an element is "
-        "missing or has a wrong number of corners",
-    ),
-    (
-        "non_manifold_edges",
-        "{non_manifold_edges:edge} of three or more elements (non-manifold), one near "
-        "{non_manifold_at:place}: inside and outside are not defined there",
-    ),
-    (
-        "pinched_vertices",
-        "{pinched_vertices:vertex} at which elements meet that share no edge there (pinched), one "
-        "at {pinched_at:place}: unless it is meant, an element is missing beside it",
-    ),
-    (
-        "overlapping_components",
-        "{overlapping_components:closed component} partly inside another, or equal to it: taken as "
-        "a solid, not as a cavity",
-    ),
-    (
-        "one_sided_components",
-        "{one_sided_components:component} one-sided (like a Moebius strip): only "
-        'side="both" makes sense',
-    ),
-    (
-        "tangled_polygons",
-        "{tangled_polygons:polygon} whose outline crosses itself: triangulated as well as possible",
-    ),
-    (
-        "opposing_normals",
-        "{opposing_normals:normal} more than 90 degrees off the element (the worst by "
-        "{largest_normal_angle:degrees} degrees)",
-    ),
+    "{holes:hole} in the surface, the largest of {hole_edges} open edges and "
+    "{largest_hole_area:.3g} m^2 near {hole_at:place}: unless it is meant, an element is "
+    "missing or has a wrong number of corners",
+    "{non_manifold_edges:edge} of three or more elements (non-manifold), one near "
+    "{non_manifold_at:place}: inside and outside are not defined there",
+    "{pinched_vertices:vertex} at which elements meet that share no edge there (pinched), one "
+    "at {pinched_at:place}: unless it is meant, an element is missing beside it",
+    "{overlapping_components:closed component} partly inside another, or equal to it: taken as "
+    "a solid, not as a cavity",
+    "{one_sided_components:component} one-sided (like a Moebius strip): only "
+    'side="both" makes sense',
+    "{tangled_polygons:polygon} whose outline crosses itself: triangulated as well as possible",
+    "{opposing_normals:normal} more than 90 degrees off the element (the worst by "
+    "{largest_normal_angle:degrees} degrees)",
 )
 
 
@@ -128,7 +85,7 @@ class _Sentences(string.Formatter):
         return format(value, spec)
 
 
-_fill = _Sentences().format
+_fill, _PARSE = _Sentences().format, string.Formatter().parse
 
 
 @dataclass(frozen=True)
@@ -344,9 +301,11 @@ class ShellHealth:
         curved = () if self.curvature is None else self.curvature.problems
         return (*self._said(_PROBLEMS), *curved)
 
-    def _said(self, sentences: tuple[tuple[str, str], ...]) -> tuple[str, ...]:
+    def _said(self, sentences: tuple[str, ...]) -> tuple[str, ...]:
         found = {**vars(self), "split_quads": self.warped_quads + self.concave_quads}
-        return tuple(_fill(text, **found) for name, text in sentences if found[name])
+        firsts = (next(filter(None, (one[1] for one in _PARSE(text)))) for text in sentences)
+        said = zip(sentences, firsts, strict=True)
+        return tuple(_fill(text, **found) for text, name in said if found[name])
 
     def summary(self) -> str:
         """One line: what the surface is."""
@@ -370,10 +329,7 @@ class ShellHealth:
             ("surface", self.name),
             ("file", self.source or ""),
             ("unit", f"{self.unit}, {self.scale:.6g} m per file unit" if self.unit else ""),
-            (
-                "elements",
-                f"{self.elements} ({self._kinds()}), given {self.input_elements}",
-            ),
+            ("elements", f"{self.elements} ({self._kinds()}), given {self.input_elements}"),
             ("vertices", f"{self.vertices}, given {self.input_vertices}"),
             ("size", f"{self.size:.6g} m (box diagonal)"),
             ("area", f"{self.area:.6g} m^2"),

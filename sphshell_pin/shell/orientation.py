@@ -8,7 +8,7 @@ import numpy as np
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array, Ints, Longs, Mask
 from sphshell_pin.shell.polygons import Polygons, examine_quads
-from sphshell_pin.shell.raw import RawSurface, area_vectors
+from sphshell_pin.shell.raw import RawSurface, area_vectors, in_use
 
 Found = dict[str, Any]
 """Findings about a surface, under the names of ShellHealth's fields."""
@@ -38,11 +38,7 @@ def unit_normals(raw: RawSurface, found: Found) -> Array | None:
 
 
 def settle_normals(
-    table: Array,
-    polygons: Polygons,
-    vertices: Array,
-    found: Found,
-    turn: bool = True,
+    table: Array, polygons: Polygons, vertices: Array, found: Found, turn: bool = True
 ) -> Array:
     """Return normals (t, 3, 3) of the triangle corners, on the side of their elements.
 
@@ -125,28 +121,17 @@ class Oriented:
     ----------
     polygons : wound consistently
     component : (m,) of each polygon, connected across edges of exactly two polygons
-    closed : (components,) its directed edges cancel
-    one_sided : (components,) no consistent winding exists (a Moebius strip)
-    flipped : (m,) wound the other way than in the input
-    reversed_components : components turned as a whole
-    cavities : closed components inside another one, wound inward (away from the material)
-    overlapping : closed components partly inside another one
-    volume : enclosed by the closed components [m^3]
     area : (components,) [m^2]
-    euler_number : vertices - edges + polygons
+    found : among it how many elements are wound the other way than in the input, and of the
+        components how many were turned as a whole, are closed (their directed edges cancel), are
+        inside another one and wound inward (away from the material), or partly inside one, and
+        have no consistent winding (a Moebius strip)
     """
 
     polygons: Polygons
     component: Ints
-    closed: Mask
-    one_sided: Mask
-    flipped: Mask
-    reversed_components: int
-    cavities: int
-    overlapping: int
-    volume: float
     area: Array
-    euler_number: int
+    found: Found
 
 
 def orient(
@@ -203,21 +188,20 @@ def orient(
         turned = np.bincount(component, flip, number)
         reversed_components = int((turned == np.bincount(component, minlength=number)).sum())
     sign = np.where(inward, -1.0, 1.0)
-    used = np.zeros(len(vertices), np.bool_)
-    used[polygons.corners] = True
-    return Oriented(
-        polygons=polygons.reverse(flip),
-        component=component,
-        closed=closed,
-        one_sided=one_sided.astype(np.bool_),
-        flipped=flip,
-        reversed_components=reversed_components,
-        cavities=0 if keep_winding else int((closed & inward).sum()),
-        overlapping=overlapping,
-        volume=float((np.abs(volume) * sign)[closed].sum()),
-        area=total_area,
-        euler_number=int(used.sum()) - len(edges.users) + len(polygons),
-    )
+    used = int(in_use(polygons.corners, len(vertices)).sum())
+    found = {
+        "area": float(total_area.sum()),
+        "volume": float((np.abs(volume) * sign)[closed].sum()),
+        "flipped_elements": int(flip.sum()),
+        "reversed_components": reversed_components,
+        "components": number,
+        "closed_components": int(closed.sum()),
+        "cavities": 0 if keep_winding else int((closed & inward).sum()),
+        "overlapping_components": overlapping,
+        "one_sided_components": int((one_sided != 0).sum()),
+        "euler_number": used - len(edges.users) + len(polygons),
+    }
+    return Oriented(polygons.reverse(flip), component, total_area, found)
 
 
 def _places(vertices: Array, triangles: Ints, owner: Ints, wanted: Mask) -> tuple[Array, Ints]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import coal
 import numpy as np
 
-from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.base.arrays import Array, Longs, frame_along
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.raw import KINDS, NO_SHAPE, RawSurface, raw_surface
 
@@ -234,14 +234,7 @@ def _ball(radius: float) -> Callable[[int], float]:
 def _box(shape: coal.Box, _: float | None, __: int | None) -> RawSurface:
     half = np.array(shape.halfSide, np.float64)
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    elements = [
-        [0, 1, 3, 2],
-        [4, 6, 7, 5],
-        [0, 4, 5, 1],
-        [2, 3, 7, 6],
-        [0, 2, 6, 4],
-        [1, 5, 7, 3],
-    ]
+    elements = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     faces = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], float)
     return raw_surface(signs * half, elements, np.repeat(faces[:, None, :], 4, axis=1))
 
@@ -321,14 +314,9 @@ def _triangle(shape: coal.TriangleP, _: float | None, __: int | None) -> RawSurf
 def _square(shape: coal.Halfspace | coal.Plane, extent: float) -> RawSurface:
     """Return a square around the point nearest to the origin, wound along the shape's normal."""
     normal = np.array(shape.n, np.float64)
-    least = np.zeros(3)
-    least[int(np.argmin(np.abs(normal)))] = 1.0
-    across = np.cross(normal, least)
-    across /= np.linalg.norm(across)
-    other = np.cross(normal, across)
     half = 0.5 * extent
     corners = np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
-    points = float(shape.d) * normal + corners @ np.array([across, other])
+    points = float(shape.d) * normal + corners @ -frame_along(normal)[:, :2].T
     raw = raw_surface(points, [[0, 1, 2, 3]], np.broadcast_to(normal, (4, 3)))
     return raw.noting(f"a square of {extent:.6g} m stands for the endless {type(shape).__name__}")
 

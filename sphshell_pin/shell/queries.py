@@ -57,11 +57,7 @@ class Queries(ShellBase):
     """The contact and closest-point queries of a shell."""
 
     def contacts(
-        self,
-        center: npt.ArrayLike,
-        radius: float,
-        method: str = "smooth",
-        gradient: bool = False,
+        self, center: npt.ArrayLike, radius: float, method: str = "smooth", gradient: bool = False
     ) -> ContactSet:
         """Find every place where a sphere touches, deepest first.
 

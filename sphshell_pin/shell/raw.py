@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sphshell_pin.base.arrays import Array, Ints, Longs
+from sphshell_pin.base.arrays import Array, Ints, Longs, Mask
 from sphshell_pin.base.checks import as_floats
 from sphshell_pin.errors import InvalidShell
 
@@ -156,6 +156,13 @@ class RawSurface:
     def noting(self, *sentences: str) -> RawSurface:
         """Return the same surface with more `notes`."""
         return replace(self, notes=(*self.notes, *sentences))
+
+
+def in_use(corners: Ints, count: int) -> Mask:
+    """(count,) which vertices are corners."""
+    used = np.zeros(count, np.bool_)
+    used[corners] = True
+    return used
 
 
 def area_vectors(corners: Array) -> Array:

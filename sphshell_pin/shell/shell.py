@@ -19,10 +19,10 @@ from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.cad.framing import check_frame
 from sphshell_pin.shell.cad.kept_surface import KeptSurface, Read
 from sphshell_pin.shell.cad.process import run_in_child, warn_caller
-from sphshell_pin.shell.cleaning import box_diagonal, clean_surface
+from sphshell_pin.shell.cleaning import box_diagonal, clean_surface, take_surface
 from sphshell_pin.shell.options import CREASE_ANGLE, check_options
 from sphshell_pin.shell.queries import Queries
-from sphshell_pin.shell.raw import RawSurface
+from sphshell_pin.shell.raw import RawSurface, raw_surface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
 from sphshell_pin.units import METERS_PER_UNIT, meters_per_unit
 
@@ -203,9 +203,6 @@ class Shell(Queries):
         clean: bool = True,
         faces: bool = True,
     ) -> None:
-        from sphshell_pin.shell.cleaning import clean_surface, take_surface
-        from sphshell_pin.shell.raw import raw_surface
-
         check_options(crease_angle, side)
         made = clean_surface if check_flag("clean", clean) else take_surface
         surface = made(raw_surface(vertices, elements, normals))
@@ -269,9 +266,6 @@ class Shell(Queries):
         MissingExtra
             If the library that reads CAD files is not installed.
         """
-        from sphshell_pin.shell.cad import CadOptions
-        from sphshell_pin.shell.shell import load_surface
-
         check_options(crease_angle, side)
         named = None if isinstance(faces, bool) else faces
         options = CadOptions(chord_error, bodies, named, sew, time_limit, memory_limit)
@@ -314,7 +308,6 @@ class Shell(Queries):
         InvalidParameter
             If the geometry is of another kind, or an option is out of range.
         """
-        from sphshell_pin.shell.cleaning import clean_surface
         from sphshell_pin.shell.primitives import geometry_surface
 
         check_options(crease_angle, side)

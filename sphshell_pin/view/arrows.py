@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from meshcat import Visualizer
 
     from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
-    from sphshell_pin.view.contact_path import ContactRows
 
 NORMAL_COLOR = 0xD4202A
 FRICTION_COLOR = 0xF08A00
@@ -27,10 +26,6 @@ HEAD_LENGTH = 6.5  # in half widths of the shaft
 SAME_CONTACT = 30.0  # likewise: farther away it is another contact
 
 ArrowKind = Literal["components", "total"]
-
-
-Contacts: TypeAlias = "SceneContacts | ContactRows"
-"""Points and normals (k, 3), forces and pairs (k,) of contacts, in the world."""
 
 
 def nice(value: float) -> float:
@@ -84,7 +79,7 @@ class ArrowScale:
         return f"{self.reference_length * 1e3:g} mm = {self.reference_force:g} N"
 
 
-def largest_force(contacts: Contacts) -> Array:
+def largest_force(contacts: SceneContacts) -> Array:
     """Magnitude (k,) of the total force of each contact [N]."""
     total = contacts.normal_world * contacts.normal_force[:, None] + contacts.friction_force_world
     return np.asarray(np.linalg.norm(total, axis=1))
@@ -99,7 +94,7 @@ class Forces:
     friction: Array
 
 
-def pushing(contacts: Contacts) -> Forces:
+def pushing(contacts: SceneContacts) -> Forces:
     """Return the forces of `contacts` (k,) without saddles, with the same sum.
 
     A saddle takes off what two contacts of its pair push too much, and would be an arrow that

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 
-from sphshell_pin.base.arrays import Array, Longs, Mask
+from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import ContactLog, Patches
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -16,48 +15,31 @@ from sphshell_pin.patches.placed import poses_along
 LARGEST = 1e15  # beyond this, [m] or [N], nothing can be drawn
 
 
-@dataclass(frozen=True)
-class ContactRows:
-    """Some rows of a contact log, world frame [m], [N]; `pair` (k,) indexes the scene's pairs.
+@dataclass(frozen=True, repr=False)
+class ContactRows(ContactLog):
+    """A contact log that can be drawn, ordered by row.
 
-    `patches` (k,) are those of the contacts, None where they were not recorded.
+    `patches` (m,) are those of the contacts, None where they were not recorded.
     """
 
-    row: Longs
-    pair: Longs
-    point_world: Array
-    normal_world: Array
-    normal_force: Array
-    friction_force_world: Array
     patches: Patches | None = None
 
     @classmethod
     def of(cls, log: ContactLog, patches: Patches | None = None) -> ContactRows:
-        """Take the columns of a Result's contact log, and its patches, ordered by row.
+        """Take a Result's contact log, and its patches.
 
         The end of a run that diverged may hold numbers no picture can show: they are left out.
         """
-        columns: dict[str, Any] = {"patches": patches}
-        for name in [one.name for one in fields(cls) if one.name != "patches"]:
-            columns[name] = np.asarray(getattr(log, name))
-        rows = cls(**columns).select(np.argsort(columns["row"], kind="stable"))
-        vectors = (rows.point_world, rows.normal_world, rows.friction_force_world)
+        rows = cls(**{f.name: getattr(log, f.name) for f in fields(log)}, patches=patches)
+        rows = rows.select(np.argsort(rows.row, kind="stable"))
         sound = np.abs(rows.normal_force) < LARGEST
-        for vector in vectors:
+        for vector in (rows.point_world, rows.normal_world, rows.friction_force_world):
             sound &= (np.abs(vector) < LARGEST).all(axis=1)
         return rows if sound.all() else rows.select(sound)
 
-    def select(self, chosen: slice | Longs | Mask) -> ContactRows:
-        """Return the entries that `chosen`, a slice, mask or indices, picks."""
-        columns: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
-        for name, column in columns.items():
-            columns[name] = None if column is None else column[chosen]
-        return ContactRows(**columns)
-
     def at(self, row: int) -> ContactRows:
         """Return the contacts of the recorded `row`."""
-        first, last = np.searchsorted(self.row, (row, row + 1))
-        return self.select(slice(int(first), int(last)))
+        return self.select(slice(*np.searchsorted(self.row, (row, row + 1))))
 
 
 @dataclass(frozen=True)

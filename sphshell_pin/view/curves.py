@@ -1,11 +1,8 @@
 """The curves and figures of a run that a recording shows under its scene."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -13,14 +10,11 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import PairSeries
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View
-from sphshell_pin.view.contact_path import LARGEST
+from sphshell_pin.view.contact_path import LARGEST, ContactRows
 from sphshell_pin.view.meshes import pack_numbers
 from sphshell_pin.view.nodes import Json
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.scene.scene import Scene
-    from sphshell_pin.view.contact_path import ContactRows
 
 CLOSE = 8.0  # radii of the sphere around it that a close-up shows, at least
 

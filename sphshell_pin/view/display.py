@@ -12,7 +12,7 @@ from sphshell_pin.dynamics.result.result_parts import Patches
 from sphshell_pin.dynamics.scene.sides import PlaneSide
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import nodes
-from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, Contacts, pushing
+from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, pushing
 from sphshell_pin.view.bodies import (
     COLORINGS,
     DrawnPlane,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from meshcat import Visualizer
     from numpy.typing import ArrayLike
 
-    from sphshell_pin.dynamics.scene.scene import Scene
+    from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 
 TRAIL_COLOR = 0x8E1B8E
 
@@ -118,7 +118,7 @@ class Display:
         draw_grid(self.visualizer["grid"], self.view, self._floor)
 
     def update(
-        self, q: ArrayLike, contacts: Contacts | None = None, patches: Patches | None = None
+        self, q: ArrayLike, contacts: SceneContacts | None = None, patches: Patches | None = None
     ) -> None:
         """Show configuration `q` (nq,) and `contacts` (of `scene.contacts`, or None for none).
 

@@ -10,11 +10,13 @@ import numpy as np
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result_parts import Patches
 from sphshell_pin.view import nodes
-from sphshell_pin.view.arrows import Contacts, strongest
+from sphshell_pin.view.arrows import strongest
 from sphshell_pin.view.surface import between_rings, ramp_colors
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
+
+    from sphshell_pin.dynamics.scene.scene import SceneContacts
 
 RAMP = ("#0d0887", "#6a00a8", "#b12a90", "#e16462", "#fca636", "#f0f921")
 """From no pressure to the largest: colors of matplotlib's plasma, evenly spaced."""
@@ -76,7 +78,7 @@ class PatchPool:
             self._moves.append(moves)
         self._hidden = nodes.hidden_at(np.zeros(3))
 
-    def update(self, contacts: Contacts | None, patches: Patches, scale: PatchScale) -> None:
+    def update(self, contacts: SceneContacts | None, patches: Patches, scale: PatchScale) -> None:
         """Show `patches` (k,) of `contacts` at `scale`: the largest forces, if there are many."""
         force = np.zeros(0) if contacts is None else contacts.normal_force
         shown = strongest(force, self.size)
@@ -91,7 +93,7 @@ class PatchPool:
                 move(matrix if number == level else waiting)
 
     def _place(
-        self, contacts: Contacts, k: int, patches: Patches, scale: PatchScale
+        self, contacts: SceneContacts, k: int, patches: Patches, scale: PatchScale
     ) -> tuple[int, Array]:
         patch = patches[k]
         normal, axis = contacts.normal_world[k], patch["axis_world"]

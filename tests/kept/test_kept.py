@@ -167,7 +167,7 @@ WRONG: dict[str, tuple[Change, str]] = {
     "kind of face": (added(f"{VALVE}face_shapes", 77.0), "its face_shapes do not fit"),
     "numbers": (
         lambda _, arrays: arrays.update({f"{PLATE}vertices": np.zeros((4, 3), np.int32)}),
-        r"its vertices are int32 \(4, 3\), not f8",
+        "of its arrays 'vertices' holds int32, not float64",
     ),
 }
 

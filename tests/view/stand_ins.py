@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.result.result_parts import ContactLog
 from sphshell_pin.dynamics.result.run_stats import RunStats
 from tests import models
 
@@ -51,10 +52,11 @@ def contact_log(rows):
         "slip_velocity_world": np.zeros(3),
         "element": 0,
         "feature": 0,
+        "contact_id": 0,
     }
     # One row more gives every column its shape and kind.
     filled = [{**defaults, **row} for row in (*rows, {})]
-    return SimpleNamespace(**{key: np.array([row[key] for row in filled])[:-1] for key in defaults})
+    return ContactLog(**{key: np.array([row[key] for row in filled])[:-1] for key in defaults})
 
 
 def a_result(t, q, rows=(), pairs=("tip",), **energy):

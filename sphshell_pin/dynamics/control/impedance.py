@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -16,13 +16,11 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.parameters import parameter
 from sphshell_pin.dynamics.control.controllers import Controller, Gain, Posture, ShellPlace
 from sphshell_pin.dynamics.control.target_path import Curve, Timing, path_fields
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.result import Result
 
 __all__ = ["CartesianImpedance"]
 

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from sphshell_pin.base.arrays import Announced, Kind, misfit
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.regular_file import open_regular
@@ -38,8 +39,6 @@ if TYPE_CHECKING:
 
 LARGEST_HEADER = 1 << 26  # characters; a million events need less
 
-Kind = tuple[np.dtype[np.generic], tuple[str | int, ...]]
-_Announced = tuple[np.dtype[np.generic], tuple[int, ...]]
 
 FLOAT, INT, LONG, BYTE = (np.dtype(one) for one in ("f8", "i4", "i8", "u1"))
 
@@ -303,18 +302,16 @@ def _wanted(names: Collection[str]) -> Mapping[str, Kind]:
     return {name: kind for part in (ARRAYS, *parts) for name, kind in part.items()}
 
 
-def _check_kinds(announced: Mapping[str, _Announced], wanted: Mapping[str, Kind]) -> None:
+def _check_kinds(announced: Mapping[str, Announced], wanted: Mapping[str, Kind]) -> None:
     """Raise _Fault unless all arrays are there, of their type and shape."""
     for name in ("header", *wanted):
         if name not in announced:
             raise _Fault(f"it has no array '{name}'")
-        kind, shape = announced[name]
-        if name == "header":
-            if kind.kind != "U" or shape != () or kind.itemsize > 4 * LARGEST_HEADER:
-                raise _Fault(f"'header' is no text but {kind} {shape}")
-        elif kind != wanted[name][0]:
-            raise _Fault(f"'{name}' holds {kind}, not {wanted[name][0]}")
-    _check_shapes({name: shape for name, (_, shape) in announced.items()}, wanted)
+    text, shape = announced["header"]
+    if text.kind != "U" or shape != () or text.itemsize > 4 * LARGEST_HEADER:
+        raise _Fault(f"'header' is no text but {text} {shape}")
+    if fault := misfit(announced, wanted):
+        raise _Fault(fault)
     for name, (kind, _) in announced.items():
         if name.startswith(KEPT) and kind not in _KEPT_KINDS:
             raise _Fault(f"'{name}' holds {kind}")
@@ -330,7 +327,7 @@ def _checked(text: str, arrays: Columns) -> Header:
     return header
 
 
-def _announced(archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str) -> _Announced:
+def _announced(archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str) -> Announced:
     """Return type and shape that an array announces; its bytes must be as many."""
     with archive.open(file) as stream, warnings.catch_warnings():
         warnings.simplefilter("error")  # numpy warns of headers that it would repair
@@ -348,23 +345,6 @@ def _announced(archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str) -> _A
                 f"'{name}' announces {size} bytes and has {file.file_size - stream.tell()}"
             )
     return kind, shape
-
-
-def _check_shapes(
-    shapes: dict[str, tuple[int, ...]],
-    arrays: Mapping[str, Kind],
-) -> None:
-    sizes: dict[str | int, tuple[int, str]] = {2: (2, ""), 3: (3, "")}
-    for name, (_, wanted) in arrays.items():
-        shape = shapes[name]
-        called = f"({', '.join(map(str, wanted))}{',' * (len(wanted) == 1)})"
-        if len(shape) != len(wanted):
-            raise _Fault(f"'{name}' has the shape {shape}, not {called}")
-        for size, letter in zip(shape, wanted, strict=True):
-            known, owner = sizes.setdefault(letter, (size, name))
-            if size != known:
-                of = f" with {letter} = {known} as of '{owner}'" if owner else ""
-                raise _Fault(f"'{name}' has the shape {shape}, not {called}{of}")
 
 
 def _array(archive: zipfile.ZipFile, file: zipfile.ZipInfo) -> NDArray[np.generic]:
@@ -427,6 +407,4 @@ def _check_sensitivities(arrays: Columns, names: list[str]) -> None:
         raise _Fault("it has no array 'sensitivities.q'")
     columns = 0 if rows is None else rows.shape[-1]
     if columns != len(names) or len(set(names)) < len(names):
-        raise _Fault(
-            f"header.sensitivities does not name each of {columns} columns once: {names}",
-        )
+        raise _Fault(f"header.sensitivities does not name each of {columns} columns once: {names}")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
@@ -42,10 +42,7 @@ def check_record(record: Collection[str]) -> frozenset[str]:
 
 def patch_columns(patches: Patches) -> dict[str, Array]:
     """Return patches as named scalar columns, units in the names (for CSV, tables)."""
-    columns = {
-        "half_axis_a [m]": patches["half_axes"][:, 0],
-        "half_axis_b [m]": patches["half_axes"][:, 1],
-    }
+    columns = {f"half_axis_{a} [m]": patches["half_axes"][:, i] for i, a in enumerate("ab")}
     columns |= {f"patch_axis_{a} [1]": patches["axis_world"][:, i] for i, a in enumerate("xyz")}
     pressures = {f"{n} [Pa]": patches[n] for n in ("peak_pressure", "mean_pressure")}
     return columns | pressures | {"approach [m]": patches["approach"]}
@@ -158,10 +155,16 @@ class ContactLog(SceneContacts):
     def _rows(self) -> None:
         return None  # its entries are those of many moments
 
+    def select(self, chosen: slice | Longs | Mask) -> Self:
+        """Return the entries that `chosen`, a slice, mask or indices, picks."""
+        columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        for name, one in columns.items():
+            columns[name] = None if one is None else one[chosen]
+        return type(self)(**columns)
+
     def of_pair(self, pair: int) -> ContactLog:
         """Return the entries of one pair."""
-        keep = self.pair == pair
-        return ContactLog(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
+        return self.select(self.pair == pair)
 
     def at_row(self, row: int) -> SceneContacts:
         """Return the contacts of one of the result's rows."""
@@ -219,14 +222,8 @@ class EnergyAudit(Summarized):
     @property
     def total(self) -> Array:
         """Energy stored and lost, less the controller's work (n,) [J]: it should not change."""
-        return (
-            self.kinetic
-            + self.potential
-            + self.elastic
-            + self.damping_loss
-            + self.friction_loss
-            - self.control_work
-        )
+        stored = self.kinetic + self.potential + self.elastic
+        return stored + self.damping_loss + self.friction_loss - self.control_work
 
     @property
     def residual(self) -> Array:

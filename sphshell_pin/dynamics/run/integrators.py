@@ -4,13 +4,7 @@ from dataclasses import dataclass
 
 from sphshell_pin.base.parameters import Component, parameter, same_parameter
 
-__all__ = [
-    "Adaptive",
-    "Implicit",
-    "LinearlyImplicitEuler",
-    "RungeKutta4",
-    "SemiImplicitEuler",
-]
+__all__ = ["Adaptive", "Implicit", "LinearlyImplicitEuler", "RungeKutta4", "SemiImplicitEuler"]
 
 
 class Integrator(Component):

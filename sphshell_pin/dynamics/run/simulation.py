@@ -7,7 +7,7 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core, errors
-from sphshell_pin.base.checks import check_not_negative
+from sphshell_pin.base.checks import check_not_negative, check_type
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import RunState
@@ -29,23 +29,16 @@ class Simulation(Summarized):
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        integrator: Integrator | None = None,
-        sensors: Iterable[Sensor] = (),
+        self, scene: Scene, integrator: Integrator | None = None, sensors: Iterable[Sensor] = ()
     ) -> None:
         if not isinstance(scene, Scene):
             raise errors.InvalidParameter(
                 "scene", type(scene).__name__, "must be a sphshell_pin.Scene"
             )
         integrator = Adaptive() if integrator is None else integrator
-        if not isinstance(integrator, Integrator):
-            raise errors.InvalidParameter(
-                "integrator",
-                integrator,
-                "must be Adaptive(rtol), Implicit(rtol), SemiImplicitEuler(dt), RungeKutta4(dt) or "
-                "LinearlyImplicitEuler(dt)",
-            )
+        fixed = "SemiImplicitEuler(dt), RungeKutta4(dt) or LinearlyImplicitEuler(dt)"
+        must = f"must be Adaptive(rtol), Implicit(rtol), {fixed}"
+        check_type("integrator", integrator, Integrator, must)
         self.scene = scene
         self.integrator = integrator
         self.sensors = check_sensors(sensors)

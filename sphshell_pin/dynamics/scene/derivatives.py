@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.base.arrays import Array, Ints
+from sphshell_pin.base.arrays import Array, Ints, frame_along
 from sphshell_pin.base.named_numbers import NamedNumber, every_column, names_of_pairs, with_value
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.scene.explain import explain_pairs, relaxation_time
@@ -57,7 +57,7 @@ def constraints_of(
     for k, point, normal, depth in zip(*columns, strict=True):
         pair = pairs[k]
         # The point is on the shell, or on the plane, which has the part of the sphere.
-        on_shell = pin.SE3(_frame(normal), point)
+        on_shell = pin.SE3(frame_along(normal), point)
         on_sphere = pin.SE3(on_shell.rotation, point - depth * normal)
         if isinstance(pair.side_i, PlaneSide):
             on_shell, on_sphere = pin.SE3(on_shell.rotation, point + depth * normal), on_shell
@@ -69,13 +69,6 @@ def constraints_of(
         stiffness = pair.plane_law.normal_stiffness(float(depth))
         compliance.append(1.0 / stiffness if stiffness > 0.0 else np.inf)
     return ContactConstraints(models, contacts.depth, np.array(compliance), contacts.pair)
-
-
-def _frame(normal: Array) -> Array:
-    """Return a rotation (3, 3) whose z is `normal`."""
-    x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
-    x /= np.linalg.norm(x)
-    return np.column_stack((x, np.cross(normal, x), normal))
 
 
 # Values of Parameter in C++.
@@ -186,11 +179,7 @@ def core_parameters(
 
 
 def _core_parameter(
-    scene: Scene,
-    column: str,
-    number: NamedNumber,
-    place: int,
-    start: tuple[Array, Array] | None,
+    scene: Scene, column: str, number: NamedNumber, place: int, start: tuple[Array, Array] | None
 ) -> _core.Parameter:
     if number.path in _PLACES:
         return _core.Parameter(number.at, _PLACES[number.path], place)

@@ -222,10 +222,7 @@ class JointComponents:
             return None
         lower, upper = self._efforts(model)
         core = _core.JointEffects(
-            self._each(model, "damping", 0.0),
-            lower,
-            upper,
-            self._each(model, "speed", math.inf),
+            self._each(model, "damping", 0.0), lower, upper, self._each(model, "speed", math.inf)
         )
         for _, in_q, in_v, end, sign, law in self._stops(model):
             core.add_stop(in_q, in_v, end, sign, law._binding)

@@ -16,6 +16,7 @@ from sphshell_pin.errors import SphshellError
 
 # [rad, m] Between a joint's stated position and the one that its mimic rule gives it.
 _OFF = 1e-6
+_WITHOUT = "load the robot with mimic = false"
 
 # Constant for every joint of a model. Limits are those of the joint that the others mimic.
 _SUMMED_SQUARE = ("damping", "armature")
@@ -124,7 +125,7 @@ def check_follows(rule: Mimic, value: float, of: float) -> None:
     if abs(value - wanted) > _OFF * max(1.0, abs(wanted)):
         raise SphshellError(
             f"joint '{rule.joint}' cannot be at {value:.9g}: it mimics '{rule.of}', {rule}, which "
-            f"puts it at {wanted:.9g}; leave it out, or load the robot with mimic = false"
+            f"puts it at {wanted:.9g}; leave it out, or {_WITHOUT}"
         )
 
 
@@ -147,26 +148,22 @@ def _groups(model: pin.Model, rules: list[Mimic]) -> dict[str, dict[str, tuple[f
     by_name = {rule.joint: rule for rule in rules}
     groups: dict[str, dict[str, tuple[float, float]]] = {}
     for rule in by_name.values():
+        said = f"joint '{rule.joint}' mimics '{rule.of}'"
         for name in (rule.joint, rule.of):
             if name not in names:
-                raise SphshellError(
-                    f"joint '{rule.joint}' mimics '{rule.of}', but the robot has no joint '{name}' "
-                    "that moves: correct the name in the file, or load it with mimic = false"
-                )
+                why = f"{said}, but the robot has no joint '{name}' that moves"
+                raise SphshellError(f"{why}: correct the name in the file, or {_WITHOUT}")
             if model.joints[model.getJointId(name)].nv != 1:
                 raise SphshellError(
-                    f"joint '{rule.joint}' mimics '{rule.of}', but '{name}' has several degrees of "
-                    "freedom: load the robot with mimic = false"
+                    f"{said}, but '{name}' has several degrees of freedom: {_WITHOUT}"
                 )
         ratio, offset, root, seen = rule.ratio, rule.offset, rule.of, {rule.joint}
         if not np.isfinite([ratio, offset]).all():
-            raise SphshellError(f"joint '{rule.joint}' mimics '{rule.of}' by no finite numbers")
+            raise SphshellError(f"{said} by no finite numbers")
         while root in by_name:
             if root in seen:
-                raise SphshellError(
-                    f"joint '{rule.joint}' mimics '{rule.of}', which in the end mimics '{root}' "
-                    "again: one joint of a group must mimic none"
-                )
+                why = f"{said}, which in the end mimics '{root}' again"
+                raise SphshellError(f"{why}: one joint of a group must mimic none")
             seen.add(root)
             next_rule = by_name[root]
             ratio, offset = ratio * next_rule.ratio, ratio * next_rule.offset + offset
@@ -184,10 +181,8 @@ def _grouped(
     ratio, offset = members[leader]
     for name, (one, _) in members.items():
         if one == 0.0:
-            raise SphshellError(
-                f"joint '{name}' mimics '{root}' with multiplier 0: make it a fixed joint, or load "
-                "the robot with mimic = false"
-            )
+            why = f"joint '{name}' mimics '{root}' with multiplier 0"
+            raise SphshellError(f"{why}: make it a fixed joint, or {_WITHOUT}")
     kinds = {model.joints[model.getJointId(name)].nq for name in order}
     if len(kinds) > 1:
         raise SphshellError(

@@ -64,16 +64,9 @@ class SceneContacts(Summarized):
 
     def _rows(self) -> Detail | None:
         headings = ("pair", "normal force [N]", "friction force [N]", "depth [m]", "point [m]")
-        rows = [
-            (
-                self.pair[k],
-                self.normal_force[k],
-                float(np.linalg.norm(self.friction_force_world[k])),
-                self.depth[k],
-                self.point_world[k],
-            )
-            for k in range(min(len(self), MOST_ROWS))
-        ]
+        friction = np.linalg.norm(self.friction_force_world, axis=1)
+        columns = self.pair, self.normal_force, friction, self.depth, self.point_world
+        rows = list(zip(*(one[:MOST_ROWS] for one in columns), strict=True))
         return Detail(headings, rows, len(self))
 
     @property

@@ -1,9 +1,7 @@
 """Parameters of a scene's contact pairs, and of sensors, that differ from run to run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TypeGuard, TypeVar
+from typing import TypeGuard, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -17,11 +15,9 @@ from sphshell_pin.base.named_numbers import (
     with_value,
 )
 from sphshell_pin.dynamics.scene.pairs import ContactPair
+from sphshell_pin.dynamics.scene.scene import Scene
+from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import InvalidParameter
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.scene.scene import Scene
-    from sphshell_pin.dynamics.sensing.sensors import Sensor
 
 T = TypeVar("T")
 
@@ -51,11 +47,7 @@ class Variations:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        vary: Mapping[str, object],
-        count: int,
-        sensors: tuple[Sensor, ...] = (),
+        self, scene: Scene, vary: Mapping[str, object], count: int, sensors: tuple[Sensor, ...] = ()
     ) -> None:
         self._scene, self._sensors = scene, sensors
         of_pairs, of_sensors = names_of_pairs(scene.pairs), names_of_sensors(sensors)

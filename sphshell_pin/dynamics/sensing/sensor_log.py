@@ -72,11 +72,7 @@ class SensorLog(Summarized):
 
 
 def split_logs(
-    columns: Mapping[str, tuple[str, ...]],
-    which: Ints,
-    t: Array,
-    sampled: Array,
-    values: Array,
+    columns: Mapping[str, tuple[str, ...]], which: Ints, t: Array, sampled: Array, values: Array
 ) -> dict[str, SensorLog]:
     """Return the log of each sensor; the arguments are `joined_logs`'."""
     if not columns:
@@ -91,9 +87,7 @@ def split_logs(
     return logs
 
 
-def joined_logs(
-    sensors: Mapping[str, SensorLog],
-) -> tuple[Ints, Array, Array, Array]:
+def joined_logs(sensors: Mapping[str, SensorLog]) -> tuple[Ints, Array, Array, Array]:
     """Return all readings, one sensor after the other.
 
     They are: the number of the sensor, when each arrived and when it was taken (s,) [s], and the

@@ -202,7 +202,7 @@ def _range(
         low = value / DECADE if low is None else low
         if high is None:
             high = value * DECADE if about.at_most is None else min(value * DECADE, about.at_most)
-    log = section.log if section.log is not None else about.log
+    log = section.log
     if log is None:
         # A range that was given spans what one wants to see, in plain steps unless it is wide.
         log = low is not None and high is not None and low > 0 and high >= DECADE * low

@@ -22,7 +22,7 @@ from sphshell_pin.scenario.format.build import Built, rebuild
 from sphshell_pin.scenario.format.reading import look_up
 from sphshell_pin.scenario.format.sliders import LiveParameter, live_parameters
 from sphshell_pin.scenario.live import acting
-from sphshell_pin.scenario.running.rows import Rows, Series, held, series_of
+from sphshell_pin.scenario.running.rows import Rows, Series, series_of
 
 # Between the rows for a chart [s].
 ROW_DT = 5e-3
@@ -171,15 +171,7 @@ class LiveRun:
             self._row = self._run.snapshot()
 
     def _rows(self, rows: Result) -> Rows:
-        more = {"q": rows.q, "v": rows.v, "residual": (rows.energy.total - self._total)[:, None]}
-        if rows.torque is not None:
-            more["torque"] = rows.torque
-        for name, log in rows.sensors.items():
-            more[f"sensor.{name}"] = held(log, rows.t, self._readings.get(name))
-            if len(log):
-                self._readings[name] = log.values[-1]
-        pairs = len(self.scene.pairs)
-        return Rows.of(rows.t, pairs, rows.contacts, rows.contacts.row, more)
+        return Rows.from_result(rows, rows.energy.total - self._total, self._readings)
 
     @one_at_a_time
     def advance(self, duration: float, wall: float = math.inf) -> Rows:

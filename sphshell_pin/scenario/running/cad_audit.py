@@ -1,28 +1,22 @@
 """The contacts of a run beside the exact faces of the CAD file that their shell was made of."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array, Ints, Mask
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_parts import ContactLog
 from sphshell_pin.errors import SphshellError, UnitWarning
 from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.scenario.format.schema import ShellSection
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.contact_set import Feature
-
-if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result.result import Result
-    from sphshell_pin.dynamics.result.result_parts import ContactLog
-    from sphshell_pin.scenario.format.schema import ShellSection
-
 
 NOWHERE, ON_FACE = 0, 2
 """Kinds of places next to a contact, as `cad.jobs.stationary_points` returns them."""
@@ -209,12 +203,12 @@ def _feet(
     )
     scale = section.scale if isinstance(section.scale, int | float) else 1.0
     arguments = (file, section.unit, options, (scale, section.magnify), centers, points)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnitWarning)  # reported when the shell was made
-        points, normals, kinds = run_in_child(
+    # It was reported when the shell was made.
+    with warnings.catch_warnings(action="ignore", category=UnitWarning):
+        found: tuple[Array, Array, Ints] = run_in_child(
             "stationary_points", arguments, file, "--audit-cad", options
         )
-    return points, normals, kinds
+    return found
 
 
 def _largest_and_rms(values: Array) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, s
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import LiveParameter
 from sphshell_pin.scenario.running.kept_scenario import restore
-from sphshell_pin.scenario.running.rows import Rows, Series, held, series_of
+from sphshell_pin.scenario.running.rows import Rows, Series, series_of
 
 # What moves the bodies, and what judges the outcome, is not needed to show them.
 UNSHOWN = ("controller", "sensor", "figures", "expect", "knob")
@@ -77,7 +77,8 @@ class Replay:
         self._check()
         # A run that diverged is shown up to where its numbers end.
         self._count = sound_rows(self._name, self.result.q, self.result.v)
-        self._rows = self._all_rows()
+        rows = Rows.from_result(self.result, self.result.energy.residual)
+        self._rows = rows.select(slice(0, self._count))
         self._residual = self.result.energy.residual
         self._exchanged = self.result.energy.exchanged_until
         self._time, self._row, self._given = self.start, 0, 0
@@ -193,16 +194,6 @@ class Replay:
         self._time = min(max(t, self.start), self.start + self.duration)
         after = np.searchsorted(self.result.t[: self._count], self._time, side="right")
         self._row = max(0, int(after) - 1)
-
-    def _all_rows(self) -> Rows:
-        result, log = self.result, self.result.contacts
-        more = {"q": result.q, "v": result.v, "residual": result.energy.residual[:, None]}
-        if result.torque is not None:
-            more["torque"] = result.torque
-        for name, readings in result.sensors.items():
-            more[f"sensor.{name}"] = held(readings, result.t, None)
-        rows = Rows.of(result.t, len(result.pairs), log, log.row, more)
-        return rows.select(slice(0, self._count))
 
     def _build(self, scenario: str | PathLike[str] | None, *, trust_code: bool) -> Built | None:
         function = load_function if trust_code else unloaded

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.tables import quantity_of
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.dynamics.scene.scene import SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
@@ -61,6 +62,24 @@ class Rows:
         np.maximum.at(deepest, place, contacts.depth)
         size = np.linalg.norm(friction, axis=2)
         return cls(np.asarray(t, dtype=float), normal, size, deepest, more or {})
+
+    @classmethod
+    def from_result(
+        cls, result: Result, residual: Array, readings: dict[str, Array] | None = None
+    ) -> Rows:
+        """Take the rows (n,) of a result, with its energy `residual` (n,) [J].
+
+        `readings` are each sensor's last one before it; they become those at its end.
+        """
+        readings = {} if readings is None else readings
+        more = {"q": result.q, "v": result.v, "residual": residual[:, None]}
+        if result.torque is not None:
+            more["torque"] = result.torque
+        for name, log in result.sensors.items():
+            more[f"sensor.{name}"] = held(log, result.t, readings.get(name))
+            if len(log):
+                readings[name] = log.values[-1]
+        return cls.of(result.t, len(result.pairs), result.contacts, result.contacts.row, more)
 
     def block(self, name: str) -> Array | None:
         """Return one of FORCES, or one of `more`; None where it was not recorded."""

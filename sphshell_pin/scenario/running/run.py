@@ -227,13 +227,7 @@ def _holds_complete(folder: Path) -> bool:
 
 
 def _draw(
-    built: Built,
-    result: Result,
-    staging: Path,
-    notes: list[str],
-    *,
-    recording: bool,
-    figures: bool,
+    built: Built, result: Result, staging: Path, notes: list[str], *, recording: bool, figures: bool
 ) -> bool:
     """Write the pictures; note which of them cannot be made, as the numbers matter more.
 

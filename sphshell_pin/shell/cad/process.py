@@ -133,10 +133,7 @@ class _Child:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the child)
         # The child ends when its standard input closes, even if this process is killed.
         self._process = subprocess.Popen(
-            child_command(CHILD),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
+            child_command(CHILD), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

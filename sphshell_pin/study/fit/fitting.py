@@ -6,13 +6,8 @@ from pathlib import Path
 
 from sphshell_pin.base.checks import check_positive
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.scenario.format import reading
 from sphshell_pin.scenario.format.build import Built, build_scenario
-from sphshell_pin.scenario.format.reading import (
-    change_scenario,
-    find_scenario,
-    full_name,
-    read_scenario,
-)
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import check_knobs
 from sphshell_pin.study.fit.data import Experiment, Source, read_experiment
@@ -70,9 +65,9 @@ def fit(
         raise InvalidParameter("level", level, "must lie between 0 and 1")
     for name, value in (sigma or {}).items():
         check_positive(f"sigma of '{name}'", value)
-    path = find_scenario(scenario)
+    path = reading.find_scenario(scenario)
     texts = {key: str(value) for key, value in (changes or {}).items()}
-    base = read_scenario(path, texts)
+    base = reading.read_scenario(path, texts)
     free = free_parameters(parameters, base, path)
     trials = _trials(base, path, free, data, columns, sigma)
     search = Search(trials, free, progress)
@@ -99,9 +94,9 @@ def _trials(
         experiment = one if isinstance(one, Experiment) else Experiment(one)
         texts = {key: str(value) for key, value in experiment.changes.items()}
         for key, text in texts.items():
-            if any(full_name(base, key, path) in one.keys for one in free):
+            if any(reading.full_name(base, key, path) in one.keys for one in free):
                 raise InvalidParameter(key, text, "is fitted, so no experiment can set it")
-        scenario = change_scenario(base, texts, path) if texts else base
+        scenario = reading.change_scenario(base, texts, path) if texts else base
         check_knobs(scenario, path, ranges=False)
         built = reuse = build_scenario(scenario, path, reuse)
         read = read_experiment(

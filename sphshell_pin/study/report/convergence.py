@@ -20,17 +20,7 @@ import numpy as np
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.plot.figure import png as png_of
-from sphshell_pin.study.report import drawing
-from sphshell_pin.study.report.contents import (
-    Finding,
-    Picture,
-    Progress,
-    Section,
-    Table,
-    about,
-    columns,
-    number,
-)
+from sphshell_pin.study.report import contents, drawing
 from sphshell_pin.study.report.surfaces import DEPTH, RADIUS, SURFACES, Surface
 from sphshell_pin.study.report.timing import part, per_center, silent, take_turns
 
@@ -73,7 +63,11 @@ def relative_forces(shell: Shell, method: str, centers: Array) -> Array:
 
 
 def measure(
-    name: str, surface: Surface, rounds: int = 0, progress: Progress = silent, finest: int = 5
+    name: str,
+    surface: Surface,
+    rounds: int = 0,
+    progress: contents.Progress = silent,
+    finest: int = 5,
 ) -> list[Row]:
     """Measure every rule on the first `finest` meshes of a surface; queries timed in `rounds`."""
     centers, normals = surface.touching(0, PLACES)
@@ -117,10 +111,10 @@ LOOKS = {
 """Color and marker."""
 CURVED = ("bowl", "dome", "torus")
 AT = 0.3  # h / r at which errors are compared
-TEXT = about(__doc__)
+TEXT = contents.about(__doc__)
 
 
-def section(*, quick: bool, progress: Progress) -> Section:
+def section(*, quick: bool, progress: contents.Progress) -> contents.Section:
     """Measure and return the section."""
     rows: list[Row] = []
     rounds, finest = (3, 4) if quick else (7, 5)
@@ -130,10 +124,10 @@ def section(*, quick: bool, progress: Progress) -> Section:
     return assemble(REPORTED, rows)
 
 
-def assemble(names: tuple[str, ...], rows: list[Row]) -> Section:
+def assemble(names: tuple[str, ...], rows: list[Row]) -> contents.Section:
     """Return the section of measured rows."""
     tables = [orders_table(names, rows)]
-    return Section(KEY, TITLE, TEXT, findings_of(rows), [picture(names, rows)], tables)
+    return contents.Section(KEY, TITLE, TEXT, findings_of(rows), [picture(names, rows)], tables)
 
 
 def of(rows: list[Row], surface: str, rule: str) -> list[Row]:
@@ -154,7 +148,7 @@ def error_at(line: list[Row], which: str = "mean", side: float = AT) -> float:
     return float(np.exp(np.interp(np.log(side), sides, errors)))
 
 
-def findings_of(rows: list[Row]) -> list[Finding]:
+def findings_of(rows: list[Row]) -> list[contents.Finding]:
     """Return the figures that have aims."""
     lines = [of(rows, name, SMOOTH) for name in CURVED]
     estimated = min(order(of(rows, name, ESTIMATED)) for name in CURVED)
@@ -169,15 +163,15 @@ def findings_of(rows: list[Row]) -> list[Finding]:
     on_flat = "force error on a flat plate, any refinement, side force included"
     worst = max(error_at(line, "largest") for line in lines)
     return [
-        Finding("force_error", error, max(map(error_at, lines)), aim=1e-4),
-        Finding("force_error_largest", largest, worst),
-        Finding("force_order", lowest, min(map(order, lines)), aim=3.5, sense=">="),
-        Finding("force_order_estimated", by_mesh, estimated, aim=2.0, sense=">="),
-        Finding("flat_error", on_flat, flat, aim=1e-12),
+        contents.Finding("force_error", error, max(map(error_at, lines)), aim=1e-4),
+        contents.Finding("force_error_largest", largest, worst),
+        contents.Finding("force_order", lowest, min(map(order, lines)), aim=3.5, sense=">="),
+        contents.Finding("force_order_estimated", by_mesh, estimated, aim=2.0, sense=">="),
+        contents.Finding("flat_error", on_flat, flat, aim=1e-12),
     ]
 
 
-def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
+def orders_table(names: tuple[str, ...], rows: list[Row]) -> contents.Table:
     """Return order and error at h / r = AT of every method on every surface."""
     cells = []
     for name, rule in product(names, LOOKS):
@@ -188,10 +182,10 @@ def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
             (name, rule, None if exact else order(line), *errors)
             + (fine.triangles, fine.mean, fine.query)
         )
-    return Table(
+    return contents.Table(
         "forces_orders",
         "Orders by a fit over all meshes; none where the force is exact at any size.",
-        columns(
+        contents.columns(
             "surface; method; order; mean_error_at_0.3: error at h/r = 0.3; largest_error_at_0.3: "
             "largest; finest_triangles: triangles of the finest mesh; finest_mean_error: error "
             "there; query_s: query [us]"
@@ -200,7 +194,7 @@ def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
     )
 
 
-def picture(names: tuple[str, ...], rows: list[Row]) -> Picture:
+def picture(names: tuple[str, ...], rows: list[Row]) -> contents.Picture:
     """Draw mean errors against the number of elements, one panel per surface."""
     with drawing.canvas(7.8, 5.8) as figure:
         panels = figure.subplots(2, 2, sharex=True).ravel()
@@ -214,7 +208,7 @@ def picture(names: tuple[str, ...], rows: list[Row]) -> Picture:
         figure.supxlabel("elements")
         figure.supylabel("mean error of the force / force")
         png = png_of(figure, 160)
-    best = number(error_at(of(rows, names[0], SMOOTH)))
+    best = contents.number(error_at(of(rows, names[0], SMOOTH)))
     what = "Mean error of the force against the number of elements"
     at = f"; smooth reaches {best} on the {names[0]} at h/r = {AT}."
-    return Picture("force_elements", png, what + at, f"{what}.")
+    return contents.Picture("force_elements", png, what + at, f"{what}.")

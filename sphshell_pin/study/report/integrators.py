@@ -14,23 +14,14 @@ import numpy as np
 
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.errors import SimulationDiverged
-from sphshell_pin.study.report import closed_forms, swing
+from sphshell_pin.study.report import closed_forms, contents, swing
 from sphshell_pin.study.report.closed_forms import Case
-from sphshell_pin.study.report.contents import (
-    TIMES,
-    Finding,
-    Progress,
-    Section,
-    Table,
-    about,
-    columns,
-)
 from sphshell_pin.study.report.timing import silent
 
 KEY, TITLE = "integrators", "Work and precision of the integrators"
 EXPLICIT = ("SemiImplicitEuler", "RungeKutta4", "Adaptive")
 ERRORS = {1e-2: "10⁻²", 1e-4: "10⁻⁴", 1e-6: "10⁻⁶"}
-TEXT = about(__doc__)
+TEXT = contents.about(__doc__)
 
 
 @dataclass(frozen=True)
@@ -43,7 +34,7 @@ class Row:
     cpu: float
 
 
-def measure(case: Case, *, quick: bool, progress: Progress = silent) -> list[Row]:
+def measure(case: Case, *, quick: bool, progress: contents.Progress = silent) -> list[Row]:
     """Run every setting, with `quick` once and without the finest; what diverges has no row."""
     settings = case.integrators
     if quick:
@@ -73,7 +64,7 @@ def _timed(case: Case, one: Integrator, duration: float | None = None) -> tuple[
     return time.process_time() - before, case.error(result)
 
 
-def section(*, quick: bool, progress: Progress) -> Section:
+def section(*, quick: bool, progress: contents.Progress) -> contents.Section:
     """Measure and return the section."""
     rows = []
     for k, case in enumerate((closed_forms.bounces(), closed_forms.glide())):
@@ -89,14 +80,16 @@ def cheapest(rows: list[Row], case: str, integrators: tuple[str, ...], error: fl
     return min((r.cpu for r in fit if r.error <= error), default=math.nan)
 
 
-def assemble(rows: list[Row], swings: swing.Row) -> Section:
+def assemble(rows: list[Row], swings: swing.Row) -> contents.Section:
     """Return the section of what was measured: what an error costs, and the figures."""
     pairs = dict.fromkeys((row.case, row.integrator) for row in rows)
-    costs = Table(
+    costs = contents.Table(
         "integrators_costs",
         "CPU seconds per simulated second of the cheapest setting with at most this error; a "
         "dash where no setting that was tried gets there.",
-        columns("case", "integrator", *(f"cpu_at_{e:.0e}: error {t}" for e, t in ERRORS.items())),
+        contents.columns(
+            "case", "integrator", *(f"cpu_at_{e:.0e}: error {t}" for e, t in ERRORS.items())
+        ),
         [
             [case, name, *(cheapest(rows, case, (name,), error) for error in ERRORS)]
             for case, name in pairs
@@ -110,9 +103,9 @@ def assemble(rows: list[Row], swings: swing.Row) -> Section:
     cost = "stiff contact, error 1e-4: CPU time of the best explicit method / Implicit"
     least = "five bounces on a spring: least error reached"
     findings = [
-        Finding("swing_period", period, swings.rms, aim=5e-7),
-        Finding("swing_energy", energy, swings.energy, aim=1e-6),
-        Finding("stiff_cost", cost, stiff, TIMES),
-        Finding("bounces_error", least, min(bounce, default=math.nan)),
+        contents.Finding("swing_period", period, swings.rms, aim=5e-7),
+        contents.Finding("swing_energy", energy, swings.energy, aim=1e-6),
+        contents.Finding("stiff_cost", cost, stiff, contents.TIMES),
+        contents.Finding("bounces_error", least, min(bounce, default=math.nan)),
     ]
-    return Section(KEY, TITLE, TEXT, findings, tables=[costs])
+    return contents.Section(KEY, TITLE, TEXT, findings, tables=[costs])

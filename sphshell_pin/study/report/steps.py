@@ -15,17 +15,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.run.advance import AnyController
-from sphshell_pin.study.report.contents import (
-    TIME_COLUMNS,
-    Finding,
-    Progress,
-    Section,
-    Spread,
-    Table,
-    about,
-    columns,
-    times_table,
-)
+from sphshell_pin.study.report import contents
 from sphshell_pin.study.report.surfaces import wavy_sheet
 from sphshell_pin.study.report.timing import measure_import, part, silent, take_turns
 
@@ -149,18 +139,18 @@ def components(shell: sp.Shell) -> dict[str, Callable[[], float]]:
     return {**runs, PYTHON: runner(on_sheet(UNDAMPED, None), zero)}
 
 
-def components_table(steps: Times) -> Table:
+def components_table(steps: Times) -> contents.Table:
     """Return what components add to the step of the scene without contact."""
     rows = [
-        (name, *Spread.of(steps[name]), float(np.median(steps[name] - steps[FREE])))
+        (name, *contents.Spread.of(steps[name]), float(np.median(steps[name] - steps[FREE])))
         for name in ADDED
     ]
     caption = "What components add to a step; a scene without them does not pay."
-    heads = columns("scene", TIME_COLUMNS, "added_s: added [us]")
-    return Table("steps_components", caption, heads, rows)
+    heads = contents.columns("scene", contents.TIME_COLUMNS, "added_s: added [us]")
+    return contents.Table("steps_components", caption, heads, rows)
 
 
-def measure(rounds: int, progress: Progress = silent) -> Times:
+def measure(rounds: int, progress: contents.Progress = silent) -> Times:
     """Return the times of a step [s] of WHOLE and of ADDED."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
     pd = sp.JointPD(100.0, 10.0)
@@ -177,19 +167,19 @@ def measure(rounds: int, progress: Progress = silent) -> Times:
 
 
 KEY, TITLE = "steps", "Cost of a step"
-TEXT = about(__doc__)
+TEXT = contents.about(__doc__)
 
 
-def section(*, quick: bool, progress: Progress) -> Section:
+def section(*, quick: bool, progress: contents.Progress) -> contents.Section:
     """Measure and return the section."""
     steps = measure(8 if quick else 50, part(progress, 0.0, 0.9))
     imports = measure_import(5 if quick else 15, part(progress, 0.9, 1.0))
     return assemble(steps, imports)
 
 
-def assemble(steps: Times, imports: Times) -> Section:
+def assemble(steps: Times, imports: Times) -> contents.Section:
     """Return the section of what was measured."""
-    bare, ratio = steps[BARE], Finding.of_rounds
+    bare, ratio = steps[BARE], contents.Finding.of_rounds
     touching = "Panda and fingertip touching 200 k triangles: whole step / bare ABA + integrate"
     control = "Panda with joint PD and gravity compensation: step touching / without any contact"
     importing = "import sphshell_pin / import pinocchio, whole interpreter"
@@ -203,5 +193,8 @@ def assemble(steps: Times, imports: Times) -> Section:
     ]
     caption, over = "Whole steps, in turn in one process.", "over_bare: over ABA + integrate"
     whole = {name: steps[name] for name in WHOLE}
-    tables = [times_table("steps", caption, "scene", whole, BARE, over), components_table(steps)]
-    return Section(KEY, TITLE, TEXT, findings, tables=tables)
+    tables = [
+        contents.times_table("steps", caption, "scene", whole, BARE, over),
+        components_table(steps),
+    ]
+    return contents.Section(KEY, TITLE, TEXT, findings, tables=tables)

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations
 
 import numpy as np
+import trimesh
 
 from sphshell_pin.base.arrays import Array, Ints
 
@@ -55,27 +55,10 @@ class Mesh:
 
 def icosphere(level: int, radius: float) -> Mesh:
     """Return a sphere [m] of 20 * 4^level triangles: an icosahedron, halved `level` times."""
-    golden = (1 + 5**0.5) / 2
-    vertices = np.array(
-        [np.roll([0.0, a, b * golden], k) for k in range(3) for a in (-1, 1) for b in (-1, 1)]
-    )
-    apart = np.linalg.norm(vertices[:, None] - vertices, axis=2)
-    triples = combinations(range(12), 3)
-    triangles = np.array([t for t in triples if apart[np.ix_(t, t)].max() < 2.1])
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
-    triangles[inward] = triangles[inward, ::-1]
-    for _ in range(level):
-        sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        halved, middle = np.unique(sides, axis=0, return_inverse=True)
-        ab, bc, ca = (len(vertices) + middle.reshape(-1, 3)).T
-        vertices = np.concatenate([vertices, vertices[halved].mean(axis=1)])
-        a, b, c = triangles.T
-        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])
-        vertices /= np.linalg.norm(vertices, axis=1)[:, None]
-    vertices /= np.linalg.norm(vertices, axis=1)[:, None]
-    return Mesh(radius * vertices, triangles.astype(np.int32), vertices)
+    ball = trimesh.creation.icosphere(level)
+    normals = np.array(ball.vertices)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return Mesh(radius * normals, ball.faces.astype(np.int32), normals)
 
 
 def ball_places(radius: float, rng: np.random.Generator, count: int) -> tuple[Array, Array]:

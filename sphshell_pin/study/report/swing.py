@@ -22,7 +22,7 @@ ANGLE = math.radians(40)
 # At rest at the turning point the normal force is m g cos(40 deg): the ball starts in balance.
 START_DEPTH = MASS * GRAVITY * math.cos(ANGLE) / STIFFNESS
 ENERGY = MASS * GRAVITY * ARM * (1 - math.cos(ANGLE))
-DT, LONG_DT, PERIODS = 1e-4, 2e-3, 4
+DT, PERIODS = 1e-4, 4
 AZIMUTHS = 0.1 + np.linspace(0, 2 * np.pi, 8, endpoint=False)
 LEVELS = {0.6: 3, 0.3: 4, 0.15: 5}  # of the icosphere, by h / r
 

@@ -219,6 +219,5 @@ def _contacts(setting: Setting, rng: np.random.Generator, poses: int) -> list[Fi
 
 
 def _run(touch: Touch, integrator: Integrator, duration: float) -> Result:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         return Simulation(touch.scene, integrator).run(touch.q, touch.v, duration)

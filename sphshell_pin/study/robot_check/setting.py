@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.arrays import Array, frame_along
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
@@ -15,15 +15,9 @@ from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import mass_fault
 from sphshell_pin.shell import Shell
+from sphshell_pin.study.robot_check import probe_spheres
 from sphshell_pin.study.robot_check.models import Subject, listed
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
-from sphshell_pin.study.robot_check.probe_spheres import (
-    center_jacobian,
-    center_of,
-    find_sphere,
-    moved_sphere,
-    placed_data,
-)
 from sphshell_pin.testing.forces import point_jacobian
 
 PLATE, BASE = "sphshell_check_plate", "sphshell_check_base"
@@ -86,8 +80,8 @@ def setting_of(
             f"dynamics has no answer for them: {listed(held)}"
         )
     try:
-        tip, said = find_sphere(subject, model, rng, frame, radius)
-        sphere, shifted = moved_sphere(model, tip, rng)
+        tip, said = probe_spheres.find_sphere(subject, model, rng, frame, radius)
+        sphere, shifted = probe_spheres.moved_sphere(model, tip, rng)
     except SphshellError:
         robot = subject.robot
         fault = mass_fault(robot.model, postures[0], robot.description) if held else None
@@ -135,9 +129,11 @@ def touch_of(
     model = _floating(setting.model, sphere) if free else setting.model
     q, v, way = _motion(model, sphere, rng, speed)
     if least:
-        v = np.linalg.pinv(center_jacobian(model, model.createData(), q, sphere)) @ (speed * way)
+        v = np.linalg.pinv(probe_spheres.center_jacobian(model, model.createData(), q, sphere)) @ (
+            speed * way
+        )
     contact = _Contact.facing(way, rng, gap, setting)
-    data = placed_data(model, q)
+    data = probe_spheres.placed_data(model, q)
     mass, pose = contact.mass(model, data, q, sphere), contact.pose(model, data, sphere)
     frame = "universe"
     if free:
@@ -146,7 +142,7 @@ def touch_of(
         q[plate.idx_q : plate.idx_q + 7] = pin.SE3ToXYZQUAT(pose)
         v[plate.idx_v : plate.idx_v + 3] = 0.0
         v[plate.idx_v + 3 : plate.idx_v + 6] = 0.1 * speed / width * rng.normal(size=3)
-        mass = contact.mass(model, placed_data(model, q, data), q, sphere, plate.id)
+        mass = contact.mass(model, probe_spheres.placed_data(model, q, data), q, sphere, plate.id)
         frame, pose = PLATE, None
     scene = Scene(model)
     law, friction = _law(mass, speed, setting.radius)
@@ -161,7 +157,7 @@ def meeting_posture(
 ) -> Array:
     """Return a random posture (nq,) of a free touch's model, the patch `gap` [radii] away."""
     q = random_posture(model, rng)
-    placed_data(model, q, data)
+    probe_spheres.placed_data(model, q, data)
     way = rng.normal(size=3)
     contact = _Contact.facing(way / np.linalg.norm(way), rng, gap, setting)
     plate = model.joints[model.getJointId(PLATE)]
@@ -200,14 +196,14 @@ class _Contact:
         normal = -way + rng.uniform(0.1, 0.5) * askew / np.linalg.norm(askew)
         xy = rng.uniform(-0.25, 0.25, 2) * _HALF * radius
         z, up = _wave(xy[0], xy[1], radius)
-        turn = _frame_along(up) @ pin.AngleAxis(rng.uniform(0, 2 * np.pi), np.eye(3)[2]).matrix()
+        turn = frame_along(up) @ pin.AngleAxis(rng.uniform(0, 2 * np.pi), np.eye(3)[2]).matrix()
         place = pin.SE3(turn, np.array([*xy, z]))
         return cls(normal / np.linalg.norm(normal), gap * radius, place, radius)
 
     def pose(self, model: pin.Model, data: pin.Data, sphere: Sphere) -> pin.SE3:
         """Return where the patch is in the world (SE3)."""
         point = self._point(model, data, sphere)[1]
-        return pin.SE3(_frame_along(self.normal), point) * self.place.inverse()
+        return pin.SE3(frame_along(self.normal), point) * self.place.inverse()
 
     def mass(
         self, model: pin.Model, data: pin.Data, q: Array, sphere: Sphere, other: int = 0
@@ -220,7 +216,7 @@ class _Contact:
         return 1.0 / float(row @ np.linalg.solve(mass_matrix(model, q), row))
 
     def _point(self, model: pin.Model, data: pin.Data, sphere: Sphere) -> tuple[int, Array]:
-        joint, center = center_of(model, data, sphere)
+        joint, center = probe_spheres.center_of(model, data, sphere)
         return joint, center - (self.radius + self.gap) * self.normal
 
 
@@ -233,7 +229,7 @@ def _motion(
     for wanted in (1e-3, 1e-4, 1e-9):
         for _ in range(_TRIES):
             q = random_posture(model, rng)
-            jacobian = center_jacobian(model, data, q, sphere)
+            jacobian = probe_spheres.center_jacobian(model, data, q, sphere)
             v = rng.normal(size=model.nv)
             way = jacobian @ v
             fast = float(np.linalg.norm(way))
@@ -338,11 +334,3 @@ def _wave(x: Array, y: Array, radius: float) -> tuple[Array, Array]:
     slope = 0.5 * _HEIGHT * radius * k
     normal = np.stack(np.broadcast_arrays(-slope * np.cos(k * x), slope * np.sin(k * y), 1.0), -1)
     return z, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-
-
-def _frame_along(z: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is the unit vector `z`."""
-    least = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = np.cross(least, z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=1)

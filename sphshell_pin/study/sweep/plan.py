@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import TypedDict
 
 from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError
@@ -68,6 +69,19 @@ class Plan:
     job: Job
     units: Mapping[str, str]
     """Units of keys and figures, those that are known."""
+
+
+class Design(TypedDict, total=False):
+    """What the runs of a sweep are, see `sweep`."""
+
+    changes: Changes | None
+    together: bool
+    dist: Dist | Iterable[str] | None
+    sample: str | None
+    n: int | None
+    seed: int
+    indices: bool
+    tornado: bool
 
 
 def plan_sweep(
@@ -240,8 +254,7 @@ def _build_one(runs: list[Changes], scenario: Scenario, path: Path) -> tuple[Cha
     faults: list[SphshellError] = []
     for run in (runs[0], runs[-1]):
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with warnings.catch_warnings(action="ignore"):
                 return run, build_scenario(changed(scenario, run, path), path)
         except SphshellError as fault:
             faults.append(fault)

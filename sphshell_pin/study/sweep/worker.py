@@ -51,8 +51,7 @@ def run_one(job: Job, changes: Changes) -> Outcome:
         if job.token not in _built:
             prepare(job)
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with warnings.catch_warnings(action="ignore"):
                 return _run(job, changes)
         except (Exception, SystemExit) as fault:  # a routine of the user's may call exit()
             return Outcome(_sentence(fault, job.path))
@@ -72,8 +71,7 @@ def prepare(job: Job) -> None:
         here = uses_of(path.parent, job.uses.keys() - versions().keys())
         if other := [name for name in job.uses if here.get(name) != job.uses[name]]:
             raise SweepError(f"{this} has another {', another '.join(other)} than the sweep")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):
             built = build_scenario(changed(job.scenario, job.sample, path), path)
     except SweepError:
         raise
