@@ -431,7 +431,7 @@ def mend_shapes(offsets: _Longs, corners: _Ints, points: _Doubles) -> _Doubles: 
 def mend_sums(
     points: _Doubles,
     triangles: _Ints,
-    triangle_polygon: _Ints | None,
+    triangle_polygon: _Ints,
     component: _Ints,
     flip: _Bytes,
     components: int,

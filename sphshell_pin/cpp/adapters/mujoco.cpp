@@ -20,7 +20,7 @@ const double* array_at(const void* from, std::size_t offset) {
 template <class Work>
 void MujocoContacts::report_faults(const Work& work) {
   try {
-    work();
+    work(scratch());
   } catch (const std::exception& error) {
     const std::string text = error.what();
     {
@@ -28,16 +28,15 @@ void MujocoContacts::report_faults(const Work& work) {
       if (!fault_.empty()) return;
       fault_ = text;
     }
-    report_(text);
+    setup.report(text);
   }
 }
 
 void MujocoContacts::apply(const void* model, void* data) {
-  report_faults([&] {
+  report_faults([&](Scratch& own) {
     char* const bytes = static_cast<char*>(data);
-    Scratch& own = scratch();
     evaluate(model, bytes, own);
-    if (logs_ && own.stage == 1) add_to_log(data, own);
+    if (setup.logs && own.stage == 1) add_to_log(data, own);
     add_forces(bytes, own.scene);
   });
 }
@@ -46,17 +45,16 @@ void MujocoContacts::apply(const void* model, void* data) {
 // the new velocity at the contacts where the step began: MuJoCo's kinematics are still those of
 // there.
 void MujocoContacts::advance(const void* model, void* data) {
-  report_faults([&] {
+  report_faults([&](Scratch& own) {
     char* const bytes = static_cast<char*>(data);
-    Scratch& own = scratch();
-    const double dt = value_at<double>(model, layout_.timestep);
+    const double dt = value_at<double>(model, setup.layout.timestep);
     if (own.data != data || (own.stage != 1 && own.stage != 4)) begin(model, bytes, own);
     if (own.stage == 4) {
       const auto& k = own.rates;
       own.z += dt / 6 * (k[0] + 2 * k[1] + 2 * k[2] + k[3]);
     } else {
-      const double* const qvel = array_at(data, layout_.qvel);
-      const double* const cdof = array_at(data, layout_.cdof);
+      const double* const qvel = array_at(data, setup.layout.qvel);
+      const double* const cdof = array_at(data, setup.layout.cdof);
       read(bytes, own, [&](const MujocoBody& body) {
         Vector6 out = Vector6::Zero();
         for (const int i : body.dofs) out += qvel[i] * Map<const Vector6>(cdof + 6 * i);
@@ -67,14 +65,14 @@ void MujocoContacts::advance(const void* model, void* data) {
     }
     own.stage = 0;
     const std::vector<double> memory = own.scene.save(own.z);
-    if (memory.size() + 1 > memory_.size)
+    if (memory.size() + 1 > setup.memory.size)
       throw std::length_error(
           "more contacts touch at once than memory is reserved for: reserve(spec, spheres, "
           "contacts)");
-    double* const state = const_cast<double*>(array_at(data, layout_.plugin_state));
-    double* const to = state + memory_.address;
+    double* const state = const_cast<double*>(array_at(data, setup.layout.plugin_state));
+    double* const to = state + setup.memory.address;
     to[0] = double(memory.size());
-    std::fill(std::copy(memory.begin(), memory.end(), to + 1), to + memory_.size, 0.0);
+    std::fill(std::copy(memory.begin(), memory.end(), to + 1), to + setup.memory.size, 0.0);
   });
 }
 
@@ -91,7 +89,8 @@ std::vector<ContactRow> MujocoContacts::contacts(const void* model, const void* 
 void MujocoContacts::add_to_log(void* data, Scratch& own) {
   const std::unique_lock lock(mutex_);
   Log& log = logs_of_[data];
-  if (const auto mark = mark_of_data(data, layout_.mark); log.mark != mark) log = {mark, {}, {}};
+  if (const auto mark = mark_of_data(data, setup.layout.mark); log.mark != mark)
+    log = {mark, {}, {}};
   const auto keep = std::lower_bound(log.times.begin(), log.times.end(), own.time);
   log.times.erase(keep, log.times.end());
   log.rows.resize(log.times.size());
@@ -102,7 +101,7 @@ void MujocoContacts::add_to_log(void* data, Scratch& own) {
 std::pair<std::vector<double>, std::vector<ContactRow>> MujocoContacts::log(void* data) {
   const std::shared_lock lock(mutex_);
   const auto at = logs_of_.find(data);
-  if (at == logs_of_.end() || at->second.mark != mark_of_data(data, layout_.mark)) return {};
+  if (at == logs_of_.end() || at->second.mark != mark_of_data(data, setup.layout.mark)) return {};
   return {at->second.times, at->second.rows};
 }
 
@@ -124,7 +123,7 @@ MujocoContacts::Scratch& MujocoContacts::scratch() {
     if (at != scratches_.end()) return *at->second;
   }
   // The copy of a law in Python waits for the interpreter's lock, whose holder may wait for mutex_.
-  auto made = std::make_unique<Scratch>(prototype_);
+  auto made = std::make_unique<Scratch>(setup.scene);
   const std::unique_lock lock(mutex_);
   return *(scratches_[own] = std::move(made));
 }
@@ -133,20 +132,20 @@ MujocoContacts::Scratch& MujocoContacts::scratch() {
 // world's axes, its angular part first; a free joint of Pinocchio has that of the body's origin, in
 // the body's axes.
 void MujocoContacts::read(const char* data, Scratch& own) const {
-  const double* const cvel = array_at(data, layout_.cvel);
+  const double* const cvel = array_at(data, setup.layout.cvel);
   read(data, own,
        [&](const MujocoBody& body) { return Vector6(Map<const Vector6>(cvel + 6 * body.id)); });
 }
 
 template <class VelocityOf>
 void MujocoContacts::read(const char* data, Scratch& own, const VelocityOf& velocity_of) const {
-  const double* const xpos = array_at(data, layout_.xpos);
-  const double* const xquat = array_at(data, layout_.xquat);
-  const double* const center = array_at(data, layout_.subtree_com);
-  own.q.resize(7 * static_cast<Eigen::Index>(bodies_.size()));
-  own.v.resize(6 * static_cast<Eigen::Index>(bodies_.size()));
-  for (std::size_t k = 0; k < bodies_.size(); ++k) {
-    const MujocoBody& body = bodies_[k];
+  const double* const xpos = array_at(data, setup.layout.xpos);
+  const double* const xquat = array_at(data, setup.layout.xquat);
+  const double* const center = array_at(data, setup.layout.subtree_com);
+  own.q.resize(7 * static_cast<Eigen::Index>(setup.bodies.size()));
+  own.v.resize(6 * static_cast<Eigen::Index>(setup.bodies.size()));
+  for (std::size_t k = 0; k < setup.bodies.size(); ++k) {
+    const MujocoBody& body = setup.bodies[k];
     const Vec3 origin = Vec3Map(xpos + 3 * body.id);
     const double* const w = xquat + 4 * body.id;
     const Eigen::Quaterniond turn(w[0], w[1], w[2], w[3]);
@@ -167,9 +166,9 @@ void MujocoContacts::read(const char* data, Scratch& own, const VelocityOf& velo
 // The stages of RK4 follow the first one at half the step, twice, and at its end; they go on from
 // what that has found. Any other evaluation is a first one, which may be of a step or of none.
 void MujocoContacts::evaluate(const void* model, const char* data, Scratch& own) const {
-  const double now = value_at<double>(data, layout_.time);
-  const double dt = value_at<double>(model, layout_.timestep);
-  const bool is_rk4 = value_at<int>(model, layout_.integrator) == kRungeKutta4;
+  const double now = value_at<double>(data, setup.layout.time);
+  const double dt = value_at<double>(model, setup.layout.timestep);
+  const bool is_rk4 = value_at<int>(model, setup.layout.integrator) == kRungeKutta4;
   const double share = own.stage == 3 ? 1 : 0.5;
   if (!is_rk4 || own.data != data || own.stage < 1 || own.stage > 3 ||
       std::abs(now - own.time - share * dt) > 1e-6 * dt) {
@@ -184,20 +183,20 @@ void MujocoContacts::evaluate(const void* model, const char* data, Scratch& own)
 
 void MujocoContacts::begin(const void* model, const char* data, Scratch& own) const {
   own.data = data;
-  own.time = value_at<double>(data, layout_.time);
+  own.time = value_at<double>(data, setup.layout.time);
   own.stage = 0;
   read(data, own);
-  const bool remembers = memory_.instance >= 0;
+  const bool remembers = setup.memory.instance >= 0;
   const double* memory = none_.data();
   double size = double(none_.size());
   if (remembers) {
-    const double* const state = array_at(data, layout_.plugin_state) + memory_.address;
+    const double* const state = array_at(data, setup.layout.plugin_state) + setup.memory.address;
     if (state[0] != 0) size = state[0], memory = state + 1;
   }
-  if (!(size > 0 && (memory == none_.data() || size < double(memory_.size))) ||
+  if (!(size > 0 && (memory == none_.data() || size < double(setup.memory.size))) ||
       !own.scene.load(memory, static_cast<std::size_t>(size), own.z))
     throw std::domain_error("the state of the plugin sphshell_pin.memory is not one that it made");
-  own.scene.relax_in(value_at<double>(model, layout_.timestep));
+  own.scene.relax_in(value_at<double>(model, setup.layout.timestep));
   own.scene.evaluate(own.q, own.v, own.z, remembers);
   if (remembers) own.scene.accept(own.z);
   own.rates[0] = own.scene.bristle_rates();
@@ -208,12 +207,12 @@ void MujocoContacts::begin(const void* model, const char* data, Scratch& own) co
 // mass of their tree.
 void MujocoContacts::add_forces(char* data, const SceneData& scene) const {
   if (!scene.touching()) return;
-  const double* const xpos = array_at(data, layout_.xpos);
-  const double* const cdof = array_at(data, layout_.cdof);
-  const double* const center = array_at(data, layout_.subtree_com);
-  double* const force_on = const_cast<double*>(array_at(data, layout_.qfrc_passive));
-  for (std::size_t k = 0; k < bodies_.size(); ++k) {
-    const MujocoBody& body = bodies_[k];
+  const double* const xpos = array_at(data, setup.layout.xpos);
+  const double* const cdof = array_at(data, setup.layout.cdof);
+  const double* const center = array_at(data, setup.layout.subtree_com);
+  double* const force_on = const_cast<double*>(array_at(data, setup.layout.qfrc_passive));
+  for (std::size_t k = 0; k < setup.bodies.size(); ++k) {
+    const MujocoBody& body = setup.bodies[k];
     const int joint = static_cast<int>(k) + 1;
     const pinocchio::Force& wrench = scene.external()[joint];
     const auto& turn = scene.body().world_from_joint(joint).rotation();

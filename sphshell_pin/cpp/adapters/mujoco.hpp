@@ -47,21 +47,25 @@ struct MujocoMemory {
 // geoms of the shell's body is left out.
 enum class MujocoRole : char { None, Sphere, Shell };
 
+// What a set of contacts is made of.
+struct MujocoSetup {
+  SceneData scene;
+  MujocoLayout layout;
+  MujocoMemory memory;
+  std::vector<MujocoBody> bodies;
+  std::vector<MujocoRole> roles;
+  std::vector<std::string> touches;  // a name for each sphere with its shell, the same for the same
+  bool logs;
+  // Is called with a fault of apply(), from any thread, where none has been noted since
+  // take_fault().
+  void (*report)(const std::string&);
+};
+
 class MujocoContacts {
  public:
-  // `report` is called with a fault of apply(), from any thread, where none has been noted since
-  // take_fault(). `touches` has a name for each sphere with its shell, the same for the same ones.
-  MujocoContacts(SceneData scene, MujocoLayout layout, MujocoMemory memory,
-                 std::vector<MujocoBody> bodies, std::vector<MujocoRole> roles,
-                 std::vector<std::string> touches, bool logs, void (*report)(const std::string&))
-      : prototype_(std::move(scene)),
-        layout_(layout),
-        memory_(memory),
-        bodies_(std::move(bodies)),
-        roles_(std::move(roles)),
-        touches_(std::move(touches)),
-        logs_(logs),
-        report_(report) {}
+  explicit MujocoContacts(MujocoSetup of) : setup(std::move(of)) {}
+
+  const MujocoSetup setup;
 
   // Adds the forces at the state of `data` to its qfrc_passive. Several threads may do so at once,
   // each with data of its own.
@@ -78,13 +82,10 @@ class MujocoContacts {
   std::string take_fault();
   // Whether MuJoCo's own contact between these geoms is left out.
   bool separates(int geom, int other) const {
-    return (roles_[geom] == MujocoRole::Sphere && roles_[other] == MujocoRole::Shell) ||
-           (roles_[geom] == MujocoRole::Shell && roles_[other] == MujocoRole::Sphere);
+    const MujocoRole one = setup.roles[geom], two = setup.roles[other];
+    return (one == MujocoRole::Sphere && two == MujocoRole::Shell) ||
+           (one == MujocoRole::Shell && two == MujocoRole::Sphere);
   }
-  const MujocoLayout& layout() const { return layout_; }
-  const std::vector<std::string>& touches() const { return touches_; }
-  const MujocoMemory& memory() const { return memory_; }
-  auto reporter() const { return report_; }
 
  private:
   // Of one thread: the scene at the stages of the step under way.
@@ -118,15 +119,7 @@ class MujocoContacts {
     return scene.save(VectorX::Zero(scene.bristle_size()));
   }
 
-  const SceneData prototype_;
-  const std::vector<double> none_ = memory_of_none(prototype_);
-  const MujocoLayout layout_;
-  const MujocoMemory memory_;
-  const std::vector<MujocoBody> bodies_;
-  const std::vector<MujocoRole> roles_;
-  const std::vector<std::string> touches_;
-  const bool logs_;
-  void (*const report_)(const std::string&);
+  const std::vector<double> none_ = memory_of_none(setup.scene);
   std::shared_mutex mutex_;  // of what follows
   std::unordered_map<std::thread::id, std::unique_ptr<Scratch>> scratches_;
   std::unordered_map<const void*, Log> logs_of_;

@@ -88,15 +88,6 @@ bool any_of_model(const void* model, const Is& is) {
   return here && std::any_of(here->begin(), here->end(), is);
 }
 
-}  // namespace
-
-void apply_passive(const void* model, void* data) {
-  if (const auto here = contacts_of(model))
-    for (const auto& contacts : *here) contacts->apply(model, data);
-}
-
-namespace {
-
 // What MuJoCo knows of a plugin: its mjpPlugin, up to what is never used here.
 struct Plugin {
   const char* name;
@@ -129,10 +120,15 @@ void forget_memory(const void* model, double* state, void*, int instance) {
 void advance_memory(const void* model, void* data, int instance) {
   if (const auto here = contacts_of(model))
     for (const auto& contacts : *here)
-      if (contacts->memory().instance == instance) contacts->advance(model, data);
+      if (contacts->setup.memory.instance == instance) contacts->advance(model, data);
 }
 
 }  // namespace
+
+void apply_passive(const void* model, void* data) {
+  if (const auto here = contacts_of(model))
+    for (const auto& contacts : *here) contacts->apply(model, data);
+}
 
 int register_memory(void* register_plugin, void* config) {
   static const char* const attributes[] = {"size"};
@@ -161,13 +157,13 @@ int filter_contact(const void* model, void*, int geom, int other) {
 std::string register_passive(void* model, std::shared_ptr<MujocoContacts> contacts) {
   Registry& all = registry();
   const std::unique_lock lock(all.mutex);
-  if (!all.layout) all.layout = contacts->layout();
-  all.report = contacts->reporter();
+  if (!all.layout) all.layout = contacts->setup.layout;
+  all.report = contacts->setup.report;
   const Marked* const before = all.find(model);
   Set set = before ? *before->contacts : Set();
   for (const auto& one : set)
-    for (const std::string& touch : contacts->touches())
-      if (std::count(one->touches().begin(), one->touches().end(), touch)) return touch;
+    for (const std::string& touch : contacts->setup.touches)
+      if (std::count(one->setup.touches.begin(), one->setup.touches.end(), touch)) return touch;
   set.push_back(std::move(contacts));
   // A copy of a model with contacts has a mark, and contacts, of its own from here on.
   const auto owned = all.owners.find(model);
@@ -201,7 +197,8 @@ void unregister_passive(const MujocoContacts* contacts) {
 }
 
 bool is_taken(const void* model, int instance) {
-  return any_of_model(model, [&](const auto& one) { return one->memory().instance == instance; });
+  return any_of_model(model,
+                      [&](const auto& one) { return one->setup.memory.instance == instance; });
 }
 
 bool acts_on(const void* model, const MujocoContacts* contacts) {

@@ -3,30 +3,24 @@
 
 #include <nanobind/ndarray.h>
 
-#include <Eigen/Core>
-#include <cstddef>
-#include <cstdint>
+#include <functional>
 #include <initializer_list>
-#include <utility>
-#include <vector>
 
 #include "bindings/own_errors.hpp"
+#include "shell/topology.hpp"
 
 namespace sphshell {
 
 template <class T>
 using Array = nb::ndarray<nb::numpy, T>;
-using Points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Doubles = nb::ndarray<const double, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
-using IntTriples = nb::ndarray<const int, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Ints = nb::ndarray<const int, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
-using Bytes = nb::ndarray<const std::uint8_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+template <class T, int... columns>
+using InArray = nb::ndarray<const T, nb::shape<-1, columns...>, nb::c_contig, nb::device::cpu>;
 
 // Moves a vector's memory into an array of the given shape; one of const elements is read-only.
-template <class Element, class T>
-Array<Element> array_of(std::vector<T> values, std::initializer_list<std::size_t> shape) {
-  auto* kept = new std::vector<T>(std::move(values));
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+template <class Element, class Row>
+Array<Element> array_of(std::vector<Row> rows, std::initializer_list<std::size_t> shape) {
+  auto* kept = new std::vector<Row>(std::move(rows));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Row>*>(p); });
   return Array<Element>(kept->data(), shape, owner);
 }
 
@@ -35,16 +29,40 @@ Array<T> to_array(std::vector<T> values, std::initializer_list<std::size_t> shap
   return array_of<T>(std::move(values), shape);
 }
 
-template <class T>
-Array<T> to_array(std::vector<T> values) {
-  const std::size_t n = values.size();
-  return to_array(std::move(values), {n});
+// Rows of so many columns.
+template <std::size_t columns, class T>
+Array<T> rows_of(std::vector<T> values) {
+  const std::size_t rows = values.size() / columns;
+  return to_array(std::move(values), {rows, columns});
 }
 
-// Of several columns.
-template <class... T>
-nb::tuple to_arrays(std::vector<T>... columns) {
+// (n,) of numbers, (n, k) of vectors or arrays of k numbers.
+template <class Row>
+auto to_array(std::vector<Row> rows) {
+  const std::size_t n = rows.size();
+  if constexpr (std::is_arithmetic_v<Row>)
+    return to_array(std::move(rows), {n});
+  else
+    return array_of<typename Row::value_type>(std::move(rows),
+                                              {n, sizeof(Row) / sizeof(typename Row::value_type)});
+}
+
+// Of the memory of several vectors.
+template <class... Row>
+nb::tuple to_arrays(std::vector<Row>&... columns) {
   return nb::make_tuple(to_array(std::move(columns))...);
+}
+
+// What `get`, a member or a function, gives of each row.
+template <class Row, class Get>
+auto column(const std::vector<Row>& rows, Get get) {
+  std::vector<std::decay_t<std::invoke_result_t<Get, const Row&>>> out;
+  for (const Row& row : rows) out.push_back(std::invoke(get, row));
+  return out;
+}
+template <class Row, class... Get>
+nb::tuple columns(const std::vector<Row>& rows, Get... get) {
+  return nb::make_tuple(to_array(column(rows, get))...);
 }
 
 // nanobind's own conversion of small vectors and matrices calls numpy.copy, which is written in
@@ -78,9 +96,21 @@ inline void append(std::vector<double>& out, const Eigen::Vector3d& x) {
   out.insert(out.end(), x.data(), x.data() + 3);
 }
 
-// Row i of an array (n, 3).
-inline Eigen::Vector3d row(const Points& points, std::size_t i) {
-  return Eigen::Vector3d(points(i, 0), points(i, 1), points(i, 2));
-}
-
 }  // namespace sphshell
+
+// Of an array that is contiguous, or made so; its memory is looked at.
+template <class T, int... columns>
+struct nanobind::detail::type_caster<sphshell::Rows<T, columns...>> {
+  using Rows = sphshell::Rows<T, columns...>;
+  using Array = make_caster<sphshell::InArray<T, columns...>>;
+  NB_TYPE_CASTER(Rows, Array::Name)
+
+  bool from_python(handle src, uint32_t flags, cleanup_list* cleanup) noexcept {
+    if (!array.from_python(src, flags, cleanup)) return false;
+    value = {array.value.data(), array.value.shape(0)};
+    return true;
+  }
+
+ private:
+  Array array;  // kept during the call
+};

@@ -15,15 +15,12 @@ template <class Family>
 nb::list parameters_of(const std::string& kind) {
   struct Lister {
     nb::list rows;
-    void operator()(const char* name, double value, const Bounds& b) {
-      rows.append(nb::make_tuple(name, b.unit, b.above, b.at_least, b.at_most, value));
-    }
     void operator()(const char* name, const std::optional<double>& value, const Bounds& b) {
       rows.append(nb::make_tuple(name, b.unit, b.above, b.at_least, b.at_most,
                                  value ? nb::cast(*value) : nb::none()));
     }
     void operator()(const char* name, const std::vector<double>&, const Bounds& b) {
-      rows.append(nb::make_tuple(name, b.unit, b.above, b.at_least, b.at_most, nb::none()));
+      (*this)(name, std::nullopt, b);
     }
   } lister;
   Kinds<Family>::of(kind, [&](auto law, auto*) { law.each(law, lister); });
@@ -37,14 +34,10 @@ template <class Law>
 nb::class_<Law> bind_family(nb::module_& m, const char* name, nb::type_slots parts) {
   using Family = Kinds<decltype(Law::law)>;
   return nb::class_<Law>(m, name, parts)
-      .def(
-          "__init__",
-          [](Law* self, const std::string& kind, const Numbers& numbers) {
-            new (self) Law{Family::make(kind, numbers)};
-          },
-          "kind"_a, "numbers"_a)
+      .def("__init__", [](Law* self, const std::string& kind,
+                          const Numbers& numbers) { new (self) Law{Family::make(kind, numbers)}; })
       .def_static("kinds", &Family::names)
-      .def_static("parameters", &parameters_of<decltype(Law::law)>, "kind"_a);
+      .def_static("parameters", &parameters_of<decltype(Law::law)>);
 }
 
 // A law of a user's functions; without one of energy that is the integral of the force.
@@ -80,7 +73,7 @@ void translate_fault(const std::exception_ptr& thrown, void*) {
 
 void bind_contact(nb::module_& m) {
   nb::register_exception_translator(translate_fault);
-  bind_family<NormalLaw>(m, "NormalLaw", slots<NormalLaw, visit_law>())
+  bind_family<NormalLaw>(m, "NormalLaw", slots<NormalLaw>())
       .def_static("of_function", &of_function, "parameters"_a, "force"_a, "of_force"_a, "energy"_a,
                   "of_energy"_a.none())
       .def_prop_ro("needs_rate", &NormalLaw::needs_rate)
@@ -97,20 +90,17 @@ void bind_contact(nb::module_& m) {
       .def("energy",
            [](const NormalLaw& law, double depth) { return depth > 0 ? law.energy(depth) : 0.0; });
   // The same for friction; no friction is null in Python.
-  bind_family<FrictionLaw>(m, "FrictionLaw", slots<FrictionLaw, visit_friction>())
-      .def_static("of_function", &friction_of_function, "parameters"_a, "force"_a, "of_force"_a)
+  bind_family<FrictionLaw>(m, "FrictionLaw", slots<FrictionLaw>())
+      .def_static("of_function", &friction_of_function)
       .def_prop_ro("has_state", &FrictionLaw::has_state)
       .def_prop_ro("torsional", &FrictionLaw::torsional)
       .def("coefficient", &FrictionLaw::coefficient, "speed"_a, "load"_a = 1.0);
-  m.def(
-      "contact_moduli",
-      [](const Numbers& materials) {
-        // E*, 8 G* and 16/3 G of sphere and shell [Pa].
-        Materials both{};
-        Materials::each(both, NumberReader{materials});
-        return nb::make_tuple(both.modulus(), both.shear(), both.twist());
-      },
-      "materials"_a);
+  m.def("contact_moduli", [](const Numbers& materials) {
+    // E*, 8 G* and 16/3 G of sphere and shell [Pa].
+    Materials both{};
+    Materials::each(both, NumberReader{materials});
+    return nb::make_tuple(both.modulus(), both.shear(), both.twist());
+  });
   m.def(
       "contact_force",
       [](const NormalLaw& law, const FrictionLaw* friction, double depth, const Vec3& normal,

@@ -1,16 +1,13 @@
-#include "bindings/interop.hpp"
-
 #include "bindings/evaluations.hpp"
 #include "bindings/held_step.hpp"
 #include "bindings/records.hpp"
 
 #include <nanobind/stl/vector.h>
 
-namespace sphshell {
-namespace {
+using namespace sphshell;
 
 template <class T>
-void bind(nb::class_<T>& bound) {
+static void bind(nb::class_<T>& bound) {
   bound
       .def(
           "dynamics_derivatives",
@@ -81,12 +78,7 @@ void bind(nb::class_<T>& bound) {
           "integrator"_a, "dt"_a, "q"_a, "v"_a.none(), "tau"_a.none(), "parameters"_a);
 }
 
-}  // namespace
-}  // namespace sphshell
-
-void bind_derivatives(nanobind::module_& m, nanobind::class_<sphshell::Evaluations>& scene,
-                      nanobind::class_<sphshell::OwnState>& state) {
-  using namespace sphshell;
+void bind_derivatives(nb::module_& m, nb::class_<Evaluations>& scene, nb::class_<OwnState>& state) {
   // A parameter as two pairs, with the number less and more a step; of what moves a body, kind and
   // axis alone.
   nb::class_<Parameter>(m, "Parameter")

@@ -1,5 +1,3 @@
-#include "bindings/interop.hpp"
-
 #include "bindings/callbacks.hpp"
 #include "bindings/evaluations.hpp"
 #include "bindings/records.hpp"
@@ -14,6 +12,19 @@
 #include <nanobind/stl/vector.h>
 
 namespace sphshell {
+
+static void look_at(const Evaluations& evaluations, Visitor& visitor) {
+  evaluations.for_each_pairs([&](const auto& pairs) { look_at(pairs, visitor); });
+}
+
+static void look_at(const OwnState& own, Visitor& visitor) {
+  look_at(own.state.scene().pairs(), visitor);
+}
+
+}  // namespace sphshell
+
+using namespace sphshell;
+
 namespace {
 
 // One geometry of four: a source, a ball of a positive radius, a plane, or a shell.
@@ -80,25 +91,10 @@ auto record(const char* doing, Record (Simulation::*method)()) {
   };
 }
 
-int visit_evaluations(const Evaluations& evaluations, visitproc visit, void* arg) {
-  return evaluations.for_each_pairs(
-      [&](const std::vector<Pair>& pairs) { return visit_sources(pairs, visit, arg); });
-}
-
-int visit_state(const OwnState& own, visitproc visit, void* arg) {
-  return visit_sources(own.state.scene().pairs(), visit, arg);
-}
-
-int visit_controller(const PythonController& controller, visitproc visit, void* arg) {
-  Py_VISIT(controller.callable().ptr());
-  return 0;
-}
-
 // A run holds its controller by the object that Python has of it.
-int visit_run(const Run& run, visitproc visit, void* arg) {
-  if (const Controller* controller = run.simulation.controller())
-    Py_VISIT(nb::find(*controller).ptr());
-  return visit_sources(run.simulation.pairs(), visit, arg);
+void look_at(const Run& run, Visitor& visitor) {
+  if (const Controller* controller = run.simulation.controller()) visitor(nb::find(*controller));
+  look_at(run.simulation.pairs(), visitor);
 }
 
 // A method of q and v, which are checked: what answer(scene, evaluate, q, v) makes of a scene
@@ -150,15 +146,12 @@ void bind_evaluations(nb::class_<T>& bound) {
 }
 
 }  // namespace
-}  // namespace sphshell
 
-void bind_derivatives(nanobind::module_& m, nanobind::class_<sphshell::Evaluations>& scene,
-                      nanobind::class_<sphshell::OwnState>& state);
+void bind_derivatives(nb::module_& m, nb::class_<Evaluations>& scene, nb::class_<OwnState>& state);
 
-void bind_dynamics(nanobind::module_& m) {
-  using namespace sphshell;
+void bind_dynamics(nb::module_& m) {
   // A pair is described in Python (dynamics/scene/pairs.py), which has checked all of it.
-  nb::class_<Pair>(m, "Pair", slots<Pair, visit_pair>())
+  nb::class_<Pair>(m, "Pair", slots<Pair>())
       .def_rw("relaxation", &Pair::relaxation)
       .def_rw("group", &Pair::group)
       .def(
@@ -188,58 +181,40 @@ void bind_dynamics(nanobind::module_& m) {
 
   // Joint components: arrays (nv) of damping and limits, then stops and dry friction one by one.
   nb::class_<CompiledRobot>(m, "CompiledRobot")
-      .def(
-          "__init__",
-          [](CompiledRobot* self, const std::string& path, nb::handle model) {
-            new (self) CompiledRobot(path, model_of(model));
-          },
-          "path"_a, "model"_a);
+      .def("__init__", [](CompiledRobot* self, const std::string& path, nb::handle model) {
+        new (self) CompiledRobot(path, model_of(model));
+      });
   nb::class_<JointEffects>(m, "JointEffects")
-      .def(nb::init<VectorX, VectorX, VectorX, VectorX>(), "damping"_a, "least_effort"_a,
-           "most_effort"_a, "speed"_a)
-      .def(
-          "add_stop",
-          [](JointEffects& self, int q, int v, double end, double sign, const NormalLaw& law) {
-            self.stops.push_back({q, v, end, sign, law});
-          },
-          "q"_a, "v"_a, "end"_a, "sign"_a, "law"_a)
-      .def(
-          "add_friction",
-          [](JointEffects& self, int v, double limit, double stiffness, double damping,
-             double relaxation) {
-            self.friction.push_back({v, limit, stiffness, damping, relaxation});
-          },
-          "v"_a, "limit"_a, "stiffness"_a, "damping"_a, "relaxation"_a)
-      .def(
-          "use",
-          [](JointEffects& self, std::shared_ptr<CompiledRobot> compiled) {
-            self.compiled = std::move(compiled);
-          },
-          "compiled"_a);
+      .def(nb::init<VectorX, VectorX, VectorX, VectorX>())
+      .def("add_stop", [](JointEffects& self, int q, int v, double end, double sign,
+                          const NormalLaw& law) { self.stops.push_back({q, v, end, sign, law}); })
+      .def("add_friction",
+           [](JointEffects& self, int v, double limit, double stiffness, double damping,
+              double relaxation) {
+             self.friction.push_back({v, limit, stiffness, damping, relaxation});
+           })
+      .def("use", [](JointEffects& self, std::shared_ptr<CompiledRobot> compiled) {
+        self.compiled = std::move(compiled);
+      });
 
-  m.def(
-      "model_fault",
-      [](nb::handle model) -> nb::object {
-        const std::optional<ModelFault> fault = model_fault(model_of(model));
-        if (!fault) return nb::none();
-        return nb::make_tuple(fault->name, fault->value, fault->must);
-      },
-      "model"_a);
+  m.def("model_fault", [](nb::handle model) -> nb::object {
+    const std::optional<ModelFault> fault = model_fault(model_of(model));
+    if (!fault) return nb::none();
+    return nb::make_tuple(fault->name, fault->value, fault->must);
+  });
 
-  m.def(
-      "touches_at",
-      [](nb::handle model, const std::vector<Pair>& pairs, const VectorX& q, const VectorX& v) {
-        check_state(model_of(model), q, v);
-        Multibody body(model_of(model));
-        std::vector<std::tuple<double, double, double, double>> out;
-        for (const Touch& one : touches_at(body, pairs, q, v))
-          out.emplace_back(one.gap, one.mass, one.slip_mass, one.speed);
-        return out;
-      },
-      "model"_a, "pairs"_a, "q"_a, "v"_a);
+  m.def("touches_at",
+        [](nb::handle model, const std::vector<Pair>& pairs, const VectorX& q, const VectorX& v) {
+          check_state(model_of(model), q, v);
+          Multibody body(model_of(model));
+          std::vector<std::tuple<double, double, double, double>> out;
+          for (const Touch& one : touches_at(body, pairs, q, v))
+            out.emplace_back(one.gap, one.mass, one.slip_mass, one.speed);
+          return out;
+        });
 
   // Evaluations at single states, from any thread.
-  nb::class_<Evaluations> scene(m, "Scene", slots<Evaluations, visit_evaluations>());
+  nb::class_<Evaluations> scene(m, "Scene", slots<Evaluations>());
   bind_evaluations(scene);
   scene.def_prop_ro("bristle_size", &Evaluations::bristle_size)
       .def("rates",
@@ -255,25 +230,22 @@ void bind_dynamics(nanobind::module_& m) {
                return to_array(out);
              });
            })
-      .def(
-          "rate_jacobian",
-          [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
-             const VectorX& tau) {
-            return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-              check_count("z", z.size(), scene.bristle_size());
-              check_count("tau", tau.size(), v.size());
-              Linearization& linearization = evaluate.linearization();
-              scene.restart();
-              scene.evaluate(q, v, z);
-              MatrixX jacobian;
-              linearization.rates(q, v, z, tau, jacobian);
-              return to_array(jacobian);
-            });
-          },
-          "q"_a, "v"_a, "z"_a, "tau"_a);
+      .def("rate_jacobian", [](Evaluations& self, const VectorX& q, const VectorX& v,
+                               const VectorX& z, const VectorX& tau) {
+        return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+          check_count("z", z.size(), scene.bristle_size());
+          check_count("tau", tau.size(), v.size());
+          Linearization& linearization = evaluate.linearization();
+          scene.restart();
+          scene.evaluate(q, v, z);
+          MatrixX jacobian;
+          linearization.rates(q, v, z, tau, jacobian);
+          return to_array(jacobian);
+        });
+      });
 
   // A state that remembers contacts and bristles, for a loop of the user's own.
-  nb::class_<OwnState> state(m, "SceneState", slots<OwnState, visit_state>());
+  nb::class_<OwnState> state(m, "SceneState", slots<OwnState>());
   bind_evaluations(state);
   state.def("copy", [](const OwnState& self) { return new OwnState(self); })
       .def("save",
@@ -281,13 +253,11 @@ void bind_dynamics(nanobind::module_& m) {
              const Use use(self.user, "save");
              return to_array(self.state.save());
            })
-      .def(
-          "restore",
-          [](OwnState& self, const VectorX& from) {
-            const Use use(self.user, "restore");
-            return self.state.restore(from.data(), static_cast<std::size_t>(from.size()));
-          },
-          "values"_a)
+      .def("restore",
+           [](OwnState& self, const VectorX& from) {
+             const Use use(self.user, "restore");
+             return self.state.restore(from.data(), static_cast<std::size_t>(from.size()));
+           })
       .def(
           "advance",
           [](OwnState& self, nb::handle q, nb::handle v, double dt) {
@@ -300,12 +270,25 @@ void bind_dynamics(nanobind::module_& m) {
   // Controllers by kind and fields, which dynamics/control/ has checked.
   nb::class_<Controller>(m, "Controller")
       .def(nb::new_([](const std::string& kind, std::map<std::string, VectorX> fields) {
-             return make_controller(kind, {std::move(fields)});
-           }),
-           "kind"_a, "fields"_a);
-  nb::class_<PythonController, Controller>(m, "PythonController",
-                                           slots<PythonController, visit_controller>())
-      .def(nb::init<nb::object>(), "callable"_a);
+        return make_controller(kind, {std::move(fields)});
+      }));
+  nb::class_<PythonController, Controller>(m, "PythonController", slots<PythonController>())
+      .def(nb::init<nb::object>());
+
+  // What a sensor measures is set at construction, the way of the signal by attributes.
+  nb::class_<Sensor>(m, "Sensor")
+      .def("__init__",
+           [](Sensor* self, const std::string& kind, std::map<std::string, VectorX> fields) {
+             new (self) Sensor{make_measured(kind, {std::move(fields)})};
+           })
+      .def_prop_ro("size", &Sensor::size)
+      .def_rw("rate", &Sensor::rate)
+      .def_rw("delay", &Sensor::delay)
+      .def_rw("cutoff", &Sensor::cutoff)
+      .def_rw("range", &Sensor::range)
+      .def_rw("noise", &Sensor::noise)
+      .def_rw("seed", &Sensor::seed);
+  m.def("normal_noise", &normal_noise);
 
   // Times in seconds; by keyword only.
   nb::class_<RunSettings>(m, "RunSettings")
@@ -314,26 +297,24 @@ void bind_dynamics(nanobind::module_& m) {
            nb::kw_only(), "integrator"_a, "dt"_a, "rtol"_a, "atol"_a, "duration"_a, "start_time"_a,
            "control_dt"_a, "record_dt"_a, "patches"_a, "torques"_a, "states"_a);
 
-  nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>(), "what"_a);
+  nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>());
   // Entered and left in one instruction of Python each, so that Ctrl-C cannot come between.
   nb::class_<PythonUse>(m, "Use")
-      .def(nb::init<OneUser&, std::string>(), "user"_a, "doing"_a, nb::keep_alive<1, 2>())
+      .def(nb::init<OneUser&, std::string>(), nb::keep_alive<1, 2>())
       .def("__enter__", [](PythonUse& self) { self.user.enter(self.doing.c_str()); })
       .def("__exit__", [](PythonUse& self, nb::args) { self.user.leave(); });
 
   // One run that goes on in pieces; each method is for one user at a time.
-  nb::class_<Run> run(m, "Simulation", slots<Run, visit_run>());
+  nb::class_<Run> run(m, "Simulation", slots<Run>());
   run.def(nb::init<nb::handle, std::vector<Pair>, JointForces::Effects, std::shared_ptr<Controller>,
                    VectorX, VectorX, const RunSettings&, std::vector<Sensor>>(),
           "model"_a, "pairs"_a, "joints"_a.none(), "controller"_a.none(), "q0"_a, "v0"_a,
           "settings"_a, "sensors"_a)
-      .def(
-          "differentiate",
-          [](Run& self, std::vector<Parameter> parameters, bool by_q0, bool by_v0) {
-            const SensitivitySettings settings{std::move(parameters), by_q0, by_v0};
-            call_alone(self, "differentiate", &Simulation::differentiate, settings);
-          },
-          "parameters"_a, "by_q0"_a, "by_v0"_a)
+      .def("differentiate",
+           [](Run& self, std::vector<Parameter> parameters, bool by_q0, bool by_v0) {
+             const SensitivitySettings settings{std::move(parameters), by_q0, by_v0};
+             call_alone(self, "differentiate", &Simulation::differentiate, settings);
+           })
       .def("take_sensitivities", alone("take", &Simulation::take_sensitivities))
       .def(
           "advance",
@@ -346,23 +327,18 @@ void bind_dynamics(nanobind::module_& m) {
       .def("deep_start", alone("start", &Simulation::deep_start))
       .def("change", alone("change", &Simulation::change), "pairs"_a, "joints"_a.none(),
            "controller"_a.none())
-      .def(
-          "take_over",
-          [](Run& self, const Run& before) {
-            call_alone(self, "take_over", &Simulation::take_over, before.simulation);
-          },
-          "before"_a)
-      .def(
-          "push",
-          [](Run& self, int joint, const Vec3& point, const Vec3& force, const Vec3& anchor,
-             double stiffness, double damping, int frame) {
-            const PointForce push{force, anchor, stiffness, damping};
-            call_alone(self, "push", &Simulation::push, joint, point, push, frame);
-          },
-          "joint"_a, "point"_a, "force_world"_a, "anchor_world"_a, "stiffness"_a, "damping"_a,
-          "frame"_a)
-      .def("record_patches", alone("record", &Simulation::record_patches), "on"_a)
-      .def("resume", alone("resume", &Simulation::resume), "state"_a)
+      .def("take_over",
+           [](Run& self, const Run& before) {
+             call_alone(self, "take_over", &Simulation::take_over, before.simulation);
+           })
+      .def("push",
+           [](Run& self, int joint, const Vec3& point, const Vec3& force_world,
+              const Vec3& anchor_world, double stiffness, double damping, int frame) {
+             const PointForce push{force_world, anchor_world, stiffness, damping};
+             call_alone(self, "push", &Simulation::push, joint, point, push, frame);
+           })
+      .def("record_patches", alone("record", &Simulation::record_patches))
+      .def("resume", alone("resume", &Simulation::resume))
       .def("record_torques", alone("record_torques", &Simulation::record_torques))
       .def("take", record("take", &Simulation::take))
       .def("snapshot", record("snapshot", &Simulation::snapshot))

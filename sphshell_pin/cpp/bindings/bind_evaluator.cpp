@@ -1,5 +1,3 @@
-#include "bindings/interop.hpp"
-
 #include "bindings/evaluations.hpp"
 #include "bindings/held_step.hpp"
 

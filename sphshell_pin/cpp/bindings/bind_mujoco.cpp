@@ -1,11 +1,10 @@
 // Contacts in MuJoCo: the adapter's half that MuJoCo calls.
-#include "bindings/interop.hpp"
+#include "bindings/evaluations.hpp"
 
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
 #include "adapters/mujoco.hpp"
-#include "bindings/evaluations.hpp"
 #include "bindings/gil.hpp"
 #include "bindings/records.hpp"
 
@@ -39,29 +38,25 @@ void bind_mujoco(nb::module_& m) {
         [](std::uintptr_t model, int instance) { return is_taken(pointer(model), instance); });
   m.def("mujoco_end", [](std::uintptr_t model) { end_model(pointer(model)); });
   nb::class_<OwnMujoco>(m, "MujocoContacts")
-      .def(
-          "__init__",
-          [](OwnMujoco* self, const OwnState& state, const std::vector<std::size_t>& layout,
-             const std::vector<int>& memory, const std::vector<int>& ids,
-             const std::vector<int>& roots, const std::vector<std::vector<int>>& dofs,
-             const std::vector<int>& roles, std::vector<std::string> touches, bool logs) {
-            check_count("layout", layout.size(), 15);
-            check_count("memory", memory.size(), 3);
-            const std::size_t* at = layout.data();
-            std::vector<MujocoBody> bodies;
-            for (std::size_t k = 0; k < ids.size(); ++k)
-              bodies.push_back({ids[k], roots[k], dofs[k]});
-            std::vector<MujocoRole> parts;
-            for (const int role : roles) parts.push_back(static_cast<MujocoRole>(role));
-            new (self) OwnMujoco{std::make_shared<MujocoContacts>(
-                SceneData(state.state.scene()),
-                MujocoLayout{at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8], at[9],
-                             at[10], at[11], at[12], at[13], at[14]},
-                MujocoMemory{memory[0], std::size_t(memory[1]), std::size_t(memory[2])},
-                std::move(bodies), std::move(parts), std::move(touches), logs, &report)};
-          },
-          nb::arg("state"), nb::arg("layout"), nb::arg("memory"), nb::arg("ids"), nb::arg("roots"),
-          nb::arg("dofs"), nb::arg("roles"), nb::arg("touches"), nb::arg("logs"))
+      .def("__init__",
+           [](OwnMujoco* self, const OwnState& state, const std::vector<std::size_t>& layout,
+              const std::vector<int>& memory, const std::vector<int>& ids,
+              const std::vector<int>& roots, const std::vector<std::vector<int>>& dofs,
+              const std::vector<int>& roles, std::vector<std::string> touches, bool logs) {
+             check_count("layout", layout.size(), sizeof(MujocoLayout) / sizeof(std::size_t));
+             check_count("memory", memory.size(), 3);
+             MujocoLayout places;
+             std::memcpy(&places, layout.data(), sizeof places);
+             std::vector<MujocoBody> bodies;
+             for (std::size_t k = 0; k < ids.size(); ++k)
+               bodies.push_back({ids[k], roots[k], dofs[k]});
+             std::vector<MujocoRole> parts;
+             for (const int role : roles) parts.push_back(static_cast<MujocoRole>(role));
+             new (self) OwnMujoco{std::make_shared<MujocoContacts>(MujocoSetup{
+                 SceneData(state.state.scene()), places,
+                 MujocoMemory{memory[0], std::size_t(memory[1]), std::size_t(memory[2])},
+                 std::move(bodies), std::move(parts), std::move(touches), logs, &report})};
+           })
       .def("attach",
            [](const OwnMujoco& self, std::uintptr_t model) {
              return register_passive(pointer(model), self.contacts);

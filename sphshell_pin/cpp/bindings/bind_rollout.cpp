@@ -1,5 +1,3 @@
-#include "bindings/interop.hpp"
-
 #include "bindings/evaluations.hpp"
 #include "bindings/gil.hpp"
 #include "bindings/records.hpp"
@@ -8,7 +6,8 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/vector.h>
 
-namespace sphshell {
+using namespace sphshell;
+
 namespace {
 
 // Energy stored and lost less the controller's work, from the first row to the last [J].
@@ -30,10 +29,8 @@ nb::list through(const Outcome& outcome) {
 }
 
 }  // namespace
-}  // namespace sphshell
 
-void bind_rollout(nanobind::module_& m) {
-  using namespace sphshell;
+void bind_rollout(nb::module_& m) {
   // What a run of a rollout leaves behind; its record is converted only when it is asked for.
   nb::class_<Outcome> outcome(m, "Outcome");
   outcome.def_prop_ro("status", [](const Outcome& self) { return as_python(self.status); })
@@ -46,12 +43,8 @@ void bind_rollout(nanobind::module_& m) {
 
   // Runs of one model on threads of their own.
   nb::class_<Rollout>(m, "Rollout")
-      .def(
-          "__init__",
-          [](Rollout* self, nb::handle model, int threads) {
-            new (self) Rollout(model_of(model), threads);
-          },
-          "model"_a, "threads"_a)
+      .def("__init__", [](Rollout* self, nb::handle model,
+                          int threads) { new (self) Rollout(model_of(model), threads); })
       .def(
           "add",
           [](Rollout& self, std::vector<Pair> pairs, JointForces::Effects joints,
@@ -64,15 +57,13 @@ void bind_rollout(nanobind::module_& m) {
           "pairs"_a, "joints"_a.none(), "controller"_a.none(), "q0"_a, "v0"_a, "settings"_a,
           "sensors"_a)
       // Threads may want the interpreter for a user's routine.
-      .def(
-          "wait",
-          [](Rollout& self, std::size_t left, double seconds) {
-            self.give_back();
-            const ReleaseGil released;
-            // What finished runs lent is released first, under the interpreter's lock.
-            return self.wait(left, seconds);
-          },
-          "left"_a, "seconds"_a)
+      .def("wait",
+           [](Rollout& self, std::size_t left, double seconds) {
+             self.give_back();
+             const ReleaseGil released;
+             // What finished runs lent is released first, under the interpreter's lock.
+             return self.wait(left, seconds);
+           })
       .def("stop",
            [](Rollout& self) {
              {

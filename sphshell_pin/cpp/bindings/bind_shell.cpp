@@ -8,32 +8,34 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
 
-namespace sphshell {
+using namespace sphshell;
+
 namespace {
 
-// Copied as a block: three doubles are a Vec3.
-std::vector<Vec3> rows(const Points& table) {
-  static_assert(sizeof(Vec3) == 3 * sizeof(double));
-  const auto* first = reinterpret_cast<const Vec3*>(table.data());
-  return {first, first + table.shape(0)};
+// Copied as a block: three doubles are a Vec3, three integers a triangle.
+template <class Row, class T, int... columns>
+std::vector<Row> copied(const Rows<T, columns...>& table) {
+  static_assert(sizeof(Row) == (sizeof(T) * ... * columns));
+  const auto* first = reinterpret_cast<const Row*>(table.data);
+  return {first, first + table.count};
+}
+template <class Row, class Array>
+std::vector<Row> copied(const std::optional<Array>& table) {
+  if (!table) return {};
+  const auto* first = reinterpret_cast<const Row*>(table->data());
+  return {first, first + table->shape(0)};
 }
 
 // Arrays were checked in Python: triangles (m, 3), the element of each, and of CAD the face and
 // three normals of each.
-std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& triangles,
-                                  const Ints& element, double crease_angle, int side,
-                                  const std::optional<Ints>& face,
-                                  const std::optional<Points>& normals) {
-  std::vector<Vec3> points = rows(vertices);
-  static_assert(sizeof(Triangle) == 3 * sizeof(int));
-  const auto* first = reinterpret_cast<const Triangle*>(triangles.data());
-  std::vector<Triangle> corners(first, first + triangles.shape(0));
-  std::vector<int> owner(element.data(), element.data() + element.shape(0));
-  CadFaces cad;
-  if (face && normals) {
-    cad.face.assign(face->data(), face->data() + face->shape(0));
-    cad.normals = rows(*normals);
-  }
+std::shared_ptr<Shell> make_shell(const Points& vertices, const Rows<int, 3>& triangles,
+                                  const Indices& element, double crease_angle, int side,
+                                  const std::optional<InArray<int>>& face,
+                                  const std::optional<InArray<double, 3>>& normals) {
+  std::vector<Vec3> points = copied<Vec3>(vertices);
+  std::vector<Triangle> corners = copied<Triangle>(triangles);
+  std::vector<int> owner = copied<int>(element);
+  const CadFaces cad{copied<int>(face), copied<Vec3>(normals)};
   const ReleaseGil released;
   return std::make_shared<Shell>(std::move(points), std::move(corners), std::move(owner),
                                  crease_angle, static_cast<Side>(side), cad);
@@ -99,10 +101,10 @@ constexpr std::size_t kGrain = 64;  // fewer queries are not worth a thread
 
 // Depth of the deepest contact and number of minima, of each sphere. Each thread has scratch of its
 // own.
-auto contacts_batch(const Shell& shell, const Points& centers, const Doubles& radii, int method,
-                    int threads) {
-  const std::size_t n = centers.shape(0);
-  check_count("radii", radii.shape(0), n);
+auto contacts_batch(const Shell& shell, const Points& centers, const Rows<double>& radii,
+                    int method, int threads) {
+  const std::size_t n = centers.count;
+  check_count("radii", radii.count, n);
   const Method how = checked_method(shell, method);
   std::vector<double> depth(n, 0.0);
   std::vector<int> count(n, 0);
@@ -112,38 +114,32 @@ auto contacts_batch(const Shell& shell, const Points& centers, const Doubles& ra
       Query query;
       std::vector<Contact> shown;
       for (std::size_t i = begin; i < end; ++i) {
-        const Vec3 center = row(centers, i);
-        merge_groups(query.find(shell, center, radii(i), how), center, radii(i), shown);
+        const Vec3 center = place(centers, i);
+        merge_groups(query.find(shell, center, radii[i], how), center, radii[i], shown);
         for (const Contact& c : shown)
           depth[i] = std::max(depth[i], c.depth), count[i] += c.weight > 0;
       }
     });
   }
-  return nb::make_tuple(to_array(std::move(depth)), to_array(std::move(count)));
+  return to_arrays(depth, count);
 }
 
 // Points, normals, signed distances and elements.
 auto closest_points(const Shell& shell, const Points& points, bool smooth, int threads) {
-  const std::size_t n = points.shape(0);
   if (smooth) checked_method(shell, static_cast<int>(Method::Smooth));
-  std::vector<double> point(3 * n), normal(3 * n), distance(n);
-  std::vector<int> element(n);
+  std::vector<SurfacePoint> found(points.count);
   {
     const ReleaseGil released;
-    in_parallel(n, threads, kGrain, [&](std::size_t begin, std::size_t end) {
+    in_parallel(found.size(), threads, kGrain, [&](std::size_t begin, std::size_t end) {
       Query query;
       for (std::size_t i = begin; i < end; ++i) {
-        SurfacePoint at = shell.closest_point(row(points, i));
-        if (smooth) at = on_curved(shell, row(points, i), at, query);
-        std::copy_n(at.point.data(), 3, &point[3 * i]);
-        std::copy_n(at.normal.data(), 3, &normal[3 * i]);
-        distance[i] = at.distance;
-        element[i] = at.element;
+        found[i] = shell.closest_point(place(points, i));
+        if (smooth) found[i] = on_curved(shell, place(points, i), found[i], query);
       }
     });
   }
-  return nb::make_tuple(to_array(std::move(point), {n, 3}), to_array(std::move(normal), {n, 3}),
-                        to_array(std::move(distance)), to_array(std::move(element)));
+  return columns(found, &SurfacePoint::point, &SurfacePoint::normal, &SurfacePoint::distance,
+                 &SurfacePoint::element);
 }
 
 // An array over the shell's own memory, which lives as long as the array.
@@ -157,64 +153,59 @@ auto view(nb::handle shell, const std::vector<Row>& rows) {
 }
 
 // get(edge) for every edge between elements.
-template <class T, class Get>
-std::vector<T> per_edge(const Shell& shell, Get&& get) {
-  std::vector<T> out;
+template <class Get>
+auto per_edge(const Shell& shell, Get&& get) {
+  std::vector<std::invoke_result_t<Get, const Edge&>> out;
   for (const Edge& edge : shell.topology().edges)
     if (!edge.inner) out.push_back(get(edge));
-  return out;
+  return to_array(std::move(out));
 }
 
-// Both ends of each edge between elements (n, 2).
-Array<int> edge_vertices(const Shell& shell) {
-  std::vector<int> out;
-  for (const Edge& edge : shell.topology().edges)
-    if (!edge.inner) out.insert(out.end(), {edge.first_vertex, edge.last_vertex});
-  const std::size_t n = out.size() / 2;
-  return to_array(std::move(out), {n, 2});
+// Triangles with curved elements; none before these are made.
+std::size_t count_curved(const Shell& shell) {
+  return shell.curved() ? shell.triangles().size() : 0;
 }
 
 // Per triangle: offsets of the two control points of each side, and of the center.
 Array<double> control_point_offsets(const Shell& shell) {
-  const std::size_t n = shell.curved() ? shell.triangles().size() : 0;
-  std::vector<double> out(21 * n);
+  const std::size_t n = count_curved(shell);
+  std::vector<std::array<Vec3, 7>> out(n);
   for (std::size_t f = 0; f < n; ++f) {
     const CurvedFacet& curved = shell.curved()->facets()[f];
-    double* to = &out[21 * std::size_t(shell.triangle_of_facet(int(f)))];
-    for (int k = 0; k < 6; ++k)
-      std::copy_n(curved.control_offset(k / 2, k % 2).data(), 3, to + 3 * k);
-    std::copy_n(curved.middle(shell.facets()[f]).data(), 3, to + 18);
+    std::array<Vec3, 7>& to = out[std::size_t(shell.triangle_of_facet(int(f)))];
+    for (int k = 0; k < 6; ++k) to[k] = curved.control_offset(k / 2, k % 2);
+    to[6] = curved.middle(shell.facets()[f]);
   }
-  return to_array(std::move(out), {n, 7, 3});
+  return array_of<double>(std::move(out), {n, 7, 3});
 }
 
 // The normals of the curved elements at their corners.
 Array<double> corner_normals(const Shell& shell) {
-  std::vector<double> out;
-  const std::size_t n = shell.curved() ? shell.triangles().size() : 0;
+  const std::size_t n = count_curved(shell);
+  std::vector<Vec3> out;
   for (std::size_t t = 0; t < n; ++t) {
     const int f = triangle_of(shell.facet_half_edge(static_cast<int>(3 * t)));
     const CubicPatch patch = shell.curved()->facets()[f].patch(shell.facets()[f]);
     for (const auto& [u, v] : {std::pair(0, 0), {1, 0}, {0, 1}})
-      append(out, patch.along_u(u, v).cross(patch.along_v(u, v)).normalized());
+      out.push_back(patch.along_u(u, v).cross(patch.along_v(u, v)).normalized());
   }
-  return to_array(std::move(out), {n, 3, 3});
+  return array_of<double>(std::move(out), {n, 3, 3});
 }
 
 // Per triangle, see Bending; empty without curved elements.
 Array<std::uint8_t> bending(const Shell& shell) {
-  std::vector<std::uint8_t> out(shell.curved() ? shell.triangles().size() : 0);
+  std::vector<std::uint8_t> out(count_curved(shell));
   for (std::size_t t = 0; t < out.size(); ++t)
     out[t] = static_cast<std::uint8_t>(shell.curved()->bending(shell, static_cast<int>(t)));
   return to_array(std::move(out));
 }
 
 // Rows of kind, point, axis and the two radii, as CleanedSurface.face_shapes in Python has them.
-using FaceShapes = nb::ndarray<const double, nb::shape<-1, 9>, nb::c_contig, nb::device::cpu>;
+using FaceShapes = InArray<double, 9>;
 
 // A face of no known kind has a negative one: its triangles lie on no face then, and its number
 // stays taken.
-std::shared_ptr<const Faces> known_faces(const Ints& of, const FaceShapes& shapes) {
+std::shared_ptr<const Faces> known_faces(const InArray<int>& of, const FaceShapes& shapes) {
   auto out = std::make_shared<Faces>();
   for (std::size_t i = 0; i < shapes.shape(0); ++i) {
     const auto vector = [&](int k) {
@@ -234,7 +225,7 @@ std::shared_ptr<const Faces> known_faces(const Ints& of, const FaceShapes& shape
 Array<int> triangle_face(const Shell& shell) {
   std::vector<int> out;
   if (shell.curved()) out = shell.curved()->faces().of;
-  out.resize(shell.curved() ? shell.triangles().size() : 0, -1);
+  out.resize(count_curved(shell), -1);
   return to_array(std::move(out));
 }
 
@@ -256,12 +247,11 @@ Array<std::uint8_t> exact_triangles(const Shell& shell) {
 // Faces that do not give all closest points: which, beside which other one (-1: none), and how far
 // off [m]; (n, 3).
 Array<double> inexact_faces(const Shell& shell) {
-  std::vector<double> out;
+  std::vector<std::array<double, 3>> out;
   if (shell.curved())
     for (const Inexact& one : shell.curved()->inexact())
-      out.insert(out.end(), {double(one.face), double(one.other), one.off});
-  const std::size_t n = out.size() / 3;
-  return to_array(std::move(out), {n, 3});
+      out.push_back({double(one.face), double(one.other), one.off});
+  return to_array(std::move(out));
 }
 
 // Kinds (n,) and numbers (n, 8) of all faces.
@@ -275,8 +265,7 @@ nb::tuple faces(const Shell& shell) {
       append(numbers, face.axis);
       numbers.insert(numbers.end(), {face.radius, face.second});
     }
-  const std::size_t n = kind.size();
-  return nb::make_tuple(to_array(std::move(kind)), to_array(std::move(numbers), {n, 8}));
+  return nb::make_tuple(to_array(std::move(kind)), rows_of<8>(std::move(numbers)));
 }
 
 // Per corner (n, 3), see CurvedShell::divided.
@@ -284,15 +273,12 @@ Array<std::uint8_t> normals_set_aside(const Shell& shell) {
   std::vector<std::uint8_t> out;
   if (shell.curved())
     out.assign(shell.curved()->divided().begin(), shell.curved()->divided().end());
-  const std::size_t n = out.size() / 3;
-  return to_array(std::move(out), {n, 3});
+  return rows_of<3>(std::move(out));
 }
 
 }  // namespace
-}  // namespace sphshell
 
-void bind_shell(nanobind::module_& m) {
-  using namespace sphshell;
+void bind_shell(nb::module_& m) {
   // Behind the Shell of Python, which has read, checked and triangulated the surface.
   m.def("shell_contact_row_type", [] { return row_type<ShellContactRow>(kShellContactFields); });
   nb::class_<Shell> shell(m, "Shell");
@@ -307,14 +293,17 @@ void bind_shell(nanobind::module_& m) {
            })
       .def(
           "curve",
-          [](const std::shared_ptr<Shell>& shell, std::optional<Points> normals, bool exact,
-             std::optional<Bytes> straight, double rounding, bool faces, std::optional<Ints> known,
-             std::optional<FaceShapes> shapes) {
-            CurveOptions options{{}, exact, {}, rounding, faces, nullptr, nullptr};
+          [](const std::shared_ptr<Shell>& shell, std::optional<InArray<double, 3>> normals,
+             bool exact, std::optional<InArray<std::uint8_t>> straight, double rounding, bool faces,
+             std::optional<InArray<int>> known, std::optional<FaceShapes> shapes) {
+            CurveOptions options{copied<Vec3>(normals),
+                                 exact,
+                                 copied<std::uint8_t>(straight),
+                                 rounding,
+                                 faces,
+                                 nullptr,
+                                 nullptr};
             if (known && shapes) options.known = known_faces(*known, *shapes);
-            if (normals) options.normals = rows(*normals);
-            if (straight)
-              options.straight.assign(straight->data(), straight->data() + straight->shape(0));
             // Under the GIL: two threads may ask for the first curved query at once.
             return curve(shell, std::move(options));
           },
@@ -334,11 +323,7 @@ void bind_shell(nanobind::module_& m) {
                    })
       .def_prop_ro(
           "pinched_vertices",
-          [](const Shell& s) {
-            std::vector<int> out;
-            for (const Pinch& p : s.topology().pinches) out.push_back(p.vertex);
-            return to_array(std::move(out));
-          },
+          [](const Shell& s) { return to_array(column(s.topology().pinches, &Pinch::vertex)); },
           nb::rv_policy::automatic)
       .def_prop_ro("creases", [](const Shell& s) { return s.curved() ? s.curved()->creases() : 0; })
       // Of a shell with curved elements.
@@ -371,13 +356,14 @@ void bind_shell(nanobind::module_& m) {
   shell.def_prop_ro("faces", &faces);
   array("normals_set_aside", &normals_set_aside);
   array("element_patch", [](const Shell& s) { return to_array(s.topology().patch); });
-  array("edge_vertices", &edge_vertices);
+  array("edge_vertices", [](const Shell& s) {
+    return per_edge(s, [](const Edge& e) { return std::array{e.first_vertex, e.last_vertex}; });
+  });
   array("edge_class", [](const Shell& s) {
-    return to_array(
-        per_edge<std::uint8_t>(s, [](const Edge& e) { return static_cast<std::uint8_t>(e.kind); }));
+    return per_edge(s, [](const Edge& e) { return static_cast<std::uint8_t>(e.kind); });
   });
   array("edge_angle", [](const Shell& s) {
-    return to_array(per_edge<double>(
-        s, [&](const Edge& e) { return s.topology().angle(s.vertices(), s.triangles(), e); }));
+    return per_edge(
+        s, [&](const Edge& e) { return s.topology().angle(s.vertices(), s.triangles(), e); });
   });
 }

@@ -1,6 +1,5 @@
 #include "bindings/interop.hpp"
 
-#include "bindings/callbacks.hpp"
 #include "bindings/law_integral.hpp"
 
 #include <cstring>
@@ -82,11 +81,6 @@ void PythonSource::operator()(const SE3& pose_i, const SE3& pose_j,
                    Feature::Face});
 }
 
-PythonController::~PythonController() {
-  const AcquireGil gil;
-  callable_.reset();
-}
-
 // The contacts are those of the state, as rows; the torques of the answer were checked by the
 // wrapper.
 void PythonController::torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
@@ -94,7 +88,7 @@ void PythonController::torque(SceneData& scene, double t, const VectorX& q, cons
   std::vector<ContactRow> rows;
   scene.log(q, v, rows);
   const AcquireGil gil;
-  const nb::object answer = gil.call(callable_, [&] {
+  const nb::object answer = gil.call(object(), [&] {
     std::vector<PyObject*> items{PyFloat_FromDouble(t), bytes_of(q.data(), q.size()),
                                  bytes_of(v.data(), v.size()), bytes_of(rows.data(), rows.size())};
     if (readings_) items.push_back(bytes_of(readings_->data(), readings_->size()));
@@ -104,34 +98,28 @@ void PythonController::torque(SceneData& scene, double t, const VectorX& q, cons
   tau = Eigen::Map<const VectorX>(torque.data(), static_cast<Eigen::Index>(torque.size()));
 }
 
-int visit_law(const NormalLaw& law, visitproc visit, void* arg) {
+void look_at(const NormalLaw& law, Visitor& visitor) {
   const auto* own = std::get_if<FunctionLaw>(&law.law);
-  if (!own) return 0;
-  if (const auto* force = own->function.target<LawForce>()) Py_VISIT(force->object().ptr());
-  if (const auto* energy = own->potential.target<LawEnergy>()) Py_VISIT(energy->object().ptr());
-  if (const auto* energy = own->potential.target<LawIntegral>())
-    Py_VISIT(energy->force().object().ptr());
-  return 0;
+  if (!own) return;
+  if (const auto* force = own->function.target<LawForce>()) visitor(force->object());
+  if (const auto* energy = own->potential.target<LawEnergy>()) visitor(energy->object());
+  if (const auto* energy = own->potential.target<LawIntegral>()) visitor(energy->force().object());
 }
 
-int visit_friction(const FrictionLaw& friction, visitproc visit, void* arg) {
-  const auto* own = std::get_if<FunctionFriction>(&friction.law);
-  if (!own) return 0;
-  if (const auto* force = own->function.target<LawForce>()) Py_VISIT(force->object().ptr());
-  return 0;
+void look_at(const FrictionLaw& friction, Visitor& visitor) {
+  if (const auto* own = std::get_if<FunctionFriction>(&friction.law))
+    if (const auto* force = own->function.target<LawForce>()) visitor(force->object());
 }
 
-int visit_pair(const Pair& pair, visitproc visit, void* arg) {
+void look_at(const Pair& pair, Visitor& visitor) {
   if (const auto* points = std::get_if<SourcePoints>(&pair.geometry))
-    if (const auto* own = points->source.target<PythonSource>()) Py_VISIT(own->object().ptr());
-  if (const int stop = visit_friction(pair.friction, visit, arg)) return stop;
-  return visit_law(pair.law, visit, arg);
+    if (const auto* own = points->source.target<PythonSource>()) visitor(own->object());
+  look_at(pair.friction, visitor);
+  look_at(pair.law, visitor);
 }
 
-int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg) {
-  for (const Pair& pair : pairs)
-    if (const int stop = visit_pair(pair, visit, arg)) return stop;
-  return 0;
+void look_at(const std::vector<Pair>& pairs, Visitor& visitor) {
+  for (const Pair& pair : pairs) look_at(pair, visitor);
 }
 
 }  // namespace sphshell

@@ -56,40 +56,50 @@ using LawEnergy = LawFunction<double>;
 // A callable tau(t, q, v, contacts): vectors and rows of contacts come as memory, of which its
 // Python wrapper makes arrays; it returns an array of float64 (nv). One that reads sensors takes
 // their latest readings too.
-class PythonController : public Controller {
+class PythonController : public Controller, public Routine {
  public:
-  explicit PythonController(nb::object callable) : callable_(std::move(callable)) {}
-  ~PythonController() override;
+  using Routine::Routine;
   bool follows_time() const override { return true; }
   void read(const std::vector<double>& readings) override { readings_ = &readings; }
   void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
               VectorX& tau) override;
-  nb::handle callable() const { return callable_; }
 
  private:
-  nb::object callable_;
   const std::vector<double>* readings_ = nullptr;  // of the run's sensors
 };
 
-// For Python's garbage collector: the Python objects that a law, a pair or pairs hold.
-int visit_law(const NormalLaw& law, visitproc visit, void* arg);
-int visit_friction(const FrictionLaw& friction, visitproc visit, void* arg);
-int visit_pair(const Pair& pair, visitproc visit, void* arg);
-int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg);
+// Shows objects to Python's garbage collector, until it wants no more.
+struct Visitor {
+  visitproc visit;
+  void* arg;
+  int stop = 0;
 
-// tp_traverse of a bound T: its type, and what visit_parts(T, visit, arg) visits.
-template <class T, int (*visit_parts)(const T&, visitproc, void*)>
+  void operator()(nb::handle object) {
+    if (stop == 0 && object.is_valid()) stop = visit(object.ptr(), arg);
+  }
+};
+
+// The Python objects that a law, a pair or pairs hold.
+void look_at(const NormalLaw& law, Visitor& visitor);
+void look_at(const FrictionLaw& friction, Visitor& visitor);
+void look_at(const Pair& pair, Visitor& visitor);
+void look_at(const std::vector<Pair>& pairs, Visitor& visitor);
+inline void look_at(const Routine& routine, Visitor& visitor) { visitor(routine.object()); }
+
+// tp_traverse of a bound T: its type, and what look_at() shows of it.
+template <class T>
 int traverse(PyObject* self, visitproc visit, void* arg) {
-  Py_VISIT(Py_TYPE(self));
-  if (!nb::inst_ready(self)) return 0;
-  return visit_parts(*nb::inst_ptr<T>(self), visit, arg);
+  Visitor visitor{visit, arg};
+  visitor(nb::handle((PyObject*)Py_TYPE(self)));
+  if (nb::inst_ready(self)) look_at(*nb::inst_ptr<T>(self), visitor);
+  return visitor.stop;
 }
 
 // Lets Python's garbage collector see what the object holds, so that cycles through callbacks are
 // freed.
-template <class T, int (*visit_parts)(const T&, visitproc, void*)>
+template <class T>
 nb::type_slots slots() {
-  static PyType_Slot all[] = {{Py_tp_traverse, reinterpret_cast<void*>(&traverse<T, visit_parts>)},
+  static PyType_Slot all[] = {{Py_tp_traverse, reinterpret_cast<void*>(&traverse<T>)},
                               {0, nullptr}};
   return nb::type_slots(all);
 }

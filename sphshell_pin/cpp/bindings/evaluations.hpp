@@ -56,11 +56,9 @@ class Evaluations {
 
   // Those at work are not among them: what holds them is alive.
   template <class Visit>
-  int for_each_pairs(Visit&& visit) const {
-    if (const int stop = visit(first_.scene().pairs())) return stop;
-    for (const auto& state : idle_)
-      if (const int stop = visit(state->scene().pairs())) return stop;
-    return 0;
+  void for_each_pairs(Visit&& visit) const {
+    visit(first_.scene().pairs());
+    for (const auto& state : idle_) visit(state->scene().pairs());
   }
 
  private:

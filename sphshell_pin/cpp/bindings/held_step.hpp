@@ -2,7 +2,7 @@
 #pragma once
 
 #include "dynamics/derivatives/step_derivatives.hpp"
-#include "dynamics/integrators/table.hpp"
+#include "dynamics/integrators/stepper.hpp"
 
 namespace sphshell {
 

@@ -10,7 +10,6 @@ void bind_dynamics(nb::module_& m);
 void bind_evaluator(nb::module_& m);
 void bind_foundation(nb::module_& m);
 void bind_rollout(nb::module_& m);
-void bind_sensors(nb::module_& m);
 
 NB_MODULE(_core, m) {
   // Interpreters that end with objects alive are no leak of ours.
@@ -19,7 +18,6 @@ NB_MODULE(_core, m) {
   bind_mending(m);
   bind_shell(m);
   bind_contact(m);
-  bind_sensors(m);
   bind_dynamics(m);
   bind_evaluator(m);
   bind_foundation(m);

@@ -2,22 +2,27 @@
 
 namespace sphshell {
 
-namespace {
+template <class Value>
+static const Value& shown(const Value& value) {
+  return value;
+}
+template <class Row>
+static auto shown(std::vector<Row>&& rows) {
+  return to_array(std::move(rows));
+}
 
-// A dictionary of names and values, one after the other.
+// A dictionary of names and values, one after the other; vectors are moved into arrays.
 template <class Value, class... Rest>
-void put(nb::dict& out, const char* name, Value&& value, Rest&&... rest) {
-  out[name] = std::forward<Value>(value);
+static void put(nb::dict& out, const char* name, Value&& value, Rest&&... rest) {
+  out[name] = shown(std::forward<Value>(value));
   if constexpr (sizeof...(rest) > 0) put(out, std::forward<Rest>(rest)...);
 }
 template <class... Fields>
-nb::dict dict_of(Fields&&... fields) {
+static nb::dict dict_of(Fields&&... fields) {
   nb::dict out;
   put(out, std::forward<Fields>(fields)...);
   return out;
 }
-
-}  // namespace
 
 // What numpy.dtype takes: names, formats, offsets and the size of a row.
 nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size) {
@@ -36,36 +41,27 @@ nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size) {
 // each; events and sensor readings column by column.
 nb::dict to_dict(Record record, int nq, int nv) {
   const std::size_t n = record.t.size();
-  std::vector<double> event_t;
-  std::vector<int> event_pair, event_kind;
-  for (const Event& e : record.events) {
-    event_t.push_back(e.t);
-    event_pair.push_back(e.pair);
-    event_kind.push_back(static_cast<int>(e.kind));
-  }
   SensorRows& sensors = record.sensors;
   nb::dict out = dict_of(
-      "t", to_array(std::move(record.t)), "q", to_array(std::move(record.q), {n, std::size_t(nq)}),
-      "v", to_array(std::move(record.v), {n, std::size_t(nv)}), "energy",
-      to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)}), "contact_row",
-      to_array(std::move(record.contact_row)), "contacts", to_bytes(std::move(record.contacts)),
-      "event_t", to_array(std::move(event_t)), "event_pair", to_array(std::move(event_pair)),
-      "event_kind", to_array(std::move(event_kind)), "sensor", to_array(std::move(sensors.sensor)),
-      "sensor_t", to_array(std::move(sensors.t)), "sensor_sampled",
-      to_array(std::move(sensors.sampled)), "sensor_values", to_array(std::move(sensors.values)));
+      "t", std::move(record.t), "q", to_array(std::move(record.q), {n, std::size_t(nq)}), "v",
+      to_array(std::move(record.v), {n, std::size_t(nv)}), "energy",
+      rows_of<Record::kEnergies>(std::move(record.energy)), "contact_row",
+      std::move(record.contact_row), "contacts", to_bytes(std::move(record.contacts)), "event_t",
+      column(record.events, &Event::t), "event_pair", column(record.events, &Event::pair),
+      "event_kind", column(record.events, [](const Event& one) { return int(one.kind); }), "sensor",
+      std::move(sensors.sensor), "sensor_t", std::move(sensors.t), "sensor_sampled",
+      std::move(sensors.sampled), "sensor_values", std::move(sensors.values));
   if (record.states)
-    put(out, "states", to_array(std::move(*record.states)), "state_sizes",
-        to_array(std::move(record.state_sizes)));
+    put(out, "states", std::move(*record.states), "state_sizes", std::move(record.state_sizes));
   if (record.torques) out["torques"] = to_array(std::move(*record.torques), {n, std::size_t(nv)});
   if (record.patches) out["patches"] = to_bytes(std::move(*record.patches));
   return out;
 }
 
 nb::dict as_python(SensitivityRecord record) {
-  return dict_of("q", to_array(std::move(record.q)), "v", to_array(std::move(record.v)),
-                 "force_world", to_array(std::move(record.force_world)), "normal_force",
-                 to_array(std::move(record.normal_force)), "depth",
-                 to_array(std::move(record.depth)));
+  return dict_of("q", std::move(record.q), "v", std::move(record.v), "force_world",
+                 std::move(record.force_world), "normal_force", std::move(record.normal_force),
+                 "depth", std::move(record.depth));
 }
 
 nb::dict as_python(const Counts& counts) {

@@ -9,9 +9,8 @@ namespace sphshell {
 // The memory of rows; NumPy's view of it with row_type() of their fields has named fields.
 template <class Row>
 Array<std::uint8_t> to_bytes(std::vector<Row> rows) {
-  auto* kept = new std::vector<Row>(std::move(rows));
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Row>*>(p); });
-  return Array<std::uint8_t>(kept->data(), {kept->size() * sizeof(Row)}, owner);
+  const std::size_t bytes = rows.size() * sizeof(Row);
+  return array_of<std::uint8_t>(std::move(rows), {bytes});
 }
 // Arguments of numpy.dtype, of a row of `size` [B].
 nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size);

@@ -3,18 +3,15 @@
 #include "library/checks.hpp"
 
 namespace sphshell_pin {
-namespace {
 
 // Of a force that depends on nothing but depth and gap rate: Hertz's law and foundations need the
 // bodies that touch.
-const sphshell::NormalLaw& alone(const sphshell::NormalLaw& law) {
+static const sphshell::NormalLaw& alone(const sphshell::NormalLaw& law) {
   if (law.hertz())
     throw InvalidParameter("radius", "0", "must be given where nothing is touched [m]");
   if (law.foundation()) throw InvalidParameter("law", "foundation", "needs a sphere and a shell");
   return law;
 }
-
-}  // namespace
 
 void BoundsCheck::operator()(const char* name, double value, const Bounds& bounds) const {
   const std::string unit = *bounds.unit ? " [" + std::string(bounds.unit) + "]" : "";

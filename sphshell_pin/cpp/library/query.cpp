@@ -2,17 +2,14 @@
 #include "library/impl.hpp"
 
 namespace sphshell_pin {
-namespace {
 
 // To the library's own type, which does not change with the core's.
-void convert(const std::vector<core::Contact>& from, std::vector<Contact>& to) {
+static void convert(const std::vector<core::Contact>& from, std::vector<Contact>& to) {
   to.clear();
   for (const core::Contact& c : from)
     to.push_back(
         {c.point, c.normal, c.depth, c.element, static_cast<Feature>(c.feature), c.weight});
 }
-
-}  // namespace
 
 // Enumerators can be made of any number.
 core::Method checked(Method method) {

@@ -174,7 +174,7 @@ Surface weld(const Surface& surface, double tolerance) {
   check_surface(surface.vertices, surface.elements);
   if (tolerance == 0) tolerance = kWeldTolerance * box_of(surface.vertices).diagonal().norm();
   const core::Weld merged =
-      core::weld(surface.vertices.front().data(), surface.vertices.size(), tolerance);
+      core::weld({surface.vertices.front().data(), surface.vertices.size()}, tolerance);
   Surface out;
   // Of each vertex its place among those that are kept, in the order in which elements use them.
   std::vector<int> place(surface.vertices.size(), -1);

@@ -1,5 +1,3 @@
-#include "shell/shell.hpp"
-
 #include "shell/curved/curved.hpp"
 #include "shell/in_parallel.hpp"
 

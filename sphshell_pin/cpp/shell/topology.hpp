@@ -14,6 +14,22 @@ namespace sphshell {
 using Vec3 = Eigen::Vector3d;
 using Triangle = std::array<int, 3>;
 
+// Numbers in rows, which others own: of one number each, or of so many columns.
+template <class T, int... columns>
+struct Rows {
+  const T* data;
+  std::size_t count;  // of rows
+
+  const T& operator[](std::size_t i) const { return data[i]; }
+};
+using Points = Rows<double, 3>;
+using Indices = Rows<std::int32_t>;
+
+// Point i.
+inline Eigen::Map<const Vec3> place(const Points& points, std::size_t i) {
+  return Eigen::Map<const Vec3>(points.data + 3 * i);
+}
+
 // Box of the vertices that triangles use.
 Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
                            const std::vector<Triangle>& triangles);

@@ -3,14 +3,11 @@
 #include "contact/query/closest_on_side.hpp"
 
 namespace sphshell {
-namespace {
 
 // An arc turns by less than twice the angle of this cosine.
 constexpr double kFlatArc = 0.92;
 // Roots nearer than 2^-kMostHalvings of a side are none.
 constexpr int kMostRootHalvings = 14;
-
-}  // namespace
 
 // The one root between the ends, by Newton's method within what is known to hold it.
 double Sextic::root() const {

@@ -1,5 +1,7 @@
 #include "dynamics/control/controllers.hpp"
 
+#include "dynamics/control/target_path.hpp"
+
 #include <Eigen/Eigenvalues>
 
 namespace sphshell {
@@ -58,13 +60,6 @@ struct ImpedanceSettings : Fields {
   bool friction_compensation = flag("friction_compensation");
 };
 
-// In the path's frame.
-PathSettings path_of(const Fields& f) {
-  return {f.list("along"), f.points("points"), f.points("tangents"), f.points("normals"),
-          f.list("times"), f.list("places"),   f.list("speeds"),     f.list("accelerations"),
-          f.list("jerks"), f.list("kinks")};
-}
-
 // Cartesian impedance (Hogan 1985): J^T F plus the bias torques, with
 // F = K (x_d - x) + D (xdot_d - xdot); with a normal force, the spring acts in the tangent plane of
 // the path's normal only and the frame is pressed against that normal. Decoupled, the wrench that
@@ -73,7 +68,7 @@ PathSettings path_of(const Fields& f) {
 class CartesianImpedance : public Controller {
  public:
   explicit CartesianImpedance(const Fields& fields)
-      : s_(fields), path_(path_of(fields)), error_(VectorX::Zero(s_.actuated.size())) {}
+      : s_(fields), path_(fields), error_(VectorX::Zero(s_.actuated.size())) {}
   void prepare(SceneData& scene) override;
   void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
               VectorX& tau) override;

@@ -5,11 +5,13 @@
 #include <stdexcept>
 #include <string>
 
-#include "dynamics/control/target_path.hpp"
 #include "dynamics/scene/geometry.hpp"   // SE3
 #include "dynamics/scene/multibody.hpp"  // VectorX
 
 namespace sphshell {
+
+// Vectors in rows, as NumPy's arrays have them.
+using PathPoints = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
 // Arrays are flat, in the order of rows. A field that is not there is a fault of the caller's. Its
 // readers derive from it, and name each field where they declare what holds it.

@@ -19,15 +19,41 @@ class Push {
  public:
   // A force at a point of the joint's frame; a zero one ends the push. `frame`: the number of the
   // one to whose body the point belongs.
-  void set(int joint, const Eigen::Vector3d& point, const PointForce& force, int frame);
+  void set(int joint, const Eigen::Vector3d& point, const PointForce& force, int frame) {
+    // The entry of the joint that was pushed before is cleared: bias() reads all of them.
+    if (!opposed_.empty()) opposed_[joint_].setZero();
+    joint_ = joint;
+    frame_ = frame;
+    point_ = point;
+    force_ = force;
+  }
   bool active() const { return !force_.is_zero(); }
   int joint() const { return joint_; }
   int frame() const { return frame_; }
   // In the joint's frame, about its origin; the body's placements and velocities are those of the
   // state.
-  pinocchio::Force on_joint(const Multibody& body) const;
+  pinocchio::Force on_joint(const Multibody& body) const {
+    const pinocchio::SE3& pose = body.world_from_joint(joint_);
+    Eigen::Vector3d world = force_.force;
+    if (force_.stiffness != 0 || force_.damping != 0) {
+      const Eigen::Vector3d x = pose.act(point_), rate = body.velocity_at(joint_, x);
+      world += force_.stiffness * (force_.anchor - x) - force_.damping * rate;
+    }
+    // Into the joint's frame, about its origin.
+    const Eigen::Vector3d force = pose.rotation().transpose() * world;
+    return {force, point_.cross(force)};
+  }
   // tau with J^T times the force added; the body's placements are those of (q, v).
-  const VectorX& added(Multibody& body, const VectorX& q, const VectorX& v, const VectorX& tau);
+  const VectorX& added(Multibody& body, const VectorX& q, const VectorX& v, const VectorX& tau) {
+    // Inverse dynamics against the force, less that without it.
+    if (opposed_.empty()) opposed_.assign(body.model().joints.size(), pinocchio::Force::Zero());
+    pinocchio::Force& opposed = opposed_[joint_];
+    opposed.setZero();
+    sum_ = tau - body.bias(q, v, opposed_);
+    opposed = -on_joint(body);
+    sum_ += body.bias(q, v, opposed_);
+    return sum_;
+  }
 
  private:
   int joint_ = 0, frame_ = 0;

@@ -1,16 +1,13 @@
 #include "dynamics/derivatives/linearization.hpp"
 
 namespace sphshell {
-namespace {
 
 // The displacement of a contact's place that goes with a displacement of its body.
-Matrix36 displacement_of(const ContactSite& site) {
+static Matrix36 displacement_of(const ContactSite& site) {
   Matrix36 out;
   out << Mat3::Identity(), site.place_by_turn - pinocchio::skew(site.place);
   return out;
 }
-
-}  // namespace
 
 // One chain of joints for each pair; contacts carry dn_dc from the next evaluation on.
 Linearization::Linearization(SceneData& scene) : scene_(scene) {

@@ -3,15 +3,12 @@
 #include "dynamics/derivatives/linearization.hpp"
 
 namespace sphshell {
-namespace {
 
 // The motion that a twist gives to the place of a contact.
-Vec3 motion_of(const Vector6& twist, const ContactSite& site) {
+static Vec3 motion_of(const Vector6& twist, const ContactSite& site) {
   const Vec3 turned = twist.tail<3>();
   return twist.head<3>() + turned.cross(site.place) + site.place_by_turn * turned;
 }
-
-}  // namespace
 
 // The velocities of the body stay as they are.
 Linearization::Answer Linearization::displaced(const Vector6& by, const ContactSite& site,

@@ -5,7 +5,6 @@
 #include "dynamics/integrators/stepper.hpp"
 
 namespace sphshell {
-namespace {
 
 // Of central differences of torques, relative to the larger of 1 and the number.
 constexpr double kTorqueDifference = 1e-7;
@@ -18,8 +17,6 @@ constexpr int kMostHalvings = 16;
 constexpr double kLeast = 1e-6, kLeastStretch = 1e-9;
 // A step ends just behind its event, where the slopes may jump: those before it count.
 constexpr double kLastNode = 1 - 1e-5;
-
-}  // namespace
 
 StepSlopes::StepSlopes(SceneData& scene, std::vector<Parameter> parameters)
     : scene_(scene), linearization_(scene) {

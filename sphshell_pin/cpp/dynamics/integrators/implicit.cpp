@@ -1,15 +1,12 @@
 #include "dynamics/integrators/implicit.hpp"
 
 namespace sphshell {
-namespace {
 
 using Group = CurvedSegment::Group;
 using pinocchio::skew;
 
 // Of a step in a difference quotient.
 constexpr double kDifference = 1e-7;
-
-}  // namespace
 
 // The Jacobian of (u, w, z) in blocks: u' = w, and (w', z') from Linearization; work is no part of
 // it.

@@ -1,6 +1,8 @@
 // What the loop of a simulation asks of a method.
 #pragma once
 
+#include <string_view>
+
 #include "dynamics/integrators/chart.hpp"
 
 namespace sphshell {
@@ -42,5 +44,9 @@ class Stepper {
 
   VectorX start_, rate_, y_, error_;
 };
+
+// The method that scenarios call so. Throws std::invalid_argument, which lists the names, for any
+// other.
+std::unique_ptr<Stepper> make_stepper(std::string_view integrator, SceneData& scene);
 
 }  // namespace sphshell

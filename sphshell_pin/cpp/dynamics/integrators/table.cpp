@@ -1,5 +1,3 @@
-#include "dynamics/integrators/table.hpp"
-
 #include "dynamics/integrators/explicit.hpp"
 #include "dynamics/integrators/implicit.hpp"
 

@@ -86,7 +86,7 @@ double ContinuousDetection::allowed(SceneData& scene, const State& from, const S
     double moved = excursion.moved;
     const double slack = radius * (known.touching ? kTouching : kApart);
     if (turned > kMostTurned) share = std::min(share, kMostTurned / turned);
-    if (turned > kTurn) moved = std::max(moved, path(scene, k, from, to));
+    if (turned > kTurn) moved = std::max(moved, path(scene, k, from, to, turned));
     if (moved <= slack) continue;
     double limit = slack + (known.touching ? 0 : gap(pair, pair.radius, known));
     if (gap_at_end && moved > limit && !known.touching)
@@ -111,12 +111,10 @@ double ContinuousDetection::gap(const Pair& pair, double radius, Known& known) {
 
 // Length of the center's path in the shell's frame, by chords.
 double ContinuousDetection::path(SceneData& scene, std::size_t k, const State& from,
-                                 const State& to) {
+                                 const State& to, double turned) {
   const Pair& pair = scene.pairs()[k];
   Multibody& body = scene.body();
   const double h = to.t - from.t;
-  const auto turned =
-      std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>()) * h;
   const int chords = static_cast<int>(std::ceil(std::min(turned, kMostTurned) / (0.5 * kTurn)));
   q_.resize(from.q.size());
   Vec3 last = known_[k].center;

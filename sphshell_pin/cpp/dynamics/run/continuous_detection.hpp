@@ -29,10 +29,11 @@ class ContinuousDetection {
     double distance = -1;
   };
 
-  // Lower bounds at the begin of the step, and the length of a center's path, in meters.
+  // Lower bounds at the begin of the step, and the length of a center's path, in meters, where
+  // nothing turns by more than `turned` [rad].
   static double gap(const Pair& pair, double radius, Known& known);
   bool is_clear(const SceneData& scene, const Cluster& cluster, Known& known) const;
-  double path(SceneData& scene, std::size_t k, const State& from, const State& to);
+  double path(SceneData& scene, std::size_t k, const State& from, const State& to, double turned);
 
   std::vector<Known> known_;
   std::vector<Known> known_of_cluster_;  // of the ball round its spheres

@@ -3,7 +3,6 @@
 #include <boost/math/tools/minima.hpp>
 
 namespace sphshell {
-namespace {
 
 // A step holds a peak that counts only where one of its ends comes this near to the largest so far;
 // what raises that by less than this share of it does not count.
@@ -13,8 +12,6 @@ constexpr double kBeside = 1e-4;
 // Of the share at which a peak is, and looks until it is found: the value is off by the square.
 constexpr int kPeakBits = 16;
 constexpr std::uintmax_t kMostPeakLooks = 50;
-
-}  // namespace
 
 // Summaries of the pairs, then of the joints' stops.
 Recorder::Recorder(SceneData& scene, double start, double end, double record_dt, bool patches)

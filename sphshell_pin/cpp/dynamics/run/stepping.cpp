@@ -1,13 +1,5 @@
 #include "dynamics/run/stepping.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <utility>
-
-#include "dynamics/integrators/table.hpp"
-
 namespace sphshell {
 namespace {
 

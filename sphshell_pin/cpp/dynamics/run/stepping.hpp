@@ -1,11 +1,6 @@
 // One step of a run: of a given length, or as long as the error allows.
 #pragma once
 
-#include <memory>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "dynamics/run/events.hpp"
 #include "dynamics/run/continuous_detection.hpp"
 #include "dynamics/integrators/stepper.hpp"

@@ -1,29 +1,14 @@
 #include "dynamics/scene/clusters.hpp"
 
 namespace sphshell {
-namespace {
 
 // Whether both are of one group and touch one surface at one place.
-bool stand_alike(const Pair& a, const Pair& b) {
+static bool stand_alike(const Pair& a, const Pair& b) {
   const auto *one = std::get_if<ShellSurface>(&a.geometry),
              *other = std::get_if<ShellSurface>(&b.geometry);
   return !a.group.empty() && a.group == b.group && one && other && one->shell == other->shell &&
          one->method == other->method && a.joint_i == b.joint_i && a.joint_j == b.joint_j &&
          a.placement_j == b.placement_j;
-}
-
-}  // namespace
-
-bool Cluster::is_far(const Pair& pair, const Vec3& center_in_shell) const {
-  const Shell& shell = *std::get<ShellSurface>(pair.geometry).shell;
-  const double bulge = shell.curved() != nullptr ? shell.curved()->bulge() : 0;
-  return !shell.bvh().may_meet(center_in_shell, radius + bulge);
-}
-
-// As find_contacts() does it with the center of one sphere.
-Vec3 Cluster::center_in_shell(const Multibody& body, const Pair& pair,
-                              const SE3& world_from_j) const {
-  return world_from_j.actInv(body.world_from(pair.joint_i, center));
 }
 
 std::vector<Cluster> clusters_of(const std::vector<Pair>& pairs) {

@@ -14,9 +14,16 @@ struct Cluster {
   double radius = 0;
 
   // Whether the ball, with its center in the shell's frame, is outside the box of the shell.
-  bool is_far(const Pair& pair, const Vec3& center_in_shell) const;
+  bool is_far(const Pair& pair, const Vec3& center_in_shell) const {
+    const Shell& shell = *std::get<ShellSurface>(pair.geometry).shell;
+    const double bulge = shell.curved() != nullptr ? shell.curved()->bulge() : 0;
+    return !shell.bvh().may_meet(center_in_shell, radius + bulge);
+  }
   // The center in the frame of the shell, which has its place in the world.
-  Vec3 center_in_shell(const Multibody& body, const Pair& pair, const SE3& world_from_j) const;
+  Vec3 center_in_shell(const Multibody& body, const Pair& pair, const SE3& world_from_j) const {
+    // As find_contacts() does it with the center of one sphere.
+    return world_from_j.actInv(body.world_from(pair.joint_i, center));
+  }
 };
 
 // Those of several pairs, in their order.

@@ -1,14 +1,11 @@
 #include "dynamics/scene/geometry.hpp"
 
 namespace sphshell {
-namespace {
 
-bool is_closed(const Shell& shell) {
+static bool is_closed(const Shell& shell) {
   const std::vector<Edge>& edges = shell.topology().edges;
   return std::none_of(edges.begin(), edges.end(), [](const Edge& edge) { return edge.count == 1; });
 }
-
-}  // namespace
 
 void ShellSurface::find_near(const Vec3& center, double radius, double margin, Query& query) const {
   query.find(*shell, center, radius + margin, method);

@@ -79,25 +79,22 @@ void Multibody::need(int joint) {
   }
 }
 
-void Multibody::kinematics(const VectorX& q) {
-  if (compiled_)
-    return compiled_->kinematics(needed_.data(), static_cast<int>(needed_.size()), q.data(),
-                                 nullptr, data_.oMi[0].rotation().data(), nullptr);
-  // The step of Pinocchio's own forward kinematics, for the joints on the way to contacts
-  // alone.
-  using Step = StepOf<pinocchio::impl::ForwardKinematicZeroStep, VectorX>;
+// The step of Pinocchio's own forward kinematics, for the joints on the way to contacts alone.
+template <class Step, class... State>
+void Multibody::run_needed(const State&... state) {
   for (int j : needed_)
-    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q));
+    Step::run(model_.joints[j], data_.joints[j], typename Step::ArgsType(model_, data_, state...));
 }
 
-void Multibody::kinematics(const VectorX& q, const VectorX& v) {
+void Multibody::kinematics(const VectorX& q, const VectorX* v) {
   if (compiled_)
-    return compiled_->kinematics(needed_.data(), static_cast<int>(needed_.size()), q.data(),
-                                 v.data(), data_.oMi[0].rotation().data(),
-                                 data_.v[0].toVector().data());
-  using Step = StepOf<pinocchio::impl::ForwardKinematicFirstStep, VectorX, VectorX>;
-  for (int j : needed_)
-    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, v));
+    compiled_->kinematics(needed_.data(), static_cast<int>(needed_.size()), q.data(),
+                          v ? v->data() : nullptr, data_.oMi[0].rotation().data(),
+                          data_.v[0].toVector().data());
+  else if (v)
+    run_needed<StepOf<pinocchio::impl::ForwardKinematicFirstStep, VectorX, VectorX>>(q, *v);
+  else
+    run_needed<StepOf<pinocchio::impl::ForwardKinematicZeroStep, VectorX>>(q);
 }
 
 // The composite-rigid-body algorithm (Featherstone 2008, section 6.2) on all joints in world axes.

@@ -42,8 +42,8 @@ class Multibody {
   void use(std::shared_ptr<const CompiledRobot> compiled) { compiled_ = std::move(compiled); }
 
   // Placements and, with v, velocities of the joints that were asked for by `need`, no others.
-  void kinematics(const VectorX& q);
-  void kinematics(const VectorX& q, const VectorX& v);
+  void kinematics(const VectorX& q, const VectorX* v = nullptr);
+  void kinematics(const VectorX& q, const VectorX& v) { kinematics(q, &v); }
   // From now on kinematics() places this joint, and those that carry it.
   void need(int joint);
 
@@ -145,6 +145,8 @@ class Multibody {
   // Pinocchio's, whose factorization of the mass matrix the derivatives go on with.
   const VectorX& own_acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                                   const Forces* external = nullptr);
+  template <class Step, class... State>
+  void run_needed(const State&... state);
   // Fills by_q of a joint at q.
   void turn_axes(const VectorX& q, TurningAxes& axes);
   // Writes the mass matrix (nv, nv) into data_.M, both triangles.

@@ -5,7 +5,6 @@
 
 #include "sphshell_pin/errors.hpp"
 #include "sphshell_pin/laws/friction.hpp"
-#include "sphshell_pin/laws/normal.hpp"
 
 namespace sphshell_pin {
 

@@ -1,10 +1,6 @@
 // Where a sphere touches a shell, without a robot.
 #pragma once
 
-#include <Eigen/Core>
-#include <memory>
-#include <vector>
-
 #include "sphshell_pin/shell.hpp"
 
 namespace sphshell_pin {

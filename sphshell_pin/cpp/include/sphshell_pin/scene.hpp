@@ -4,13 +4,8 @@
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/spatial.hpp>
 
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "sphshell_pin/laws.hpp"
 #include "sphshell_pin/query.hpp"
-#include "sphshell_pin/shell.hpp"
 
 namespace sphshell_pin {
 

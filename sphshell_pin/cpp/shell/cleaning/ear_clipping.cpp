@@ -69,7 +69,7 @@ class Tournament {
 // best shape first, until three corners are left.
 class Clipper {
  public:
-  Clipper(const PolygonView& polygons, const double* points, double tolerance)
+  Clipper(const PolygonView& polygons, const Points& points, double tolerance)
       : polygons_(polygons), points_(points), tolerance_(tolerance) {}
 
   // Appends the triangles of one polygon; false if no proper ear was left at some point.
@@ -300,17 +300,17 @@ class Clipper {
     // Cyclic order starting at the first-listed corner of the three.
     std::array<int, 3> ear{previous_[i], i, next_[i]};
     std::rotate(ear.begin(), std::min_element(ear.begin(), ear.end()), ear.end());
-    for (const int k : ear) out.triangle_slots.push_back(first_ + k);
+    out.triangle_slots.push_back({first_ + ear[0], first_ + ear[1], first_ + ear[2]});
     out.triangle_polygon.push_back(static_cast<std::int32_t>(polygon));
   }
 
   const double* point(std::int64_t slot) const {
-    return points_ + 3 * static_cast<std::size_t>(polygons_.corners[slot]);
+    return points_.data + 3 * static_cast<std::size_t>(polygons_.corners[slot]);
   }
   std::int32_t vertex(int i) const { return polygons_.corners[first_ + i]; }
 
   const PolygonView& polygons_;
-  const double* points_;
+  const Points& points_;
   double tolerance_;
   std::int64_t first_ = 0;
   std::vector<Vec2> flat_;
@@ -330,7 +330,7 @@ class Clipper {
 
 }  // namespace
 
-EarClips clip_ears(const PolygonView& polygons, const double* points, double tolerance) {
+EarClips clip_ears(const PolygonView& polygons, Points points, double tolerance) {
   EarClips out;
   out.tangled.assign(polygons.count, 0);
   Clipper clipper(polygons, points, tolerance);

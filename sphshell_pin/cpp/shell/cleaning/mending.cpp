@@ -8,7 +8,7 @@
 namespace sphshell {
 namespace {
 
-std::array<Vec3, 3> corners_of(const double* points, const std::int32_t* vertices) {
+std::array<Vec3, 3> corners_of(const Points& points, const std::int32_t* vertices) {
   std::array<Vec3, 3> out;
   for (int k = 0; k < 3; ++k) out[k] = place(points, vertices[k]);
   return out;
@@ -19,8 +19,9 @@ constexpr double kCellInTolerances = 64.0;
 
 }  // namespace
 
-Weld weld(const double* points, std::size_t count, double tolerance) {
+Weld weld(Points points, double tolerance) {
   Weld out;
+  const std::size_t count = points.count;
   DisjointSets groups(count);
   std::array<double, 3> low{};
   low.fill(std::numeric_limits<double>::infinity());
@@ -37,7 +38,7 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
   using Place = std::pair<std::uint64_t, std::int32_t>;
   LargeArray<Place> places(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const double* p = points + 3 * i;
+    const Vec3 p = place(points, i);
     places[i] = {key(index(p[0], 0), index(p[1], 1), index(p[2], 2)), static_cast<std::int32_t>(i)};
   }
   std::sort(places.begin(), places.end());
@@ -59,7 +60,7 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
   places.resize(kept);
   // And across cells, where the ball of the tolerance meets several: seldom, as they are wide.
   for (const Place& place : places) {
-    const double* p = points + 3 * static_cast<std::size_t>(place.second);
+    const Vec3 p = sphshell::place(points, place.second);
     std::array<std::uint64_t, 3> from{}, to{};
     for (int axis = 0; axis < 3; ++axis) {
       from[axis] = index(p[axis] - tolerance, axis);
@@ -94,7 +95,7 @@ EdgeTable edge_table(const PolygonView& polygons, std::size_t vertex_count) {
       following[s] = polygons.corners[polygons.next(p, s)];
   EdgeTable out;
   out.slot_edge.assign(slots, -1);
-  out.ends.reserve(slots + 16);
+  out.ends.reserve(slots / 2 + 8);
   out.users.reserve(slots / 2 + 8);
   for_each_edge(
       slots, vertex_count,
@@ -104,23 +105,21 @@ EdgeTable edge_table(const PolygonView& polygons, std::size_t vertex_count) {
           // A word holds the slot in its lower half.
           out.slot_edge[static_cast<std::uint32_t>(*word)] =
               static_cast<std::int32_t>(out.users.size());
-        out.ends.push_back(low);
-        out.ends.push_back(high);
+        out.ends.push_back({low, high});
         out.users.push_back(static_cast<std::int32_t>(last - first));
       });
   return out;
 }
 
 // Equal as cycles of corners, in either direction, from any corner on.
-Duplicates duplicate_polygons(const PolygonView& polygons, const std::int32_t* slot_edge,
-                              const std::int32_t* users, std::size_t edge_count) {
+Duplicates duplicate_polygons(const PolygonView& polygons, Indices slot_edge, Indices users) {
   Duplicates out;
   out.first.resize(polygons.count);
   std::iota(out.first.begin(), out.first.end(), 0);
   out.opposite.assign(polygons.count, 0);
   // Equal cycles have the same edges: only polygons are compared that agree about which of theirs
   // fewest polygons use. They are chained, each to the one before.
-  LargeArray<std::int32_t> latest(edge_count, -1), before(polygons.count, -1);
+  LargeArray<std::int32_t> latest(users.count, -1), before(polygons.count, -1);
   for (std::size_t p = 0; p < polygons.count; ++p) {
     const std::int64_t from = polygons.offsets[p], n = polygons.offsets[p + 1] - from;
     std::int32_t edge = -1;
@@ -174,7 +173,7 @@ std::vector<std::uint8_t> repeated_corners(const PolygonView& polygons) {
   return out;
 }
 
-std::vector<double> triangle_shapes(const PolygonView& polygons, const double* points) {
+std::vector<double> triangle_shapes(const PolygonView& polygons, Points points) {
   std::vector<double> out(polygons.count, -1.0);
   for (std::size_t p = 0; p < polygons.count; ++p) {
     const std::int64_t from = polygons.offsets[p];
@@ -190,17 +189,16 @@ std::vector<double> triangle_shapes(const PolygonView& polygons, const double* p
 }
 
 // Signed volume, area, and the area that flips turn over.
-ComponentSums component_sums(const double* points, const std::int32_t* triangles,
-                             const std::int32_t* triangle_polygon, std::size_t triangle_count,
-                             const std::int32_t* component, const std::uint8_t* flip,
-                             std::size_t component_count, const double* center) {
+ComponentSums component_sums(Points points, Rows<std::int32_t, 3> triangles,
+                             Indices triangle_polygon, Indices component, Rows<std::uint8_t> flip,
+                             std::size_t component_count, Rows<double> center) {
   ComponentSums out;
   out.volume.assign(component_count, 0.0);
   out.area = out.turned_area = out.volume;
   const Vec3 middle(center[0], center[1], center[2]);
-  for (std::size_t t = 0; t < triangle_count; ++t) {
-    const std::size_t p = triangle_polygon == nullptr ? t : triangle_polygon[t];
-    const auto [a, b, c] = corners_of(points, triangles + 3 * t);
+  for (std::size_t t = 0; t < triangles.count; ++t) {
+    const std::size_t p = triangle_polygon[t];
+    const auto [a, b, c] = corners_of(points, triangles.data + 3 * t);
     const Vec3 vector_area = 0.5 * (b - a).cross(c - a);
     // The volume of the tetrahedron from the middle to the triangle: by the divergence theorem
     // their sum is the volume enclosed.
@@ -214,14 +212,13 @@ ComponentSums component_sums(const double* points, const std::int32_t* triangles
 }
 
 // Breadth first over edges of two polygons: `flip` makes neighbors wound alike.
-Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edge,
-                       const std::int32_t* users, std::size_t edge_count) {
+Orientation flood_fill(const PolygonView& polygons, Indices slot_edge, Indices users) {
   struct User {
     std::int32_t slot, polygon;
   };
   constexpr User kNone{-1, -1};
   // The two polygons at each edge that has two.
-  LargeArray<User> pair(2 * edge_count, kNone);
+  LargeArray<User> pair(2 * users.count, kNone);
   for (std::size_t p = 0; p < polygons.count; ++p) {
     for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s) {
       const std::int32_t edge = slot_edge[s];
@@ -265,10 +262,9 @@ Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edg
   return out;
 }
 
-std::vector<std::int32_t> connected_components(std::size_t nodes, const std::int32_t* pairs,
-                                               std::size_t pair_count) {
+std::vector<std::int32_t> connected_components(std::size_t nodes, Rows<std::int32_t, 2> pairs) {
   DisjointSets sets(nodes);
-  for (std::size_t k = 0; k < pair_count; ++k) sets.merge(pairs[2 * k], pairs[2 * k + 1]);
+  for (std::size_t k = 0; k < pairs.count; ++k) sets.merge(pairs[2 * k], pairs[2 * k + 1]);
   return sets.labels();
 }
 

@@ -7,10 +7,8 @@
 
 namespace sphshell {
 
-Overlaps overlaps(const double* points, const std::int32_t* triangles,
-                  const std::int32_t* triangle_component, std::size_t triangle_count,
-                  const double* places, const std::int32_t* place_component,
-                  std::size_t place_count, const std::int32_t* group) {
+Overlaps overlaps(Points points, Rows<std::int32_t, 3> triangles, Indices triangle_component,
+                  Points places, Indices place_component, Indices group) {
   // Lines in a generic direction, so that they do not run along the axis-aligned faces and edges
   // CAD is full of. They are in a tree across that direction: each triangle meets only those near.
   using Vec = std::array<double, 3>;
@@ -25,10 +23,10 @@ Overlaps overlaps(const double* points, const std::int32_t* triangles,
     return out;
   };
   // In the plane across the lines.
-  std::vector<double> place(2 * place_count);
-  std::vector<std::int32_t> lines(place_count);
-  for (std::size_t k = 0; k < place_count; ++k) {
-    const Vec q = turned(places + 3 * k);
+  std::vector<double> place(2 * places.count);
+  std::vector<std::int32_t> lines(places.count);
+  for (std::size_t k = 0; k < places.count; ++k) {
+    const Vec q = turned(places.data + 3 * k);
     place[2 * k] = q[0], place[2 * k + 1] = q[1];
     lines[k] = static_cast<std::int32_t>(k);
   }
@@ -39,7 +37,7 @@ Overlaps overlaps(const double* points, const std::int32_t* triangles,
     std::int32_t component;
   };
   std::vector<Crossing> crossings;
-  for (std::size_t t = 0; t < triangle_count; ++t) {
+  for (std::size_t t = 0; t < triangles.count; ++t) {
     const std::int32_t owner = triangle_component[t];
     if (group[owner] < 0) continue;
     std::array<std::int32_t, 3> index{};
@@ -47,7 +45,7 @@ Overlaps overlaps(const double* points, const std::int32_t* triangles,
     PointTree<2>::Box span{};
     for (int k = 0; k < 3; ++k) {
       index[k] = triangles[3 * t + k];
-      corner[k] = turned(points + 3 * static_cast<std::size_t>(index[k]));
+      corner[k] = turned(points.data + 3 * static_cast<std::size_t>(index[k]));
     }
     for (int k = 0; k < 2; ++k)
       std::tie(span.low[k], span.high[k]) = std::minmax({corner[0][k], corner[1][k], corner[2][k]});
@@ -106,7 +104,7 @@ Overlaps overlaps(const double* points, const std::int32_t* triangles,
   for (const auto& [pair, length] : shared) {
     const double own = shared.at({pair.first, pair.first});
     if (pair.first == pair.second || !(own > 0.0)) continue;
-    out.pairs.insert(out.pairs.end(), {pair.first, pair.second});
+    out.pairs.push_back({pair.first, pair.second});
     out.share.push_back(length / own);
   }
   return out;

@@ -4,10 +4,9 @@
 #include "shell/point_tree.hpp"
 
 namespace sphshell {
-namespace {
 
 // Slab test of the segment against the box grown by the tolerance: never misses a point.
-bool meets(const PointTree<3>::Box& box, const Vec3& a, const Vec3& b, double tolerance) {
+static bool meets(const PointTree<3>::Box& box, const Vec3& a, const Vec3& b, double tolerance) {
   double enter = 0.0, leave = 1.0;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = box.low[axis] - tolerance, high = box.high[axis] + tolerance;
@@ -26,23 +25,20 @@ bool meets(const PointTree<3>::Box& box, const Vec3& a, const Vec3& b, double to
   return true;
 }
 
-}  // namespace
-
-Insertions find_t_junctions(const PolygonView& polygons, const double* points,
-                            const std::vector<std::int64_t>& open_slots,
-                            const std::vector<std::int32_t>& open_polygons,
-                            const std::vector<std::int32_t>& candidates, double tolerance,
-                            std::size_t most) {
+Insertions find_t_junctions(const PolygonView& polygons, Points points,
+                            Rows<std::int64_t> open_slots, Indices open_polygons,
+                            Indices candidates, double tolerance, std::size_t most) {
   Insertions out;
-  const PointTree<3> tree(points, candidates);
+  const std::size_t n = candidates.count;
+  const PointTree<3> tree(points.data, {candidates.data, candidates.data + n});
   struct Hit {
     double parameter;
     std::int32_t vertex;
   };
   std::vector<Hit> hits;
   // Per vertex the last polygon that has it as a corner.
-  std::vector<std::int32_t> owner(candidates.empty() ? 0 : candidates.back() + 1, -1);
-  for (std::size_t k = 0; k < open_slots.size() && out.slot.size() <= most; ++k) {
+  std::vector<std::int32_t> owner(n == 0 ? 0 : candidates[n - 1] + 1, -1);
+  for (std::size_t k = 0; k < open_slots.count && out.slot.size() <= most; ++k) {
     const auto polygon = static_cast<std::size_t>(open_polygons[k]);
     const std::int64_t from = polygons.offsets[polygon], to = polygons.offsets[polygon + 1];
     const std::int64_t slot = open_slots[k];

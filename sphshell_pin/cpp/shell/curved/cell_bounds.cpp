@@ -1,5 +1,3 @@
-#include "shell/curved/cell_bounds.hpp"
-
 #include "shell/curved/curved.hpp"
 #include "shell/in_parallel.hpp"
 

@@ -23,10 +23,6 @@ constexpr double kBeyond = 0.3;
 // lean.
 constexpr double kAveraged = 0.1;
 
-}  // namespace
-
-namespace {
-
 // How far a fan's normal is from the nearest mean of those of its elements, and how much it leans
 // from them.
 std::array<double, 2> off_mean(const Shell& shell, const Fans& fans, int f, const Vec3& normal) {

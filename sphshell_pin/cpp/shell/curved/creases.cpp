@@ -1,11 +1,8 @@
-#include "shell/curved/creases.hpp"
-
 #include <Eigen/Dense>
 
 #include "shell/curved/crease_search.hpp"
 
 namespace sphshell {
-namespace {
 
 // A wall ends in a fillet where its element bends by less than this share of the fillet's, and is
 // longer by this factor.
@@ -13,8 +10,6 @@ constexpr double kWall = 0.1, kLongWall = 2.5;
 // A crease goes on along a joint in the same direction (cosine) that turns alike (factor).
 constexpr float kOnward = 0.85f, kSameTurn = 1.3f;
 constexpr int kMostRounds = 40;
-
-}  // namespace
 
 // Directions, turning angles and half-edges of all edges, and the edges at each vertex.
 void CreaseSearch::list_joints() {

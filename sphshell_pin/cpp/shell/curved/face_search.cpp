@@ -1,8 +1,3 @@
-#include "shell/curved/face_search.hpp"
-
-#include <algorithm>
-#include <cstdlib>
-
 #include "shell/curved/curved.hpp"
 
 namespace sphshell {

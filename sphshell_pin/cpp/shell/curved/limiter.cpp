@@ -1,7 +1,6 @@
 #include "shell/curved/limiter.hpp"
 
 namespace sphshell {
-namespace {
 
 // A facet holds no turn beyond a side if it is so many times higher than the one beside it.
 constexpr double kMuchHigher = 5;
@@ -12,8 +11,6 @@ constexpr double kMostSagittas = 8;
 // errors alike. A surface that fits the vertices around is better evidence, but not along a needle,
 // so many times longer than high, of which it sees the ends alone.
 constexpr double kMostUsual = 2, kMost = 0.75, kNeedle = 10;
-
-}  // namespace
 
 Dominance::Dominance(const Shell& shell, const CoplanarRegions& regions)
     : shell_(shell), regions_(regions), uneven_(shell.topology().edges.size(), 0) {

@@ -57,7 +57,7 @@ struct MindlinFriction {
     visit("torsional", law.torsional, Bounds{});
     visit("rolling", law.rolling, Bounds::not_negative());
     visit("rolling_speed", law.rolling_speed, Bounds::positive("m/s"));
-    visit("rings", law.rings, Bounds{"", -std::numeric_limits<double>::infinity(), 1, kMostRings});
+    visit("rings", law.rings, Bounds{"", -Bounds::kNone, 1, kMostRings});
   }
 };
 

@@ -83,10 +83,9 @@ namespace sphshell {
 
 // The laws as the core computes them. Each has its Parameters, and
 // - force: a template, as dual numbers give its slopes; at depth > 0 [m] and gap_rate = n . v_rel
-// [m/s], negative while closing;
-// - energy: the potential of the elastic part [J];
+// [m/s], negative while closing, and for Hertz's law the scale of the gap, see Hertz [m^0.5];
+// - energy: the potential of the elastic part [J], by the depth and that scale;
 // - needs_rate: whether the force depends on gap_rate.
-// Hertz's law also gets the scale of the gap, see Hertz [m^0.5].
 
 // What the laws have in common whose spring is k depth^e.
 template <class Stated>
@@ -98,7 +97,9 @@ struct PowerLaw : Stated {
   S elastic(const S& depth) const {
     return this->stiffness * power(depth, this->exponent);
   }
-  double energy(double depth) const { return elastic(depth) * depth / (this->exponent + 1); }
+  double energy(double depth, double) const {
+    return elastic(depth) * depth / (this->exponent + 1);
+  }
 };
 
 // max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate)
@@ -108,7 +109,7 @@ struct ImpactLaw : PowerLaw<sphshell_pin::ImpactLaw> {
   bool needs_rate() const { return damping > 0; }
 
   template <class S>
-  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+  NormalForce<S> force(const S& depth, const S& gap_rate, const S&) const {
     const S spring = elastic(depth);
     if (!needs_rate()) return {spring, spring};
     return push(S(spring - step(depth, 0, 0, full_damping_depth, damping) * gap_rate), spring);
@@ -122,7 +123,7 @@ struct HuntCrossleyLaw : PowerLaw<sphshell_pin::HuntCrossleyLaw> {
   bool needs_rate() const { return dissipation > 0; }
 
   template <class S>
-  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+  NormalForce<S> force(const S& depth, const S& gap_rate, const S&) const {
     const S spring = elastic(depth);
     if (!needs_rate()) return {spring, spring};
     return push(S(spring - spring * dissipation * gap_rate), spring);
@@ -168,7 +169,7 @@ struct FoundationLaw : sphshell_pin::FoundationLaw {
   bool needs_rate() const { return dissipation > 0; }
 
   template <class S>
-  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+  NormalForce<S> force(const S& depth, const S& gap_rate, const S&) const {
     // Integral of kappa (R^2 - rho^2) / (2 rho) over the plane's disc: kappa times the volume of
     // the cap.
     const S elastic = modulus / thickness * M_PI * depth * depth * (radius - depth / 3);
@@ -176,7 +177,7 @@ struct FoundationLaw : sphshell_pin::FoundationLaw {
     return push(S(elastic - elastic * dissipation * gap_rate), elastic);
   }
 
-  double energy(double depth) const {
+  double energy(double depth, double) const {
     return modulus / thickness * M_PI * depth * depth * depth * (radius / 3 - depth / 12);
   }
 };
@@ -221,7 +222,7 @@ struct FunctionLaw : OwnFunction {
   bool needs_rate() const { return true; }
 
   template <class S>
-  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+  NormalForce<S> force(const S& depth, const S& gap_rate, const S&) const {
     if constexpr (std::is_same_v<S, double>) {
       const double elastic = at(depth, 0);
       return push(gap_rate == 0 ? elastic : at(depth, gap_rate), elastic);
@@ -238,7 +239,7 @@ struct FunctionLaw : OwnFunction {
     }
   }
 
-  double energy(double depth) const {
+  double energy(double depth, double) const {
     return checked(potential(depth, parameters.data()), "energy of a FunctionLaw", depth, 0);
   }
 
@@ -275,25 +276,11 @@ struct NormalLaw {
 
   template <class S>
   NormalForce<S> force(const S& depth, const S& gap_rate, const S& scale = S(0)) const {
-    return std::visit(
-        [&](const auto& one) {
-          if constexpr (std::is_same_v<std::decay_t<decltype(one)>, HertzLaw>)
-            return one.force(depth, gap_rate, scale);
-          else
-            return one.force(depth, gap_rate);
-        },
-        law);
+    return std::visit([&](const auto& one) { return one.force(depth, gap_rate, scale); }, law);
   }
 
   double energy(double depth, double scale = 0) const {
-    return std::visit(
-        [&](const auto& one) {
-          if constexpr (std::is_same_v<std::decay_t<decltype(one)>, HertzLaw>)
-            return one.energy(depth, scale);
-          else
-            return one.energy(depth);
-        },
-        law);
+    return std::visit([&](const auto& one) { return one.energy(depth, scale); }, law);
   }
 };
 

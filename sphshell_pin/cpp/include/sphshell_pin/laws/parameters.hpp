@@ -20,10 +20,9 @@ namespace sphshell_pin {
 
 /// Unit and bounds of a parameter; a bound that does not exist is infinite.
 struct Bounds {
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
   const char* unit = "";
-  double above = -std::numeric_limits<double>::infinity();
-  double at_least = -std::numeric_limits<double>::infinity();
-  double at_most = std::numeric_limits<double>::infinity();
+  double above = -kNone, at_least = -kNone, at_most = kNone;
   /// A parameter before this one, with its value: a number must not exceed it, or exceed it if
   /// `beyond`; a column must have as many rows.
   const char* other = nullptr;
@@ -33,23 +32,11 @@ struct Bounds {
   Bounds not_above(const char* name, double most) const { return beside(name, most, false); }
   Bounds more_than(const char* name, double least) const { return beside(name, least, true); }
   Bounds beside(const char* name, double of_it, bool is_beyond) const {
-    Bounds out = *this;
-    out.other = name;
-    out.value = of_it;
-    out.beyond = is_beyond;
-    return out;
+    return {unit, above, at_least, at_most, name, of_it, is_beyond};
   }
 
-  static Bounds positive(const char* unit = "") {
-    Bounds out{unit};
-    out.above = 0;
-    return out;
-  }
-  static Bounds not_negative(const char* unit = "") {
-    Bounds out{unit};
-    out.at_least = 0;
-    return out;
-  }
+  static Bounds positive(const char* unit = "") { return {unit, 0}; }
+  static Bounds not_negative(const char* unit = "") { return {unit, -kNone, 0}; }
 };
 
 /// Elastic materials of the sphere, and of the shell where it has another one.
@@ -74,8 +61,7 @@ struct Materials {
 
   template <class Law, class Visit>
   static void each(Law& law, Visit&& visit) {
-    const double infinity = std::numeric_limits<double>::infinity();
-    const Bounds young = Bounds::positive("Pa"), poisson{"", -1, -infinity, 0.5};
+    const Bounds young = Bounds::positive("Pa"), poisson{"", -1, -Bounds::kNone, 0.5};
     visit("young", law.young, young);
     visit("poisson", law.poisson, poisson);
     visit("young_2", law.young_2, young);

@@ -89,7 +89,7 @@ struct TableLaw {
   bool needs_rate() const { return false; }
 
   template <class S>
-  NormalForce<S> force(const S& depth, const S&) const {
+  NormalForce<S> force(const S& depth, const S&, const S&) const {
     const std::size_t i = piece_at(depth);
     const auto& c = pieces[i].c;
     const S x = depth - starts[i];
@@ -97,7 +97,7 @@ struct TableLaw {
     return {elastic, elastic};
   }
 
-  double energy(double depth) const {
+  double energy(double depth, double) const {
     const std::size_t i = piece_at(depth);
     return energy_at(pieces[i], depth - starts[i]);
   }
