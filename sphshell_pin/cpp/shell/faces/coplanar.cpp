@@ -1,8 +1,10 @@
 #include "shell/faces/coplanar.hpp"
 
 #include <Eigen/Dense>
-#include <numeric>
+#include <cstring>
 #include <tuple>
+
+#include "shell/in_parallel.hpp"
 
 namespace sphshell {
 namespace {
@@ -17,25 +19,50 @@ constexpr std::size_t kFewToFit = 3, kMostFits = 6;
 }  // namespace
 
 CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
-    : of_(shell.triangles().size(), -1) {
+    : of_(shell.triangles().size(), -1), alone_(shell.triangles().size()) {
   const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
   const Topology& topology = shell.topology();
   const std::size_t count = triangles.size();
-  std::vector<float> area(count);
-  std::vector<int> order(count), found;
-  for (std::size_t t = 0; t < count; ++t) {
+  // How far a triangle is off a plane [m]; infinite where it is turned away from it.
+  const auto off_plane = [&](int t, const Vec3& normal, const Vec3& origin) {
+    double most = 0;
+    if (topology.face_normal[t].dot(normal) < kSameSide)
+      return std::numeric_limits<double>::infinity();
+    for (const int v : triangles[t]) most = std::max(most, std::abs((p[v] - origin).dot(normal)));
+    return most;
+  };
+  LargeArray<float> area(count);
+  LargeArray<std::uint64_t> order(count);
+  std::vector<int> found;
+  for_each_in_parallel(count, [&](std::size_t t) {
     const Triangle& c = triangles[t];
     area[t] = static_cast<float>((p[c[1]] - p[c[0]]).cross(p[c[2]] - p[c[0]]).norm() / 2);
-  }
-  std::iota(order.begin(), order.end(), 0);
+    // Descending areas, then ascending numbers: the bits of positive floats are in their order.
+    std::uint32_t bits;
+    std::memcpy(&bits, &area[t], sizeof bits);
+    order[t] = std::uint64_t(~bits) << 32 | t;
+    // In the order of memory, which that of the areas is not.
+    alone_[t] = 1;
+    for (int k = 0; k < 3 && alone_[t]; ++k) {
+      const int h = topology.other_half_edge(static_cast<int>(3 * t) + k);
+      alone_[t] =
+          h < 0 || !(off_plane(triangle_of(h), topology.face_normal[t], p[c[0]]) <= tolerance);
+    }
+  });
   // The largest triangle of a region gives its plane, as its normal is the most exact.
-  std::sort(order.begin(), order.end(),
-            [&](int a, int b) { return area[a] != area[b] ? area[a] > area[b] : a < b; });
-  for (const int first : order) {
+  std::sort(order.begin(), order.end());
+  regions_.reserve(count);
+  for (const std::uint64_t word : order) {
+    const int first = static_cast<int>(static_cast<std::uint32_t>(word));
     if (of_[first] >= 0) continue;
     const int region = size();
-    Region out{topology.face_normal[first], 0, 0, 0};
+    Region out{topology.face_normal[first], area[first], 0, 1};
+    if (alone_[first]) {
+      of_[first] = region;
+      regions_.push_back(out);
+      continue;
+    }
     Vec3 origin = p[triangles[first][0]];
     Eigen::AlignedBox3d box;
     // The plane of the largest triangle is off far from it, by the rounding of its corners: where
@@ -46,10 +73,7 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     for (std::size_t before = 0, round = 0;; ++round) {
       bool any_beside = false;
       const auto lies_in_plane = [&](int t) {
-        if (topology.face_normal[t].dot(out.normal) < kSameSide) return false;
-        double most = 0;
-        for (const int v : triangles[t])
-          most = std::max(most, std::abs((p[v] - origin).dot(out.normal)));
+        const double most = off_plane(t, out.normal, origin);
         any_beside = any_beside || (most > tolerance && most < kBeside * tolerance);
         return most <= tolerance;
       };
@@ -98,6 +122,7 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
       for (const int t : found) of_[t] = -1;
     }
     out.count = static_cast<int>(found.size());
+    for (const int t : found) alone_[t] = found.size() == 1;
     out.extent = box.diagonal().norm();
     regions_.push_back(out);
   }
@@ -107,11 +132,10 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
   for (std::size_t t = 0; t < count; ++t)
     for (int k = 0; k < 3; ++k) {
       const Triangle& c = triangles[t];
-      const Region& region = regions_[of_[t]];
       const Vec3 side = p[c[next_corner(k)]] - p[c[k]];
       heights_[3 * t + static_cast<std::size_t>(k)] =
-          region.count == 1 ? side.cross(p[c[previous_corner(k)]] - p[c[k]]).norm() / side.norm()
-                            : std::min(region.area / side.norm(), region.extent);
+          alone_[t] ? side.cross(p[c[previous_corner(k)]] - p[c[k]]).norm() / side.norm()
+                    : std::min(regions_[of_[t]].area / side.norm(), regions_[of_[t]].extent);
     }
 }
 

@@ -14,6 +14,8 @@ class CoplanarRegions {
   int of(int triangle) const { return of_[triangle]; }
   int size() const { return static_cast<int>(regions_.size()); }
   int count(int region) const { return regions_[region].count; }
+  // Whether its region has no other: most of a curved surface, known without a look at the region.
+  bool is_alone(int triangle) const { return alone_[triangle] != 0; }
   double area(int region) const { return regions_[region].area; }
   const Vec3& normal(int region) const { return regions_[region].normal; }
   // How far the region of a half-edge (3 triangle + side) reaches from that side [m].
@@ -28,7 +30,8 @@ class CoplanarRegions {
   };
   LargeArray<int> of_;
   LargeArray<double> heights_;  // per half-edge
-  std::vector<Region> regions_;
+  LargeArray<Region> regions_;
+  LargeArray<char> alone_;  // per triangle
 };
 
 }  // namespace sphshell

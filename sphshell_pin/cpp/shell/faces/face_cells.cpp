@@ -207,8 +207,8 @@ class CellMaker {
 
   void decide(int f, int k) {
     FaceCell& cell = out_.of[f];
-    const int h = beyond(f, k), other = h < 0 ? -1 : out_.of[triangle_of(h)].face;
     if (cell.face < 0 || cell.side[k] == FaceCell::Side::Border) return;  // decided from beyond it
+    const int h = beyond(f, k), other = h < 0 ? -1 : out_.of[triangle_of(h)].face;
     if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
     if (other == cell.face || !(is_bent(f) || (h >= 0 && is_bent(triangle_of(h))))) return;
     cell.bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
@@ -357,8 +357,8 @@ class CellMaker {
   void check_sides() const {
     for (int h = 0; h < static_cast<int>(3 * out_.of.size()); ++h) {
       const FaceCell& cell = out_.of[triangle_of(h)];
-      const int k = side_of(h), g = beyond(triangle_of(h), k);
-      if (g < h || !cell.closed || !out_.of[triangle_of(g)].closed) continue;
+      const int k = side_of(h), g = cell.closed ? beyond(triangle_of(h), k) : -1;
+      if (g < h || !out_.of[triangle_of(g)].closed) continue;
       const FaceCell& other = out_.of[triangle_of(g)];
       if (cell.side[k] != other.side[side_of(g)] || cell.joint[k] != other.joint[side_of(g)])
         throw std::logic_error("the facets of side " + std::to_string(h) + " read two joints");

@@ -220,12 +220,14 @@ void Recognizer::drop_zones_of_free_shapes() {
     for (const int t : faces_[f].triangles) of_[t] = -1;
 }
 
-std::vector<Recognizer::Moments> Recognizer::moments_of_regions() const {
-  std::vector<Moments> out(static_cast<std::size_t>(regions_.size()));
-  std::vector<Vec3> origin(out.size());
+// Per region that has a row; most have none.
+std::vector<Recognizer::Moments> Recognizer::moments_of_regions(const std::vector<int>& row,
+                                                                std::size_t rows) const {
+  std::vector<Moments> out(rows);
+  std::vector<Vec3> origin(rows, Vec3::Zero());
   for (std::size_t t = 0; t < of_.size(); ++t) {
-    const int r = regions_.of(int(t));
-    if (regions_.count(r) == 1) continue;
+    if (regions_.is_alone(int(t))) continue;
+    const int r = row[regions_.of(int(t))];
     if (out[r].area == 0) origin[r] = point(corners(int(t))[0]);
     out[r].area += area(int(t));
     out[r].middle += area(int(t)) * (centroid(int(t)) - origin[r]);
@@ -233,8 +235,8 @@ std::vector<Recognizer::Moments> Recognizer::moments_of_regions() const {
   for (std::size_t r = 0; r < out.size(); ++r)
     out[r].middle = origin[r] + out[r].middle / std::max(out[r].area, 1e-300);
   for (std::size_t t = 0; t < of_.size(); ++t) {
-    if (regions_.count(regions_.of(int(t))) == 1) continue;
-    Moments& of = out[regions_.of(int(t))];
+    if (regions_.is_alone(int(t))) continue;
+    Moments& of = out[row[regions_.of(int(t))]];
     const double share = area(int(t)) / std::max(of.area, 1e-300);
     // A triangle has the moments of its corners and its middle, weighted 1 : 1 : 1 : 9.
     const auto add = [&](const Vec3& x, double weight) {
@@ -255,34 +257,41 @@ std::vector<Recognizer::Moments> Recognizer::moments_of_regions() const {
 void Recognizer::add_planes(Faces& faces) const {
   const Topology& topology = shell_.topology();
   const auto count = static_cast<std::size_t>(regions_.size());
-  std::vector<char> plane(count, 1);
-  std::vector<int> number(count, -1), some(count, -1);
+  // Those that may be planes have a row.
+  std::vector<char> plane(count, 0);
+  std::vector<int> row(count, -1);
+  std::size_t rows = 0;
+  for (std::size_t r = 0; r < count; ++r)
+    if (regions_.count(int(r)) > 1 || inscribed_[r] == Inscribed::Plane)
+      plane[r] = 1, row[r] = static_cast<int>(rows++);
+  std::vector<int> number(rows, -1), some(rows, -1);
   // The largest turn at sides beyond which a region goes on narrowly, the smallest at others [rad],
   // and the sagitta of that [m].
   struct Turns {
     double narrow = 0, alike = std::numeric_limits<double>::infinity(), sagitta = alike;
   };
-  std::vector<Turns> turns(count);
-  const std::vector<Moments> moments = moments_of_regions();
+  std::vector<Turns> turns(rows);
+  const std::vector<Moments> moments = moments_of_regions(row, rows);
   // Of a region across a side: that of a rectangle with the same second moment [m].
   const auto width = [&](int h) {
     const int t = triangle_of(h), k = side_of(h), r = regions_.of(t);
-    if (regions_.count(r) == 1) return regions_.height(h);
+    if (regions_.is_alone(t)) return regions_.height(h);
     const Vec3 side = point(corners(t)[next_corner(k)]) - point(corners(t)[k]);
     const Vec3 across = regions_.normal(r).cross(side).normalized();
-    return std::sqrt(12 * across.dot(moments[r].second * across));
+    return std::sqrt(12 * across.dot(moments[row[r]].second * across));
   };
   for (std::size_t t = 0; t < of_.size(); ++t) {
     // Each triangle may speak against its region.
     char& is_plane = plane[regions_.of(int(t))];
-    some[regions_.of(int(t))] = static_cast<int>(t);
+    if (!is_plane) continue;
+    some[row[regions_.of(int(t))]] = static_cast<int>(t);
     if (is_own_plane(int(t))) continue;
-    if (of_[t] >= 0 || regions_.count(regions_.of(int(t))) < 2) is_plane = 0;
+    if (of_[t] >= 0) is_plane = 0;
     for (int k = 0; k < 3 && is_plane; ++k) {
       const int h = 3 * static_cast<int>(t) + k, u = beside_[h];
       if (u < 0 || regions_.of(u) == regions_.of(int(t))) continue;
       const bool few = regions_.count(regions_.of(int(t))) < kFewOfPlane;
-      auto& [narrow, alike, sagitta] = turns[regions_.of(int(t))];
+      auto& [narrow, alike, sagitta] = turns[row[regions_.of(int(t))]];
       const double here = width(h), there = width(topology.other_half_edge(h));
       if (here > (few ? kFarLarger : kFarther) * there)
         narrow = std::max(narrow, turn(int(t), u));
@@ -298,22 +307,24 @@ void Recognizer::add_planes(Faces& faces) const {
     if (face >= 0) most = std::max(most, faces_[face].deviation);
   if (most < 0) most = std::numeric_limits<double>::infinity();
   for (std::size_t r = 0; r < count; ++r) {
-    const auto& [narrow, alike, sagitta] = turns[r];
+    if (!plane[r]) continue;
+    const auto& [narrow, alike, sagitta] = turns[row[r]];
     const bool sharper = alike > kMuchSharper * narrow ||
                          (alike > kSharper * narrow && sagitta > kMuchSharper * most);
-    plane[r] = plane[r] && (std::isinf(alike) || (narrow > 0 && sharper));
+    plane[r] = std::isinf(alike) || (narrow > 0 && sharper);
   }
   for (std::size_t t = 0; t < of_.size(); ++t) {
-    const int r = regions_.of(int(t));
-    if (!plane[r] || of_[t] >= 0) continue;
+    const int region = regions_.of(int(t)), r = row[region];
+    if (!plane[region] || of_[t] >= 0) continue;
     if (number[r] < 0) {
       number[r] = static_cast<int>(faces.shapes.size());
       // Fitted where the vertices are off the plane of the largest triangle by their rounding.
-      std::pair<Vec3, Vec3> plane{point(corners(some[r])[0]), regions_.normal(r)};
+      const Vec3& own = regions_.normal(region);
+      std::pair<Vec3, Vec3> plane{point(corners(some[r])[0]), own};
       if (moments[r].off > kMostGap * shell_.size()) {
         const Eigen::SelfAdjointEigenSolver<Mat3> solver(moments[r].second);
         const Vec3 normal = solver.eigenvectors().col(0);
-        plane = {moments[r].middle, normal.dot(regions_.normal(r)) < 0 ? Vec3(-normal) : normal};
+        plane = {moments[r].middle, normal.dot(own) < 0 ? Vec3(-normal) : normal};
       }
       // A plane has no second number: it says whether the plane is inscribed in a round face.
       faces.shapes.push_back(

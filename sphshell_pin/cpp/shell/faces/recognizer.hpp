@@ -153,7 +153,7 @@ class Recognizer {
     Mat3 second = Mat3::Zero();  // about the middle, over the area [m^2]
     double off = 0;              // of a vertex from the plane of the largest triangle [m]
   };
-  std::vector<Moments> moments_of_regions() const;
+  std::vector<Moments> moments_of_regions(const std::vector<int>& row, std::size_t rows) const;
 
   const Shell& shell_;
   const CoplanarRegions& regions_;
