@@ -300,6 +300,28 @@ def test_friction_is_continuous_over_a_groove(friction, degrees: float) -> None:
     assert jumps[1] < 0.4 * jumps[0]
 
 
+def test_contacts_that_split_and_merge_share_one_bristle() -> None:
+    """A ball that rolls over a groove while 1 N along it holds: each contact carries all of it."""
+    angle, radius, dt = math.radians(1), 0.1, 1e-3
+    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
+    friction, law = sp.BristleFriction(0.4, 0.3, 1e4), sp.HuntCrossleyLaw(3e5, 1.5, 0.0)
+    scene = models.on_shell(models.ball(radius=radius), shell, law, friction, radius=radius)
+    x = np.linspace(-0.004, 0.004, 100)
+    z = radius / math.cos(angle) - 5e-4 + np.abs(x) * math.tan(angle)
+    state = scene.state(models.free_q([x[0], 0.1, z[0]]), np.zeros(6))
+    state.advance(models.free_q([x[0], 0.1, z[0]]), [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], dt)
+    counts = []
+    for k in range(1, len(x)):
+        q, speed = models.free_q([x[k], 0.1, z[k]]), (x[k] - x[k - 1]) / dt
+        state.advance(q, [speed, 0.0, 0.0, 0.0, speed / radius, 0.0], dt)
+        found = scene.contacts(q, np.zeros(6), state=state)
+        counts.append(len(found.depth))
+        held = -np.sign(found.normal_force)  # a saddle counts off
+        assert found.friction_force_world[:, 1] == pytest.approx(held, rel=1e-3)
+    assert counts[0] == counts[-1] == 1
+    assert counts.count(3) > 20
+
+
 def test_a_source_has_no_radius() -> None:
     scene = sp.Scene(models.ball())
     with pytest.raises(InvalidParameter, match="needs a sphere, and a contact source has none"):
