@@ -97,11 +97,7 @@ def moves(scene: sp.Scene, q: Array, v: Array, tau: Array | None = None) -> dict
 
 
 def acceleration(
-    scene: sp.Scene,
-    q: Array,
-    v: Array,
-    tau: Array,
-    state: sp.results.SceneState | None = None,
+    scene: sp.Scene, q: Array, v: Array, tau: Array, state: sp.results.SceneState | None = None
 ) -> Array:
     """ABA with `Scene.external_forces`; of mimic joints, which ABA has not, M^-1 (tau - rnea)."""
     model = scene.model

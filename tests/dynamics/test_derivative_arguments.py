@@ -8,15 +8,7 @@ import pytest
 from sphshell_pin import CoulombFriction, Simulation
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-from tests.dynamics.scenes import (
-    BRISTLE,
-    COULOMB,
-    FRICTIONS,
-    LAWS,
-    in_bowl,
-    in_touch,
-    two_spheres,
-)
+from tests.dynamics.scenes import BRISTLE, COULOMB, FRICTIONS, LAWS, in_bowl, in_touch, two_spheres
 
 SCENE = in_bowl(LAWS["impact"], COULOMB)
 

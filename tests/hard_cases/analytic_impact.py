@@ -79,12 +79,7 @@ def undamped() -> Verdicts:
         yield compare("time of the touch", tried, "gap / v", GAP / speed, seen.touch, 1e-6)
         yield compare("time in touch", tried, "2 I depth / v", duration, seen.duration, 1e-6)
         yield compare(
-            "largest depth",
-            tried,
-            "((e + 1) m v^2 / (2 k))^(1 / (e + 1))",
-            depth,
-            seen.depth,
-            1e-6,
+            "largest depth", tried, "((e + 1) m v^2 / (2 k))^(1 / (e + 1))", depth, seen.depth, 1e-6
         )
         yield compare("restitution", tried, "1", 1.0, seen.restitution, 1e-6)
 

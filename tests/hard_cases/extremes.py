@@ -91,10 +91,7 @@ def stack(upper: float, lower: float) -> sp.Scene:
         models.add_body(model, name, pin.JointModelPZ(), inertia=inertia)
     scene = sp.Scene(model)
     plate = models.plate(0.2)
-    for name, frame, carried in (
-        ("ground", "universe", upper + lower),
-        ("between", "low", upper),
-    ):
+    for name, frame, carried in (("ground", "universe", upper + lower), ("between", "low", upper)):
         law = damped(carried, 1e6, carried * GRAVITY / 1e6)
         ball = "low" if frame == "universe" else "high"
         top = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.0 if frame == "universe" else 0.02]))

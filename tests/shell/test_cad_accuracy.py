@@ -15,14 +15,7 @@ from sphshell_pin.shell.curvature import curved_mesh
 from tests.oracle.cad import ExactShape, curved_places, deviation
 from tests.parts.occ import faces as occ_faces
 from tests.shell import cad_shapes as shapes
-from tests.shell.cad_cases import (
-    KNOWN,
-    REAL_FILES,
-    force_errors,
-    order,
-    rms,
-    stated_and_measured,
-)
+from tests.shell.cad_cases import KNOWN, REAL_FILES, force_errors, order, rms, stated_and_measured
 from tests.shell.surfaces import surface_file
 
 
