@@ -200,12 +200,7 @@ def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
-@pytest.mark.parametrize(
-    "integrator",
-    [sp.SemiImplicitEuler(1e-4), sp.RungeKutta4(1e-4), sp.LinearlyImplicitEuler(1e-3),
-     sp.Adaptive(), sp.Implicit()],
-    ids=str,
-)  # fmt: skip
+@models.every_integrator(1e-4, 1e-6, 1e-5)
 def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyped-def]
     angle = math.radians(10)
     law = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT, restitution=0.1, speed=0.1)

@@ -8,14 +8,7 @@ import sphshell_pin as sp
 from tests import models
 
 R = 0.01
-INTEGRATORS = [
-    sp.SemiImplicitEuler(1e-2),
-    sp.RungeKutta4(1e-2),
-    sp.LinearlyImplicitEuler(1e-2),
-    sp.Adaptive(1e-5),
-    sp.Implicit(1e-4),
-]
-every = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda i: type(i).__name__)
+every = models.every_integrator(1e-2, 1e-5, 1e-4)
 pytestmark = pytest.mark.filterwarnings("ignore::sphshell_pin.errors.WeakLawWarning")
 
 
