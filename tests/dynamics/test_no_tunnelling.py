@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from tests import models
+from tests import meshes, models
 
 R = 0.01
 every = models.every_integrator(1e-2, 1e-5, 1e-4)
@@ -120,8 +120,8 @@ def test_what_turns_a_sphere_round_within_a_step_is_a_touch(share: float) -> Non
     assert figures.impulse == pytest.approx(rows.v[-1, 2] + speed, rel=1e-2)
 
 
-def led(path) -> sp.Result:
-    """Lead a heavy ball along the corners of `path` [m] in a second."""
+def led(path, shell=None) -> sp.Result:
+    """Lead a heavy ball along the corners of `path` [m] in a second, beside a sheet."""
     path = np.array(path, dtype=float)
     pieces = len(path) - 1
 
@@ -130,7 +130,11 @@ def led(path) -> sp.Result:
         goal = path[i] + (t * pieces - i) * (path[i + 1] - path[i])
         return 1e4 * (1e5 * (goal - q) + 600.0 * (pieces * (path[i + 1] - path[i]) - v))
 
-    scene = scene_of(models.block(0.0, 1e4), 1.0, models.linear_law(100.0))
+    law = models.linear_law(100.0)
+    if shell is None:
+        scene = scene_of(models.block(0.0, 1e4), 1.0, law)
+    else:
+        scene = models.on_shell(models.block(0.0, 1e4), shell, law, radius=R)
     more = {"controller": controller, "control_dt": 2e-4}
     speed = pieces * (path[1] - path[0])
     return run(scene, sp.SemiImplicitEuler(2e-4), path[0], speed, 1.0, **more)
@@ -148,6 +152,19 @@ def test_pushed_past_and_back(side: float) -> None:
     assert log.depth == pytest.approx(depth, abs=1e-12)
     assert np.array_equal(log.normal_world, np.tile([0, 0, side], (len(log.t), 1)))
     assert rows.stats.pairs[rows.pairs[0]].max_depth == pytest.approx(1.4 * R, rel=1e-3)
+
+
+def test_pushed_past_and_on_over_a_ridge_of_the_far_side() -> None:
+    """A valley from above is a ridge from below; a ball pushed through stays pushed up there."""
+    lean, x = 0.5, 0.2
+    shell = sp.Shell(*meshes.v_groove(lean, size=1.0, cells=4))
+    beside = [-x, 0.03, x * np.tan(lean)] + R * np.array([np.sin(lean), 0.0, np.cos(lean)])
+    up = R * np.array([np.sin(lean), 0.0, np.cos(lean)])
+    below = [0.0, 0.03, -0.4 * R]
+    log = led([beside + 0.2 * up, beside - 1.4 * up, below, below], shell).contacts
+    ridge = log.t > 0.7
+    assert np.abs(log.normal_world[ridge] - [0, 0, 1]).max() < 1e-3
+    assert log.depth[ridge] == pytest.approx(1.4 * R, rel=1e-3)
 
 
 def test_after_it_lifted_off_the_memory_is_gone() -> None:
