@@ -15,9 +15,7 @@ from tests.validation.rattleback import ellipsoid
 AXES = np.array([0.2, 0.03, 0.02])
 
 
-def scene_of(
-    shell: sp.Shell, law=None, friction=None, method=None, inertia=None, **plane
-) -> sp.Scene:
+def scene_of(shell, law=None, friction=None, method=None, inertia=None, **plane):
     """`shell` on a free body, over a plane of the world."""
     model, law = empty(), law or linear_law(1e4)
     add_body(model, "body", pin.JointModelFreeFlyer(), inertia=inertia)

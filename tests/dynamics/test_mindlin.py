@@ -234,9 +234,7 @@ def test_a_spin_dies_out_at_the_moment_limit(rings: int) -> None:
 class TestRolling:
     COEFFICIENT = 0.02
 
-    def rolling(
-        self, slope: float, speed: float, duration: float, rolling_speed: float
-    ) -> sp.Result:
+    def rolling(self, slope, speed, duration, rolling_speed):
         model = models.ball()
         model.gravity.linear = 9.81 * np.array([math.sin(slope), 0.0, -math.cos(slope)])
         law = sp.ImpactLaw.hertz(0.05, 1e9, 0.3, 1e9, 0.3, restitution=0.1, speed=0.1)

@@ -29,9 +29,7 @@ def damped(mass: float, stiffness: float, depth: float) -> sp.ImpactLaw:
     return sp.ImpactLaw(stiffness, 1.0, 1.4 * math.sqrt(stiffness * mass), 0.1 * depth)
 
 
-def resting_depth(
-    mass: float, stiffness: float, integrator: Any, gravity: float = GRAVITY, start: float = 0.0
-) -> tuple[float, float, float]:
+def resting_depth(mass, stiffness, integrator, gravity=GRAVITY, start=0.0):
     """Let a ball settle; return its depth, m g / k, and what rounding may make of it, relative.
 
     It starts at `start` times its depth at rest.
