@@ -5,7 +5,7 @@ eps |f| / h; steps of 1e-3, 1e-4 and 1e-5 of the length or value on which a func
 tried, and the best counts: a kink nearby or rounding spoils one of them, a wrong derivative none.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -37,17 +37,7 @@ def columns_of(name: str) -> list[str]:
     return [name] if ends is None else [f"{name}.{end}" for end in ends]
 
 
-def off(
-    got: Array,
-    f: Function,
-    scale: float,
-    *,
-    floor: float = 0.0,
-    tolerance: float = 1e-6,
-    known: float | None = None,
-    shares: Sequence[float] = SHARES,
-    ahead: bool = False,
-) -> float:
+def off(got, f, scale, *, floor=0.0, tolerance=1e-6, known=None, shares=SHARES, ahead=False):
     """Return by how much `got` is not the derivative of f at 0, relative to its largest entry.
 
     f changes on the length `scale`; what is smaller than `floor`, or than what differences resolve
@@ -96,13 +86,7 @@ def moves(scene: sp.Scene, q: Array, v: Array, tau: Array | None = None) -> dict
     return found
 
 
-def acceleration(
-    scene: sp.Scene,
-    q: Array,
-    v: Array,
-    tau: Array,
-    state: sp.results.SceneState | None = None,
-) -> Array:
+def acceleration(scene, q, v, tau, state=None):
     """ABA with `Scene.external_forces`; of mimic joints, which ABA has not, M^-1 (tau - rnea)."""
     model = scene.model
     torques = tau + scene.joint_forces(q, v, state=state)

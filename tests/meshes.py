@@ -34,9 +34,7 @@ def grid_plate(rows: int = 1, columns: int = 1, size: float = 1.0, quads: bool =
     return vertices, _split(cells, np.zeros(len(cells), dtype=bool))
 
 
-def random_plate(
-    elements: int, seed: int = 0, size: float = 1.0, jitter: float = 0.45, slivers: bool = True
-) -> Mesh:
+def random_plate(elements, seed=0, size=1.0, jitter=0.45, slivers=True):
     """Plate z = 0 of about `elements` triangles: jittered grid, random diagonals, slivers.
 
     Slivers: a tenth of the rows and columns are squeezed to a thousandth of their width, and no two

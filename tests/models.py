@@ -2,8 +2,10 @@
 
 import numpy as np
 import pinocchio as pin
+import pytest
 from numpy.typing import NDArray
 
+import sphshell_pin as sp
 from sphshell_pin import CoulombFriction, ImpactLaw, Scene, Shell, Sphere
 from tests import meshes
 
@@ -16,6 +18,13 @@ JOINTS = {
     "prismatic": pin.JointModelPZ,
     "spherical": pin.JointModelSpherical,
 }
+
+
+def every_integrator(dt: float, adaptive: float, implicit: float) -> pytest.MarkDecorator:
+    """Parametrize a test by the steppers of fixed steps [s], and the two of these tolerances."""
+    fixed = (sp.SemiImplicitEuler, sp.RungeKutta4, sp.LinearlyImplicitEuler)
+    five = [*(one(dt) for one in fixed), sp.Adaptive(adaptive), sp.Implicit(implicit)]
+    return pytest.mark.parametrize("integrator", five, ids=lambda one: type(one).__name__)
 
 
 def composite() -> pin.JointModelComposite:

@@ -5,12 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 
-def python(
-    program: str, *arguments: object, check: bool = False, timeout: float = 120.0, **more: Any
-) -> subprocess.CompletedProcess[str]:
+def python(program, *arguments, check=False, timeout=120.0, **more):
     """Run a program to its end, and return its exit code and what it printed."""
     command = [sys.executable, "-c", program, *map(str, arguments)]
     return subprocess.run(

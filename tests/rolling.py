@@ -13,15 +13,12 @@ import pinocchio as pin
 from sphshell_pin import (
     Adaptive,
     BristleFriction,
-    HuntCrossleyLaw,
     ImpactLaw,
     Scene,
-    Shell,
     Simulation,
     Sphere,
 )
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.contact.friction import Friction
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.models import model_of
 from sphshell_pin.study.report.swing import GRAVITY, mean_period
@@ -58,32 +55,19 @@ class Ball:
         moved = 2 / 7 * self.mass if mass is None else mass
         return BristleFriction(mu, mu, stiffness, 2 * RATIO * math.sqrt(stiffness * moved))
 
-    def model(
-        self, *others: tuple[str, pin.JointModel, pin.Inertia], gravity: float = GRAVITY
-    ) -> pin.Model:
+    def model(self, *others, gravity=GRAVITY):
         """Return the ball, and `others` beside it; the frame "ball" is at its center."""
         inertia = pin.Inertia.FromSphere(self.mass, self.radius)
         return model_of(("ball", pin.JointModelFreeFlyer(), inertia), *others, gravity=gravity)
 
-    def scene(
-        self,
-        shell: Shell,
-        law: ImpactLaw | HuntCrossleyLaw,
-        friction: Friction | None = None,
-        *,
-        model: pin.Model | None = None,
-        frame: str = "universe",
-        placement: pin.SE3 | None = None,
-    ) -> Scene:
+    def scene(self, shell, law, friction=None, *, model=None, frame="universe", placement=None):
         """Return the ball, on a free-flyer unless `model` is given, and a shell."""
         scene = Scene(self.model() if model is None else model)
         scene.add_contact(Sphere(self.radius, "ball"), shell, frame, placement, law, friction)
         return scene
 
 
-def state(
-    center: Array | list[float], velocity: Array | list[float], spin: Array | list[float]
-) -> tuple[Array, Array]:
+def state(center, velocity, spin):
     """Return q0, v0 of the unturned free ball; all in the world, [m], [m/s], [rad/s]."""
     q0 = np.concatenate([np.asarray(center, dtype=float), [0.0, 0.0, 0.0, 1.0]])
     return q0, np.concatenate([velocity, spin]).astype(float)
@@ -111,16 +95,7 @@ class Orbit:
     expected: float
 
 
-def on_turntable(
-    ball: Ball,
-    shell: Shell,
-    turn: float,
-    *,
-    place: tuple[float, float],
-    velocity: tuple[float, float],
-    stiffness: float,
-    bristles: float,
-) -> Orbit:
+def on_turntable(ball, shell, turn, *, place, velocity, stiffness, bristles):
     """Roll two orbits on a table z = 0 that turns by `turn` [rad/s] about z.
 
     The ball starts rolling at `place` [m] with `velocity` [m/s]; `stiffness` and `bristles` [N/m].
@@ -160,16 +135,7 @@ class Bobbing:
     lost: float
 
 
-def in_cylinder(
-    ball: Ball,
-    shell: Shell,
-    radius: float,
-    orbit: float,
-    *,
-    stiffness: float,
-    mu: float = 1.5,
-    periods: int = 3,
-) -> Bobbing:
+def in_cylinder(ball, shell, radius, orbit, *, stiffness, mu=1.5, periods=3):
     """Let the ball roll around inside a cylinder of `radius` [m] about z at `orbit` [rad/s].
 
     It starts level, without spin about the normal, from the top of the swing about z = 0. The ball
@@ -206,16 +172,7 @@ class Swinging:
     expected: float
 
 
-def in_bowl(
-    ball: Ball,
-    shell: Shell,
-    radius: float,
-    angle: float,
-    *,
-    stiffness: float,
-    friction: Friction | None = None,
-    periods: int = 2,
-) -> Swinging:
+def in_bowl(ball, shell, radius, angle, *, stiffness, friction=None, periods=2):
     """Let the ball swing, rolling, from rest at `angle` [rad] in a bowl of `radius` [m] about 0.
 
     The period is 4 sqrt((1 + b) (R - r + depth) / g) K(sin(angle / 2)), and for small angles

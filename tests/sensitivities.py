@@ -54,13 +54,7 @@ class Case:
             "control_dt": control_dt,
         }
 
-    def run(
-        self,
-        scene: sp.Scene | None = None,
-        q0: Array | None = None,
-        v0: Array | None = None,
-        names: Sequence[str] | None = None,
-    ) -> sp.Result:
+    def run(self, scene=None, q0=None, v0=None, names=None):
         asked = {} if names is None else {"sensitivities": names}
         return sp.Simulation(scene or self.scene, self.integrator).run(  # type: ignore[arg-type]
             self.q0 if q0 is None else q0,
@@ -95,15 +89,7 @@ class Case:
             return max(float(np.abs(self.v0).max()), 0.1), False
         return (depth, False) if part == "q0" else differences.scale_of(self.scene, column, depth)
 
-    def check(
-        self,
-        names: Sequence[str],
-        *,
-        tolerance: float = 1e-5,
-        depth: float = 1e-3,
-        error: float = 10.0,
-        bounces: int | None = None,
-    ) -> sp.Result:
+    def check(self, names, *, tolerance=1e-5, depth=1e-3, error=10.0, bounces=None):
         """Compare motion, forces and depths of all rows, each relative to its largest entry.
 
         Runs of an integrator that controls its error are known to `error` times its tolerance.
@@ -172,16 +158,7 @@ class Case:
         return result
 
 
-def drop(
-    law: sp.NormalLaw,
-    integrator: object = ADAPTIVE,
-    *,
-    gap: float = 0.01,
-    speed: float = 0.5,
-    duration: float = 0.1,
-    gravity: float = 9.81,
-    **more: object,
-) -> Case:
+def drop(law, integrator=ADAPTIVE, *, gap=0.01, speed=0.5, duration=0.1, gravity=9.81, **more):
     """A mass that falls on a plate, `gap` below it."""
     scene = models.on_plate(models.slider(gravity), law)
     return Case(scene, [R + gap], [-speed], duration, integrator, **more)  # type: ignore[arg-type]

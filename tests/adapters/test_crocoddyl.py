@@ -70,6 +70,20 @@ def pressed(scene: sp.Scene, q: np.ndarray, v: list[float]) -> tuple[sp.Scene, n
     return scene, np.concatenate((q, v))
 
 
+class ActuationModelDamped(crocoddyl.ActuationModelAbstract):
+    """Motors with springs and dampers: tau = u - 3 x, of a model whose q is a vector."""
+
+    def __init__(self, state):
+        super().__init__(state, state.nv)
+
+    def calc(self, data, x, u):
+        data.tau = u - 3.0 * (x[: self.nu] + x[self.nu :])
+
+    def calcDiff(self, data, x, u):  # noqa: N802
+        data.dtau_dx = -3.0 * np.hstack((np.eye(self.nu), np.eye(self.nu)))
+        data.dtau_du = np.eye(self.nu)
+
+
 def dynamics(scene: sp.Scene, actuation: str = "Full") -> ContactDynamics:
     """Return a model with every residual of the adapter."""
     return ContactDynamics(scene, *parts(scene, actuation))
@@ -78,7 +92,8 @@ def dynamics(scene: sp.Scene, actuation: str = "Full") -> ContactDynamics:
 def bare(scene: sp.Scene, actuation: str = "Full"):
     """Return state, actuation, and no costs."""
     state = crocoddyl.StateMultibody(scene.model)
-    actuated = getattr(crocoddyl, f"ActuationModel{actuation}")(state)
+    name = f"ActuationModel{actuation}"
+    actuated = (getattr(crocoddyl, name, None) or globals()[name])(state)
     return state, actuated, crocoddyl.CostModelSum(state, actuated.nu)
 
 
@@ -103,6 +118,7 @@ def parts(scene: sp.Scene, actuation: str = "Full"):
 
 CASES = {
     "arm": (arm_on_moving_plate, "Full"),
+    "arm with damped motors": (arm_on_moving_plate, "Damped"),
     "corner": (ball_in_a_corner, "Full"),
     "ball": (free_ball, "Full"),
     "ball-without-motors": (free_ball, "FloatingBase"),

@@ -1,7 +1,5 @@
 """What the contact tests share: probe positions, and comparison of contact sets."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,14 +16,7 @@ def heights(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDAr
     return np.asarray(doubled / longest)
 
 
-def positions(
-    vertices: NDArray[np.float64],
-    elements: NDArray[np.int32],
-    radius: float,
-    count: int,
-    seed: int,
-    heights: tuple[float, ...] = (0.0, 0.3, 0.9),
-) -> Iterator[NDArray[np.float64]]:
+def positions(vertices, elements, radius, count, seed, heights=(0.0, 0.3, 0.9)):
     """Sphere centres: `count` near random places of the surface, `count` on borders of regions.
 
     A border position stands over a point of an element's side (or over a corner), at a height (one

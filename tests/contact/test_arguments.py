@@ -101,10 +101,7 @@ REFUSED: list[tuple[str, Call]] = [
     # Friction
     ("mu_dynamic", lambda: sp.CoulombFriction(0.1, 0.3, 0.1, 1.0)),
     ("v_dynamic", lambda: sp.CoulombFriction(0.3, 0.1, 0.1, 0.1)),
-    (
-        "beside a FoundationLaw take a Coulomb",
-        lambda: pressed(sp.FoundationLaw(1e6, 5e-3), OWN),
-    ),
+    ("beside a FoundationLaw take a Coulomb", lambda: pressed(sp.FoundationLaw(1e6, 5e-3), OWN)),
 ]
 
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.shell.curvature import curved_mesh
 from tests.contact.test_faces import VALVE_BODY, written
+from tests.joints.boxes import BOXES
 from tests.parts import occ
 
 MM = 1e-3
@@ -122,6 +124,45 @@ def test_a_plane_is_flat_however_far_off_it_its_vertices_are(folder):
             place -= (place - face.point) @ face.axis * face.axis
             force = shell.contacts(place + (ball - depth) * face.axis, ball).force(law)
             assert np.linalg.norm(force) == pytest.approx(depth**1.5, rel=1e-9)
+
+
+def test_where_cylinders_end_in_planes_the_planes_stay_flat(folder):
+    """Borders are moved onto both faces at once; a plane has the last word."""
+    shell = sp.Shell.from_file(step_of(BOXES["mitre"](np.random.default_rng(0)), folder))
+    points, _, _ = curved_mesh(shell, 3)
+    points = points.reshape(len(shell.triangles), -1, 3)
+    for face in shell.faces:
+        if face.kind == "plane":
+            off = (points[np.isin(shell.triangle_element, face.elements)] - face.point) @ face.axis
+            assert np.abs(off).max() <= 1e-14 * shell.size
+
+
+def test_a_border_that_runs_through_the_facet_beside_its_own():
+    """Of a bore in a plate: beside a needle at its rim the round rim is beyond the next facet."""
+    count, radius, height = 32, 0.1, 0.09
+    turn = 2 * np.pi * np.arange(count) / count
+    rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    chord, out = rim[1] - rim[0], (rim[0] + rim[1]) / np.linalg.norm(rim[0] + rim[1])
+    bulge = chord @ chord / 2  # at a share s of the chord the rim is s (1 - s) of it beyond
+    needle = rim[0] + 0.05 * chord + 0.3 * bulge * out
+    vertices = np.concatenate([rim, 2 * rim, rim - [0, 0, 1.0], [needle]])
+    i, j = np.arange(count), np.roll(np.arange(count), -1)
+    quads = np.stack([i, i + count, j + count, j], axis=1)
+    walls = np.stack([i, j, j + 2 * count, i + 2 * count], axis=1)
+    flat = np.concatenate([quads[1:, [0, 1, 2]], quads[1:, [0, 2, 3]]])
+    fan = [[a, b, 3 * count] for a, b in ((0, 1), (1, count + 1), (count + 1, count), (count, 0))]
+    round_ = np.concatenate([walls[:, [0, 1, 2]], walls[:, [0, 2, 3]]])
+    triangles = np.concatenate([flat, fan, round_])
+    normals = np.broadcast_to([0, 0, 1.0], (len(triangles), 3, 3)).copy()
+    normals[-len(round_) :] = -vertices[round_] * [1, 1, 0]
+    shell = sp.Shell(vertices, triangles, normals=normals)
+    assert [face.exact for face in shell.faces] == [True, True]
+    for share in np.linspace(0.35, 0.9, 12):
+        for beyond in np.linspace(0.3, share, 5)[1:-1] * (1 - share):
+            center = rim[0] + share * chord + beyond * bulge * out + [0, 0, height]
+            found = shell.contacts(center, radius)
+            aside = 1 - np.hypot(*center[:2])
+            assert found.depth == pytest.approx([radius - np.hypot(height, aside)], abs=1e-14)
 
 
 def test_a_border_to_a_free_form_face_ends_on_its_face(folder):

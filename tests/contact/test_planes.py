@@ -6,6 +6,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.study.report.surfaces import torus
+from sphshell_pin.testing import assert_derivatives
 from tests.meshes import crumpled, cube, grid_plate, icosphere, soup
 from tests.models import add_body, empty, free_q, linear_law
 from tests.validation.rattleback import ellipsoid
@@ -13,9 +15,7 @@ from tests.validation.rattleback import ellipsoid
 AXES = np.array([0.2, 0.03, 0.02])
 
 
-def scene_of(
-    shell: sp.Shell, law=None, friction=None, method=None, inertia=None, **plane
-) -> sp.Scene:
+def scene_of(shell, law=None, friction=None, method=None, inertia=None, **plane):
     """`shell` on a free body, over a plane of the world."""
     model, law = empty(), law or linear_law(1e4)
     add_body(model, "body", pin.JointModelFreeFlyer(), inertia=inertia)
@@ -114,6 +114,13 @@ def test_spheres_and_tori_are_exact() -> None:
         found = scene.contacts(pose(rotation, 0.039))
         assert found.depth == pytest.approx([0.001], abs=1e-14)
         assert found.point_world[0] == pytest.approx([0.3, -0.2, 0.0], abs=1e-9)
+    mesh = torus(0.06, 0.02, 0.01)
+    scene = scene_of(sp.Shell(mesh.vertices, mesh.triangles, normals=mesh.normals))
+    for rotation in rotations(10, 3):
+        low = 0.06 * np.hypot(*rotation[2, :2]) + 0.02
+        q = pose(rotation, low - 0.001)
+        assert scene.contacts(q).depth == pytest.approx([0.001], abs=1e-14)
+        assert_derivatives(scene, q, np.array([0.1, -0.2, -0.1, 1.0, 2.0, -3.0]), tolerance=1e-5)
 
 
 def test_limit_of_large_spheres() -> None:

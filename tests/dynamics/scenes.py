@@ -249,9 +249,7 @@ def stretched(scene: sp.Scene, size: float) -> Array:
     return z
 
 
-def assert_rate_jacobian(
-    scene: sp.Scene, q: Array, v: Array, z: Array, *, step: float = 1e-6, turning: float = 1e-6
-) -> None:
+def assert_rate_jacobian(scene, q, v, z, *, step=1e-6, turning=1e-6):
     """The derivatives of accelerations and of bristles' rates by q, v and the stretches z.
 
     `turning`: tolerance of how the bristles' rates change with q.

@@ -11,14 +11,7 @@ R = 0.05
 G = 9.81
 K = 1e5  # stiffness of the normal law, and of bristles [N/m]
 DEPTH = G / K  # of 1 kg at rest
-FIVE = [
-    sp.SemiImplicitEuler(1e-4),
-    sp.RungeKutta4(1e-4),
-    sp.LinearlyImplicitEuler(1e-4),
-    sp.Adaptive(1e-7),
-    sp.Implicit(1e-6),
-]
-every = pytest.mark.parametrize("integrator", FIVE, ids=lambda i: type(i).__name__)
+every = models.every_integrator(1e-4, 1e-7, 1e-6)
 ACCURATE = sp.Adaptive(1e-9)
 
 

@@ -5,18 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sphshell_pin import CoulombFriction, Simulation
+from sphshell_pin import CoulombFriction, HuntCrossleyLaw, Simulation
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-from tests.dynamics.scenes import (
-    BRISTLE,
-    COULOMB,
-    FRICTIONS,
-    LAWS,
-    in_bowl,
-    in_touch,
-    two_spheres,
-)
+from tests import models
+from tests.dynamics.scenes import BRISTLE, COULOMB, FRICTIONS, LAWS, in_bowl, in_touch, two_spheres
 
 SCENE = in_bowl(LAWS["impact"], COULOMB)
 
@@ -120,6 +113,17 @@ def test_a_number_that_no_side_allows_has_no_derivative() -> None:
         scene.dynamics_derivatives(q, v, parameters=["tip.friction.mu_dynamic"])
     d = scene.dynamics_derivatives(q, v, parameters=["tip.friction.mu_static"])
     assert np.isfinite(d.by_parameters).all()
+
+
+def test_numbers_at_their_bounds() -> None:
+    """F = k depth^n (1 - b gap_rate) by b = 0, and mu_dynamic F by a mu_dynamic = mu_static."""
+    law, friction = HuntCrossleyLaw(1e5, 1.5, 0.0), CoulombFriction(0.3, 0.3, 0.01, 0.1)
+    scene = models.on_plate(models.block(), law, friction)
+    names = ["ball-plate.law.dissipation", "ball-plate.friction.mu_dynamic"]
+    got = scene.contact_force_derivatives([0, 0, 0.049], [1.0, 0, -0.2], parameters=names)
+    load = 1e5 * 1e-3**1.5
+    expected = [[-0.3 * 0.2 * load, -load], [0, 0], [0.2 * load, 0]]
+    np.testing.assert_allclose(got.by_parameters[0], expected, rtol=0, atol=1e-6 * load)
 
 
 def test_single_columns_of_the_start_of_a_run() -> None:

@@ -86,11 +86,7 @@ def test_a_sheet_bears_by_its_area() -> None:
     assert found.point_world[0] == pytest.approx([*(q[:2] + middle[:2]), 0.0])
 
 
-FRICTIONS = [
-    None,
-    sp.CoulombFriction(0.3, 0.2, 0.05, 0.5),
-    sp.BristleFriction(0.4, 0.3, 2e4, 5.0),
-]
+FRICTIONS = [None, sp.CoulombFriction(0.3, 0.2, 0.05, 0.5), sp.BristleFriction(0.4, 0.3, 2e4, 5.0)]
 SHELLS = {
     "box": box,
     "egg": lambda: egg(10, np.array([0.03, 0.02, 0.025])),

@@ -289,6 +289,9 @@ def test_a_model_states_its_joints() -> None:
     # At its highest speed the joint goes 0.01 rad into the stop, or less if its motor is strong.
     energy = 0.5 * INERTIA * 3.0**2
     assert limits.law.depth_of(energy) <= 0.01 * (1 + 1e-9)
+    one_way = link()
+    one_way.lowerEffortLimit[0] = -2.0
+    assert sp.JointComponents.from_model(one_way).effort == {"hinge": (-2.0, 5.0)}
     assert sp.JointComponents.from_model(link(), ["damping"]).kinds() == ("damping",)
     with pytest.raises(NameNotFound, match=r"'drag'.*damping"):
         sp.JointComponents.from_model(link(), ["drag"])

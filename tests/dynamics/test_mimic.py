@@ -6,9 +6,9 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics.scene.mimic import mimics, shortened
+from sphshell_pin.dynamics.scene.mimic import Mimic, mimics, shortened, with_mimics
 from sphshell_pin.errors import SphshellError
-from tests import meshes
+from tests import meshes, models
 from tests.texts import text_of
 
 
@@ -138,3 +138,14 @@ def test_a_joint_that_follows_is_where_its_rule_puts_it(off: float) -> None:
         one[full.joints[full.getJointId(joint)].idx_q] += off
         with pytest.raises(SphshellError, match=f"joint '{joint}' cannot be at .* it mimics"):
             shortened(model, one, check=True)
+
+
+def test_chained_rules_are_one_rule() -> None:
+    """c = 2 b + 0.1 and b = 3 a - 0.2 put c at 6 a - 0.3."""
+    model = models.empty()
+    for name in "abc":
+        models.add_body(model, name, pin.JointModelRZ())
+    b, c = model.names[2], model.names[3]
+    rules = [Mimic(c, b, 2.0, 0.1), Mimic(b, model.names[1], 3.0, -0.2)]
+    made = with_mimics(model, rules)
+    assert shortened(made, [0.5, 1.3, 2.7], check=True) == pytest.approx([0.5])

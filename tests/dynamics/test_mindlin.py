@@ -200,12 +200,7 @@ def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
-@pytest.mark.parametrize(
-    "integrator",
-    [sp.SemiImplicitEuler(1e-4), sp.RungeKutta4(1e-4), sp.LinearlyImplicitEuler(1e-3),
-     sp.Adaptive(), sp.Implicit()],
-    ids=str,
-)  # fmt: skip
+@models.every_integrator(1e-4, 1e-6, 1e-5)
 def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyped-def]
     angle = math.radians(10)
     law = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT, restitution=0.1, speed=0.1)
@@ -239,9 +234,7 @@ def test_a_spin_dies_out_at_the_moment_limit(rings: int) -> None:
 class TestRolling:
     COEFFICIENT = 0.02
 
-    def rolling(
-        self, slope: float, speed: float, duration: float, rolling_speed: float
-    ) -> sp.Result:
+    def rolling(self, slope, speed, duration, rolling_speed):
         model = models.ball()
         model.gravity.linear = 9.81 * np.array([math.sin(slope), 0.0, -math.cos(slope)])
         law = sp.ImpactLaw.hertz(0.05, 1e9, 0.3, 1e9, 0.3, restitution=0.1, speed=0.1)
@@ -298,6 +291,28 @@ def test_friction_is_continuous_over_a_groove(friction, degrees: float) -> None:
         jumps.append(np.linalg.norm(np.diff(force[5:], axis=0), axis=1).max())
         assert np.abs(run.energy.residual).max() < 1e-6 * run.energy.exchanged
     assert jumps[1] < 0.4 * jumps[0]
+
+
+def test_contacts_that_split_and_merge_share_one_bristle() -> None:
+    """A ball that rolls over a groove while 1 N along it holds: each contact carries all of it."""
+    angle, radius, dt = math.radians(1), 0.1, 1e-3
+    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
+    friction, law = sp.BristleFriction(0.4, 0.3, 1e4), sp.HuntCrossleyLaw(3e5, 1.5, 0.0)
+    scene = models.on_shell(models.ball(radius=radius), shell, law, friction, radius=radius)
+    x = np.linspace(-0.004, 0.004, 100)
+    z = radius / math.cos(angle) - 5e-4 + np.abs(x) * math.tan(angle)
+    state = scene.state(models.free_q([x[0], 0.1, z[0]]), np.zeros(6))
+    state.advance(models.free_q([x[0], 0.1, z[0]]), [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], dt)
+    counts = []
+    for k in range(1, len(x)):
+        q, speed = models.free_q([x[k], 0.1, z[k]]), (x[k] - x[k - 1]) / dt
+        state.advance(q, [speed, 0.0, 0.0, 0.0, speed / radius, 0.0], dt)
+        found = scene.contacts(q, np.zeros(6), state=state)
+        counts.append(len(found.depth))
+        held = -np.sign(found.normal_force)  # a saddle counts off
+        assert found.friction_force_world[:, 1] == pytest.approx(held, rel=1e-3)
+    assert counts[0] == counts[-1] == 1
+    assert counts.count(3) > 20
 
 
 def test_a_source_has_no_radius() -> None:

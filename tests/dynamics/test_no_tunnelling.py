@@ -1,21 +1,16 @@
 """No sphere passes a shell, however fast what moves and whatever the step."""
 
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from tests import models
+from tests import meshes, models
 
 R = 0.01
-INTEGRATORS = [
-    sp.SemiImplicitEuler(1e-2),
-    sp.RungeKutta4(1e-2),
-    sp.LinearlyImplicitEuler(1e-2),
-    sp.Adaptive(1e-5),
-    sp.Implicit(1e-4),
-]
-every = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda i: type(i).__name__)
+every = models.every_integrator(1e-2, 1e-5, 1e-4)
 pytestmark = pytest.mark.filterwarnings("ignore::sphshell_pin.errors.WeakLawWarning")
 
 
@@ -127,8 +122,8 @@ def test_what_turns_a_sphere_round_within_a_step_is_a_touch(share: float) -> Non
     assert figures.impulse == pytest.approx(rows.v[-1, 2] + speed, rel=1e-2)
 
 
-def led(path) -> sp.Result:
-    """Lead a heavy ball along the corners of `path` [m] in a second."""
+def led(path, shell=None) -> sp.Result:
+    """Lead a heavy ball along the corners of `path` [m] in a second, beside a sheet."""
     path = np.array(path, dtype=float)
     pieces = len(path) - 1
 
@@ -137,7 +132,11 @@ def led(path) -> sp.Result:
         goal = path[i] + (t * pieces - i) * (path[i + 1] - path[i])
         return 1e4 * (1e5 * (goal - q) + 600.0 * (pieces * (path[i + 1] - path[i]) - v))
 
-    scene = scene_of(models.block(0.0, 1e4), 1.0, models.linear_law(100.0))
+    law = models.linear_law(100.0)
+    if shell is None:
+        scene = scene_of(models.block(0.0, 1e4), 1.0, law)
+    else:
+        scene = models.on_shell(models.block(0.0, 1e4), shell, law, radius=R)
     more = {"controller": controller, "control_dt": 2e-4}
     speed = pieces * (path[1] - path[0])
     return run(scene, sp.SemiImplicitEuler(2e-4), path[0], speed, 1.0, **more)
@@ -155,6 +154,32 @@ def test_pushed_past_and_back(side: float) -> None:
     assert log.depth == pytest.approx(depth, abs=1e-12)
     assert np.array_equal(log.normal_world, np.tile([0, 0, side], (len(log.t), 1)))
     assert rows.stats.pairs[rows.pairs[0]].max_depth == pytest.approx(1.4 * R, rel=1e-3)
+
+
+def test_pushed_past_and_on_over_a_ridge_of_the_far_side() -> None:
+    """A valley from above is a ridge from below; a ball pushed through stays pushed up there."""
+    lean, x, law = 0.5, 0.2, models.linear_law(100.0)
+    shell = sp.Shell(*meshes.v_groove(lean, size=1.0, cells=4))
+    up = R * np.array([np.sin(lean), 0.0, np.cos(lean)])
+    beside, below = [-x, 0.03, x * np.tan(lean)] + up, np.array([0.0, 0.03, -0.4 * R])
+    path = [beside + 0.2 * up, beside - 1.4 * up, below, below]
+    log = led(path, shell).contacts
+    ridge = log.t > 0.7
+    assert np.abs(log.normal_world[ridge] - [0, 0, 1]).max() < 1e-3
+    assert log.depth[ridge] == pytest.approx(1.4 * R, rel=1e-3)
+    # The derivative of the force there, in your own loop.
+    scene, still = models.on_shell(models.block(0.0), shell, law, radius=R), np.zeros(3)
+    state = scene.state(path[0], still)
+    for a, b in pairwise(path):
+        for share in np.linspace(0, 1, 200):
+            state.advance(a + share * (b - a), still, 1e-3)
+
+    def force(move: np.ndarray) -> np.ndarray:
+        return scene.external_forces(below + 1e-7 * move, still, state=state)[1].linear
+
+    by_q, _ = scene.contact_derivatives(below, still, state=state)
+    expected = [(force(one) - force(-one)) / 2e-7 for one in np.eye(3)]
+    np.testing.assert_allclose(by_q.T, expected, rtol=0, atol=1e-3)
 
 
 def test_after_it_lifted_off_the_memory_is_gone() -> None:

@@ -81,6 +81,10 @@ def test_a_push_gives_its_impulse_and_its_work(integrator) -> None:
     np.testing.assert_allclose(row.v[0, 3:], 0.0, atol=1e-12)
     assert row.energy.control_work[0] == pytest.approx(0.5 * (5.0 * pushed) ** 2, rel=1e-9)
     assert abs(run.residual) < 1e-9
+    # So it is of a controller's force.
+    steady = lambda *_: np.array([3.0, 0.0, -4.0, 0.0, 0.0, 0.0])  # noqa: E731
+    row = sp.Simulation(scene, integrator).run(models.free_q([0, 0, 1.0]), None, 0.1, steady)
+    assert row.energy.control_work[-1] == pytest.approx(0.5 * (5.0 * row.t[-1]) ** 2, rel=1e-9)
 
 
 @every

@@ -54,11 +54,7 @@ def touching(scene: sp.Scene, depth: float = 2e-4, seed: int = 0, turned=None, r
 
 
 LAW = sp.ImpactLaw(2e7, 1.5, 20.0, 1e-4)
-FRICTIONS = [
-    None,
-    sp.CoulombFriction(0.3, 0.2, 0.05, 0.5),
-    sp.BristleFriction(0.4, 0.3, 2e4, 5.0),
-]
+FRICTIONS = [None, sp.CoulombFriction(0.3, 0.2, 0.05, 0.5), sp.BristleFriction(0.4, 0.3, 2e4, 5.0)]
 
 
 def test_rolling_loses_no_energy() -> None:

@@ -7,22 +7,16 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, ResultError
+from tests import models
 from tests.dynamics.scenes import on_surface
 from tests.dynamics.test_scene_state import DT, on_slope, start
 
 LAW = sp.HuntCrossleyLaw(1e5, 1.5, 0.3)
 STICKS = sp.BristleFriction(0.5, 0.4, 1e4, 10.0)
 MINDLIN = sp.MindlinFriction(0.5, 0.4, 1e7, 0.3)
-INTEGRATORS = [
-    sp.SemiImplicitEuler(2e-5),
-    sp.RungeKutta4(5e-5),
-    sp.LinearlyImplicitEuler(2e-5),
-    sp.Adaptive(1e-7),
-    sp.Implicit(1e-6),
-]
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda one: one.kind)
+@models.every_integrator(2e-5, 1e-7, 1e-6)
 @pytest.mark.parametrize("friction", [STICKS, MINDLIN], ids=["bristle", "mindlin"])
 def test_a_run_goes_on_from_a_row_with_the_same_bits(integrator, friction):
     scene, q, v = on_surface("bowl", LAW, friction)

@@ -22,14 +22,7 @@ from tests.results import assert_same_bits
 G = 9.81
 R = 0.05
 BRISTLES = sp.BristleFriction(0.6, 0.5, 1e5, 100.0)
-INTEGRATORS = [
-    sp.SemiImplicitEuler(1e-4),
-    sp.RungeKutta4(1e-4),
-    sp.LinearlyImplicitEuler(1e-4),
-    sp.Adaptive(1e-8),
-    sp.Implicit(1e-7),
-]
-every = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda i: type(i).__name__)
+every = models.every_integrator(1e-4, 1e-8, 1e-7)
 PAIR = "tip"
 
 

@@ -152,10 +152,7 @@ def sampled(t: float, q: Array, v: Array, contacts: object) -> Array:
 
 @pytest.mark.parametrize(
     ("control_dt", "integrator"),
-    mostly_studies(
-        product([None, 2e-3], INTEGRATORS),
-        lambda both: both == (None, "adaptive"),
-    ),
+    mostly_studies(product([None, 2e-3], INTEGRATORS), lambda both: both == (None, "adaptive")),
 )
 def test_a_controller_of_the_package(control_dt: float | None, integrator: str) -> None:
     model, q0 = models.arm(), models.ARM_Q

@@ -94,16 +94,7 @@ def test_the_filter_misses_no_impact():
     assert abs(result.sensors["wrist"].values[:, 2].sum() / 1000 / expected - 1) < 1e-3
 
 
-@pytest.mark.parametrize(
-    "integrator",
-    [
-        sp.Adaptive(),
-        sp.Implicit(),
-        sp.SemiImplicitEuler(1e-4),
-        sp.RungeKutta4(1e-4),
-        sp.LinearlyImplicitEuler(1e-3),
-    ],
-)
+@models.every_integrator(1e-4, 1e-6, 1e-5)
 def test_sensors_do_not_change_the_motion(integrator):
     friction = sp.BristleFriction(0.5, 0.4, 1e4, 10.0)
     scene = models.on_plate(models.arm(), sp.HuntCrossleyLaw(1e6, 1.5, 0.2), friction)

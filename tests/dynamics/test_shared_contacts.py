@@ -53,9 +53,7 @@ SHELLS = {
 }
 
 
-def lying(
-    name: str, law, friction, *, ground: bool = True, tilt: float = 0.2
-) -> tuple[sp.Scene, np.ndarray, np.ndarray]:
+def lying(name, law, friction, *, ground=True, tilt=0.2):
     """A body that lies flat but for a share of the crown's tilt, and its state."""
     make, flat = SHELLS[name]
     shell = make()

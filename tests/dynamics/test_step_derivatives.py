@@ -1,6 +1,5 @@
 """State transition of the integrators of fixed step, against differences of runs of one step."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -40,22 +39,14 @@ STEPPERS = {
 every_stepper = pytest.mark.parametrize("stepper", STEPPERS)
 
 
-def one_step(
-    scene: sp.Scene, integrator: object, q: Array, v: Array, tau: Array
-) -> tuple[Array, Array]:
+def one_step(scene, integrator, q, v, tau):
     """Return q and v after one step under held torques, by a run."""
     run = sp.Simulation(scene, integrator).run(q, v, integrator.dt, lambda *_: tau)  # type: ignore[attr-defined, arg-type]
     assert len(run.t) == 2
     return run.q[-1], run.v[-1]
 
 
-def assert_columns(
-    got: sp.results.StepDerivatives,
-    end: tuple[Array, Array],
-    moves: dict[str, differences.Move],
-    after: Callable[..., tuple[Array, Array]],
-    tolerance: float = 1e-6,
-) -> None:
+def assert_columns(got, end, moves, after, tolerance=1e-6):
     """Every column relative to its largest entry, positions and velocities apart."""
     nv = len(end[1])
     known = differences.ROUNDING * np.array([1.0, max(1.0, float(np.abs(end[1]).max()))])
@@ -86,9 +77,7 @@ def assert_columns(
     assert not wrong
 
 
-def assert_step(
-    scene: sp.Scene, integrator: object, q: Array, v: Array
-) -> sp.results.StepDerivatives:
+def assert_step(scene, integrator, q, v):
     """Compare the derivatives of a step with those of runs of one step."""
     model, nv = scene.model, scene.model.nv
     tau = np.random.default_rng(1).normal(size=nv)

@@ -14,13 +14,6 @@ from tests.results import assert_same_bits
 
 Q0 = np.array([0.2, 0.6, 0.5])
 KP, KD = np.array([0.4, 0.3, 0.2]), np.array([0.02, 0.01, 0.01])
-INTEGRATORS = [
-    sp.SemiImplicitEuler(2e-4),
-    sp.RungeKutta4(2e-4),
-    sp.LinearlyImplicitEuler(2e-4),
-    sp.Adaptive(),
-    sp.Implicit(),
-]
 
 
 def simulation(integrator=None, effort=None):
@@ -46,7 +39,7 @@ def expected(model, result):
     return KP * (Q0 + 0.3 - result.q) - KD * result.v + np.array(weights)
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda one: one.kind)
+@models.every_integrator(2e-4, 1e-6, 1e-5)
 def test_they_are_those_of_the_controller_and_all_else_keeps_its_bits(integrator):
     run = simulation(integrator)
     asked = run.run(Q0, duration=0.1, controller=pd(), record_dt=1e-3, record=("torque",))

@@ -311,8 +311,4 @@ def test_without_the_package_the_extra_is_named(finger, tmp_path, monkeypatch):
 
 def test_names_that_ros_2_does_not_allow_or_that_coincide_get_their_own_topics():
     topics = exporting._topics("sensors", ["a-b", "a_b", "1 µ"])
-    assert list(topics.values()) == [
-        "/sensors/a_b",
-        "/sensors/a_b_2",
-        "/sensors/_1__",
-    ]
+    assert list(topics.values()) == ["/sensors/a_b", "/sensors/a_b_2", "/sensors/_1__"]

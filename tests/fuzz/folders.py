@@ -7,7 +7,7 @@ import random
 import tempfile
 import zipfile
 from base64 import b64encode
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -200,9 +200,7 @@ def damaged_folder(rng: random.Random, data: bytes) -> bytes:
     return tables.pack(files)
 
 
-def damaged(
-    rng: random.Random, structure: Structure | None, data: bytes, others: Sequence[bytes] = ()
-) -> bytes:
+def damaged(rng, structure, data, others=()):
     """Return `data` with its structure changed, or some of its bytes."""
     # Of an archive with other bytes, all is refused at once.
     archives = (damaged_folder, damaged_kept)

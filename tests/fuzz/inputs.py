@@ -80,12 +80,7 @@ KINDS: dict[str, Kind] = {
     "packages": _folder("packages", folders.package_corpus, readers.read_robot_in),
     "meshes": _folder("meshes", folders.mesh_corpus, readers.read_robot_in),
     "results": _folder("results", folders.results_corpus, readers.read_run),
-    "kept": Kind(
-        ".kept.zip",
-        folders.results_corpus,
-        folders.damaged_kept,
-        readers.look_in,
-    ),
+    "kept": Kind(".kept.zip", folders.results_corpus, folders.damaged_kept, readers.look_in),
     "special": Kind(".special", lambda: (b"",), lambda rng, _: rng.randbytes(8), read_special),
     "expression": Kind(
         ".expression", strangers.expression_corpus, strangers.expression, strangers.read_expression

@@ -10,7 +10,6 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -62,9 +61,7 @@ class Task:
     hang: float = 10.0
 
 
-def watch(
-    task: Task, report: Report, failed: Callable[[Failure], bool] = lambda failure: True
-) -> None:
+def watch(task, report, failed=lambda failure: True):
     """Do `task` and fill `report`; `failed` is told of each failure, and True ends it.
 
     A new process takes over from one that died or hung.
@@ -98,14 +95,7 @@ def watch(
             first = place.value + 1
 
 
-def _follow(
-    task: Task,
-    ours: Any,
-    worker: Any,
-    place: Any,
-    report: Report,
-    failed: Callable[[Failure], bool],
-) -> str | None:
+def _follow(task, ours, worker, place, report, failed):
     """Take what `worker` reports until it ends; return why it had to, None if it came to its end.
 
     None as well where `failed` says that this is enough.

@@ -173,9 +173,7 @@ def _line(rng: np.random.Generator, aim: Aim) -> tuple[Array, Array, bool]:
     return at, along, bool(only)
 
 
-def _law(
-    rng: np.random.Generator, mass: float, speed: float, r: float
-) -> sp.ImpactLaw | sp.HuntCrossleyLaw:
+def _law(rng, mass, speed, r):
     e = float(rng.choice([1.0, 1.5, 2.2]))
     depth = STOPPED_AT * r
     k = 0.5 * (e + 1) * mass * speed**2 / depth ** (e + 1)

@@ -126,11 +126,7 @@ def top() -> Verdicts:
 
 
 # What energy and momentum of a tumbling body may change by.
-DEFAULTS = (
-    (sp.RungeKutta4(), 1e-8),
-    (sp.Adaptive(1e-9), 1e-8),
-    (sp.Implicit(1e-7), 1e-7),
-)
+DEFAULTS = ((sp.RungeKutta4(), 1e-8), (sp.Adaptive(1e-9), 1e-8), (sp.Implicit(1e-7), 1e-7))
 FIRST_ORDER = (sp.SemiImplicitEuler, sp.LinearlyImplicitEuler)
 
 

@@ -7,7 +7,6 @@ Undamped, `F = k depth^e` gives back all energy; the largest depth is
 """
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,12 +78,7 @@ def undamped() -> Verdicts:
         yield compare("time of the touch", tried, "gap / v", GAP / speed, seen.touch, 1e-6)
         yield compare("time in touch", tried, "2 I depth / v", duration, seen.duration, 1e-6)
         yield compare(
-            "largest depth",
-            tried,
-            "((e + 1) m v^2 / (2 k))^(1 / (e + 1))",
-            depth,
-            seen.depth,
-            1e-6,
+            "largest depth", tried, "((e + 1) m v^2 / (2 k))^(1 / (e + 1))", depth, seen.depth, 1e-6
         )
         yield compare("restitution", tried, "1", 1.0, seen.restitution, 1e-6)
 
@@ -127,17 +121,13 @@ def oscillation_error(integrator: object) -> float:
     )
 
 
-def order_by_step(
-    error: Callable[[object], float], integrator: type, steps: Sequence[float]
-) -> float:
+def order_by_step(error, integrator, steps):
     """Return the order seen between the last two steps [s]."""
     coarse, fine = (error(integrator(dt)) for dt in steps)
     return math.log(coarse / fine) / math.log(steps[0] / steps[1])
 
 
-def order_by_tolerance(
-    error: Callable[[object], float], integrator: type, span: tuple[float, float]
-) -> tuple[float, float]:
+def order_by_tolerance(error, integrator, span):
     """Return the power of the tolerance with which the error falls, and the last error."""
     tolerances = np.geomspace(*span, 6)
     errors = [error(integrator(float(rtol))) for rtol in tolerances]

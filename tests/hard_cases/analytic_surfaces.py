@@ -120,12 +120,7 @@ def cone() -> Verdicts:
         turned = along / (crossings[4] - crossings[0])
         tried = f"half angle {degrees} deg, orbit of 35 mm"
         yield compare(
-            "orbit [rad/s]",
-            tried,
-            "sqrt(g / (tan(half angle) radius))",
-            orbit,
-            turned,
-            1e-4,
+            "orbit [rad/s]", tried, "sqrt(g / (tan(half angle) radius))", orbit, turned, 1e-4
         )
         yield compare(
             "radial / orbit frequency",

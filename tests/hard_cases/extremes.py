@@ -29,9 +29,7 @@ def damped(mass: float, stiffness: float, depth: float) -> sp.ImpactLaw:
     return sp.ImpactLaw(stiffness, 1.0, 1.4 * math.sqrt(stiffness * mass), 0.1 * depth)
 
 
-def resting_depth(
-    mass: float, stiffness: float, integrator: Any, gravity: float = GRAVITY, start: float = 0.0
-) -> tuple[float, float, float]:
+def resting_depth(mass, stiffness, integrator, gravity=GRAVITY, start=0.0):
     """Let a ball settle; return its depth, m g / k, and what rounding may make of it, relative.
 
     It starts at `start` times its depth at rest.
@@ -91,10 +89,7 @@ def stack(upper: float, lower: float) -> sp.Scene:
         models.add_body(model, name, pin.JointModelPZ(), inertia=inertia)
     scene = sp.Scene(model)
     plate = models.plate(0.2)
-    for name, frame, carried in (
-        ("ground", "universe", upper + lower),
-        ("between", "low", upper),
-    ):
+    for name, frame, carried in (("ground", "universe", upper + lower), ("between", "low", upper)):
         law = damped(carried, 1e6, carried * GRAVITY / 1e6)
         ball = "low" if frame == "universe" else "high"
         top = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.0 if frame == "universe" else 0.02]))

@@ -118,9 +118,7 @@ def _should_touch(impact: ImpactTest, scene: sp.Scene, at: Array, v: Array) -> b
     return sweep(at, v / speed, 0.999 * impact.aim.radius, corners) < speed * impact.duration
 
 
-def _clip(
-    starts: Array, ends: Array, corners: Array, r: float
-) -> tuple[NDArray[np.bool_], Array, Array]:
+def _clip(starts, ends, corners, r):
     """Cut legs to a ball round the target: far ends would cost digits."""
     middle = corners.reshape(-1, 3).mean(axis=0)
     reach = np.linalg.norm(corners - middle, axis=2).max() + 2 * r

@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
@@ -19,15 +18,7 @@ RADIUS, MASS, GRAVITY = 0.02, 0.3, 9.81
 WEIGHT = MASS * GRAVITY
 
 
-def rest(
-    model: pin.Model,
-    shell: sp.Shell,
-    law: sp.ImpactLaw,
-    q: Array,
-    integrator: Any,
-    duration: float,
-    method: str = "smooth",
-) -> sp.Result:
+def rest(model, shell, law, q, integrator, duration, method="smooth"):
     """Let the ball settle on `shell`."""
     scene = models.on_shell(model, shell, law, radius=RADIUS, method=method)
     return sp.Simulation(scene, integrator).run(q, duration=duration, record_dt=duration)
@@ -122,9 +113,7 @@ def ring_depth(half_angle: float, columns: int, flat: bool, stiffness: float) ->
     return RADIUS - z * sin_a
 
 
-def seated(
-    integrator: Any, columns: int, flat: bool, free: bool
-) -> tuple[float, float, float, float]:
+def seated(integrator, columns, flat, free):
     """Let a ball settle in a cone; return its depth, what is right, the force up, and how far
     from the axis it is [m]. `free`: it may leave the axis.
     """

@@ -30,14 +30,7 @@ def shell_of(mesh: Mesh) -> Shell:
     return Shell(mesh.vertices, triangles, normals=mesh.normals)
 
 
-def grid(
-    place: Place,
-    u: tuple[float, float],
-    v: tuple[float, float],
-    rows: int,
-    columns: int,
-    ring: bool,
-) -> Shell:
+def grid(place, u, v, rows, columns, ring):
     """Mesh the surface `place`(u, v) -> points, normals; `ring`: the ends of v are one line."""
     at_u, at_v, triangles = unit.jittered_grid(u, v, rows, columns, rows)
     if ring:

@@ -26,16 +26,7 @@ class Verdict(Finding):
     group: str = ""
 
     @classmethod
-    def on(
-        cls,
-        what: str,
-        tried: str,
-        law: str,
-        expected: float | str,
-        measured: float | str,
-        error: float,
-        bound: float,
-    ) -> Verdict:
+    def on(cls, what, tried, law, expected, measured, error, bound):
         """Return the verdict on an error; one that is no number is out of every bound."""
         error = math.inf if math.isnan(error) else float(error)
         return cls(
@@ -48,16 +39,7 @@ class Verdict(Finding):
         return self.met is True
 
 
-def compare(
-    what: str,
-    tried: str,
-    law: str,
-    expected: float,
-    measured: float,
-    bound: float,
-    *,
-    scale: float | None = None,
-) -> Verdict:
+def compare(what, tried, law, expected, measured, bound, *, scale=None):
     """Return the verdict on |measured - expected| / scale; the scale is |expected| by default."""
     error = abs(measured - expected) / (abs(expected) if scale is None else scale)
     return Verdict.on(what, tried, law, expected, measured, error, bound)

@@ -155,13 +155,7 @@ class Profile:
         return count
 
 
-def outline(
-    corners: Array,
-    radii: dict[int, float],
-    missed: dict[int, tuple[float, float]] | None = None,
-    cut: dict[int, float] | None = None,
-    closed: bool = False,
-) -> Profile:
+def outline(corners, radii, missed=None, cut=None, closed=False):
     """Round or cut corners of a polygon (k, 2).
 
     missed : angles [rad] by which the arc at a corner misses the tangents of both lines

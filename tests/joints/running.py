@@ -5,7 +5,7 @@ from pathlib import Path
 import sphshell_pin as sp
 from tests.joints.boxes import BOXES
 from tests.joints.solid_walk import judge_solid, read_step, spheres_of
-from tests.joints.solids import FAMILIES, Part, write_step, write_stl
+from tests.joints.solids import FAMILIES, write_step, write_stl
 from tests.joints.trimmed import TrimmedSolid
 from tests.joints.verdict import Verdict, exact_share
 from tests.joints.walk import chord_error, judge, spheres
@@ -25,14 +25,7 @@ DIGITS = {False: 2e-12, True: 2e-7}
 """What the digits of STEP files leave open, and the single precision of STL, over the size."""
 
 
-def walk_part(
-    family: str,
-    folder: Path,
-    rng: Rng,
-    stl: bool = False,
-    moved: bool = False,
-    most: int = PER_PART,
-) -> Verdict:
+def walk_part(family, folder, rng, stl=False, moved=False, most=PER_PART):
     """Walk over a random part of a family."""
     if family in BOXES:
         path = write_step(checked(BOXES[family](rng)), folder / f"{family}.step")
@@ -41,9 +34,7 @@ def walk_part(
     return walk_outline(part.moved(rng) if moved else part, folder, rng, stl, min(PER_PART, most))
 
 
-def walk_outline(
-    part: Part, folder: Path, rng: Rng, stl: bool = False, count: int = PER_PART
-) -> Verdict:
+def walk_outline(part, folder, rng, stl=False, count=PER_PART):
     """Walk over a part that is judged by its outline."""
     solid = part.solid()
     if stl:

@@ -106,14 +106,7 @@ def _name(solid: TrimmedSolid, edge: Edge, point: Array) -> str:
     return f"{'-'.join(kinds)} {'tangent' if sine < 1e-6 else 'nearly' if sine < 0.03 else 'angle'}"
 
 
-def judge_solid(
-    shell: sp.Shell,
-    solid: TrimmedSolid,
-    name: str,
-    asked: SolidSpheres,
-    digits: float,
-    rough: float,
-) -> Verdict:
+def judge_solid(shell, solid, name, asked, digits, rough):
     """Compare the contacts of every sphere with the local minima of the distance.
 
     digits, rough : tolerances of depths on exact faces, beside 1e-10 r, and on other ones [mm]

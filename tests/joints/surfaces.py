@@ -128,9 +128,7 @@ class Crossing:
     closed: bool
 
     @staticmethod
-    def of(
-        one: Surface, two: Surface, points: Array, along: Array, closed: bool, most: float
-    ) -> Crossing | None:
+    def of(one, two, points, along, closed, most):
         """Return None if both are tangent between the ends, or farther than `most` away."""
         moved = _onto_both(one, two, points)
         away = np.linalg.norm(moved - points, axis=1)

@@ -113,9 +113,7 @@ def chord_error(shell: sp.Shell, part: Part) -> float:
     return MM * float(np.abs(part.profile.truth(flat, np.zeros(len(flat))).depth).max())
 
 
-def judge(
-    shell: sp.Shell, part: Part, asked: Spheres, digits: float, rough: float, exact: float = 1e-10
-) -> Verdict:
+def judge(shell, part, asked, digits, rough, exact=1e-10):
     """Compare the contacts of every sphere with the truth.
 
     exact : tolerance of depths on exact faces [radii], beside that of the `digits` of the file [m]

@@ -96,9 +96,7 @@ def cylinder(radius: float, length: float, at: ArrayLike = ORIGIN, axis: ArrayLi
     return BRepPrimAPI_MakeCylinder(_frame(at, axis), radius, length).Shape()
 
 
-def cone(
-    low: float, high: float, length: float, at: ArrayLike = ORIGIN, axis: ArrayLike = UP
-) -> Solid:
+def cone(low, high, length, at=ORIGIN, axis=UP):
     """Radius `low` at the place `at`, `high` at the other end."""
     return BRepPrimAPI_MakeCone(_frame(at, axis), low, high, length).Shape()
 

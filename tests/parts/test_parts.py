@@ -5,12 +5,7 @@ import pytest
 
 from tests.parts.cad_mesh import area_vectors, joined, meshed_faces
 from tests.parts.files import KINDS_OF_FILE
-from tests.parts.judge import (
-    Part,
-    forces_on_planes,
-    loaded,
-    random_part,
-)
+from tests.parts.judge import Part, forces_on_planes, loaded, random_part
 from tests.parts.occ import area_and_volume
 from tests.parts.solids import FAMILIES, family_of, random_solid
 

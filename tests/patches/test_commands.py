@@ -9,8 +9,7 @@ from tests.scenario.files import DROP, write
 
 def test_a_scenario_writes_patches_and_taxels(tmp_path):
     text = DROP.replace(
-        "[run]",
-        'friction = { type = "coulomb", mu_static = 0.3 }\n[run]\nrecord = ["patch"]',
+        "[run]", 'friction = { type = "coulomb", mu_static = 0.3 }\n[run]\nrecord = ["patch"]'
     ).replace("[robot]", "[robot]\nspeed = { root_joint = [0.2, 0, 0, 0, 0, 0] }")
     out = tmp_path / "out"
     succeed("run", write(tmp_path, text), "--out", out)

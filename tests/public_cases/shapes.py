@@ -1,7 +1,6 @@
 """Meshes of the public cases."""
 
 import struct
-from collections.abc import Callable
 
 import numpy as np
 
@@ -9,9 +8,7 @@ import sphshell_pin as sp
 from tests.meshes import grid_plate
 
 
-def terrain(
-    cells: int, half: float, height: Callable[[np.ndarray, np.ndarray], np.ndarray]
-) -> sp.Shell:
+def terrain(cells, half, height):
     """Return a height field on a square of side 2 half [m]."""
     vertices, triangles = grid_plate(cells, cells, 2 * half)
     vertices[:, 2] = height(vertices[:, 0], vertices[:, 1])

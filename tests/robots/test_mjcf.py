@@ -384,3 +384,22 @@ def test_models_that_are_attached_weigh_and_move_as_in_mujoco(tmp_path):
     model = robots.load_file(file).model
     at = [model.joints[model.getJointId(theirs.joint(k).name)].idx_v for k in range(theirs.njnt)]
     assert np.allclose(mass_matrix(model, pin.neutral(model))[np.ix_(at, at)], mass, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "half"),
+    [
+        ("sphere", (0.1,), (0.1, 0.1, 0.1)),
+        ("capsule", (0.1, 0.2), (0.1, 0.1, 0.3)),
+        ("cylinder", (0.1, 0.2), (0.1, 0.1, 0.2)),
+        ("ellipsoid", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
+        ("box", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
+    ],
+)
+def test_shapes_are_as_large_as_mujoco_says(tmp_path, kind, size, half):
+    """Its sizes are half lengths, of a capsule without its ends."""
+    geom = f'<geom type="{kind}" size="{" ".join(map(str, size))}"/>'
+    robot = robots.load_file(written(tmp_path, f'<body><joint name="j"/>{geom}</body>'))
+    (one,) = robot.collision_model.geometryObjects
+    one.geometry.computeLocalAABB()
+    assert one.geometry.aabb_local.max_ == pytest.approx(half, rel=1e-6)

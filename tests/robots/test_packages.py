@@ -288,3 +288,9 @@ def test_a_package_whose_meshes_were_put_into_more_folders_and_the_nearer_of_two
     file.write_text(file.read_text().replace("/one.obj", "/collision/one.obj"))
     (geometry,) = robots.load_file(file).collision_model.geometryObjects
     assert geometry.meshPath.endswith("vendor/arm_resources/meshes/collision/large/one.obj")
+    # Where two fit, neither is taken.
+    twin = mesh.parent / "collision" / "small" / "one.obj"
+    twin.parent.mkdir()
+    twin.write_bytes((mesh.parent / "collision" / "large" / "one.obj").read_bytes())
+    with pytest.warns(RobotWarning, match="without these meshes.*collision/one.obj"):
+        robots.load_file(file)

@@ -151,3 +151,12 @@ def test_each_of_many_balls_that_brings_a_little_is_taken() -> None:
     points = grid.reshape(-1, 3)
     chosen = mesh_spheres._choose(points, points, np.zeros(400), 500)
     assert np.array_equal(np.sort(chosen), np.arange(400))
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_the_distance_of_a_sphere_is_measured_in_every_direction(axis: int) -> None:
+    """In a long bar it is the radius, along the bar alone; across it the sphere touches."""
+    sides = np.full(3, 0.02)
+    sides[axis] = 0.2
+    found = robots.spheres_of_mesh(shell_of(coal.Box(*sides)), "link", count=1)
+    assert found.spheres_to_mesh == pytest.approx(0.01, rel=6e-2)

@@ -77,8 +77,7 @@ def test_a_wrong_knob_is_told_when_the_scenario_is_built(text, match, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name",
-    mostly_studies(shipped_scenarios(), {"fingertip_on_blade", "gear_contact"}.__contains__),
+    "name", mostly_studies(shipped_scenarios(), {"fingertip_on_blade", "gear_contact"}.__contains__)
 )
 def test_shipped_knobs_hold_over_their_range(name):
     built = build(name)

@@ -193,8 +193,7 @@ def test_a_target_that_cannot_be_changes_nothing(arm, joint, value, fault, says)
 
 
 @pytest.mark.parametrize(
-    "controller",
-    ["", '[controller]\ntype = "gravity-compensation"\n', PD.replace("60.0", "0.0")],
+    "controller", ["", '[controller]\ntype = "gravity-compensation"\n', PD.replace("60.0", "0.0")]
 )
 def test_without_a_posture_there_are_no_targets(tmp_path, controller) -> None:
     live = LiveRun(build(write_arm(tmp_path, controller)))

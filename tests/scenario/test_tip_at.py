@@ -110,6 +110,10 @@ def test_of_a_place_out_of_reach_a_solution_is_never_farther_than_its_start(beyo
     models.add_body(model, "tip", pin.JointModelRZ())
     model.lowerPositionLimit, model.upperPositionLimit = np.array([-1.0]), np.array([1.0])
     reach = Reach(model, "tip", [arm, 0.0, 0.0])
+    # Beyond a limit a joint is brought back within, and no farther than it must.
+    for q in (-4.0, -1.01, -0.99, 0.0, 0.99, 1.01, 4.0):
+        inside = reach.into_limits(np.array([q]))[0]
+        assert inside == q if abs(q) < 1 else 0.95 < inside * np.sign(q) < 1
     place = arm * np.array([np.cos(1 + beyond), np.sin(1 + beyond), 0.0])
     for start in (1.0, 0.5):
         q, off = reach.solve(np.array([start]), place)

@@ -1,6 +1,7 @@
 """How near the elements of CAD files are to the exact surfaces, judged by OpenCASCADE itself."""
 
 import pickle
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -19,14 +20,7 @@ from sphshell_pin.shell.curvature import curved_mesh
 from tests.oracle.cad import ExactShape, curved_places, deviation
 from tests.parts.occ import faces as occ_faces
 from tests.shell import cad_shapes as shapes
-from tests.shell.cad_cases import (
-    KNOWN,
-    REAL_FILES,
-    force_errors,
-    order,
-    rms,
-    stated_and_measured,
-)
+from tests.shell.cad_cases import KNOWN, REAL_FILES, force_errors, order, rms, stated_and_measured
 from tests.shell.surfaces import surface_file
 
 
@@ -197,3 +191,15 @@ def test_a_face_that_gets_no_triangles_is_meshed_more_finely(monkeypatch):
     assert None not in made.meshes
     assert laid[-1] < 1e-2
     assert made.error <= 5e-2
+
+
+def test_a_mesh_that_is_too_far_off_is_made_again_as_much_finer(monkeypatch):
+    """Errors may be a multiple of OpenCASCADE's deflection: here 3 times as large."""
+    shape, asked, laid = shapes.rounded_box(), 5e-2, []
+    lay, measure = tessellation._lay, tessellation._measure
+    monkeypatch.setattr(tessellation, "_lay", lambda *of: (laid.append(of[1]), lay(*of)))
+    far = lambda *of: replace(measure(*of), interior=3.0 * laid[-1], border=0.0)  # noqa: E731
+    monkeypatch.setattr(tessellation, "_measure", far)
+    made = tessellation.tessellate(shape, tuple(occ_faces(shape)), 50.0, asked, 1e-3)
+    assert 0.7 * asked <= made.error <= asked
+    assert len(laid) == 2

@@ -49,9 +49,7 @@ def same(one: CleanedSurface, other: CleanedSurface) -> bool:
     return True
 
 
-def test_the_second_reading_needs_no_child_and_gives_the_same(
-    reads: list[str], tmp_path: Path
-) -> None:
+def test_the_second_reading_needs_no_child_and_gives_the_same(reads, tmp_path):
     part = shutil.copy(PART, tmp_path / "part.step")
     first, second = load(part), load(part)
     assert same(first, second)
@@ -106,9 +104,7 @@ def test_files_that_others_of_the_group_may_write_by_default_are_kept(reads: lis
     assert len(reads) == 1
 
 
-def test_without_a_folder_nothing_is_kept(
-    reads: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_folder_nothing_is_kept(reads, tmp_path, monkeypatch):
     open_to_all = tmp_path / "open"
     open_to_all.mkdir()
     open_to_all.chmod(0o777)

@@ -7,16 +7,7 @@ from hypothesis import strategies as st
 
 from sphshell_pin.shell import clean
 
-from .surfaces import (
-    CUBE,
-    CUBE_QUADS,
-    areas,
-    by_place,
-    joined,
-    plate,
-    signed_volume,
-    tetrahedron,
-)
+from .surfaces import CUBE, CUBE_QUADS, areas, by_place, joined, plate, signed_volume, tetrahedron
 
 
 @given(st.lists(st.booleans(), min_size=6, max_size=6))

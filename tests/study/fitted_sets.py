@@ -6,7 +6,6 @@ python -m tests.study.fitted_sets [--sets 1000] [--first 0]
 import argparse
 import tempfile
 import time
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -57,9 +56,7 @@ def one_set(path: Path, number: int) -> tuple[Array, Array, Array, int]:
     return values, low, high, found.runs
 
 
-def many_sets(
-    count: int, first: int = 0, workers: int = 2
-) -> Iterator[tuple[Array, Array, Array, int]]:
+def many_sets(count, first=0, workers=2):
     """Yield what one_set returns of sets `first` to `first` + `count`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bounce.toml"

@@ -80,9 +80,7 @@ def test_missing_faces_are_lost_contacts() -> None:
     ("place", "scale", "says"),
     [((0.0, 0.0, 0.0), 25.4, "25.4 times as large"), ((0.001, 0.0, 0.02), 1.0, "(0.001, 0, 0.02)")],
 )
-def test_a_part_in_another_place_or_unit_is_told_so(
-    place: tuple[float, float, float], scale: float, says: str
-) -> None:
+def test_a_part_in_another_place_or_unit_is_told_so(place, scale, says):
     first = bracket()
     found = compare_shells(first, first.transformed(pin.SE3(np.eye(3), np.array(place)), scale))
     assert not found.same

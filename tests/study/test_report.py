@@ -11,8 +11,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sphshell_pin import Shell
 from sphshell_pin.errors import Interrupted
-from sphshell_pin.study.report import PAGE, closed_forms, convergence, machine, making, steps
+from sphshell_pin.study.report import (
+    PAGE,
+    closed_forms,
+    convergence,
+    machine,
+    making,
+    steps,
+    surfaces,
+)
 from sphshell_pin.study.report import integrators as work
 from sphshell_pin.study.report import queries as query_section
 from sphshell_pin.study.report.contents import Column, Finding, Section, Table
@@ -132,6 +141,15 @@ def test_whole_report(small, tmp_path):
         content = picture.read_bytes()
         assert int.from_bytes(content[16:20], "big") > 800  # its width
         assert f"({picture.name})" in text
+
+
+def test_spheres_touch_its_surfaces_as_deep_as_it_says() -> None:
+    sheet = Shell(*surfaces.wavy_sheet(200, 1.0))
+    centers = surfaces.touching_centers(200, 1.0, 0.02, 1e-3)
+    depths, _ = sheet.contacts_batch(centers, np.full(200, 0.02))
+    np.testing.assert_allclose(depths, 1e-3, rtol=0, atol=2e-5)
+    vertices = surfaces.plate(0.01, 0.06).vertices
+    np.testing.assert_allclose(np.abs(vertices).max(axis=0), [0.06, 0.06, 0.0], atol=1e-15)
 
 
 def test_order_and_error_of_a_power_law():

@@ -9,14 +9,7 @@ from scipy import stats
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError
 from sphshell_pin.plot.uncertainty import plot_uncertainty
-from sphshell_pin.study.sweep import (
-    plan_sweep,
-    quantiles,
-    sample_of,
-    sobol_indices,
-    sweep,
-    tornado,
-)
+from sphshell_pin.study.sweep import plan_sweep, quantiles, sample_of, sobol_indices, sweep, tornado
 from tests.command import succeed
 from tests.study.resting import GRAVITY
 

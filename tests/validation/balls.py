@@ -8,8 +8,6 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.contact.friction import Friction
-from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.study.report.models import model_of
 from tests.rolling import turned
@@ -56,9 +54,7 @@ def plane(half: float) -> sp.Shell:
     return sp.Shell(corners, [[0, 1, 2, 3]])
 
 
-def on_plane(
-    ball: Ball, law: sp.HertzLaw, friction: Friction | None = None, *, rows: int = 0
-) -> Impact:
+def on_plane(ball, law, friction=None, *, rows=0):
     """Shoot the ball down at the plane z = 0; `rows` of the contact are recorded."""
     model = _free([ball])
     scene = sp.Scene(model)
@@ -69,9 +65,7 @@ def on_plane(
     return _run(scene, [ball], [(0.0, 0.0, height)], plain, ball.mass, speed, rows)
 
 
-def head_on(
-    first: Ball, second: Ball, law: sp.HertzLaw, friction: Friction | None = None, *, rows: int = 0
-) -> Impact:
+def head_on(first, second, law, friction=None, *, rows=0):
     """Let two balls collide along z, the first from above; `rows` of the contact are recorded."""
     scene = sp.Scene(_free([first, second]))
     balls = sp.Sphere(first.radius, "ball0"), sp.Sphere(second.radius, "ball1")
@@ -91,15 +85,7 @@ def _free(balls: list[Ball]) -> pin.Model:
     )
 
 
-def _run(
-    scene: sp.Scene,
-    balls: list[Ball],
-    centers: list[tuple[float, float, float]],
-    plain: NormalLaw,
-    mass: float,
-    speed: float,
-    rows: int,
-) -> Impact:
+def _run(scene, balls, centers, plain, mass, speed, rows):
     """Run until well after lift-off; `plain` is the law of a ball on a plane as stiff as these."""
     gap = GAP * min(ball.radius for ball in balls)
     expected = plain.contact_time(plain.depth_of(0.5 * mass * speed**2), speed)

@@ -142,11 +142,7 @@ def elliptical_contacts() -> Outcome:
         names = f"published {one} [{unit}]", f"our {one} [{unit}]"
         panels.append(Panel(*names, [marks], (), [equal], logarithmic=True))
     heads = ("contact", "quantity", "published: published [mm, MPa]", "ours", "error")
-    return Outcome(
-        findings,
-        panels,
-        [Table(FILE, "All figures.", columns(*heads), rows)],
-    )
+    return Outcome(findings, panels, [Table(FILE, "All figures.", columns(*heads), rows)])
 
 
 @case("hertz_coefficients")

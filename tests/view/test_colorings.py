@@ -10,12 +10,7 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.curvature import curved_mesh
 from sphshell_pin.view.display import Display
 from sphshell_pin.view.recording import render_recording
-from sphshell_pin.view.surface import (
-    FACE_COLORS,
-    RAMP,
-    hex_colors,
-    ramp_colors,
-)
+from sphshell_pin.view.surface import FACE_COLORS, RAMP, hex_colors, ramp_colors
 from tests import models
 from tests.shell.test_curvature import ball
 from tests.view.drawn import Film, attribute

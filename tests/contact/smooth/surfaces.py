@@ -41,9 +41,7 @@ def mean_edge(vertices: Array, elements: NDArray[np.int32]) -> float:
     return float(np.linalg.norm(sides, axis=2).mean())
 
 
-def jittered_grid(
-    u: tuple[float, float], v: tuple[float, float], rows: int, columns: int, seed: int
-) -> tuple[Array, Array, NDArray[np.int32]]:
+def jittered_grid(u, v, rows, columns, seed):
     """Parameters (n,), (n,) and triangles of a grid, inner vertices moved by up to a fifth of a
     cell, diagonals at random."""
     rng = np.random.default_rng(seed)
@@ -91,9 +89,7 @@ def _cylinder(z: Array, angle: Array) -> tuple[Array, Array]:
     return point, normal
 
 
-def used(
-    point: Array, normal: Array, triangles: NDArray[np.int32]
-) -> tuple[Array, Array, NDArray[np.int32]]:
+def used(point, normal, triangles):
     """Leave out the vertices that no triangle uses."""
     kept, mapped = np.unique(triangles, return_inverse=True)
     return point[kept], normal[kept], mapped.reshape(-1, 3).astype(np.int32)

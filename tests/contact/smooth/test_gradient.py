@@ -30,9 +30,7 @@ def differences(shell: Shell, center, radius: float, method: str, step: float):
     return out
 
 
-def assert_gradient(
-    shell: Shell, centers, radius: float, method: str = "smooth", step: float = 1e-5
-):
+def assert_gradient(shell, centers, radius, method="smooth", step=1e-5):
     """All gradients are right; returns the features and weights that were met."""
     met = set()
     for center in centers:

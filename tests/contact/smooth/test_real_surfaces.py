@@ -7,7 +7,6 @@ files of another folder, in millimeters.
 
 import os
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import pairwise
@@ -199,9 +198,7 @@ def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
     return max(lost - most, 0.0) / potential if potential > 0 else 0.0
 
 
-def steepest_between(
-    find: Callable[[Array], ContactSet], start: Array, end: Array, width: float
-) -> tuple[Array, Array]:
+def steepest_between(find, start, end, width):
     """The two centres `width` apart, between `start` and `end`, between which the potential changes
     most beside what the forces account for, by halving."""
 
