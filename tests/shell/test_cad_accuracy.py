@@ -195,11 +195,11 @@ def test_a_face_that_gets_no_triangles_is_meshed_more_finely(monkeypatch):
 
 def test_a_mesh_that_is_too_far_off_is_made_again_as_much_finer(monkeypatch):
     """Errors may be a multiple of OpenCASCADE's deflection: here 3 times as large."""
-    shape, asked, laid = shapes.rounded_box(), 5e-2, []
+    asked, laid = 5e-2, []
     lay, measure = tessellation._lay, tessellation._measure
     monkeypatch.setattr(tessellation, "_lay", lambda *of: (laid.append(of[1]), lay(*of)))
     far = lambda *of: replace(measure(*of), interior=3.0 * laid[-1], border=0.0)  # noqa: E731
     monkeypatch.setattr(tessellation, "_measure", far)
-    made = tessellation.tessellate(shape, tuple(occ_faces(shape)), 50.0, asked, 1e-3)
+    made = tessellation.tessellate(tuple(occ_faces(shapes.rounded_box())), 50.0, asked, 1e-3)
     assert 0.7 * asked <= made.error <= asked
     assert len(laid) == 2
