@@ -23,7 +23,6 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
                            std::vector<Minimum>& minima) {
   const CurvedShell& surface = *shell.curved();
   const Region& region = surface.face_search()->of_face[face];
-  if (!region.holds(sphere.center, sphere.radius)) return;
   const Primitive& shape = surface.faces().shapes[face];
   Vec3 normal;  // as the shape has it
   const double distance = shape.distance(sphere.center, normal);
@@ -31,7 +30,6 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
   if (!(std::abs(distance) < sphere.radius) || !(shape.radius_at(point) > 0)) return;
   const bool anywhere = shape.singular(sphere.center, kOnAxis);
   const double slack = surface.face_search()->slack;
-  if (!anywhere && !region.holds(point, slack)) return;
   facets_.clear();
   region.parts.find(anywhere ? sphere.center : point, anywhere ? sphere.radius : slack, facets_);
   bool placed = !shape.has_parameters();
