@@ -35,16 +35,16 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
   bool placed = !shape.has_parameters();
   Eigen::Vector2d place(0, 0);
   for (const int f : facets_) {
-    const NormalCone& cone = surface.cones()[f];
-    const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
     if (anywhere) {
+      const NormalCone& cone = surface.cones()[f];
+      const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
       shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
       point = sphere.center - distance * normal;
       placed = !shape.has_parameters();
+      // The facet's ball excludes most facets before the exact test.
+      const double reach = cone.reach + slack;
+      if ((point - middle).squaredNorm() > reach * reach) continue;
     }
-    // The facet's ball excludes most facets before the exact test.
-    const double reach = cone.reach + slack;
-    if ((point - middle).squaredNorm() > reach * reach) continue;
     const FaceCell& cell = surface.face_cells()[f];
     if (!placed) place = shape.parameters(point, shell.size()), placed = true;
     const Vec3 outward = cell.sign < 0 ? Vec3(-normal) : normal;
@@ -162,9 +162,10 @@ bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
       const int before = previous_corner(k);
       if (cell.side[k] != FaceCell::Side::Inner || cell.side[before] != FaceCell::Side::Inner)
         continue;
-      const Vec3 into = (corner[next_corner(k)] - corner[k]).normalized() +
-                        (corner[before] - corner[k]).normalized();
-      if ((at.point - corner[k]).dot(into) < -tolerance) return false;
+      const Vec3 from = at.point - corner[k];
+      const Vec3 ahead = corner[next_corner(k)] - corner[k], back = corner[before] - corner[k];
+      if (from.dot(ahead) >= 0 && from.dot(back) >= 0) continue;
+      if (from.dot(ahead.normalized() + back.normalized()) < -tolerance) return false;
     }
   // Borders of facets beside this one that bulge into it count along their own chord.
   for (int i = cell.intruder; i >= 0; i = surface.intruders()[i].second) {
