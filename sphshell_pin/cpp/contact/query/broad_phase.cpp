@@ -45,9 +45,10 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones,
   if (!begin(shell, sphere, margin)) return;
   const double reach = sphere.radius + margin;
   overlapping.clear(), faces.clear(), joints.clear(), corners.clear();
-  search.faces.find(sphere.center, reach, faces);
-  search.joints.find(sphere.center, reach, joints);
-  search.corners.find(sphere.center, reach, corners);
+  search.things.find(sphere.center, reach, overlapping);
+  std::vector<int>* const lists[] = {&faces, &joints, &corners};
+  for (const int one : overlapping) lists[one % 3]->push_back(one / 3);
+  overlapping.clear();
   search.facets.find(sphere.center, reach, overlapping);
   find_candidates(shell, cones, search.bulge, sphere, margin, cells);
 }

@@ -88,19 +88,19 @@ std::vector<Region> regions_of_joints(const Shell& shell, const CurvedShell& sur
   return out;
 }
 
-Boxes boxes_of(const std::vector<Region>& regions) {
-  Boxes out;
+void add(const std::vector<Region>& regions, FaceSearch::Kind kind, Boxes& out) {
   for (std::size_t i = 0; i < regions.size(); ++i)
-    if (!regions[i].box.isEmpty()) out.emplace_back(regions[i].box, static_cast<int>(i));
-  return out;
+    if (!regions[i].box.isEmpty()) out.emplace_back(regions[i].box, static_cast<int>(3 * i) + kind);
 }
 
-Boxes boxes_of_corners(const Shell& shell, const CurvedShell& surface) {
+Boxes boxes_of_things(const Shell& shell, const CurvedShell& surface, const FaceSearch& search) {
   Boxes out;
+  add(search.of_face, FaceSearch::Face, out);
+  add(search.of_joint, FaceSearch::Joint, out);
   for (int h = 0; h < static_cast<int>(3 * shell.facets().size()); ++h) {
     const int f = triangle_of(h), k = side_of(h);
     if (surface.face_cells()[f].closed && surface.facets()[f].owned.vertex[k] >= 0)
-      out.emplace_back(Box(shell.facets()[f].corner[k]), h);
+      out.emplace_back(Box(shell.facets()[f].corner[k]), 3 * h + FaceSearch::Corner);
   }
   return out;
 }
@@ -204,7 +204,7 @@ void BoxTree::find(const Vec3& center, double radius, std::vector<int>& out) con
 }
 
 std::size_t FaceSearch::bytes() const {
-  std::size_t all = faces.bytes() + joints.bytes() + corners.bytes() + facets.bytes();
+  std::size_t all = things.bytes() + facets.bytes();
   for (const auto* regions : {&of_face, &of_joint})
     for (const Region& one : *regions) all += sizeof(Region) + one.parts.bytes();
   return all;
@@ -218,9 +218,7 @@ FaceSearch::FaceSearch(const Shell& shell, const CurvedShell& surface)
     : of_face(regions_of_faces(shell, surface)),
       of_joint(regions_of_joints(shell, surface)),
       slack(1e-6 * shell.size()),
-      faces(boxes_of(of_face)),
-      joints(boxes_of(of_joint)),
-      corners(boxes_of_corners(shell, surface)),
+      things(boxes_of_things(shell, surface, *this)),
       facets(boxes_of_facets(shell, surface)) {
   for (const int f : facets.items()) bulge = std::max<double>(bulge, surface.facets()[f].bulge);
 }

@@ -54,8 +54,10 @@ struct FaceSearch {
   std::vector<Region> of_face, of_joint;  // beside Faces::shapes and Faces::joints
   double slack;                           // more than rounding [m]
   // Faces and joints that are lines or circles by their numbers in Faces, and corners of faces as
-  // 3 facet + corner; facets with an element, or another side.
-  BoxTree faces, joints, corners, facets;
+  // 3 facet + corner: each as 3 times that, plus its Kind.
+  enum Kind { Face = 0, Joint = 1, Corner = 2 };
+  BoxTree things;
+  BoxTree facets;    // with an element, or another side
   double bulge = 0;  // the largest of facets [m]
 
   std::size_t bytes() const;
