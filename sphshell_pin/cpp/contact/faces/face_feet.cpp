@@ -23,7 +23,6 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
                            std::vector<Minimum>& minima) {
   const CurvedShell& surface = *shell.curved();
   const Region& region = surface.face_search()->of_face[face];
-  if (!region.holds(sphere.center, sphere.radius)) return;
   const Primitive& shape = surface.faces().shapes[face];
   Vec3 normal;  // as the shape has it
   const double distance = shape.distance(sphere.center, normal);
@@ -31,22 +30,21 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
   if (!(std::abs(distance) < sphere.radius) || !(shape.radius_at(point) > 0)) return;
   const bool anywhere = shape.singular(sphere.center, kOnAxis);
   const double slack = surface.face_search()->slack;
-  if (!anywhere && !region.holds(point, slack)) return;
   facets_.clear();
   region.parts.find(anywhere ? sphere.center : point, anywhere ? sphere.radius : slack, facets_);
   bool placed = !shape.has_parameters();
   Eigen::Vector2d place(0, 0);
   for (const int f : facets_) {
-    const NormalCone& cone = surface.cones()[f];
-    const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
     if (anywhere) {
+      const NormalCone& cone = surface.cones()[f];
+      const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
       shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
       point = sphere.center - distance * normal;
       placed = !shape.has_parameters();
+      // The facet's ball excludes most facets before the exact test.
+      const double reach = cone.reach + slack;
+      if ((point - middle).squaredNorm() > reach * reach) continue;
     }
-    // The facet's ball excludes most facets before the exact test.
-    const double reach = cone.reach + slack;
-    if ((point - middle).squaredNorm() > reach * reach) continue;
     const FaceCell& cell = surface.face_cells()[f];
     if (!placed) place = shape.parameters(point, shell.size()), placed = true;
     const Vec3 outward = cell.sign < 0 ? Vec3(-normal) : normal;
@@ -164,9 +162,10 @@ bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
       const int before = previous_corner(k);
       if (cell.side[k] != FaceCell::Side::Inner || cell.side[before] != FaceCell::Side::Inner)
         continue;
-      const Vec3 into = (corner[next_corner(k)] - corner[k]).normalized() +
-                        (corner[before] - corner[k]).normalized();
-      if ((at.point - corner[k]).dot(into) < -tolerance) return false;
+      const Vec3 from = at.point - corner[k];
+      const Vec3 ahead = corner[next_corner(k)] - corner[k], back = corner[before] - corner[k];
+      if (from.dot(ahead) >= 0 && from.dot(back) >= 0) continue;
+      if (from.dot(ahead.normalized() + back.normalized()) < -tolerance) return false;
     }
   // Borders of facets beside this one that bulge into it count along their own chord.
   for (int i = cell.intruder; i >= 0; i = surface.intruders()[i].second) {

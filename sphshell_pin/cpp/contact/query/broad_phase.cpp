@@ -28,23 +28,29 @@ bool BroadPhase::begin(const Shell& shell, const Sphere& sphere, double& margin)
 void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
                       const Sphere& sphere, const CellBounds* cells) {
   double margin;
-  if (begin(shell, sphere, margin))
-    find(shell, {shell.bvh(), cones, nullptr, bulge}, sphere, margin, cells);
+  if (!begin(shell, sphere, margin)) return;
+  overlapping.clear();
+  const NormalCone* all = cones.data();
+  shell.bvh().find_overlapping(sphere.center, sphere.radius + margin + bulge, overlapping,
+                               [all](int first) {
+                                 prefetch(all + first);
+                                 prefetch(all + first + 3);
+                               });
+  find_candidates(shell, cones, bulge, sphere, margin, cells);
 }
 
-void BroadPhase::find(const Shell& shell, const FaceSearch& search, const Sphere& sphere,
-                      const CellBounds* cells) {
+void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones,
+                      const FaceSearch& search, const Sphere& sphere, const CellBounds* cells) {
   double margin;
   if (!begin(shell, sphere, margin)) return;
-  overlapping.clear(), candidates.clear(), faces.clear(), joints.clear(), corners.clear();
   const double reach = sphere.radius + margin;
+  overlapping.clear(), faces.clear(), joints.clear(), corners.clear();
   search.things.find(sphere.center, reach, overlapping);
   std::vector<int>* const lists[] = {&faces, &joints, &corners};
   for (const int one : overlapping) lists[one % 3]->push_back(one / 3);
   overlapping.clear();
-  if (const Bvh* tree = search.facets.tree())
-    find(shell, {*tree, search.cones, search.facets.items().data(), search.bulge}, sphere, margin,
-         cells);
+  search.facets.find(sphere.center, reach, overlapping);
+  find_candidates(shell, cones, search.bulge, sphere, margin, cells);
 }
 
 // At a minimum the plane's normal is among those of the features that the facet owns.
@@ -87,15 +93,11 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
 // The center may be inside the cone of normals of the features that a facet owns
 // (Johnson and Cohen, I3D 2001), wherever it is within the margin and however far within it the
 // element bulges from its triangle.
-void BroadPhase::find(const Shell& shell, const Part& part, const Sphere& sphere, double margin,
-                      const CellBounds* cells) {
-  overlapping.clear();
-  const NormalCone* all = part.cones.data();
-  part.tree.find_overlapping(sphere.center, sphere.radius + margin + part.bulge, overlapping,
-                             [all](int first) {
-                               prefetch(all + first);
-                               prefetch(all + first + 3);
-                             });
+void BroadPhase::find_candidates(const Shell& shell, const LargeArray<NormalCone>& cones,
+                                 double bulge, const Sphere& sphere, double margin,
+                                 const CellBounds* cells) {
+  candidates.clear();
+  if (overlapping.empty()) return;
   const Facet* facets = shell.facets().data();
   // In single precision about the shell's origin; 1e-6 and 1.000001 cover its rounding, so that
   // nothing is lost.
@@ -103,10 +105,9 @@ void BroadPhase::find(const Shell& shell, const Part& part, const Sphere& sphere
   const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
   const float radius = float(sphere.radius);
   const float wide = 1e-6f * (float(shell.size()) + radius) + 1.000001f * float(margin);
-  const float slack = wide + 1.000001f * float(part.bulge);
-  candidates.clear();
-  for (int position : overlapping) {
-    const NormalCone& cone = all[position];
+  const float slack = wide + 1.000001f * float(bulge);
+  for (int f : overlapping) {
+    const NormalCone& cone = cones[f];
     const float x = c[0] - cone.middle[0], y = c[1] - cone.middle[1], z = c[2] - cone.middle[2];
     // In the coordinates of the cone: height along its axis, distance from the axis by Pythagoras.
     // The center lies within the cone if that distance is below the reach of the facet plus height
@@ -118,7 +119,6 @@ void BroadPhase::find(const Shell& shell, const Part& part, const Sphere& sphere
     const float farthest = radius * 1.000001f + cone.reach + wide;
     if (square * 0.999999f > farthest * farthest) continue;
     if (square * 0.999999f - height * height > allowed * allowed) continue;
-    const int f = part.facets ? part.facets[position] : position;
     prefetch(&facets[f]);
     prefetch(reinterpret_cast<const char*>(&facets[f]) + 64);
     if (cells != nullptr) prefetch(&cells[f]);

@@ -21,8 +21,8 @@ class BroadPhase {
 
   // The same of the facets of a search, and its `faces`, `joints` and `corners` that the sphere may
   // reach.
-  void find(const Shell& shell, const FaceSearch& search, const Sphere& sphere,
-            const CellBounds* cells);
+  void find(const Shell& shell, const LargeArray<NormalCone>& cones, const FaceSearch& search,
+            const Sphere& sphere, const CellBounds* cells);
 
   // Facets whose box comes below the plane, widened by `bulge`, and those of them that may hold a
   // minimum of the height over it.
@@ -32,17 +32,11 @@ class BroadPhase {
   std::vector<int> overlapping, candidates, faces, joints, corners;
 
  private:
-  // Some facets of a shell, with their cones, in the order of a tree; all, where there is no list.
-  struct Part {
-    const Bvh& tree;
-    const LargeArray<NormalCone>& cones;
-    const int* facets;
-    double bulge;
-  };
   // False where the lists still hold; else they may hold for spheres within `margin`.
   bool begin(const Shell& shell, const Sphere& sphere, double& margin);
-  void find(const Shell& shell, const Part& part, const Sphere& sphere, double margin,
-            const CellBounds* cells);
+  // Of the overlapping ones.
+  void find_candidates(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
+                       const Sphere& sphere, double margin, const CellBounds* cells);
 
   bool follow_;
   // The lists hold while the center is within margin_ of anchor_; -1: they hold nothing.

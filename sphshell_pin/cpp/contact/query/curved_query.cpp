@@ -27,7 +27,7 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
     if (faces.empty()) {
       broad.find(shell, surface.cones(), surface.bulge(), probe, cells);
     } else {
-      broad.find(shell, *surface.face_search(), probe, cells);
+      broad.find(shell, surface.cones(), *surface.face_search(), probe, cells);
       for (const int face : broad.faces) feet_.add_closest(shell, face, probe, want_dn_dc, minima);
     }
   } else {
@@ -271,15 +271,11 @@ void CurvedQuery::add_border(const Task<Probe>& task, int f) {
 void CurvedQuery::add_joint(const Task<Sphere>& task, int joint) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const CurvedShell& surface = *shell.curved();
-  const FaceSearch& search = *surface.face_search();
   const FaceJoint& curve = surface.faces().joints[joint];
-  const Region& region = search.of_joint[joint];
-  if (!region.holds(sphere.center, sphere.radius)) return;
   const bool one = curve.has_one_nearest(sphere.center);
   const Vec3 point = one ? curve.nearest(sphere.center) : sphere.center;
   if (!sphere.reaches(point)) return;
   joints_.push_back(joint);
-  if (one && !region.holds(point, search.slack)) return;
   // What add_edge() asks of each side, where that is the same of all.
   for (int i = 0; i < 2; ++i)
     if (falls(task, joint, i) > 0) return;
@@ -323,8 +319,7 @@ bool CurvedQuery::find_ways(const Task<Sphere>& task, const BroadPhase& broad) {
   if (!shell.topology().pinches.empty() || minima.size() > kMostWays) return false;
   // Faces whose border is near a facet that is looked at by itself.
   loose_.clear();
-  for (const int position : broad.overlapping) {
-    const int f = search.facets.items()[position];
+  for (const int f : broad.overlapping) {
     loose_.push_back(surface.face_cells()[f].face);
     for (const int beyond : surface.cells()[f].beyond) {
       if (beyond < kBoundary) return false;

@@ -1,3 +1,9 @@
+#include "shell/curved/face_search.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+
 #include "shell/curved/curved.hpp"
 
 namespace sphshell {
@@ -5,9 +11,6 @@ namespace {
 
 using Box = Eigen::AlignedBox3d;
 using Boxes = BoxTree::Boxes;
-
-// To look at so many parts of a face or a joint takes no longer than to search a tree of them.
-constexpr std::size_t kFew = 8;
 
 bool holds_more(const CurvedShell& surface, int f) {
   const FaceCell& cell = surface.face_cells()[f];
@@ -33,6 +36,14 @@ Box widened(const Box& part, double bulge) {
   return {Vec3(part.min().array() - bulge), Vec3(part.max().array() + bulge)};
 }
 
+// Of a facet as it is on its face, with its sides.
+Box whole_box_of(const Shell& shell, const CurvedShell& surface, int f) {
+  // A face of known shape may bulge a little more than its cubic.
+  double bulge = 1.25 * surface.facets()[f].bulge;
+  for (const float side : surface.face_cells()[f].bulge) bulge = std::max<double>(bulge, side);
+  return widened(box_of(shell.facets()[f]), bulge);
+}
+
 // Whether a side of a closed facet is within the face, or one that is looked for.
 bool is_known(const CurvedShell& surface, int f, int k) {
   const int beyond = surface.cells()[f].beyond[k];
@@ -45,11 +56,7 @@ std::vector<Region> regions_of_faces(const Shell& shell, const CurvedShell& surf
   std::vector<Boxes> boxes(surface.faces().shapes.size());
   for (int f = 0; f < static_cast<int>(shell.facets().size()); ++f) {
     const FaceCell& cell = surface.face_cells()[f];
-    if (!cell.closed) continue;
-    // A face of known shape may bulge a little more than its cubic.
-    double bulge = 1.25 * surface.facets()[f].bulge;
-    for (const float side : cell.bulge) bulge = std::max<double>(bulge, side);
-    boxes[cell.face].emplace_back(widened(box_of(shell.facets()[f]), bulge), f);
+    if (cell.closed) boxes[cell.face].emplace_back(whole_box_of(shell, surface, f), f);
   }
   std::vector<Region> out(boxes.begin(), boxes.end());
   for (std::size_t i = 0; i < out.size(); ++i)
@@ -101,8 +108,29 @@ Boxes boxes_of_things(const Shell& shell, const CurvedShell& surface, const Face
 Boxes boxes_of_facets(const Shell& shell, const CurvedShell& surface) {
   Boxes out;
   for (int f = 0; f < static_cast<int>(shell.facets().size()); ++f)
-    if (holds_more(surface, f)) out.emplace_back(box_of(shell.facets()[f]), f);
+    if (holds_more(surface, f)) out.emplace_back(whole_box_of(shell, surface, f), f);
   return out;
+}
+
+// Divides boxes in two, so that all nodes but the last of a level are full, and across the axis
+// that leaves the boxes of both halves smallest.
+void put_in_order(Boxes& boxes, std::size_t from, std::size_t to) {
+  if (to - from <= 8) return;
+  std::size_t half = 8;
+  while (2 * half < to - from) half *= 2;
+  const auto divide = [&](int axis) {
+    std::nth_element(boxes.begin() + from, boxes.begin() + from + half, boxes.begin() + to,
+                     [axis](const auto& a, const auto& b) {
+                       const double x = a.first.center()[axis], y = b.first.center()[axis];
+                       return x != y ? x < y : a.second < b.second;
+                     });
+    Box halves[2];
+    for (std::size_t i = from; i < to; ++i) halves[i < from + half ? 0 : 1].extend(boxes[i].first);
+    return halves[0].sizes().sum() + halves[1].sizes().sum();
+  };
+  const double size[3] = {divide(0), divide(1), divide(2)};
+  divide(static_cast<int>(std::min_element(size, size + 3) - size));
+  put_in_order(boxes, from, from + half), put_in_order(boxes, from + half, to);
 }
 
 }  // namespace
@@ -118,42 +146,71 @@ bool is_on_joint(const CurvedShell& surface, int f, int k) {
   return is_on_border(surface, f, k) && twin >= 0 && surface.face_cells()[triangle_of(twin)].closed;
 }
 
-BoxTree::BoxTree(const Boxes& boxes, std::size_t few) {
-  if (boxes.size() <= few) {
-    for (const auto& [box, item] : boxes) items_.push_back(item);
-    return;
+BoxTree::BoxTree(Boxes boxes) {
+  if (boxes.empty()) return;
+  put_in_order(boxes, 0, boxes.size());
+  Box all;
+  for (const auto& [box, item] : boxes) all.extend(box), items_.push_back(item);
+  origin_ = all.center();
+  // Rounding a box to single precision, and a center near it, each err by less than this.
+  const double widen = 4e-7 * all.sizes().maxCoeff();
+  for (auto& [box, item] : boxes) box = widened(box.translate(-origin_), widen);
+  // The boxes of one level's nodes are in those of the next.
+  for (std::size_t first = 0; nodes_.empty() || boxes.size() > 1;) {
+    const bool leaf = nodes_.empty();
+    const std::size_t begin = nodes_.size();
+    for (std::size_t i = 0; i < boxes.size(); i += 8) {
+      constexpr float kNowhere = std::numeric_limits<float>::infinity();
+      Node& node = nodes_.emplace_back();
+      node.first = static_cast<int>(first + i), node.leaf = leaf;
+      Box whole;
+      for (std::size_t j = 0; j < 8; ++j) {
+        const bool none = i + j >= boxes.size();
+        if (!none) whole.extend(boxes[i + j].first);
+        for (int k = 0; k < 3; ++k) {
+          node.low[k][j] = none ? kNowhere : static_cast<float>(boxes[i + j].first.min()[k]);
+          node.high[k][j] = none ? -kNowhere : static_cast<float>(boxes[i + j].first.max()[k]);
+        }
+      }
+      boxes[i / 8].first = whole;
+    }
+    boxes.resize(nodes_.size() - begin);
+    first = begin;
   }
-  // A triangle with two corners of a box has that box.
-  std::vector<Vec3> corners;
-  std::vector<Triangle> triangles;
-  for (const auto& [box, item] : boxes) {
-    const int at = static_cast<int>(corners.size());
-    corners.insert(corners.end(), {box.min(), box.max()});
-    triangles.push_back({at, at + 1, at});
-  }
-  tree_.emplace(corners, triangles, items_);
-  for (int& position : items_) position = boxes[position].second;
 }
 
 void BoxTree::find(const Vec3& center, double radius, std::vector<int>& out) const {
-  if (!tree_) return void(out.insert(out.end(), items_.begin(), items_.end()));
-  const std::size_t first = out.size();
-  tree_->find_overlapping(center, radius, out, [](int) {});
-  for (std::size_t i = first; i < out.size(); ++i) out[i] = items_[out[i]];
-}
-
-std::size_t BoxTree::bytes() const {
-  return items_.size() * sizeof(int) + (tree_ ? tree_->bytes() : 0);
+  if (nodes_.empty()) return;
+  const Eigen::Vector3f c = (center - origin_).cast<float>();
+  const float reach = float(radius) * 1.000001f;
+  // Nothing is infinitely far.
+  const float limit = std::min(reach * reach, std::numeric_limits<float>::max());
+  int stack[8 * kMostLevels], hit[8], top = 0;
+  stack[top++] = static_cast<int>(nodes_.size()) - 1;
+  while (top > 0) {
+    const Node& node = nodes_[stack[--top]];
+    Eigen::Array<float, 8, 1> square = Eigen::Array<float, 8, 1>::Zero();
+    for (int k = 0; k < 3; ++k)
+      square += (node.low[k] - c[k]).max(c[k] - node.high[k]).max(0.0f).square();
+    int* const list = node.leaf ? hit : stack + top;
+    const int first = node.first;
+    int count = 0;
+    for (int i = 0; i < 8; ++i) list[count] = first + i, count += square[i] <= limit;
+    if (!node.leaf)
+      top += count;
+    else
+      for (int i = 0; i < count; ++i) out.push_back(items_[hit[i]]);
+  }
 }
 
 std::size_t FaceSearch::bytes() const {
   std::size_t all = things.bytes() + facets.bytes();
   for (const auto* regions : {&of_face, &of_joint})
     for (const Region& one : *regions) all += sizeof(Region) + one.parts.bytes();
-  return all + cones.size() * sizeof(NormalCone);
+  return all;
 }
 
-Region::Region(const Boxes& boxes) : parts(boxes, kFew) {
+Region::Region(const Boxes& boxes) : parts(boxes) {
   for (const auto& [part, item] : boxes) box.extend(part);
 }
 
@@ -163,11 +220,7 @@ FaceSearch::FaceSearch(const Shell& shell, const CurvedShell& surface)
       slack(1e-6 * shell.size()),
       things(boxes_of_things(shell, surface, *this)),
       facets(boxes_of_facets(shell, surface)) {
-  cones.reserve(facets.items().size());
-  for (const int f : facets.items()) {
-    cones.push_back(surface.cones()[f]);
-    bulge = std::max<double>(bulge, surface.facets()[f].bulge);
-  }
+  for (const int f : facets.items()) bulge = std::max<double>(bulge, surface.facets()[f].bulge);
 }
 
 }  // namespace sphshell

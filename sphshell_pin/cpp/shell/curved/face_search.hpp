@@ -1,32 +1,36 @@
 // What a sphere's query walks through where facets lie on faces.
 #pragma once
 
-#include <optional>
-
 #include "shell/shell.hpp"
 
 namespace sphshell {
 
 class CurvedShell;
 
-// Things by number, in a tree of their boxes.
+// Things by number, in a tree of their boxes. A node has eight, which are tested at once and
+// without a branch: cold queries cost what processors guess wrong.
 class BoxTree {
  public:
   using Boxes = std::vector<std::pair<Eigen::AlignedBox3d, int>>;
-  // Of so `few` or less there is no tree: all are found.
-  explicit BoxTree(const Boxes& boxes, std::size_t few = 0);
+  explicit BoxTree(Boxes boxes);
 
   // In the order of the tree.
   const std::vector<int>& items() const { return items_; }
-  // Null where there is none.
-  const Bvh* tree() const { return tree_ ? &*tree_ : nullptr; }
-  std::size_t bytes() const;
-  // Those whose box meets a ball, and some beside them.
+  std::size_t bytes() const { return items_.size() * sizeof(int) + nodes_.size() * sizeof(Node); }
+  // Appends those whose box meets a ball.
   void find(const Vec3& center, double radius, std::vector<int>& out) const;
 
  private:
+  // Boxes relative to origin_, rounded outward; of nothing: nowhere.
+  struct Node {
+    Eigen::Array<float, 8, 1> low[3], high[3];
+    int first;  // of eight nodes, or of eight items
+    bool leaf;
+  };
+  static constexpr int kMostLevels = 11;  // 8^11 > 2^31
+  Vec3 origin_ = Vec3::Zero();
   std::vector<int> items_;
-  std::optional<Bvh> tree_;
+  std::vector<Node> nodes_;  // level by level, the leaves first and the root last
 };
 
 // Where a face or a joint is.
@@ -38,11 +42,6 @@ struct Region {
   BoxTree parts;         // facets, or half-edges (3 facet + side)
   bool enclosed = true;  // of a face: all of its border is looked for, as joints or with facets
   int turn[2] = {0, 0};  // of a joint: FaceCell::turn of its sides on either face; 0: of both signs
-
-  // Whether it may have a point this near to x.
-  bool holds(const Vec3& x, double slack) const {
-    return box.squaredExteriorDistance(x) <= slack * slack;
-  }
 };
 
 // Inside a face nothing but its own closest point can be a minimum, and on a joint that is a line
@@ -58,9 +57,8 @@ struct FaceSearch {
   // 3 facet + corner: each as 3 times that, plus its Kind.
   enum Kind { Face = 0, Joint = 1, Corner = 2 };
   BoxTree things;
-  BoxTree facets;                // with an element, or another side
-  LargeArray<NormalCone> cones;  // beside facets.items()
-  double bulge = 0;              // the largest of facets [m]
+  BoxTree facets;    // with an element, or another side
+  double bulge = 0;  // the largest of facets [m]
 
   std::size_t bytes() const;
 };
