@@ -236,7 +236,7 @@ def exactly(
     if loops and mimic:
         raise RobotError(
             f"{file}: not supported: {'; '.join(loops)}; leave them out of the file, or load it "
-            "with mimic = false, which lets these joints move freely"
+            "with mimic = false (--no-mimic), which lets these joints move freely"
         )
     if loops:
         loops = (

@@ -84,6 +84,14 @@ def test_the_tool_frame_comes_before_the_jaws(load, tool, jaws, mimic):
     assert frame.act(tip.offset)[2] - tip.radius > 0.11 - 1e-6
 
 
+def test_the_ball_is_before_jaws_that_the_shape_of_the_hand_encloses(load) -> None:
+    parts = arm(jaws="prismatic", tool="tcp").replace(".06 .06 .1", ".1 .1 .3")
+    robot = load(parts)
+    (tip,) = tips_of(robot)
+    frame = robot.model.frames[robot.model.getFrameId("tcp")].placement
+    assert frame.act(tip.offset)[2] - tip.radius > 0.15 - 1e-6
+
+
 def carrier(robot: LoadedRobot, tip: Tip) -> str:
     """Return the name of the joint that moves a tip."""
     model = robot.model

@@ -102,7 +102,7 @@ class LinkGeometry:
         bodies = [k for k in sorted(shown) if model.frames[k].parentJoint == self._joint]
         self.link = model.frames[bodies[0]].name if bodies else frame
         self.corners = moved(
-            self._frame.placement.inverse(), self._corners(self._joint, self._jaws)
+            self._frame.placement.inverse(), self._corners(self._joint, {self._joint, *self._jaws})
         )
 
     def depth(self, center: Array) -> float:
@@ -150,12 +150,13 @@ class LinkGeometry:
         model, place = self._model, self._frame.placement.inverse()
         here = _middle(self.corners)
         if self._jaws:
-            away = here - _middle(moved(place, self._corners(self._joint)))
-            return unit(away)
+            jaws, wrist = (self._corners(self._joint, one) for one in (self._jaws, {self._joint}))
+            return unit(place.rotation @ (_middle(jaws) - _middle(wrist)))
         joint = model.joints[self._joint]
         if joint.nv == 6:
             return np.asarray(place.rotation @ np.array([0.0, 0.0, -1.0]))
-        before = self._corners(int(model.parents[self._joint]))
+        parent = int(model.parents[self._joint])
+        before = self._corners(parent, {parent})
         behind = place.act(model.jointPlacements[self._joint].actInv(_middle(before)))
         origin, away = place.translation, here - behind
         if joint.nv == 1:
@@ -180,8 +181,8 @@ class LinkGeometry:
         jacobian, pose = reach.jacobian(q)[:3], reach.data.oMf[reach.frame]
         return bool(np.abs(pose.rotation @ axis @ jacobian).max(initial=0.0) > _STILL)
 
-    def _corners(self, joint: int, jaws: Collection[int] = ()) -> Array:
-        """Return the corners (k, 3) [m] of the geometry of joints, in the first one's frame."""
+    def _corners(self, joint: int, joints: Collection[int]) -> Array:
+        """Return the corners (k, 3) [m] of the geometry of `joints`, in the frame of `joint`."""
         data = self._model.createData()
         pin.forwardKinematics(self._model, data, self._robot.q0)
         for geometry in (self._robot.collision_model, self._robot.visual_model):
@@ -191,7 +192,7 @@ class LinkGeometry:
                     np.asarray(Shell.from_geometry(one).vertices),
                 )
                 for one in geometry.geometryObjects
-                if int(one.parentJoint) in {joint, *jaws}
+                if int(one.parentJoint) in joints
             ]
             if found:
                 return np.concatenate(found)
