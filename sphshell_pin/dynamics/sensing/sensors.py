@@ -322,11 +322,9 @@ def check_sensors(sensors: Iterable[object]) -> tuple[Sensor, ...]:
     except TypeError:
         raise InvalidParameter("sensors", sensors, "must be a list of sensors") from None
     found: dict[str, Sensor] = {}
-    for k, one in enumerate(given):
-        if not isinstance(one, Sensor):
-            raise InvalidParameter(
-                f"sensors[{k}]", one, "must be a sensor, as ForceTorqueSensor(name, frame)"
-            )
+    must = "must be a sensor, as ForceTorqueSensor(name, frame)"
+    for k, sensor in enumerate(given):
+        one = check_type(f"sensors[{k}]", sensor, Sensor, must)
         if one.name in found:
             raise InvalidParameter(f"sensors[{k}].name", one.name, "is taken by another sensor")
         found[one.name] = one
