@@ -21,7 +21,6 @@ INTEGRATORS = {
     "linearly implicit": sp.LinearlyImplicitEuler(2e-5),
 }
 every_integrator = pytest.mark.parametrize("integrator", INTEGRATORS)
-LINEAR = sp.ImpactLaw(4e4, 1.0)
 IMPACT = sp.ImpactLaw(2e6, 1.5, 50.0, 1e-3)
 HUNT = sp.HuntCrossleyLaw(2e6, 1.5, 0.3)
 COULOMB = sp.CoulombFriction(0.3, 0.2, 0.02, 0.2)

@@ -58,8 +58,3 @@ def test_wall_that_ends_in_fillets(rows: int) -> None:
         found = shell.contacts((1 + 0.45) * out + [0, 0, z], 0.5)
         assert len(found) == 1
         assert abs(found.depth[0] - 0.05) <= 5e-3
-
-
-def test_cube_stays_flat() -> None:
-    shell = Shell(*meshes.cube())
-    assert np.abs(shell.core_for("smooth").control_point_offsets).max() == 0
