@@ -15,6 +15,9 @@ constexpr double kSettled = 1e-9;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
+// Most corners share one: SharedNormals.
+bool are_same(const Vec3& m, const Vec3& n) { return &m == &n || (m - n).norm() <= kSameNormal; }
+
 // Appends n where no equal one is there; edges have few normals at an end.
 void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
   for (const Vec3& other : normals)
@@ -201,8 +204,8 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
               g = topology.incidence[edge.begin + edge.count - 1];
     const bool opposed = triangles[h / 3][h % 3] != triangles[g / 3][g % 3];
     const int h1 = corner_after(h), g1 = corner_after(g);
-    return edge.count == 2 && (normals_[h] - normals_[opposed ? g1 : g]).norm() <= kSameNormal &&
-           (normals_[h1] - normals_[opposed ? g : g1]).norm() <= kSameNormal;
+    return edge.count == 2 && are_same(normals_[h], normals_[opposed ? g1 : g]) &&
+           are_same(normals_[h1], normals_[opposed ? g : g1]);
   };
   std::optional<SagittaWitness> witness;
   if (regions) witness.emplace(shell, *regions, goes_on);
@@ -293,10 +296,9 @@ int CurvedShell::corner_beyond(const Shell& shell, int h) const {
   const auto vertex = [&](int c) { return shell.triangles()[triangle_of(c)][side_of(c)]; };
   if (vertex(h) != vertex(corner_after(g))) return -1;  // ill-wound
   if (facets_[triangle_of(shell.facet_half_edge(g))].flat) return -1;
-  const auto differ = [&](int i, int j) {
-    return (normals_[i] - normals_[j]).norm() > kSameNormal;
-  };
-  if (differ(h, corner_after(g)) || differ(corner_after(h), g)) return -1;
+  if (!are_same(normals_[h], normals_[corner_after(g)]) ||
+      !are_same(normals_[corner_after(h)], normals_[g]))
+    return -1;
   return corner_before(g);
 }
 

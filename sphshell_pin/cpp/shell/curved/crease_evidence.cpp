@@ -193,6 +193,9 @@ void CreaseSearch::weigh_runs() {
         float& most = next[n][side];
         at_vertex(vertex(opposite(joints_[e].half_edge[side])), [&](int other) {
           if (!core_[other]) return;
+          // What cannot be the most, whichever way it leads, needs no look.
+          const auto [back_run, on_run] = run_[other];
+          if (evidence_[other] + std::max(back_run, on_run) <= most) return;
           const float cosine = joints_[e].direction.dot(joints_[other].direction);
           if (cosine * cosine < 0.5) return;
           // The side of the other joint that leads on, away from this one.
