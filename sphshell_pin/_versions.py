@@ -5,6 +5,8 @@ Their shared objects carry no version in their names, so the core would load wit
 read memory in another layout than theirs. `_built_against` is written by CMake beside the core.
 """
 
+import os
+import sys
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -73,4 +75,7 @@ def _load() -> None:
     )
 
 
+# NumPy's threads wait by turning in circles, and no command's matrices are large enough for two.
+if Path(*sys.argv[:1]).stem == "sphshell-pin":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 _load()

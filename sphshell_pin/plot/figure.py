@@ -38,15 +38,18 @@ def new_figure(width: float, height: float, title: str = "") -> Figure:
 
 def png(figure: Figure, dpi: int = RESOLUTION) -> bytes:
     """Return `figure` as a .png file."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     stream = io.BytesIO()
-    # Its places are found once: `savefig` would draw it twice to find them, and find them twice.
+    # Its places are found once and it is drawn once, where `savefig` does both twice.
     layout, own_dpi = figure.get_layout_engine(), figure.get_dpi()
     try:
         figure.set_dpi(dpi)
         if layout is not None:
             layout.execute(figure)
         figure.set_layout_engine("none")
-        figure.savefig(stream, format="png", dpi=dpi, pil_kwargs={"compress_level": 1})
+        canvas = FigureCanvasAgg(figure)
+        canvas.print_png(stream, pil_kwargs={"compress_level": 1})  # type: ignore[no-untyped-call]
     finally:
         figure.set_layout_engine(layout)
         figure.set_dpi(own_dpi)
