@@ -12,13 +12,14 @@ from functools import partial
 from os import PathLike
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ResultError, SweepError, import_extra
 from sphshell_pin.study.sweep import worker
+from sphshell_pin.study.sweep.distributions import Dist
 from sphshell_pin.study.sweep.indices import DESIGN, figures_of
-from sphshell_pin.study.sweep.plan import Changes, Design, Plan, plan_sweep
+from sphshell_pin.study.sweep.plan import Changes, Plan, plan_sweep
 from sphshell_pin.study.sweep.points import Vary, text_of
 from sphshell_pin.study.sweep.worker import Outcome
 
@@ -48,11 +49,18 @@ def sweep(
     scenario: str | PathLike[str],
     vary: Vary | Iterable[str] | None = None,
     *,
+    changes: Mapping[str, str] | None = None,
+    together: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
     out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
-    **design: Unpack[Design],
+    dist: Dist | Iterable[str] | None = None,
+    sample: str | None = None,
+    n: int | None = None,
+    seed: int = 0,
+    indices: bool = False,
+    tornado: bool = False,
 ) -> pd.DataFrame:
     """Run a scenario many times with other values and return the table of its figures.
 
@@ -107,7 +115,18 @@ def sweep(
     KeyboardInterrupt
         On Ctrl-C; its text says how many runs are done and kept.
     """
-    plan = plan_sweep(scenario, vary, **design)
+    plan = plan_sweep(
+        scenario,
+        vary,
+        changes=changes,
+        together=together,
+        dist=dist,
+        sample=sample,
+        n=n,
+        seed=seed,
+        indices=indices,
+        tornado=tornado,
+    )
     return run_plan(plan, workers=workers, scheduler=scheduler, out=out, progress=progress).table
 
 

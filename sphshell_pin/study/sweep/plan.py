@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TypedDict
 
 from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError
@@ -69,19 +68,6 @@ class Plan:
     job: Job
     units: Mapping[str, str]
     """Units of keys and figures, those that are known."""
-
-
-class Design(TypedDict, total=False):
-    """What the runs of a sweep are, see `sweep`."""
-
-    changes: Changes | None
-    together: bool
-    dist: Dist | Iterable[str] | None
-    sample: str | None
-    n: int | None
-    seed: int
-    indices: bool
-    tornado: bool
 
 
 def plan_sweep(
