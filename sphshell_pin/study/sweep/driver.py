@@ -315,8 +315,11 @@ def _client(workers: int | None, runs: int, scheduler: str | None) -> Any:
         "silence_logs": "CRITICAL",
     }
     remote = {"address": scheduler, "timeout": _CONNECT_TIMEOUT}
+    # `silence_logs` leaves what a worker itself logs, as where it ends while another begins.
+    quiet = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
     try:
-        return distributed.Client(**(remote if scheduler else local), set_as_default=False)
+        with _need("dask.config").set(quiet):
+            return distributed.Client(**(remote if scheduler else local), set_as_default=False)
     # Another server at that address may be misread in any way.
     except Exception as fault:
         why = "no worker process can be started"
