@@ -42,6 +42,9 @@ def serve(source: int, target: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (MOST_WRITTEN, MOST_WRITTEN))
     _load_display_libraries()
+    # Until the first job has loaded OpenCASCADE: all of that stays, and to search it for garbage
+    # takes a sixth of the time.
+    gc.disable()
     while requests.poll(IDLE):
         try:
             message = requests.recv_bytes()
@@ -105,14 +108,12 @@ def _answer(requests: Connection, answers: Connection, message: bytes) -> bytes:
         warnings.simplefilter("default")
         try:
             signal.setitimer(signal.ITIMER_REAL, time_limit + GRACE)
-            # A sixth of the time of the import are searches for garbage among what stays.
-            gc.disable()
             require_kernel(purpose)
             from sphshell_pin.shell.cad.jobs import JOBS
 
-            gc.freeze()
-            gc.enable()
-
+            if not gc.isenabled():
+                gc.freeze()
+                gc.enable()
             if folder:
                 os.chdir(folder)
             limit_memory(memory_limit)
