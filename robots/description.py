@@ -27,10 +27,15 @@ INCLUDED = "name the file of the robot that includes this one"
 
 
 def frames_without_link(root: ET.Element) -> list[str]:
-    """Return the links that fixed joints place and a URDF with links does not have."""
+    """Return the links that fixed joints name and a URDF with links does not have.
+
+    A joint may place any of them, and start from the ground, `world`.
+    """
     links = {link.get("name") for link in root.findall("link")}
-    children = [one.find("child") for one in root.findall("joint[@type='fixed']")]
-    names = [one.get("link", "") for one in children if one is not None]
+    fixed = root.findall("joint[@type='fixed']")
+    names = [one.get("link", "") for joint in fixed for one in joint.findall("child")]
+    if any(one.get("link") == "world" for joint in fixed for one in joint.findall("parent")):
+        names.append("world")
     return [name for name in names if name and name not in links] if links else []
 
 
@@ -94,7 +99,7 @@ def add_limits(root: ET.Element) -> Iterator[str]:
         negative = []
         for joint in root.iter("joint"):
             for limit in joint.findall("limit"):
-                if limit.get(key, "").strip().startswith("-"):
+                if limit.attrib.setdefault(key, "0").strip().startswith("-"):
                     limit.set(key, "0")
                     negative.append(joint)
         if negative:

@@ -70,6 +70,7 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     # xacro asks ament alone, which few machines have. $(eval find('name')) looks in the dictionary.
     substitution_args._eval_find = substitution_args._eval_dict["find"] = find
     _without_missing_colors(xacro, folders)
+    _with_former_tags(xacro)
     try:
         install(xacro, substitution_args)
         document = _processed(xacro, file, arguments)
@@ -143,6 +144,32 @@ def _without_missing_colors(xacro: Any, folders: Folders) -> None:
         return call(node, macros, symbols)
 
     xacro.get_include_files, xacro.handle_macro_call = include, handle
+
+
+def _with_former_tags(xacro: Any) -> None:
+    """Let xacro read its tags without the prefix `xacro:`, as its versions before 2020 did."""
+    read, call = xacro.parse, xacro.handle_macro_call
+    tags, macros = ("macro", "include", "property", "if", "unless", "insert_block"), set[str]()
+
+    def parse(text: str | None, file: str | None = None) -> Any:
+        document = read(text, file)
+        named = [one for one in document.getElementsByTagName("macro") if one.hasAttribute("name")]
+        files = document.getElementsByTagName("include")
+        if named or any(one.hasAttribute("filename") for one in files):
+            of = Path(xacro.filestack[-1]).name
+            xacro.warning(f"{of}: tags of xacro lack the prefix 'xacro:'")
+            macros.update(one.getAttribute("name") for one in named)
+            for tag in tags:
+                for one in document.getElementsByTagName(tag):
+                    one.tagName = one.nodeName = f"xacro:{tag}"
+        return document
+
+    def handle(node: Any, *given: object) -> object:
+        if node.tagName in macros:
+            node.tagName = f"xacro:{node.tagName}"
+        return call(node, *given)
+
+    xacro.parse, xacro.handle_macro_call = parse, handle
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:

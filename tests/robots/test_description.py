@@ -59,19 +59,22 @@ def test_a_chain_as_long_as_may_be_is_read(tmp_path):
 
 
 def test_what_moves_nothing_is_mended(tmp_path):
-    """A fixed joint of a link that is missing, limits of -1, and boxes of size 0."""
+    """Fixed joints of links that are missing, limits of -1, and boxes of size 0."""
     box = "<collision><geometry><box size='0 0 0.0'/></geometry></collision>"
     file = tmp_path / "arm.urdf"
     tool = "<joint name='t' type='fixed'><parent link='l1'/><child link='tool'/></joint>"
     arm = joint(1, 0, "continuous").replace('effort="50"', 'effort="-1"')
-    file.write_text(robot(arm.replace("</link>", f"{box}</link>") + tool))
+    ground = "<joint name='g' type='fixed'><parent link='world'/><child link='l0'/></joint>"
+    file.write_text(robot(arm.replace("</link>", f"{box}</link>") + tool + ground))
     with pytest.warns(robots.RobotWarning) as said:
         loaded = robots.load_file(file)
     text = " ".join(str(one.message) for one in said)
-    assert "links that it does not have are frames: tool" in text
+    assert "links that it does not have are frames: tool, world" in text
     assert "without the negative effort limits of the joints 'j1'" in text
     assert loaded.model.existFrame("tool")
     assert loaded.collision_model.ngeoms == 0
     file.write_text(robot(arm + tool.replace("fixed", "revolute")))
     with pytest.raises(robots.RobotError, match="child 'tool', but there is no such link"):
         robots.load_file(file)
+    file.write_text(robot(arm.replace(' effort="-1"', "")))
+    assert robots.load_file(file).model.nv == 1

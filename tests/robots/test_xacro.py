@@ -198,6 +198,18 @@ def test_xacro_expressions_compute(tmp_path):
     assert model.upperPositionLimit[0] == -model.lowerPositionLimit[0] == pytest.approx(np.pi / 2)
 
 
+def test_tags_without_prefix_are_read(tmp_path, capsys):
+    """Versions of xacro before 2020 took its tags without `xacro:`, calls of macros too."""
+    (tmp_path / "colors.xacro").write_text(
+        '<robot><property name="size" value="2"/><macro name="body" params="name">'
+        '<if value="${size == 2}"><link name="${name}"/></if></macro></robot>'
+    )
+    inside = '<include filename="colors.xacro"/><body name="l0"/>'
+    links = robots.read(xacro(tmp_path, inside)).root.findall("link")
+    assert [one.get("name") for one in links] == ["l0"]
+    assert "colors.xacro: tags of xacro lack the prefix 'xacro:'" in capsys.readouterr().err
+
+
 def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
     for inside, words in (
         ("${nix}", "xacro cannot expand it: .*nix"),
