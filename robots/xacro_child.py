@@ -57,23 +57,23 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
     import xacro
     from xacro import substitution_args
 
+    missing = set[str]()
+
     def find(name: str) -> str:
         folder = folders.package(name)
         if folder is None:
-            raise substitution_args.ArgException(
-                f"there is no package '{name}' in {folders.searched()}: give the folder above it "
-                "with --package-dir, or package_dirs in a scenario or in Python"
-                + stated_source(file.resolve().parent, name)
-            )
+            raise substitution_args.ArgException(_absent(name, file, folders))
         return str(folder)
 
     # xacro asks ament alone, which few machines have. $(eval find('name')) looks in the dictionary.
     substitution_args._eval_find = substitution_args._eval_dict["find"] = find
-    _without_missing_colors(xacro, folders)
+    _without_missing_includes(xacro, folders, missing)
     _with_former_tags(xacro)
     try:
         install(xacro, substitution_args)
         document = _processed(xacro, file, arguments)
+        if missing and not _is_whole(document):
+            raise ValueError(_absent(min(missing), file, folders))
     except Exception as error:  # of the package xacro, which raises what happens to come up
         causes = list(_causes(error))
         if any(isinstance(one, MemoryError) for one in causes):
@@ -81,10 +81,29 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
         if any(isinstance(one, RecursionError) for one in causes):
             raise ValueError("its files, macros or elements are nested too deeply") from None
         reason = _reason(error, causes) or type(error).__name__
+        if missing and "there is no package" not in reason:
+            reason = f"{_absent(min(missing), file, folders)} ({reason})"
         where = Path((xacro.filestack or [file])[-1]).name
         of = f" (in {where})" if where != file.name else ""
         raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
     return str(document.toxml())
+
+
+def _absent(name: str, file: Path, folders: Folders) -> str:
+    """Say that a package is nowhere, and what to do."""
+    return (
+        f"there is no package '{name}' in {folders.searched()}: give the folder above it "
+        "with --package-dir, or package_dirs in a scenario or in Python"
+        + stated_source(file.resolve().parent, name)
+    )
+
+
+def _is_whole(document: Any) -> bool:
+    """Whether a robot has links, and all that its joints name."""
+    root = document.documentElement
+    links = {one.getAttribute("name") for one in root.getElementsByTagName("link")} - {""}
+    ends = [one for tag in ("parent", "child") for one in root.getElementsByTagName(tag)]
+    return bool(links) and {one.getAttribute("link") for one in ends} <= links | {""}
 
 
 def _processed(xacro: Any, file: Path, arguments: Mapping[str, str]) -> Any:
@@ -119,19 +138,24 @@ def _of_robot(document: Any) -> Any:
     return document
 
 
-def _without_missing_colors(xacro: Any, folders: Folders) -> None:
-    """Let xacro leave out files and macros of colors, where their package is missing."""
+def _without_missing_includes(xacro: Any, folders: Folders, missing: set[str]) -> None:
+    """Let xacro leave out files of packages that are `missing`: of sensors that are not asked for.
+
+    Macros of theirs are unknown, and a fault where they are called, but for colors.
+    """
     included, call = xacro.get_include_files, xacro.handle_macro_call
-    missing = set[str]()
 
     def include(name: str, symbols: object) -> Iterable[str]:
-        package = re.match(r"\$\(find ([\w-]+)\).*(?:colou?r|material)", name)
+        package = re.match(r"\$\(find ([\w-]+)\)", name)
         if package is None or folders.package(package[1]) is not None:
             found: Iterable[str] = included(name, symbols)
             return found
         if package[1] not in missing:
             missing.add(package[1])
-            xacro.warning(f"without colors: there is no package '{package[1]}' (see --package-dir)")
+            xacro.warning(
+                f"without {name.rpartition('/')[2]}: there is no package '{package[1]}' "
+                "(see --package-dir)"
+            )
         return ()
 
     def handle(node: Any, macros: Any, symbols: object) -> object:

@@ -74,7 +74,7 @@ def test_a_workspace_lists_its_robots(tmp_path: Path) -> None:
     links = urdf.link("a"), urdf.link("b", urdf.shape("visual", '<sphere radius="1"/>'))
     urdf.write(file.with_name("bare.urdf"), *links, urdf.joint("j", "continuous", "a", "b"))
     asking = file.with_name("asking.xacro")
-    far = '<xacro:include filename="$(find far)/a.xacro"/>'
+    far = '<xacro:include filename="$(find far)/a.xacro"/><xacro:a/>'
     asking.write_text(file.read_text().replace("<link", f"{far}<link", 1))
     found = {one.file.name: one for one in find_robots(tmp_path)}
     assert sorted(found) == ["arm.xacro", "asking.xacro", "bare.urdf"]
@@ -226,19 +226,26 @@ def test_the_source_of_a_missing_package_is_named(tmp_path: Path) -> None:
         robots.load_file(file)
 
 
-def test_colors_of_a_missing_package_are_left_out(
+def test_files_of_a_missing_package_that_nothing_calls_are_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """Colors, and sensors that are not asked for; not macros, properties or links that are."""
     file = tmp_path / "arm.xacro"
     head = '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro"><xacro:include filename='
     link = '<link name="a"><visual><geometry><sphere radius="1"/></geometry>'
     body = f"{link}<xacro:orange/></visual></link></robot>"
     file.write_text(f'{head}"$(find far)/common_materials.xacro"/>{body}')
     assert robots.load_file(file).visual_model.ngeoms == 1
-    assert "without colors: there is no package 'far'" in capsys.readouterr().err
-    file.write_text(f'{head}"$(find far)/arm_macro.xacro"/>{body}')
-    with pytest.raises(robots.RobotError, match="there is no package 'far'"):
-        robots.load_file(file)
+    said = "without common_materials.xacro: there is no package 'far' (see --package-dir)"
+    assert said in capsys.readouterr().err
+    head += '"$(find far)/laser.xacro"/><link name="a"/>'
+    file.write_text(f"{head}<xacro:if value='0'><xacro:laser/></xacro:if></robot>")
+    assert robots.load_file(file).model.existFrame("a")
+    to_b = "<joint name='j' type='fixed'><parent link='b'/><child link='a'/></joint>"
+    for needed in ("<xacro:laser/>", "<link name='${nix}'/>", to_b):
+        file.write_text(f"{head}{needed}</robot>")
+        with pytest.raises(robots.RobotError, match="there is no package 'far'"):
+            robots.load_file(file)
 
 
 def test_a_package_that_a_simulator_alone_needs_may_be_missing(tmp_path: Path) -> None:
