@@ -116,13 +116,13 @@ def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
         ("python.zip(python.range(10**12))", "has more than 1000000 items"),
         ("[1 for a in range(10**5) for b in range(10**5)]", "take more than 300000 steps"),
         ("[0 for a in range(10**9) if 0]", "take more than 300000 steps"),
-        ("python.sum(python.range(10**11))", "takes more than 1 s to expand"),
-        ("math.factorial(10**8)", "takes more than 1 s to expand"),
+        ("python.sum(python.range(10**11))", "takes more than 3 s to expand"),
+        ("math.factorial(10**8)", "takes more than 3 s to expand"),
         ("len(list(range(10**9)))", "takes more than 1 GB of memory"),
     ],
 )
 def test_what_a_xacro_file_takes_is_limited(tmp_path, monkeypatch, expression, words):
-    monkeypatch.setattr(xacro_file, "TIME_LIMIT", 1.0)
+    monkeypatch.setattr(xacro_file, "TIME_LIMIT", 3.0)  # 300000 steps take less beside others
     with pytest.raises(robots.RobotError, match=words):
         robots.load_file(xacro(tmp_path, f'<link name="${{{expression}}}"/>'))
 
