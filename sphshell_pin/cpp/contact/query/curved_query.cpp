@@ -306,65 +306,62 @@ double CurvedQuery::falls(const Task<Sphere>& task, int joint, int i) const {
                            task.probe.tolerance - surface.gap());
 }
 
-// Inside the sphere a face whose whole border there is one joint goes on beyond that alone. A face
-// has one minimum at most, so where the distance falls from the joint's closest point into both
-// faces, it is there that this one's is connected with the others: with that of the face beyond,
-// or, from that, with those that are connected with it higher up. Where all minima but one are on
-// such faces, or on some without a border there, this says all.
+// Kruskal's method on faces in place of cells, the joints in the order of their depth. Of parts that
+// have been put together so far all joints to others are no deeper than the next one. Where both of
+// its parts hold minima and the depth grows from its closest point into both, it grows on to a
+// minimum without leaving the part: so they are connected there, and nowhere higher up. A part
+// without minima adds its border only. So a face need be neither whole nor convex. All that has an
+// unknown border is one part, which then may hold one minimum at most.
 bool CurvedQuery::find_ways(const Task<Sphere>& task, const BroadPhase& broad) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const CurvedShell& surface = *shell.curved();
-  const FaceSearch& search = *surface.face_search();
-  ways_.clear();
+  ways_.clear(), passes_.clear();
   if (!shell.topology().pinches.empty() || minima.size() > kMostWays) return false;
+  parts_.assign(1, {-1, 0, kNone});
   // Faces whose border is near a facet that is looked at by itself.
-  loose_.clear();
   for (const int f : broad.overlapping) {
-    loose_.push_back(surface.face_cells()[f].face);
+    parts_.push_back({surface.face_cells()[f].face, 0, kNone});
     for (const int beyond : surface.cells()[f].beyond) {
       if (beyond < kBoundary) return false;
-      if (beyond >= 0) loose_.push_back(surface.face_cells()[triangle_of(beyond)].face);
+      if (beyond >= 0)
+        parts_.push_back({surface.face_cells()[triangle_of(beyond)].face, 0, kNone});
     }
   }
-  const auto is_enclosed = [&](int face) {
-    return face >= 0 && search.of_face[face].enclosed &&
-           std::find(loose_.begin(), loose_.end(), face) == loose_.end();
-  };
-  const auto face_of = [&](const Minimum& at) {
-    const FaceCell& cell = surface.face_cells()[at.facet];
-    return at.contact.feature == Feature::Face && cell.closed ? cell.face : -1;
-  };
-  const auto holder = [&](int face) {
-    return std::find_if(minima.begin(), minima.end(),
-                        [&](const Minimum& at) { return face_of(at) == face; });
-  };
-  int unknown = 0;
-  for (const Minimum& at : minima) {
-    const int face = face_of(at);
-    int count = 0, joint = -1;
-    for (const int j : joints_) {
-      const FaceJoint& curve = surface.faces().joints[j];
-      if (curve.face[0] == face || curve.face[1] == face) ++count, joint = j;
+  for (std::size_t i = 0; i < minima.size(); ++i) {
+    int& minimum = parts_[part_of(surface, surface.face_cells()[minima[i].facet].face)].minimum;
+    if (minimum != kNone || minima[i].off_axis < 1) return false;
+    minimum = static_cast<int>(i);
+  }
+  for (const int j : joints_) {
+    const FaceJoint& curve = surface.faces().joints[j];
+    if (!curve.has_one_nearest(sphere.center)) return false;
+    passes_.emplace_back(sphere.depth(curve.nearest(sphere.center)), j);
+  }
+  std::sort(passes_.rbegin(), passes_.rend());
+  for (const auto& [depth, joint] : passes_) {
+    const FaceJoint& curve = surface.faces().joints[joint];
+    const int a = part_of(surface, curve.face[0]), b = part_of(surface, curve.face[1]);
+    if (a == b) continue;
+    const int from = parts_[a].minimum, to = parts_[b].minimum;
+    if (from != kNone && to != kNone) {
+      const int half_edge = saddle_side(task, joint);
+      if (half_edge < 0) return false;
+      ways_.push_back({minima[from].facet, minima[to].facet, half_edge});
     }
-    if (at.off_axis < 1) return false;
-    const bool enclosed = count < 2 && is_enclosed(face);
-    if (enclosed && count == 0) continue;
-    const int half_edge = enclosed ? saddle_side(task, joint) : -1;
-    auto other = minima.end();
-    if (half_edge >= 0) {
-      const FaceJoint& curve = surface.faces().joints[joint];
-      other = holder(curve.face[1 - curve.which(face)]);
-    }
-    if (other == minima.end()) {
-      if (++unknown > 1) return false;
-      continue;
-    }
-    const bool twice = std::any_of(ways_.begin(), ways_.end(), [&](const Way& way) {
-      return way.from == other->facet && way.to == at.facet;
-    });
-    if (!twice) ways_.push_back({at.facet, other->facet, half_edge});
+    parts_[b].in = a;
+    if (from == kNone) parts_[a].minimum = to;
   }
   return true;
+}
+
+// The part that a face is in, by its number.
+int CurvedQuery::part_of(const CurvedShell& surface, int face) {
+  if (face < 0 || !surface.face_search()->of_face[face].enclosed) face = -1;
+  std::size_t i = 0;
+  while (i < parts_.size() && parts_[i].face != face) ++i;
+  if (i == parts_.size()) parts_.push_back({face, int(i), kNone});
+  while (parts_[i].in != int(i)) i = parts_[i].in;
+  return int(i);
 }
 
 // The side that holds the closest point of a joint, from which the distance falls into both faces,

@@ -53,6 +53,7 @@ class CurvedQuery {
   double falls(const Task<Sphere>& task, int joint, int i) const;
   // Whether ways_ are all that connect the minima.
   bool find_ways(const Task<Sphere>& task, const BroadPhase& broad);
+  int part_of(const CurvedShell& surface, int face);
   int saddle_side(const Task<Sphere>& task, int joint);
   template <class Probe>
   void add_edge(const Task<Probe>& task, int facet, int side);
@@ -63,8 +64,15 @@ class CurvedQuery {
   std::vector<int> borders_;  // facets that lie on faces
   std::vector<int> joints_;   // that the sphere reaches
   std::vector<int> sides_;    // half-edges of one of them
-  std::vector<int> loose_;    // faces
   std::vector<Way> ways_;
+  // Faces that have been put together, by the part that one is in (its own number: a first one),
+  // and a minimum of those of a first one.
+  static constexpr int kNone = -1;
+  struct Part {
+    int face, in, minimum;
+  };
+  std::vector<Part> parts_;  // the first one: of all faces, and facets on none, of unknown border
+  std::vector<std::pair<double, int>> passes_;  // joints by their depth [m]
   FaceFeet feet_;
   Components components_;
 };
