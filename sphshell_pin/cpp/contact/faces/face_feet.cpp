@@ -30,11 +30,10 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
   if (!(std::abs(distance) < sphere.radius) || !(shape.radius_at(point) > 0)) return;
   const bool anywhere = shape.singular(sphere.center, kOnAxis);
   const double slack = surface.face_search()->slack;
-  facets_.clear();
-  region.parts.find(anywhere ? sphere.center : point, anywhere ? sphere.radius : slack, facets_);
   bool placed = !shape.has_parameters();
   Eigen::Vector2d place(0, 0);
-  for (const int f : facets_) {
+  for (const int f : region.parts.find(anywhere ? sphere.center : point,
+                                       anywhere ? sphere.radius : slack, room_)) {
     if (anywhere) {
       const NormalCone& cone = surface.cones()[f];
       const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);

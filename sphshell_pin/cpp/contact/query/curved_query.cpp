@@ -279,19 +279,17 @@ void CurvedQuery::add_joint(const Task<Sphere>& task, int joint) {
   // What add_edge() asks of each side, where that is the same of all.
   for (int i = 0; i < 2; ++i)
     if (falls(task, joint, i) > 0) return;
-  find_sides(task, joint);
-  for (const int h : sides_) add_edge(task, triangle_of(h), side_of(h));
+  for (const int h : sides_near(task, joint)) add_edge(task, triangle_of(h), side_of(h));
 }
 
 // The sides near the closest point of a joint; about the axis of a circle, those near the sphere.
-void CurvedQuery::find_sides(const Task<Sphere>& task, int joint) {
+BoxTree::Found CurvedQuery::sides_near(const Task<Sphere>& task, int joint) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const FaceSearch& search = *shell.curved()->face_search();
   const FaceJoint& curve = shell.curved()->faces().joints[joint];
   const bool one = curve.has_one_nearest(sphere.center);
-  sides_.clear();
-  search.of_joint[joint].parts.find(one ? curve.nearest(sphere.center) : sphere.center,
-                                    one ? search.slack : sphere.radius, sides_);
+  return search.of_joint[joint].parts.find(one ? curve.nearest(sphere.center) : sphere.center,
+                                           one ? search.slack : sphere.radius, sides_);
 }
 
 // How far inside face i of a joint the center is, beyond the overlap; 0: not, or not the same at
@@ -370,8 +368,7 @@ int CurvedQuery::saddle_side(const Task<Sphere>& task, int joint) {
   if (!task.shell.curved()->faces().joints[joint].has_one_nearest(task.probe.center) ||
       !(falls(task, joint, 0) > 0 && falls(task, joint, 1) > 0))
     return -1;
-  find_sides(task, joint);
-  for (const int h : sides_) {
+  for (const int h : sides_near(task, joint)) {
     const SideFoot foot = nearest_on_side(task.shell, triangle_of(h), side_of(h), task.probe);
     if (foot.t > 0 && foot.t < 1) return h;
   }

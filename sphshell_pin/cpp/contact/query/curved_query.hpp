@@ -49,7 +49,7 @@ class CurvedQuery {
   template <class Probe>
   void add_border(const Task<Probe>& task, int facet);
   void add_joint(const Task<Sphere>& task, int joint);
-  void find_sides(const Task<Sphere>& task, int joint);
+  BoxTree::Found sides_near(const Task<Sphere>& task, int joint);
   double falls(const Task<Sphere>& task, int joint, int i) const;
   // Whether ways_ are all that connect the minima.
   bool find_ways(const Task<Sphere>& task, const BroadPhase& broad);
@@ -63,7 +63,7 @@ class CurvedQuery {
   std::vector<Outlook> outlooks_;
   std::vector<int> borders_;  // facets that lie on faces
   std::vector<int> joints_;   // that the sphere reaches
-  std::vector<int> sides_;    // half-edges of one of them
+  std::vector<int> sides_;    // room for half-edges of one of them
   std::vector<Way> ways_;
   // Faces that have been put together, by the part that one is in (its own number: a first one),
   // and a minimum of those of a first one.
