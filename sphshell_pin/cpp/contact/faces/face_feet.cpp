@@ -118,17 +118,17 @@ bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tol
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
   const Facet& facet = shell.facets()[f];
-  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)], d = q - p;
   if (cell.side[k] == FaceCell::Side::Inner) {
     const auto [inside, overlap] = within_line(surface.faces().shapes[cell.face], cell, facet, k,
                                                at.point, at.place, tolerance);
-    return !(inside < -overlap);
+    // The first is seldom decided late: the second takes a root.
+    return inside >= 0 || !(inside < -overlap);
   }
-  const Vec3 in = at.outward.cross(d).normalized();
-  const double inside = in.dot(at.point - p);
+  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)], d = q - p;
+  const Vec3 in = at.outward.cross(d);
+  const double inside = in.dot(at.point - p), bulge = double(cell.bulge[k]);
   // Farther from the chord than the curve bulges: the curve need not be looked at.
-  if (inside > cell.bulge[k]) return true;
-  if (inside < -double(cell.bulge[k])) return false;
+  if (inside * inside > bulge * bulge * in.squaredNorm()) return inside > 0;
   if (cell.side[k] == FaceCell::Side::Border) {
     const FaceJoint& joint = surface.faces().joints[cell.joint[k]];
     const bool crossing = joint.kind == FaceJoint::Kind::Crossing;

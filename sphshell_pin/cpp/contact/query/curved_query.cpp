@@ -74,16 +74,14 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
     }
   }
   for (const int f : borders_) add_border(task, f);
+  bool known = false;
   if constexpr (sphere)
     if (!faces.empty()) {
       for (const int joint : broad.joints) add_joint(task, joint);
       for (const int c : broad.corners) add_vertex(task, triangle_of(c), side_of(c));
+      find_rings(shell, probe, minima);
+      known = minima.size() > 1 && find_ways(task, broad);
     }
-  if constexpr (sphere)
-    if (!faces.empty() && !minima.empty()) find_rings(shell, probe, minima);
-  bool known = false;
-  if constexpr (sphere)
-    if (!faces.empty() && minima.size() > 1) known = find_ways(task, broad);
   if (minima.size() > 1)
     components_.merge(shell, probe, want_dn_dc, minima, known ? &ways_ : nullptr);
 }
@@ -273,23 +271,20 @@ void CurvedQuery::add_joint(const Task<Sphere>& task, int joint) {
   const CurvedShell& surface = *shell.curved();
   const FaceJoint& curve = surface.faces().joints[joint];
   const bool one = curve.has_one_nearest(sphere.center);
-  const Vec3 point = one ? curve.nearest(sphere.center) : sphere.center;
-  if (!sphere.reaches(point)) return;
-  joints_.push_back(joint);
+  const Reached at{joint, one, one ? curve.nearest(sphere.center) : sphere.center};
+  if (!sphere.reaches(at.point)) return;
+  joints_.push_back(at);
   // What add_edge() asks of each side, where that is the same of all.
   for (int i = 0; i < 2; ++i)
     if (falls(task, joint, i) > 0) return;
-  for (const int h : sides_near(task, joint)) add_edge(task, triangle_of(h), side_of(h));
+  for (const int h : sides_near(task, at)) add_edge(task, triangle_of(h), side_of(h));
 }
 
 // The sides near the closest point of a joint; about the axis of a circle, those near the sphere.
-BoxTree::Found CurvedQuery::sides_near(const Task<Sphere>& task, int joint) {
-  const auto& [shell, sphere, want_dn_dc, minima] = task;
-  const FaceSearch& search = *shell.curved()->face_search();
-  const FaceJoint& curve = shell.curved()->faces().joints[joint];
-  const bool one = curve.has_one_nearest(sphere.center);
-  return search.of_joint[joint].parts.find(one ? curve.nearest(sphere.center) : sphere.center,
-                                           one ? search.slack : sphere.radius, sides_);
+BoxTree::Found CurvedQuery::sides_near(const Task<Sphere>& task, const Reached& at) {
+  const FaceSearch& search = *task.shell.curved()->face_search();
+  return search.of_joint[at.joint].parts.find(at.point, at.one ? search.slack : task.probe.radius,
+                                              sides_);
 }
 
 // How far inside face i of a joint the center is, beyond the overlap; 0: not, or not the same at
@@ -304,16 +299,16 @@ double CurvedQuery::falls(const Task<Sphere>& task, int joint, int i) const {
                            task.probe.tolerance - surface.gap());
 }
 
-// Kruskal's method on faces in place of cells, the joints in the order of their depth. Of parts that
-// have been put together so far all joints to others are no deeper than the next one. Where both of
-// its parts hold minima and the depth grows from its closest point into both, it grows on to a
-// minimum without leaving the part: so they are connected there, and nowhere higher up. A part
-// without minima adds its border only. So a face need be neither whole nor convex. All that has an
-// unknown border is one part, which then may hold one minimum at most.
+// Kruskal's method with faces in place of cells, and their joints in the order of falling depth.
+// The joints around a part, which is of faces put together so far, are no deeper than the next one.
+// Where both parts there hold minima, and the depth grows from its closest point into both, the way
+// up leaves neither part and ends at a minimum: so they are connected there, and nowhere higher up.
+// Of a part without minima only the joints around it matter. No face need be whole or convex. All
+// whose border is not known is one part, of one minimum at most.
 bool CurvedQuery::find_ways(const Task<Sphere>& task, const BroadPhase& broad) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const CurvedShell& surface = *shell.curved();
-  ways_.clear(), passes_.clear();
+  ways_.clear();
   if (!shell.topology().pinches.empty() || minima.size() > kMostWays) return false;
   parts_.assign(1, {-1, 0, kNone});
   // Faces whose border is near a facet that is looked at by itself.
@@ -321,8 +316,7 @@ bool CurvedQuery::find_ways(const Task<Sphere>& task, const BroadPhase& broad) {
     parts_.push_back({surface.face_cells()[f].face, 0, kNone});
     for (const int beyond : surface.cells()[f].beyond) {
       if (beyond < kBoundary) return false;
-      if (beyond >= 0)
-        parts_.push_back({surface.face_cells()[triangle_of(beyond)].face, 0, kNone});
+      if (beyond >= 0) parts_.push_back({surface.face_cells()[triangle_of(beyond)].face, 0, kNone});
     }
   }
   for (std::size_t i = 0; i < minima.size(); ++i) {
@@ -330,19 +324,20 @@ bool CurvedQuery::find_ways(const Task<Sphere>& task, const BroadPhase& broad) {
     if (minimum != kNone || minima[i].off_axis < 1) return false;
     minimum = static_cast<int>(i);
   }
-  for (const int j : joints_) {
-    const FaceJoint& curve = surface.faces().joints[j];
-    if (!curve.has_one_nearest(sphere.center)) return false;
-    passes_.emplace_back(sphere.depth(curve.nearest(sphere.center)), j);
+  for (Reached& at : joints_) {
+    if (!at.one) return false;
+    at.depth = sphere.depth(at.point);
   }
-  std::sort(passes_.rbegin(), passes_.rend());
-  for (const auto& [depth, joint] : passes_) {
-    const FaceJoint& curve = surface.faces().joints[joint];
+  std::sort(joints_.begin(), joints_.end(), [](const Reached& x, const Reached& y) {
+    return x.depth != y.depth ? x.depth > y.depth : x.joint < y.joint;
+  });
+  for (const Reached& at : joints_) {
+    const FaceJoint& curve = surface.faces().joints[at.joint];
     const int a = part_of(surface, curve.face[0]), b = part_of(surface, curve.face[1]);
     if (a == b) continue;
     const int from = parts_[a].minimum, to = parts_[b].minimum;
     if (from != kNone && to != kNone) {
-      const int half_edge = saddle_side(task, joint);
+      const int half_edge = saddle_side(task, at);
       if (half_edge < 0) return false;
       ways_.push_back({minima[from].facet, minima[to].facet, half_edge});
     }
@@ -364,11 +359,9 @@ int CurvedQuery::part_of(const CurvedShell& surface, int face) {
 
 // The side that holds the closest point of a joint, from which the distance falls into both faces,
 // or -1.
-int CurvedQuery::saddle_side(const Task<Sphere>& task, int joint) {
-  if (!task.shell.curved()->faces().joints[joint].has_one_nearest(task.probe.center) ||
-      !(falls(task, joint, 0) > 0 && falls(task, joint, 1) > 0))
-    return -1;
-  for (const int h : sides_near(task, joint)) {
+int CurvedQuery::saddle_side(const Task<Sphere>& task, const Reached& at) {
+  if (!(falls(task, at.joint, 0) > 0 && falls(task, at.joint, 1) > 0)) return -1;
+  for (const int h : sides_near(task, at)) {
     const SideFoot foot = nearest_on_side(task.shell, triangle_of(h), side_of(h), task.probe);
     if (foot.t > 0 && foot.t < 1) return h;
   }
