@@ -358,12 +358,27 @@ int CurvedQuery::part_of(const CurvedShell& surface, int face) {
 }
 
 // The side that holds the closest point of a joint, from which the distance falls into both faces,
-// or -1.
+// or -1. Where a circle bulges beyond another side of a sliver, its facet has not got that point.
 int CurvedQuery::saddle_side(const Task<Sphere>& task, const Reached& at) {
   if (!(falls(task, at.joint, 0) > 0 && falls(task, at.joint, 1) > 0)) return -1;
   for (const int h : sides_near(task, at)) {
     const SideFoot foot = nearest_on_side(task.shell, triangle_of(h), side_of(h), task.probe);
-    if (foot.t > 0 && foot.t < 1) return h;
+    if (!(foot.t > 0 && foot.t < 1)) continue;
+    const auto has_it = [&](int one) {
+      const CurvedShell& surface = *task.shell.curved();
+      const FaceCell& cell = surface.face_cells()[triangle_of(one)];
+      const Primitive& shape = surface.faces().shapes[cell.face];
+      Vec3 normal;
+      shape.distance(foot.point, normal);
+      return cell.bulge[side_of(one)] == 0 ||
+             holds(task.shell, triangle_of(one),
+                   {foot.point, cell.sign * normal, foot.point,
+                    shape.has_parameters() ? shape.parameters(foot.point, task.shell.size())
+                                           : Eigen::Vector2d(0, 0)},
+                   task.probe.tolerance + surface.gap());
+    };
+    const int twin = task.shell.curved()->facets()[triangle_of(h)].owned.twin[side_of(h)];
+    return has_it(h) && has_it(twin) ? h : -1;
   }
   return -1;
 }
