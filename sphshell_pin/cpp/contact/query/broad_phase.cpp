@@ -47,7 +47,7 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones,
   faces.clear(), joints.clear(), corners.clear();
   std::vector<int>* const lists[] = {&faces, &joints, &corners};
   for (const int one : search.things.find(sphere.center, reach, room_))
-    lists[one % 3]->push_back(one / 3);
+    lists[one & 3]->push_back(one >> 2);
   const BoxTree::Found found = search.facets.find(sphere.center, reach, room_);
   overlapping.assign(found.begin(), found.end());
   find_candidates(shell, cones, search.bulge, sphere, margin, cells);

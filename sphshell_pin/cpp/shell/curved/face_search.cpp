@@ -90,7 +90,7 @@ std::vector<Region> regions_of_joints(const Shell& shell, const CurvedShell& sur
 
 void add(const std::vector<Region>& regions, FaceSearch::Kind kind, Boxes& out) {
   for (std::size_t i = 0; i < regions.size(); ++i)
-    if (!regions[i].box.isEmpty()) out.emplace_back(regions[i].box, static_cast<int>(3 * i) + kind);
+    if (!regions[i].box.isEmpty()) out.emplace_back(regions[i].box, static_cast<int>(4 * i) + kind);
 }
 
 Boxes boxes_of_things(const Shell& shell, const CurvedShell& surface, const FaceSearch& search) {
@@ -100,7 +100,7 @@ Boxes boxes_of_things(const Shell& shell, const CurvedShell& surface, const Face
   for (int h = 0; h < static_cast<int>(3 * shell.facets().size()); ++h) {
     const int f = triangle_of(h), k = side_of(h);
     if (surface.face_cells()[f].closed && surface.facets()[f].owned.vertex[k] >= 0)
-      out.emplace_back(Box(shell.facets()[f].corner[k]), 3 * h + FaceSearch::Corner);
+      out.emplace_back(Box(shell.facets()[f].corner[k]), 4 * h + FaceSearch::Corner);
   }
   return out;
 }

@@ -55,7 +55,7 @@ struct FaceSearch {
   std::vector<Region> of_face, of_joint;  // beside Faces::shapes and Faces::joints
   double slack;                           // more than rounding [m]
   // Faces and joints that are lines or circles by their numbers in Faces, and corners of faces as
-  // 3 facet + corner: each as 3 times that, plus its Kind.
+  // 3 facet + corner: each as 4 times that, plus its Kind.
   enum Kind { Face = 0, Joint = 1, Corner = 2 };
   BoxTree things;
   BoxTree facets;    // with an element, or another side
