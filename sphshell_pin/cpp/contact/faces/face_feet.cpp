@@ -30,11 +30,10 @@ void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, b
   if (!(std::abs(distance) < sphere.radius) || !(shape.radius_at(point) > 0)) return;
   const bool anywhere = shape.singular(sphere.center, kOnAxis);
   const double slack = surface.face_search()->slack;
-  facets_.clear();
-  region.parts.find(anywhere ? sphere.center : point, anywhere ? sphere.radius : slack, facets_);
   bool placed = !shape.has_parameters();
   Eigen::Vector2d place(0, 0);
-  for (const int f : facets_) {
+  for (const int f : region.parts.find(anywhere ? sphere.center : point,
+                                       anywhere ? sphere.radius : slack, room_)) {
     if (anywhere) {
       const NormalCone& cone = surface.cones()[f];
       const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
@@ -119,17 +118,17 @@ bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tol
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
   const Facet& facet = shell.facets()[f];
-  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)], d = q - p;
   if (cell.side[k] == FaceCell::Side::Inner) {
     const auto [inside, overlap] = within_line(surface.faces().shapes[cell.face], cell, facet, k,
                                                at.point, at.place, tolerance);
-    return !(inside < -overlap);
+    // The first is seldom decided late: the second takes a root.
+    return inside >= 0 || !(inside < -overlap);
   }
-  const Vec3 in = at.outward.cross(d).normalized();
-  const double inside = in.dot(at.point - p);
+  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)], d = q - p;
+  const Vec3 in = at.outward.cross(d);
+  const double inside = in.dot(at.point - p), bulge = double(cell.bulge[k]);
   // Farther from the chord than the curve bulges: the curve need not be looked at.
-  if (inside > cell.bulge[k]) return true;
-  if (inside < -double(cell.bulge[k])) return false;
+  if (inside * inside > bulge * bulge * in.squaredNorm()) return inside > 0;
   if (cell.side[k] == FaceCell::Side::Border) {
     const FaceJoint& joint = surface.faces().joints[cell.joint[k]];
     const bool crossing = joint.kind == FaceJoint::Kind::Crossing;

@@ -20,7 +20,7 @@ class FaceFeet {
                   std::vector<Minimum>& minima);
 
  private:
-  std::vector<int> facets_;             // that may hold a point
+  std::vector<int> room_;               // of facets
   std::vector<std::uint32_t> claimed_;  // beside the faces: the last round in which one claimed it
   std::uint32_t round_ = 0;
   const CurvedShell* of_ = nullptr;

@@ -44,12 +44,12 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones,
   double margin;
   if (!begin(shell, sphere, margin)) return;
   const double reach = sphere.radius + margin;
-  overlapping.clear(), faces.clear(), joints.clear(), corners.clear();
-  search.things.find(sphere.center, reach, overlapping);
+  faces.clear(), joints.clear(), corners.clear();
   std::vector<int>* const lists[] = {&faces, &joints, &corners};
-  for (const int one : overlapping) lists[one % 3]->push_back(one / 3);
-  overlapping.clear();
-  search.facets.find(sphere.center, reach, overlapping);
+  for (const int one : search.things.find(sphere.center, reach, room_))
+    lists[one & 3]->push_back(one >> 2);
+  const BoxTree::Found found = search.facets.find(sphere.center, reach, room_);
+  overlapping.assign(found.begin(), found.end());
   find_candidates(shell, cones, search.bulge, sphere, margin, cells);
 }
 

@@ -39,6 +39,7 @@ class BroadPhase {
                        const Sphere& sphere, double margin, const CellBounds* cells);
 
   bool follow_;
+  std::vector<int> room_;
   // The lists hold while the center is within margin_ of anchor_; -1: they hold nothing.
   const Shell* followed_ = nullptr;
   double followed_radius_ = 0, margin_ = -1;

@@ -74,16 +74,14 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
     }
   }
   for (const int f : borders_) add_border(task, f);
+  bool known = false;
   if constexpr (sphere)
     if (!faces.empty()) {
       for (const int joint : broad.joints) add_joint(task, joint);
       for (const int c : broad.corners) add_vertex(task, triangle_of(c), side_of(c));
+      find_rings(shell, probe, minima);
+      known = minima.size() > 1 && find_ways(task, broad);
     }
-  if constexpr (sphere)
-    if (!faces.empty() && !minima.empty()) find_rings(shell, probe, minima);
-  bool known = false;
-  if constexpr (sphere)
-    if (!faces.empty() && minima.size() > 1) known = find_ways(task, broad);
   if (minima.size() > 1)
     components_.merge(shell, probe, want_dn_dc, minima, known ? &ways_ : nullptr);
 }
@@ -273,25 +271,20 @@ void CurvedQuery::add_joint(const Task<Sphere>& task, int joint) {
   const CurvedShell& surface = *shell.curved();
   const FaceJoint& curve = surface.faces().joints[joint];
   const bool one = curve.has_one_nearest(sphere.center);
-  const Vec3 point = one ? curve.nearest(sphere.center) : sphere.center;
-  if (!sphere.reaches(point)) return;
-  joints_.push_back(joint);
+  const Reached at{joint, one, one ? curve.nearest(sphere.center) : sphere.center};
+  if (!sphere.reaches(at.point)) return;
+  joints_.push_back(at);
   // What add_edge() asks of each side, where that is the same of all.
   for (int i = 0; i < 2; ++i)
     if (falls(task, joint, i) > 0) return;
-  find_sides(task, joint);
-  for (const int h : sides_) add_edge(task, triangle_of(h), side_of(h));
+  for (const int h : sides_near(task, at)) add_edge(task, triangle_of(h), side_of(h));
 }
 
 // The sides near the closest point of a joint; about the axis of a circle, those near the sphere.
-void CurvedQuery::find_sides(const Task<Sphere>& task, int joint) {
-  const auto& [shell, sphere, want_dn_dc, minima] = task;
-  const FaceSearch& search = *shell.curved()->face_search();
-  const FaceJoint& curve = shell.curved()->faces().joints[joint];
-  const bool one = curve.has_one_nearest(sphere.center);
-  sides_.clear();
-  search.of_joint[joint].parts.find(one ? curve.nearest(sphere.center) : sphere.center,
-                                    one ? search.slack : sphere.radius, sides_);
+BoxTree::Found CurvedQuery::sides_near(const Task<Sphere>& task, const Reached& at) {
+  const FaceSearch& search = *task.shell.curved()->face_search();
+  return search.of_joint[at.joint].parts.find(at.point, at.one ? search.slack : task.probe.radius,
+                                              sides_);
 }
 
 // How far inside face i of a joint the center is, beyond the overlap; 0: not, or not the same at
@@ -306,77 +299,86 @@ double CurvedQuery::falls(const Task<Sphere>& task, int joint, int i) const {
                            task.probe.tolerance - surface.gap());
 }
 
-// Inside the sphere a face whose whole border there is one joint goes on beyond that alone. A face
-// has one minimum at most, so where the distance falls from the joint's closest point into both
-// faces, it is there that this one's is connected with the others: with that of the face beyond,
-// or, from that, with those that are connected with it higher up. Where all minima but one are on
-// such faces, or on some without a border there, this says all.
+// Kruskal's method with faces in place of cells, and their joints in the order of falling depth.
+// The joints around a part, which is of faces put together so far, are no deeper than the next one.
+// Where both parts there hold minima, and the depth grows from its closest point into both, the way
+// up leaves neither part and ends at a minimum: so they are connected there, and nowhere higher up.
+// Of a part without minima only the joints around it matter. No face need be whole or convex. All
+// whose border is not known is one part, of one minimum at most.
 bool CurvedQuery::find_ways(const Task<Sphere>& task, const BroadPhase& broad) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const CurvedShell& surface = *shell.curved();
-  const FaceSearch& search = *surface.face_search();
   ways_.clear();
   if (!shell.topology().pinches.empty() || minima.size() > kMostWays) return false;
+  parts_.assign(1, {-1, 0, kNone});
   // Faces whose border is near a facet that is looked at by itself.
-  loose_.clear();
   for (const int f : broad.overlapping) {
-    loose_.push_back(surface.face_cells()[f].face);
+    parts_.push_back({surface.face_cells()[f].face, 0, kNone});
     for (const int beyond : surface.cells()[f].beyond) {
       if (beyond < kBoundary) return false;
-      if (beyond >= 0) loose_.push_back(surface.face_cells()[triangle_of(beyond)].face);
+      if (beyond >= 0) parts_.push_back({surface.face_cells()[triangle_of(beyond)].face, 0, kNone});
     }
   }
-  const auto is_enclosed = [&](int face) {
-    return face >= 0 && search.of_face[face].enclosed &&
-           std::find(loose_.begin(), loose_.end(), face) == loose_.end();
-  };
-  const auto face_of = [&](const Minimum& at) {
-    const FaceCell& cell = surface.face_cells()[at.facet];
-    return at.contact.feature == Feature::Face && cell.closed ? cell.face : -1;
-  };
-  const auto holder = [&](int face) {
-    return std::find_if(minima.begin(), minima.end(),
-                        [&](const Minimum& at) { return face_of(at) == face; });
-  };
-  int unknown = 0;
-  for (const Minimum& at : minima) {
-    const int face = face_of(at);
-    int count = 0, joint = -1;
-    for (const int j : joints_) {
-      const FaceJoint& curve = surface.faces().joints[j];
-      if (curve.face[0] == face || curve.face[1] == face) ++count, joint = j;
+  for (std::size_t i = 0; i < minima.size(); ++i) {
+    int& minimum = parts_[part_of(surface, surface.face_cells()[minima[i].facet].face)].minimum;
+    if (minimum != kNone || minima[i].off_axis < 1) return false;
+    minimum = static_cast<int>(i);
+  }
+  for (Reached& at : joints_) {
+    if (!at.one) return false;
+    at.depth = sphere.depth(at.point);
+  }
+  std::sort(joints_.begin(), joints_.end(), [](const Reached& x, const Reached& y) {
+    return x.depth != y.depth ? x.depth > y.depth : x.joint < y.joint;
+  });
+  for (const Reached& at : joints_) {
+    const FaceJoint& curve = surface.faces().joints[at.joint];
+    const int a = part_of(surface, curve.face[0]), b = part_of(surface, curve.face[1]);
+    if (a == b) continue;
+    const int from = parts_[a].minimum, to = parts_[b].minimum;
+    if (from != kNone && to != kNone) {
+      const int half_edge = saddle_side(task, at);
+      if (half_edge < 0) return false;
+      ways_.push_back({minima[from].facet, minima[to].facet, half_edge});
     }
-    if (at.off_axis < 1) return false;
-    const bool enclosed = count < 2 && is_enclosed(face);
-    if (enclosed && count == 0) continue;
-    const int half_edge = enclosed ? saddle_side(task, joint) : -1;
-    auto other = minima.end();
-    if (half_edge >= 0) {
-      const FaceJoint& curve = surface.faces().joints[joint];
-      other = holder(curve.face[1 - curve.which(face)]);
-    }
-    if (other == minima.end()) {
-      if (++unknown > 1) return false;
-      continue;
-    }
-    const bool twice = std::any_of(ways_.begin(), ways_.end(), [&](const Way& way) {
-      return way.from == other->facet && way.to == at.facet;
-    });
-    if (!twice) ways_.push_back({at.facet, other->facet, half_edge});
+    parts_[b].in = a;
+    if (from == kNone) parts_[a].minimum = to;
   }
   return true;
 }
 
+// The part that a face is in, by its number.
+int CurvedQuery::part_of(const CurvedShell& surface, int face) {
+  if (face < 0 || !surface.face_search()->of_face[face].enclosed) face = -1;
+  std::size_t i = 0;
+  while (i < parts_.size() && parts_[i].face != face) ++i;
+  if (i == parts_.size()) parts_.push_back({face, int(i), kNone});
+  while (parts_[i].in != int(i)) i = parts_[i].in;
+  return int(i);
+}
+
 // The side that holds the closest point of a joint, from which the distance falls into both faces,
-// or -1.
-int CurvedQuery::saddle_side(const Task<Sphere>& task, int joint) {
-  if (!task.shell.curved()->faces().joints[joint].has_one_nearest(task.probe.center) ||
-      !(falls(task, joint, 0) > 0 && falls(task, joint, 1) > 0))
-    return -1;
-  find_sides(task, joint);
-  for (const int h : sides_) {
+// or -1. Where a circle bulges beyond another side of a sliver, its facet has not got that point.
+int CurvedQuery::saddle_side(const Task<Sphere>& task, const Reached& at) {
+  if (!(falls(task, at.joint, 0) > 0 && falls(task, at.joint, 1) > 0)) return -1;
+  for (const int h : sides_near(task, at)) {
     const SideFoot foot = nearest_on_side(task.shell, triangle_of(h), side_of(h), task.probe);
-    if (foot.t > 0 && foot.t < 1) return h;
+    if (!(foot.t > 0 && foot.t < 1)) continue;
+    const auto has_it = [&](int one) {
+      const CurvedShell& surface = *task.shell.curved();
+      const FaceCell& cell = surface.face_cells()[triangle_of(one)];
+      const Primitive& shape = surface.faces().shapes[cell.face];
+      Vec3 normal;
+      shape.distance(foot.point, normal);
+      return cell.bulge[side_of(one)] == 0 ||
+             holds(task.shell, triangle_of(one),
+                   {foot.point, cell.sign * normal, foot.point,
+                    shape.has_parameters() ? shape.parameters(foot.point, task.shell.size())
+                                           : Eigen::Vector2d(0, 0)},
+                   task.probe.tolerance + surface.gap());
+    };
+    const int twin = task.shell.curved()->facets()[triangle_of(h)].owned.twin[side_of(h)];
+    return has_it(h) && has_it(twin) ? h : -1;
   }
   return -1;
 }

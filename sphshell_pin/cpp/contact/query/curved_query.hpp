@@ -41,6 +41,15 @@ class CurvedQuery {
     std::vector<Minimum>& minima;
   };
 
+  // A joint within the sphere: where it is nearest to the center, if there is one such point, else
+  // the center.
+  struct Reached {
+    int joint;
+    bool one;
+    Vec3 point;
+    double depth = 0;  // once it is needed [m]
+  };
+
   // Each adds the minimum of one feature, if there is one: within a flat or a bent cell, on the
   // border of a face, on the joint of two, on a side, at a corner.
   void add_flat(const Task<Sphere>& task, const Outlook& outlook);
@@ -49,11 +58,12 @@ class CurvedQuery {
   template <class Probe>
   void add_border(const Task<Probe>& task, int facet);
   void add_joint(const Task<Sphere>& task, int joint);
-  void find_sides(const Task<Sphere>& task, int joint);
+  BoxTree::Found sides_near(const Task<Sphere>& task, const Reached& at);
   double falls(const Task<Sphere>& task, int joint, int i) const;
   // Whether ways_ are all that connect the minima.
   bool find_ways(const Task<Sphere>& task, const BroadPhase& broad);
-  int saddle_side(const Task<Sphere>& task, int joint);
+  int part_of(const CurvedShell& surface, int face);
+  int saddle_side(const Task<Sphere>& task, const Reached& at);
   template <class Probe>
   void add_edge(const Task<Probe>& task, int facet, int side);
   template <class Probe>
@@ -61,10 +71,16 @@ class CurvedQuery {
 
   std::vector<Outlook> outlooks_;
   std::vector<int> borders_;  // facets that lie on faces
-  std::vector<int> joints_;   // that the sphere reaches
-  std::vector<int> sides_;    // half-edges of one of them
-  std::vector<int> loose_;    // faces
+  std::vector<Reached> joints_;
+  std::vector<int> sides_;  // room for half-edges of one of them
   std::vector<Way> ways_;
+  // Faces that have been put together, by the part that one is in (its own number: a first one),
+  // and a minimum of those of a first one.
+  static constexpr int kNone = -1;
+  struct Part {
+    int face, in, minimum;
+  };
+  std::vector<Part> parts_;  // the first one: of all faces, and facets on none, of unknown border
   FaceFeet feet_;
   Components components_;
 };

@@ -9,27 +9,26 @@
 namespace sphshell {
 namespace {
 
-// The pseudo-normal of the feature that a contact is on: it separates outside from inside.
-struct FeatureNormal {
-  Vec3 outward;
-  bool rim;  // on the border of an open sheet: no inside there
-};
-
-// Sum of the faces' normals weighted by their angles at a vertex, of both faces at an edge
-// (Baerentzen and Aanaes, IEEE TVCG 11 (2005) 243): its sign tells inside from outside for a
-// closest point.
-FeatureNormal feature_normal(const Shell& shell, const Minimum& at) {
+// Whether a feature is on the border of an open sheet: no inside there.
+bool is_on_rim(const Shell& shell, const Minimum& at) {
+  if (at.contact.feature == Feature::Face) return false;
   const Topology& topology = shell.topology();
   const int t = shell.triangle_of_facet(at.facet);
-  if (at.contact.feature == Feature::Vertex) {
-    const int vertex = shell.triangles()[t][at.index];
-    return {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])};
-  }
-  if (at.contact.feature == Feature::Edge) {
-    const Edge& edge = topology.edge_at(3 * t + at.index);
-    return {topology.edge_normal(edge), edge.on_rim()};
-  }
-  return {at.behind ? Vec3(-at.contact.normal) : at.contact.normal, false};
+  if (at.contact.feature == Feature::Edge) return topology.edge_at(3 * t + at.index).on_rim();
+  return topology.vertex_on_rim[shell.triangles()[t][at.index]];
+}
+
+// The pseudo-normal of the feature that a contact is on: the sum of the faces' normals weighted by
+// their angles at a vertex, of both faces at an edge (Baerentzen and Aanaes, IEEE TVCG 11 (2005)
+// 243): its sign tells inside from outside for a closest point.
+Vec3 feature_normal(const Shell& shell, const Minimum& at) {
+  const Topology& topology = shell.topology();
+  const int t = shell.triangle_of_facet(at.facet);
+  if (at.contact.feature == Feature::Vertex)
+    return topology.vertex_normal[shell.triangles()[t][at.index]];
+  if (at.contact.feature == Feature::Edge)
+    return topology.edge_normal(topology.edge_at(3 * t + at.index));
+  return at.behind ? Vec3(-at.contact.normal) : at.contact.normal;
 }
 
 // Whether a feature faces what touches it. On a border there is no inside: such features face all.
@@ -37,8 +36,8 @@ template <class Probe>
 bool faces(const Shell& shell, const Probe& probe, const Minimum& at) {
   const double sign = shell.side() == Side::Outside ? 1.0 : -1.0;
   if (at.contact.feature == Feature::Face) return at.behind == (sign < 0);
-  const FeatureNormal n = feature_normal(shell, at);
-  return n.rim || sign * n.outward.dot(probe.pull(at.contact.point)) >= 0;
+  return is_on_rim(shell, at) ||
+         sign * feature_normal(shell, at).dot(probe.pull(at.contact.point)) >= 0;
 }
 
 // Of a plane the features that face it count.
@@ -73,7 +72,7 @@ void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum
   for (Minimum& at : minima)
     if (at.contact.depth == sphere.radius)
       // The center is on the surface, where its direction is undefined.
-      at.contact.normal = sign * feature_normal(shell, at).outward.normalized();
+      at.contact.normal = sign * feature_normal(shell, at).normalized();
 }
 
 // The paper's sum: every element within reach counts, at its closest point.
@@ -186,7 +185,7 @@ const std::vector<Contact>& Query::list(const Shell& shell, const Probe& probe, 
   if (shell.side() != Side::Both) keep_one_side(shell, probe, minima);
   for (const Minimum& minimum : minima) {
     Contact& contact = contacts.emplace_back(minimum.contact);
-    contact.rim = contact.feature != Feature::Face && feature_normal(shell, minimum).rim;
+    contact.rim = is_on_rim(shell, minimum);
     if constexpr (std::is_same_v<Probe, Sphere>)
       if (rings && minimum.off_axis < 1) contact = ring_of(minimum, probe);
     contact.facet = minimum.facet, contact.index = minimum.index;

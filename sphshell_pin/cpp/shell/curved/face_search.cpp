@@ -60,7 +60,7 @@ std::vector<Region> regions_of_faces(const Shell& shell, const CurvedShell& surf
   }
   std::vector<Region> out(boxes.begin(), boxes.end());
   for (std::size_t i = 0; i < out.size(); ++i)
-    for (const int f : out[i].parts.items())
+    for (const auto& [box, f] : boxes[i])
       for (int k = 0; k < 3; ++k) out[i].enclosed = out[i].enclosed && is_known(surface, f, k);
   return out;
 }
@@ -77,8 +77,8 @@ std::vector<Region> regions_of_joints(const Shell& shell, const CurvedShell& sur
     }
   std::vector<Region> out(boxes.begin(), boxes.end());
   for (std::size_t j = 0; j < out.size(); ++j) {
-    const int count = static_cast<int>(out[j].parts.items().size());
-    for (const int h : out[j].parts.items())
+    const int count = static_cast<int>(boxes[j].size());
+    for (const auto& [box, h] : boxes[j])
       for (const int one : {h, surface.facets()[triangle_of(h)].owned.twin[side_of(h)]}) {
         const FaceCell& cell = surface.face_cells()[triangle_of(one)];
         out[j].turn[joints[j].which(cell.face)] += cell.turn[side_of(one)];
@@ -90,7 +90,7 @@ std::vector<Region> regions_of_joints(const Shell& shell, const CurvedShell& sur
 
 void add(const std::vector<Region>& regions, FaceSearch::Kind kind, Boxes& out) {
   for (std::size_t i = 0; i < regions.size(); ++i)
-    if (!regions[i].box.isEmpty()) out.emplace_back(regions[i].box, static_cast<int>(3 * i) + kind);
+    if (!regions[i].box.isEmpty()) out.emplace_back(regions[i].box, static_cast<int>(4 * i) + kind);
 }
 
 Boxes boxes_of_things(const Shell& shell, const CurvedShell& surface, const FaceSearch& search) {
@@ -100,7 +100,7 @@ Boxes boxes_of_things(const Shell& shell, const CurvedShell& surface, const Face
   for (int h = 0; h < static_cast<int>(3 * shell.facets().size()); ++h) {
     const int f = triangle_of(h), k = side_of(h);
     if (surface.face_cells()[f].closed && surface.facets()[f].owned.vertex[k] >= 0)
-      out.emplace_back(Box(shell.facets()[f].corner[k]), 3 * h + FaceSearch::Corner);
+      out.emplace_back(Box(shell.facets()[f].corner[k]), 4 * h + FaceSearch::Corner);
   }
   return out;
 }
@@ -150,57 +150,57 @@ BoxTree::BoxTree(Boxes boxes) {
   if (boxes.empty()) return;
   put_in_order(boxes, 0, boxes.size());
   Box all;
-  for (const auto& [box, item] : boxes) all.extend(box), items_.push_back(item);
+  for (const auto& [box, thing] : boxes) all.extend(box);
   origin_ = all.center();
   // Rounding a box to single precision, and a center near it, each err by less than this.
   const double widen = 4e-7 * all.sizes().maxCoeff();
-  for (auto& [box, item] : boxes) box = widened(box.translate(-origin_), widen);
+  for (auto& [box, thing] : boxes) box = widened(box.translate(-origin_), widen);
   // The boxes of one level's nodes are in those of the next.
-  for (std::size_t first = 0; nodes_.empty() || boxes.size() > 1;) {
-    const bool leaf = nodes_.empty();
+  for (; nodes_.empty() || boxes.size() > 1; ++levels_) {
     const std::size_t begin = nodes_.size();
     for (std::size_t i = 0; i < boxes.size(); i += 8) {
       constexpr float kNowhere = std::numeric_limits<float>::infinity();
       Node& node = nodes_.emplace_back();
-      node.first = static_cast<int>(first + i), node.leaf = leaf;
       Box whole;
       for (std::size_t j = 0; j < 8; ++j) {
         const bool none = i + j >= boxes.size();
         if (!none) whole.extend(boxes[i + j].first);
+        node.of[j] = none ? -1 : boxes[i + j].second;
         for (int k = 0; k < 3; ++k) {
           node.low[k][j] = none ? kNowhere : static_cast<float>(boxes[i + j].first.min()[k]);
           node.high[k][j] = none ? -kNowhere : static_cast<float>(boxes[i + j].first.max()[k]);
         }
       }
-      boxes[i / 8].first = whole;
+      boxes[i / 8] = {whole, static_cast<int>(nodes_.size() - 1)};
     }
     boxes.resize(nodes_.size() - begin);
-    first = begin;
   }
 }
 
-void BoxTree::find(const Vec3& center, double radius, std::vector<int>& out) const {
-  if (nodes_.empty()) return;
+// Level by level, so that nodes do not wait for each other.
+BoxTree::Found BoxTree::find(const Vec3& center, double radius, std::vector<int>& room) const {
+  if (nodes_.empty()) return {nullptr, nullptr};
   const Eigen::Vector3f c = (center - origin_).cast<float>();
   const float reach = float(radius) * 1.000001f;
   // Nothing is infinitely far.
   const float limit = std::min(reach * reach, std::numeric_limits<float>::max());
-  int stack[8 * kMostLevels], hit[8], top = 0;
-  stack[top++] = static_cast<int>(nodes_.size()) - 1;
-  while (top > 0) {
-    const Node& node = nodes_[stack[--top]];
-    Eigen::Array<float, 8, 1> square = Eigen::Array<float, 8, 1>::Zero();
-    for (int k = 0; k < 3; ++k)
-      square += (node.low[k] - c[k]).max(c[k] - node.high[k]).max(0.0f).square();
-    int* const list = node.leaf ? hit : stack + top;
-    const int first = node.first;
-    int count = 0;
-    for (int i = 0; i < 8; ++i) list[count] = first + i, count += square[i] <= limit;
-    if (!node.leaf)
-      top += count;
-    else
-      for (int i = 0; i < count; ++i) out.push_back(items_[hit[i]]);
+  std::size_t first = 0, last = 1;
+  if (room.empty()) room.resize(64);
+  room[0] = static_cast<int>(nodes_.size()) - 1;
+  for (int level = 0; level < levels_; ++level) {
+    std::size_t end = last;
+    for (std::size_t i = first; i < last; ++i) {
+      if (room.size() < end + 8) room.resize(2 * room.size());
+      const Node& node = nodes_[room[i]];
+      Eigen::Array<float, 8, 1> square = Eigen::Array<float, 8, 1>::Zero();
+      for (int k = 0; k < 3; ++k)
+        square += (node.low[k] - c[k]).max(c[k] - node.high[k]).max(0.0f).square();
+      int* const list = room.data();
+      for (int j = 0; j < 8; ++j) list[end] = node.of[j], end += square[j] <= limit;
+    }
+    first = last, last = end;
   }
+  return {room.data() + first, room.data() + last};
 }
 
 std::size_t FaceSearch::bytes() const {
@@ -211,7 +211,7 @@ std::size_t FaceSearch::bytes() const {
 }
 
 Region::Region(const Boxes& boxes) : parts(boxes) {
-  for (const auto& [part, item] : boxes) box.extend(part);
+  for (const auto& [part, thing] : boxes) box.extend(part);
 }
 
 FaceSearch::FaceSearch(const Shell& shell, const CurvedShell& surface)
@@ -220,7 +220,8 @@ FaceSearch::FaceSearch(const Shell& shell, const CurvedShell& surface)
       slack(1e-6 * shell.size()),
       things(boxes_of_things(shell, surface, *this)),
       facets(boxes_of_facets(shell, surface)) {
-  for (const int f : facets.items()) bulge = std::max<double>(bulge, surface.facets()[f].bulge);
+  for (int f = 0; f < static_cast<int>(shell.facets().size()); ++f)
+    if (holds_more(surface, f)) bulge = std::max<double>(bulge, surface.facets()[f].bulge);
 }
 
 }  // namespace sphshell

@@ -14,22 +14,23 @@ class BoxTree {
   using Boxes = std::vector<std::pair<Eigen::AlignedBox3d, int>>;
   explicit BoxTree(Boxes boxes);
 
-  // In the order of the tree.
-  const std::vector<int>& items() const { return items_; }
-  std::size_t bytes() const { return items_.size() * sizeof(int) + nodes_.size() * sizeof(Node); }
-  // Appends those whose box meets a ball.
-  void find(const Vec3& center, double radius, std::vector<int>& out) const;
+  std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
+  // Those whose box meets a ball, in the order of the tree; in `room`, which grows where it must.
+  struct Found {
+    const int *first, *last;
+    const int* begin() const { return first; }
+    const int* end() const { return last; }
+  };
+  Found find(const Vec3& center, double radius, std::vector<int>& room) const;
 
  private:
   // Boxes relative to origin_, rounded outward; of nothing: nowhere.
-  struct Node {
+  struct alignas(64) Node {
     Eigen::Array<float, 8, 1> low[3], high[3];
-    int first;  // of eight nodes, or of eight items
-    bool leaf;
+    int of[8];  // nodes, or things
   };
-  static constexpr int kMostLevels = 11;  // 8^11 > 2^31
   Vec3 origin_ = Vec3::Zero();
-  std::vector<int> items_;
+  int levels_ = 0;
   std::vector<Node> nodes_;  // level by level, the leaves first and the root last
 };
 
@@ -54,7 +55,7 @@ struct FaceSearch {
   std::vector<Region> of_face, of_joint;  // beside Faces::shapes and Faces::joints
   double slack;                           // more than rounding [m]
   // Faces and joints that are lines or circles by their numbers in Faces, and corners of faces as
-  // 3 facet + corner: each as 3 times that, plus its Kind.
+  // 3 facet + corner: each as 4 times that, plus its Kind.
   enum Kind { Face = 0, Joint = 1, Corner = 2 };
   BoxTree things;
   BoxTree facets;    // with an element, or another side

@@ -72,14 +72,8 @@ std::array<Vec3, 4> middles_of(const Primitive& shape, const FaceCell& cell, con
   return out;
 }
 
-WithinLine within_line(const Primitive& shape, const FaceCell& cell, const Facet& facet, int k,
-                       const Vec3& point, const Eigen::Vector2d& place, double tolerance) {
-  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
-  if (!shape.has_parameters()) {
-    Vec3 n;
-    shape.distance((p + q) / 2, n);
-    return {cell.sign * n.cross(q - p).dot(point - p), tolerance * (q - p).norm()};
-  }
+WithinLine within_straight(const Primitive& shape, const FaceCell& cell, int k,
+                           const Eigen::Vector2d& place) {
   const double *a = cell.place[k], *b = cell.place[next_corner(k)];
   // At a cone's tip every angle will do: that of the other end.
   const double begin = std::isnan(a[0]) ? b[0] : a[0];

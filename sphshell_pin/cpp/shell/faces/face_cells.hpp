@@ -57,8 +57,17 @@ FaceCells make_face_cells(const Shell& shell, Faces& faces, const LargeArray<Cur
 struct WithinLine {
   double inside, overlap;
 };
-WithinLine within_line(const Primitive& shape, const FaceCell& cell, const Facet& facet, int k,
-                       const Vec3& point, const Eigen::Vector2d& place, double tolerance);
+WithinLine within_straight(const Primitive& shape, const FaceCell& cell, int k,
+                           const Eigen::Vector2d& place);
+inline WithinLine within_line(const Primitive& shape, const FaceCell& cell, const Facet& facet,
+                              int k, const Vec3& point, const Eigen::Vector2d& place,
+                              double tolerance) {
+  if (shape.has_parameters()) return within_straight(shape, cell, k, place);
+  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
+  Vec3 n;
+  shape.distance((p + q) / 2, n);
+  return {cell.sign * n.cross(q - p).dot(point - p), tolerance * (q - p).norm()};
+}
 
 // The points of a face in the middle of the sides of a facet, and of the facet: a long chord of a
 // thin tube may be on its other side.

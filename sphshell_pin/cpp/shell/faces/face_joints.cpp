@@ -232,18 +232,6 @@ std::optional<FaceJoint> mitre(const Primitive& one, const Primitive& two, const
 
 }  // namespace
 
-bool FaceJoint::has_one_nearest(const Vec3& x) const {
-  constexpr double kNearAxis = 1e-6;  // of the radius: nearer to the axis nothing has a direction
-  return kind != Kind::Crossing && axis.cross(x - point).norm() > kNearAxis * radius;
-}
-
-Vec3 FaceJoint::nearest(const Vec3& x) const {
-  const Vec3 y = x - point, along = y.dot(axis) * axis;
-  if (kind == Kind::Line) return point + along;
-  const Vec3 beside = y - along;
-  return point + radius / std::max(beside.norm(), 1e-300) * beside;
-}
-
 Intersection FaceJoint::at(const std::vector<Primitive>& shapes, const Vec3& x) const {
   if (kind == Kind::Crossing) {
     for (int i = 0; i < num_ends; ++i)

@@ -48,9 +48,17 @@ struct FaceJoint {
   int which(int of_face) const { return of_face == face[0] ? 0 : 1; }
   const Primitive& across_of(int of_face) const { return across[tangent ? 0 : which(of_face)]; }
   // Whether it is a line, or a circle on whose axis x is not.
-  bool has_one_nearest(const Vec3& x) const;
+  bool has_one_nearest(const Vec3& x) const {
+    const double near_axis = 1e-6 * radius;  // nearer to the axis nothing has a direction
+    return kind != Kind::Crossing && axis.cross(x - point).squaredNorm() > near_axis * near_axis;
+  }
   // The point of a line or circle nearest to x.
-  Vec3 nearest(const Vec3& x) const;
+  Vec3 nearest(const Vec3& x) const {
+    const Vec3 y = x - point, along = y.dot(axis) * axis;
+    if (kind == Kind::Line) return point + along;
+    const Vec3 beside = y - along;
+    return point + radius / std::max(beside.norm(), 1e-300) * beside;
+  }
   // The tangent end that is nearer to x than `most`; null: none.
   const End* end_near(const Vec3& x, double most) const;
   // Whether another crossing of the faces has its tangent ends at the same places, to `gap`, and

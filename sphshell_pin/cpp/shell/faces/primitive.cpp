@@ -114,13 +114,9 @@ bool is_sound(const Primitive& p) {
 
 // In closed form, positive outside; the normal is its gradient. 1e-300: on the axis or at the
 // center there is no direction, and the result is finite.
-double Primitive::distance(const Vec3& x, Vec3& normal) const {
-  const Vec3 y = x - point;
-  if (kind == FaceKind::Plane) {
-    normal = axis;
-    return y.dot(axis);
-  }
+double Primitive::distance_of_curved(const Vec3& x, Vec3& normal) const {
   if (kind == FaceKind::Sphere) {
+    const Vec3 y = x - point;
     const double length = y.norm();
     normal = y / std::max(length, 1e-300);
     return length - radius;
@@ -192,14 +188,7 @@ Vec3 Primitive::at(const Eigen::Vector2d& place, double size, Vec3* along) const
   return point + off * out + height * axis;
 }
 
-// Of the circle about the axis, at the height of x.
-double Primitive::radius_at(const Vec3& x) const {
-  if (kind == FaceKind::Cone) return radius + (x - point).dot(axis) * std::tan(second);
-  return kind == FaceKind::Plane ? 1 : radius;
-}
-
-bool Primitive::singular(const Vec3& x, double share) const {
-  if (kind == FaceKind::Plane) return false;
+bool Primitive::is_on_axis(const Vec3& x, double share) const {
   const AboutAxis at(*this, x);
   if (kind == FaceKind::Sphere) return at.y.norm() < share * radius;
   const double size = std::max(std::abs(radius), std::abs(at.h));

@@ -19,14 +19,21 @@ struct Primitive {
 
   // Signed distance of x [m] and its gradient, which points away from the axis (sphere: center,
   // torus: circle of centers).
-  double distance(const Vec3& x, Vec3& normal) const;
+  double distance(const Vec3& x, Vec3& normal) const {
+    if (kind != FaceKind::Plane) return distance_of_curved(x, normal);
+    normal = axis;
+    return (x - point).dot(axis);
+  }
   double distance(const Vec3& x) const {
     Vec3 normal;
     return distance(x, normal);
   }
   // Of a cone: beside a point of it, negative beyond its tip; of others the radius, which is
   // positive.
-  double radius_at(const Vec3& x) const;
+  double radius_at(const Vec3& x) const {
+    if (kind == FaceKind::Plane) return 1;
+    return kind == FaceKind::Cone ? radius + (x - point).dot(axis) * std::tan(second) : radius;
+  }
   // The point next to x where it is zero.
   Vec3 onto(const Vec3& x) const {
     Vec3 normal;
@@ -44,7 +51,13 @@ struct Primitive {
   Mat3 hessian(const Vec3& x) const;
   // Whether x is so near the axis or the center, to this share of the radius, that the gradient has
   // no direction there.
-  bool singular(const Vec3& x, double share) const;
+  bool singular(const Vec3& x, double share) const {
+    return kind != FaceKind::Plane && is_on_axis(x, share);
+  }
+
+ private:
+  double distance_of_curved(const Vec3& x, Vec3& normal) const;
+  bool is_on_axis(const Vec3& x, double share) const;
 };
 
 // How the curve goes on which two shapes are zero, at a point next to it: the derivatives of the
