@@ -78,7 +78,7 @@ def _load_cad(
             warn_caller(UnitWarning(text))
         return known[0]
     heard: list[Warning] = []
-    read: Read = run_in_child("read", arguments, file, purpose, cad, heard=heard)
+    read: Read = run_in_child(arguments, file, purpose, cad, heard=heard)
     # Unless the file was saved anew meanwhile.
     if KeptSurface.of(file, cad, (unit, number, crease_angle)) == kept:
         kept.save(read, heard)
