@@ -26,7 +26,6 @@ from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.study.compare import compare, measured, tables_of
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.robot_check.models import load_subject
-from sphshell_pin.view.live.opening import player_of
 from sphshell_pin.view.recording import render_recording
 from tests.fuzz.folders import results_corpus, unpacked
 from tests.fuzz.tables import prepare
@@ -120,11 +119,9 @@ look_in = in_folder(read_run)
 
 
 def _replay(home: Path) -> None:
-    player = player_of(home)
-    player.advance(1e-2)
-    player.seek(0.02)
-    for kind in player.series:
-        kind.values(player.now)
+    replay = Replay(home / "run.npz")
+    for row in range(len(replay.result.t)):
+        replay.result.contacts.at_row(row)
 
 
 def _taxels(home: Path) -> None:

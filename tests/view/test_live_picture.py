@@ -74,7 +74,6 @@ def test_a_trail_grows_on_its_shell_and_moves_with_it():
     player = SimpleNamespace(
         patches=None,
         time=0.0,
-        duration=None,
         scene=SimpleNamespace(
             model=model, pairs=(contact_pair(model, "ball", 0.05, plate(), "table"),)
         ),

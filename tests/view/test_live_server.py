@@ -81,7 +81,6 @@ def test_wrong_names_and_values_are_told_to_the_one_who_asked(live):
                 ("parameter", {"key": "stiffness", "value": -1.0}, "must be positive"),
                 ("show", {"part": "hat", "on": True}, "cones"),
                 ("hold", {"body": "x", "direction": [1, 0, 0], "newtons": 1.0}, "ball"),
-                ("seek", {"t": 1.0}, "finished run"),
             ):
                 client.errors.clear()
                 await client.say(kind, **fields)

@@ -52,15 +52,12 @@ class Access:
     folder named as the token.
     """
 
-    def __init__(self, host: str, address: str, framed: str | None = None) -> None:
+    def __init__(self, host: str, address: str) -> None:
         self.token = process_token()
         self.frame_token = secrets.token_urlsafe(24)
         """Token of an address that another page, such as a notebook, may show in a frame."""
         self.is_open = not ipaddress.ip_address(address.partition("%")[0]).is_loopback
         self._names = {"localhost", host.lower(), socket.gethostname().lower()} - {""}
-        # The picture that the page itself has in a frame.
-        site = re.match(r"https?://[\w.:\[\]-]+", framed or "")
-        self._framed = site[0] if site else "'none'"
 
     def check(self, request: HTTPServerRequest) -> tuple[str, str]:
         """Return the token that `request` has, and the file that it names.
@@ -111,7 +108,7 @@ class Access:
             "style-src 'self' 'unsafe-inline'",
             "img-src 'self' data: blob:",
             f"connect-src 'self' data: blob:{sockets}",
-            f"frame-src {self._framed}",
+            "frame-src 'none'",
             "base-uri 'self'",
             "form-action 'none'",
         ]

@@ -41,8 +41,8 @@ def check_speed(speed: float) -> float:
     return value
 
 
-def greeting(player: Player, picture: str | None, offer: Json) -> Json:
-    """Return what does not change while `player` runs; `picture` is the page of the scene, if any.
+def greeting(player: Player, offer: Json) -> Json:
+    """Return what does not change while `player` runs.
 
     `offer` is what there is to do with the mouse. The "session" differs from one run to the next on
     the same port.
@@ -59,11 +59,9 @@ def greeting(player: Player, picture: str | None, offer: Json) -> Json:
             for one in player.parameters
         ],
         "start": player.start,
-        "duration": player.duration,
         "planned": player.planned,
         "speeds": [SLOWEST, FASTEST],
         "window": STRIP_SECONDS,
-        "picture": picture,
         "ramp": list(RAMP),
         "pressure_ramp": list(PRESSURE_RAMP),
         "colors": {name: css(color) for name, color in _COLORS.items()},

@@ -12,7 +12,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result_parts import Patches
 from sphshell_pin.view import nodes
 from sphshell_pin.view.arrows import ArrowPool, ArrowScale, Forces, arrow_length
-from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
+from sphshell_pin.view.camera import View, choose_view
 from sphshell_pin.view.display import HIDDEN_AT_FIRST, PARTS, Display
 from sphshell_pin.view.nodes import show
 from sphshell_pin.view.patches import PatchScale
@@ -29,7 +29,6 @@ POOL = 16
 CONE_COLOR = 0x1F8A8A
 # More of the robot than in a recording: here one looks round before one looks closely.
 FAR = 18.0
-STILLS = 24  # of a finished run, to place the camera
 # Frames with contact from which the scale of the arrows is taken.
 FRAMES_TO_SCALE = 45
 # A trail is drawn in pieces of so many points; the oldest piece makes room for the newest.
@@ -44,10 +43,9 @@ class Picture:
 
     def __init__(self, player: Player, visualizer: Visualizer) -> None:
         scene = player.scene
-        q, points, normals = _seen_in(player)
-        whole = player.duration is not None
-        view = choose_view(scene, q, points, normals, player.visual_model, FAR, whole=whole)
-        view = lowered(view)
+        seen = player.contacts
+        places = seen.point_world, seen.normal_world
+        view = lowered(choose_view(scene, player.q[None], *places, player.visual_model, FAR))
         self.display = Display(scene, player.visual_model, visualizer, view=view, pool=_pool(scene))
         self.view: View = view
         self.shown = {part: part in PARTS and part not in HIDDEN_AT_FIRST for part in LIVE_PARTS}
@@ -123,11 +121,6 @@ class Picture:
             self.display.show_patches(on)
         else:
             self.display.show(part, on)  # type: ignore[arg-type]
-
-    def look(self) -> None:
-        """Place the camera again, and the background: other pages than ours may forget both."""
-        set_surroundings(self.display.visualizer)
-        look(self.display.visualizer, self.view)
 
     def magnify_arrows(self, factor: float) -> None:
         """Draw arrows `factor` times as long as by themselves."""
@@ -327,25 +320,6 @@ def lowered(view: View) -> View:
     """
     lift = np.array([0.0, 0.0, 0.05 * view.distance])
     return View(view.eye + lift + 0.08 * (view.eye - view.target), view.target + lift)
-
-
-def _seen_in(player: Player) -> tuple[Array, Array, Array]:
-    """Return configurations (n, nq), and points and normals (k, 3) of the contacts seen in them.
-
-    They are those of now, of a finished run those of all of it.
-    """
-    now, length = player.time, player.duration
-    times = [now] if length is None else player.start + np.linspace(0.0, length, STILLS)
-    found = []
-    for t in times:
-        if length is not None:
-            player.seek(float(t))
-        found.append((player.q[None], player.contacts.point_world, player.contacts.normal_world))
-    if length is not None:
-        player.seek(now)
-    q, points, normals = (np.concatenate(column) for column in zip(*found, strict=True))
-    sound = np.isfinite(points).all(axis=1)  # at the end of a run that diverged it may not be
-    return q, points[sound], normals[sound]
 
 
 def _pool(scene: Scene) -> int:

@@ -49,14 +49,12 @@ class Server:
     """Serves the page and one websocket per browser at `url`, until `stop`.
 
     What changed it takes from `window` and `panel`, in its thread. Events of all browsers are
-    gathered by `events`. `framed` is the address of a picture that the page has in a frame.
+    gathered by `events`.
 
     Raises MissingExtra without meshcat, SphshellError where the port is taken.
     """
 
-    def __init__(
-        self, window: LiveWindow, panel: Panel, host: str, port: int, framed: str | None
-    ) -> None:
+    def __init__(self, window: LiveWindow, panel: Panel, host: str, port: int) -> None:
         viewer = viewer_script()
         try:
             import tornado.netutil
@@ -88,7 +86,7 @@ class Server:
             ) from fault
         address, self.port = sockets[0].getsockname()[:2]
         self.host = host
-        self.access = Access(host, address, framed)
+        self.access = Access(host, address)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(
             target=self._serve, args=(sockets, viewer), daemon=True, name="live-page"

@@ -25,10 +25,6 @@ on("hello", (data) => {
   document.title = data.title;
   element("title").textContent = data.title;
   element("title").title = data.title;
-  if (data.picture) {
-    document.body.classList.add("framed");
-    element("legend").hidden = true;
-  }
 });
 
 on("state", (data) => {
