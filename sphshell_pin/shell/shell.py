@@ -391,7 +391,4 @@ class Shell(Queries):
             Fact("size", float(self.size), "m"),
             Fact("side", self.side),
             *([Fact("faces", len(self.faces))] if "faces" in vars(self) else []),
-            Fact("smooth patches", self.num_patches, brief=False),
-            Fact("file", self.source or "none", brief=False),
-            Fact("to look at", "; ".join(self.health.problems) or "nothing", brief=False),
         ]

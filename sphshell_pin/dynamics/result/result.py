@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_finite, read_only
-from sphshell_pin.base.summary import Detail, Fact, Summarized
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.result import result_columns, result_parts
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene.joint_components import moving_joints
@@ -85,28 +85,14 @@ class Result(Summarized):
 
     def _facts(self) -> list[Fact]:
         pairs = self.stats.pairs.values()
-        facts = [
+        return [
             Fact("simulated", self.stats.duration, "s"),
             Fact("rows", len(self.t)),
             Fact("contact pairs", len(self.pairs)),
             Fact("touches", sum(one.touches for one in pairs), one="touch"),
             Fact("peak force", max((one.peak_force for one in pairs), default=0.0), "N"),
             Fact("energy residual", float(self.energy.residual[-1]) if len(self.t) else 0.0, "J"),
-            Fact("energy exchanged", self.energy.exchanged, "J", brief=False),
-            Fact("logged contacts", len(self.contacts), brief=False),
-            Fact("events", len(self.events), brief=False),
-            Fact("integrator", self.stats.integrator, brief=False),
-            Fact("steps", self.stats.steps, brief=False),
-            Fact("wall time", self.stats.wall_time, "s", brief=False),
         ]
-        if self.sensors:
-            facts.append(Fact("sensors", ", ".join(self.sensors), brief=False))
-        if self.origin is not None:
-            facts.append(Fact("scenario", self.origin.scenario, brief=False))
-        return facts
-
-    def _rows(self) -> Detail | None:
-        return self.stats._rows() if len(self.pairs) else None
 
     @property
     def sensitivities(self) -> Sensitivities | None:

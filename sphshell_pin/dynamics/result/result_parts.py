@@ -148,13 +148,6 @@ class ContactLog(SceneContacts):
     t: Array
     row: Longs
 
-    def _facts(self) -> list[Fact]:
-        rows = len(np.unique(self.row))
-        return [*super()._facts(), Fact("recorded rows with contact", rows, brief=False)]
-
-    def _rows(self) -> None:
-        return None  # its entries are those of many moments
-
     def select(self, chosen: slice | Longs | Mask) -> Self:
         """Return the entries that `chosen`, a slice, mask or indices, picks."""
         columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -208,15 +201,10 @@ class EnergyAudit(Summarized):
     control_work: Array
 
     def _facts(self) -> list[Fact]:
-        parts = [
-            Fact(f"{f.name.replace('_', ' ')} at the end", _last(getattr(self, f.name)), "J", False)
-            for f in fields(self)
-        ]
         return [
             Fact("rows", len(self.kinetic)),
             Fact("exchanged", self.exchanged, "J"),
             Fact("residual at the end", _last(self.residual), "J"),
-            *parts,
         ]
 
     @property
