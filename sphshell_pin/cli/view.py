@@ -36,8 +36,7 @@ def view(
     host : Address to serve the page at; 0.0.0.0 lets other machines in.
     port : Port of the page; 0 takes any that is free.
     open_ : Open the page in the web browser.
-    color : Colors of the shells: surface, patches, faces (by kind), or distance (of curved elements
-        from the flat ones).
+    color : Colors of the shells: surface, or faces (by kind).
     """
     from sphshell_pin.view import preview
     from sphshell_pin.view.live.opening import result_file
@@ -95,14 +94,14 @@ def render(
     from_: float | None = None,
     to: float | None = None,
     size: str = "1280x720",
-    fps: float | None = None,
+    fps: float = 30.0,
     speed: float | None = None,
     camera: str = "fit",
     chart: bool = True,
     dark: bool = False,
     of: common.OfOption = None,
 ) -> None:
-    """Draw a finished run: one picture, a film, or a folder of pictures for slides.
+    """Draw a finished run: one picture or a film.
 
     It needs the extra video, and Chromium.
 
@@ -110,12 +109,12 @@ def render(
 
     Options
     -------
-    out : A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures.
+    out : A .png (one picture) or .mp4 (a film).
     time : Of a picture: time of the run [s]; by default its end.
     from_ : Of a film: time at which it begins [s].
     to : Of a film: time at which it ends [s].
     size : Width and height in pixels.
-    fps : Pictures per second; by default 30, of a .gif 20.
+    fps : Pictures per second of a film.
     speed : Simulated seconds per second; by default as the scenario has it.
     camera : From where: fit, front, side, top, follow, contact.
     chart : Forces and depth under the scene.

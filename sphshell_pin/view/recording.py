@@ -30,7 +30,7 @@ from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
 from sphshell_pin.view.robot import has_links
-from sphshell_pin.view.surface import RAMP, Coloring, check_coloring
+from sphshell_pin.view.surface import Coloring, check_coloring
 
 BARE = (
     "The robot is drawn by its joints, as the scene's model has no geometry: "
@@ -90,11 +90,10 @@ def render_recording(
     frames are kept per second of the page, `speed` seconds of simulated time pass in one second of
     it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
     two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
-    `color` is what the colors of the shells show: nothing ("surface"), the patches ("patches"),
-    how far curved elements are from the flat ones ("distance"), or the kinds of their faces
-    ("faces"). Of a `span` from and to a time
-    of the run [s] the scene has that part alone, in one frame where both are the same. With `whole`
-    the camera takes in all of the robot, else the surroundings of the contacts.
+    `color` is what the colors of the shells show: nothing ("surface") or the kinds of their faces
+    ("faces"). Of a `span` from and to a time of the run [s] the scene has that part alone, in one
+    frame where both are the same. With `whole` the camera takes in all of the robot, else the
+    surroundings of the contacts.
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
     positive, more than MOST_FRAMES frames, another `color`, or a geometry model that does not fit,
@@ -140,7 +139,7 @@ def render_recording(
         pool=min(most, MOST_ARROWS),
     )
     if color != "surface":
-        display.show(color, True)
+        display.show("faces", True)
     if shown.patches is not None:
         display.patch_scale = PatchScale.of(shown.patches, view.distance)
     for frame, row in enumerate(rows):
@@ -372,10 +371,8 @@ def _legend(
 
 def _color_keys(display: Display, shown: ContactRows) -> list[tuple[str, str]]:
     """Return the legend of the colors of shells and patches, and of the grid."""
-    keys: list[tuple[tuple[str, ...], str]] = []
-    if display.coloring is not None:
-        keys.append((RAMP, display.coloring))
+    found = []
     if shown.patches is not None and len(shown.row):
-        keys.append((PRESSURE_RAMP, str(display.patch_scale)))
-    found = [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
+        ramp = f"linear-gradient(90deg, {', '.join(PRESSURE_RAMP)})"
+        found.append((ramp, str(display.patch_scale)))
     return [*found, *display.face_keys, (css(GRID_COLOR), str(display.grid))]

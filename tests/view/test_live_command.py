@@ -71,7 +71,7 @@ def test_faults_are_one_sentence(tmp_path, finished):
             (["no_such"], "fingertip_on_blade"),
             ([tmp_path / "no.npz"], "no.npz"),
             ([scenario, "--speed", "0"], "must be from 0.01 to 10"),
-            ([scenario, "--color", "red"], "surface, patches, distance"),
+            ([scenario, "--color", "red"], "surface, faces"),
             ([scenario, "--port", "70000"], "65535"),
             ([scenario, "--port", live.server.port], "another port"),
             ([scenario, "--scenario", "gear_contact"], "only a finished run"),

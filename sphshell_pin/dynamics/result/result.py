@@ -285,7 +285,7 @@ class Result(Summarized):
         visual_model: pin.GeometryModel | None = None,
         **options: Unpack[FilmOptions],
     ) -> Path:
-        """Draw this result as a picture (.png), a film (.gif, .mp4) or a folder of pictures.
+        """Draw this result as a picture (.png) or a film (.mp4).
 
         `scene` and `visual_model` are as in `view`; the options are those of
         `sphshell_pin.view.film.render_film`, among them `time` of a picture and `span` of a film

@@ -382,7 +382,6 @@ class Live:
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
-            "coloring": self.picture.display.coloring,
             "pressure": self.picture.pressure,
             "grid": self.picture.display.grid,
             **self._interaction.state(),

@@ -54,9 +54,8 @@ def preview(
     open
         Open the page in the web browser, where there is a screen.
     color
-        What the colors of the shells show: nothing ("surface"), the patches ("patches"), how far
-        curved elements are from the flat ones ("distance"), or the kinds of their faces ("faces").
-        The page can change it.
+        What the colors of the shells show: nothing ("surface") or the kinds of their faces
+        ("faces"). The page can change it.
     told
         Called with the page's address, which ends with a token and gives access.
 

@@ -18,7 +18,6 @@ from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR
 from sphshell_pin.view.live.picture import CONE_COLOR
 from sphshell_pin.view.nodes import Json, css
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
-from sphshell_pin.view.surface import RAMP
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import ContactPair, SceneContacts
@@ -62,7 +61,6 @@ def greeting(player: Player, offer: Json) -> Json:
         "planned": player.planned,
         "speeds": [SLOWEST, FASTEST],
         "window": STRIP_SECONDS,
-        "ramp": list(RAMP),
         "pressure_ramp": list(PRESSURE_RAMP),
         "colors": {name: css(color) for name, color in _COLORS.items()},
         **offer,

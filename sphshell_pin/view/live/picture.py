@@ -304,8 +304,6 @@ def _empty_parts(scene: Scene) -> frozenset[str]:
     """Return the parts that show nothing of `scene`."""
     shells = [(one.shell, one.is_smooth) for pair in scene.pairs for one in pair.shells]
     has = {
-        "patches": any(np.ptp(shell.element_patch) for shell, _ in shells),
-        "distance": any(smooth for _, smooth in shells),
         "curved": any(is_curved(shell, smooth) for shell, smooth in shells),
         "faces": any(shell.element_face is None for shell, _ in shells),
         "pressure": bool(scene.pairs),

@@ -6,9 +6,9 @@ import { element, number, Slider } from "./controls.js";
 
 const PARTS = {
   robot: "Robot", spheres: "Spheres", arrows: "Force arrows", points: "Contact points",
-  trails: "Trails", cones: "Friction cones", wireframe: "Wireframe", patches: "Patch colors",
+  trails: "Trails", cones: "Friction cones", wireframe: "Wireframe",
   curved: "Curved surface", frames: "Axes of frames", grid: "Grid",
-  distance: "Curved-flat distance", faces: "Face colors", pressure: "Pressure patches",
+  faces: "Face colors", pressure: "Pressure patches",
 };
 const boxes = new Map();
 let arrows = null, picture = null;
