@@ -79,7 +79,6 @@ def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
     np.testing.assert_array_equal(series.normal, [0, 5, 0])
     np.testing.assert_array_equal(series.friction, [0, 0, 0])
     np.testing.assert_array_equal(series.depth, [0, 2e-3, 0])
-    np.testing.assert_array_equal(series.count, [0, 2, 0])
 
 
 def test_a_run_without_contact_is_told_in_words(tmp_path):

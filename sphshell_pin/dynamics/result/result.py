@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack, get_args
@@ -97,8 +97,7 @@ class Result(Summarized):
     @property
     def sensitivities(self) -> Sensitivities | None:
         """How the rows change with parameters and the start; None where this was not asked for."""
-        rows = self.sensitivity_rows
-        return None if rows is None else replace(rows, result=self)
+        return self.sensitivity_rows
 
     @classmethod
     def _from_record(

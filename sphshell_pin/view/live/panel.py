@@ -15,7 +15,6 @@ from sphshell_pin.base.checks import check_finite
 from sphshell_pin.base.texts import plain
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR
-from sphshell_pin.view.live.picture import CONE_COLOR
 from sphshell_pin.view.nodes import Json, css
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 
@@ -29,7 +28,7 @@ SLOWEST, FASTEST = 0.01, 10.0  # speeds that the page offers
 STRIP_SECONDS = 6.0  # of the clock on the wall, that the strip shows at the speed of now
 
 _PARAMETER = ("key", "label", "unit", "low", "high", "log", "value")
-_COLORS = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR, "cone": CONE_COLOR}
+_COLORS = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR}
 
 
 def check_speed(speed: float) -> float:

@@ -37,7 +37,6 @@ on("state", (data) => {
     ? "energy residual" : `residual, ${number(data.relative, 2)} of exchanged`;
   element("scale").textContent = data.scale;
   element("cut").hidden = !data.cut;
-  element("cone-key").hidden = !data.show.cones;
   element("axes").hidden = !data.show.frames;
   for (const name of ["pressure", "grid"]) {
     element(name).hidden = !data[name];

@@ -6,7 +6,7 @@ import { element, number, Slider } from "./controls.js";
 
 const PARTS = {
   robot: "Robot", spheres: "Spheres", arrows: "Force arrows", points: "Contact points",
-  trails: "Trails", cones: "Friction cones", wireframe: "Wireframe",
+  trails: "Trails", wireframe: "Wireframe",
   curved: "Curved surface", frames: "Axes of frames", grid: "Grid",
   faces: "Face colors", pressure: "Pressure patches",
 };
