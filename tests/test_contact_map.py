@@ -137,7 +137,7 @@ def test_what_cannot_be_drawn_is_reported():
     scene, result = stand_ins.ball_on_plate()
     with pytest.raises(ResultError, match="no scene"):
         plot_contact_map(result)
-    with pytest.raises(NameNotFound, match="overview, force, energy, path, map"):
+    with pytest.raises(NameNotFound, match="overview, force, energy, map"):
         plot_result(result, "forces")
     empty, scene = on(grid(), [])
     assert "No contact in this run." in texts(plot_contact_map(empty, scene))

@@ -51,7 +51,7 @@ def plot_contact_map(result: Result, scene: Scene | None = None) -> Figure:
     ResultError without a scene, MissingExtra without matplotlib.
     """
     scene = scene_of(result, scene)
-    groups = [group for group in on_shell.group_paths(result, scene) if group.shell is not None]
+    groups = on_shell.group_paths(result, scene)
     views = [view for group in groups for view in _views(result, group)][:MOST_VIEWS]
     if not views:
         reason = "No shell was touched." if len(result.contacts.t) else NO_CONTACT
@@ -114,7 +114,6 @@ def _caution(result: Result, groups: list[on_shell.PathGroup]) -> str:
 def _views(result: Result, group: on_shell.PathGroup) -> list[_View]:
     """Return the pictures of one shell: one, or two if it is touched from opposite sides."""
     shell = group.shell
-    assert shell is not None
     values = element_impulses(result, [path.pair for path in group.paths], len(shell.elements))
     normals = np.concatenate([path.normals for path in group.paths])
     force = np.concatenate([path.force for path in group.paths])

@@ -12,7 +12,7 @@ from sphshell_pin.dynamics.result.result_parts import Patches
 from sphshell_pin.dynamics.scene.sides import PlaneSide
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import nodes
-from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, pushing
+from sphshell_pin.view.arrows import ArrowPool, ArrowScale, pushing
 from sphshell_pin.view.bodies import (
     DrawnPlane,
     DrawnShell,
@@ -66,9 +66,8 @@ class Display:
     `visual_model` is any geometry model of `scene.model`, visual or collision; without one the
     joints are drawn as a skeleton. `visualizer` is an existing `meshcat.Visualizer`; without one
     a page is served as `meshcat.Visualizer()` does. `view` places the camera and sets the sizes of
-    arrows and points; without one it is chosen for the neutral configuration. `arrows` shows
-    normal and friction force apart ("components") or their sum ("total"); at most `pool` contacts
-    at a time. `arrow_scale` and `patch_scale` may be set at any time.
+    arrows and points; without one it is chosen for the neutral configuration. At most
+    `pool` contacts have arrows at a time. `arrow_scale` and `patch_scale` may be set at any time.
 
     Raises MissingExtra without meshcat, InvalidParameter for a geometry model that does not fit.
     """
@@ -80,12 +79,9 @@ class Display:
         visualizer: Visualizer | None = None,
         *,
         view: View | None = None,
-        arrows: ArrowKind = "components",
         arrow_scale: ArrowScale | None = None,
         pool: int = 8,
     ) -> None:
-        if arrows not in ("components", "total"):
-            raise InvalidParameter("arrows", arrows, 'must be "components" or "total"')
         self.scene = scene
         self.visualizer = nodes.new_visualizer() if visualizer is None else visualizer
         self._model = scene.model
@@ -107,9 +103,7 @@ class Display:
         self._pool = pool
         self._patches: PatchPool | None = None  # until there are some
         self._patches_on = True
-        self._arrows = ArrowPool(
-            self.visualizer["contacts"], pool, 0.0026 * self.view.distance, arrows
-        )
+        self._arrows = ArrowPool(self.visualizer["contacts"], pool, 0.0026 * self.view.distance)
         set_surroundings(self.visualizer)
         look(self.visualizer, self.view)
         self.update(neutral)

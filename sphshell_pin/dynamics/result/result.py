@@ -237,10 +237,9 @@ class Result(Summarized):
         """Return a figure, which a notebook shows.
 
         `kind` is "overview" (forces, depth and energy over time), "force" (force and depth of each
-        pair), "energy" (the audit), "sensors" (their readings), "path" (of the contacts on their
-        shells) or "map" (the impulse that each element took). The last two need a scene: `scene`,
-        or the one that ran, or that of the scenario the result came from; without any, the path is
-        drawn in the world.
+        pair), "energy" (the audit), "sensors" (their readings) or "map" (the path on the shells,
+        and the impulse that each element took). The map needs a scene: `scene`, or the one that
+        ran, or that of the scenario the result came from.
 
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
         there is no scene for the map or it cannot be built again.

@@ -38,7 +38,7 @@ RESULTS = (
     SUMMARY,
     "force_and_depth.png",
     "energy.png",
-    "contact_path.png",
+    "contact_path.png",  # of earlier versions
     "contact_map.png",
     "sensors.png",
     RECORDING,

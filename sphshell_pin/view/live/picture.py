@@ -53,7 +53,7 @@ class Picture:
         self._scale = _Scale(scene, view)
         self._trails = _Trails(self.display)
         width = 0.0026 * view.distance
-        self._push = ArrowPool(visualizer["push"], 1, width, "total")
+        self._push = ArrowPool(visualizer["push"], 1, width, total=True)
         self._drag: DragLine | None = None  # until something is dragged
         self.cut = False
         """Whether a force is larger than its arrow: no arrow is longer than the longest."""
