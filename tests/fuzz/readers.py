@@ -46,8 +46,8 @@ def read_result(path: Path) -> None:
     if (by := result.sensitivities) is not None:
         assert by.q.shape == (*result.v.shape, len(by.parameters))
     assert result.energy.exchanged >= 0.0 or np.isnan(result.energy.exchanged)
-    replay = Replay(result)
-    replay.advance(1e-2)
+    Replay(result)
+    result.contacts.at_row(0)
 
 
 def read_scenario(path: Path) -> None:
@@ -139,10 +139,10 @@ def _compare(home: Path) -> None:
     (home / "whole.npz").write_bytes(unpacked(results_corpus()[0])["run.npz"])
     runs = [measured(name, *with_scene(home / name)) for name in ("run.npz", "whole.npz")]
     for pair in (runs, runs[::-1]):
-        comparison = compare(pair)
-        for table in tables_of(comparison).values():
+        differences = compare(pair)
+        for table in tables_of(differences).values():
             csv_text(table)
-    plot_compare(comparison)
+        plot_compare(pair, differences)
 
 
 def _save(home: Path) -> None:
@@ -168,6 +168,6 @@ def _plot(kind: str) -> Callable[[Path], None]:
 
 LOOKS = (
     *(_replay, _mcap, _export("csv"), _export("parquet"), _compare, _recording, _taxels),
-    *(_save, *map(_plot, ("overview", "force", "energy", "sensors", "path", "map"))),
+    *(_save, *map(_plot, ("overview", "force", "energy", "sensors", "map"))),
 )
 """Everything that shows or exports the results in a folder."""

@@ -133,11 +133,6 @@ class Live:
         finally:
             self.stop()
 
-    def _repr_html_(self) -> str:
-        """Show the page in a notebook's cell."""
-        address = self.server.frame_url
-        return f'<iframe src="{address}" style="width: 100%; height: 720px; border: 0"></iframe>'
-
     def __enter__(self) -> Live:
         return self.start()
 
