@@ -16,7 +16,7 @@ import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report.contents import times_table
 from sphshell_pin.study.report.machine import machine
-from sphshell_pin.study.report.steps import panda, start_of, with_sheet
+from sphshell_pin.study.report.steps import START, panda, with_sheet
 from sphshell_pin.study.report.surfaces import wavy_sheet
 from sphshell_pin.study.report.timing import one_core, take_turns
 from sphshell_pin.testing.differences import names_of
@@ -59,7 +59,7 @@ def main() -> None:
     one_core()
     print(machine())
     free, touching = panda(), with_sheet(panda(), sp.Shell(*wavy_sheet(316, 1.0)), 5e-4)
-    model, q = free.model, start_of(free)
+    model, q = free.model, START
     v = 0.1 * np.ones(model.nv)
     if len(touching.contacts(q, v)) != 1:
         raise SystemExit("the fingertip does not touch")

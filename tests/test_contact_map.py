@@ -7,7 +7,7 @@ import sphshell_pin as sp
 from sphshell_pin.dynamics.result.run_stats import PairFigures, RunStats
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.plot import plot_contact_map, plot_result
-from sphshell_pin.plot.contact_map import element_values
+from sphshell_pin.plot.contact_map import element_impulses
 from sphshell_pin.plot.on_shell import eye_direction
 from tests.test_plot import texts
 from tests.view import stand_ins
@@ -56,15 +56,13 @@ ROWS = [
 def test_elements_take_force_over_time():
     result, _ = on(grid(), ROWS, ("tip", "toe"))
     # The rows at 0, 1, 3, 4 s stand for 0.5, 1.5, 1.5, 0.5 s: the trapezoidal rule.
-    impulse = element_values(result, [0, 1], 16, "impulse")
+    impulse = element_impulses(result, [0, 1], 16)
     assert impulse[5] == pytest.approx(0.5 * 2 + 1.5 * 5)
     assert impulse[6] == pytest.approx(1.5 * 8 + 0.5 * 9)
     assert np.count_nonzero(impulse) == 2
     force = np.array([2.0, 5.0, 8.0, 9.0])
     assert impulse.sum() == pytest.approx(np.trapezoid(force, result.t))
-    np.testing.assert_allclose(element_values(result, [0, 1], 16, "time")[[5, 6]], [2.0, 2.0])
-    np.testing.assert_allclose(element_values(result, [0, 1], 16, "peak")[[5, 6]], [4.0, 9.0])
-    np.testing.assert_allclose(element_values(result, [1], 16, "impulse")[[5, 6]], [0, 12.0])
+    np.testing.assert_allclose(element_impulses(result, [1], 16)[[5, 6]], [0, 12.0])
 
 
 def test_the_touched_elements_are_colored_where_they_are():
@@ -139,9 +137,7 @@ def test_what_cannot_be_drawn_is_reported():
     scene, result = stand_ins.ball_on_plate()
     with pytest.raises(ResultError, match="no scene"):
         plot_contact_map(result)
-    with pytest.raises(NameNotFound, match="impulse"):
-        plot_contact_map(result, scene, "heat")
-    with pytest.raises(NameNotFound, match="overview, force, energy, path, map"):
+    with pytest.raises(NameNotFound, match="overview, force, energy, map"):
         plot_result(result, "forces")
     empty, scene = on(grid(), [])
     assert "No contact in this run." in texts(plot_contact_map(empty, scene))
@@ -152,18 +148,16 @@ def test_what_cannot_be_drawn_is_reported():
     [
         # What the rows of ball_on_plate hold, about: 31 rows of 0.05 s with 5 N.
         ({"contact_time": 1.55, "mean_force": 5.0, "peak_force": 6.0}, ""),
-        ({"contact_time": 3.1, "mean_force": 5.0, "peak_force": 6.0}, "hold 50% of it"),
+        ({"contact_time": 3.1, "mean_force": 5.0, "peak_force": 6.0}, "hold 51% of it"),
     ],
 )
 def test_what_passed_between_the_rows_is_reported(figures, said):
     scene, result = stand_ins.ball_on_plate()
     rest = dict.fromkeys(("impulse", "peak_force_time", "max_depth", "max_depth_time"), 0.0)
     result.stats = RunStats(pairs={"ball": PairFigures(**figures, **rest, touches=1)})
-    for quantity in ("impulse", "time"):
-        title = plot_contact_map(result, scene, quantity)._suptitle.get_text()
-        assert ("record more often" in title) == bool(said)
-        if quantity == "time":
-            assert said in title
+    title = plot_contact_map(result, scene)._suptitle.get_text()
+    assert ("record more often" in title) == bool(said)
+    assert said in title
 
 
 def test_of_a_large_shell_the_part_that_was_touched_is_shown():

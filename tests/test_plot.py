@@ -45,7 +45,6 @@ def test_the_figures_are_written_and_not_blank(tmp_path):
     assert [path.name for path in paths] == [
         "force_and_depth.png",
         "energy.png",
-        "contact_path.png",
         "contact_map.png",
     ]
     for path in paths:
@@ -59,10 +58,9 @@ def test_axes_carry_their_units():
     assert {"force [N]", "largest depth [mm]", "time [s]"} <= labels(
         plot.plot_force_and_depth(result)
     )
-    assert {"x of the shell [m]", "y of the shell [m]", "normal force [N]"} <= labels(
-        plot.plot_contact_path(result, scene)
+    assert {"x of the shell [m]", "y of the shell [m]"} <= labels(
+        plot.plot_contact_map(result, scene)
     )
-    assert {"x of the world [mm]", "z of the world [mm]"} <= labels(plot.plot_contact_path(result))
     energetic = a_result(
         [0, 1], np.zeros((2, 8)), kinetic=np.array([0, 2e-3]), residual=np.array([0, 3e-9])
     )
@@ -79,30 +77,13 @@ def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
     np.testing.assert_array_equal(series.normal, [0, 5, 0])
     np.testing.assert_array_equal(series.friction, [0, 0, 0])
     np.testing.assert_array_equal(series.depth, [0, 2e-3, 0])
-    np.testing.assert_array_equal(series.count, [0, 2, 0])
 
 
 def test_a_run_without_contact_is_told_in_words(tmp_path):
     result = without_contact()
-    for figure in (
-        plot.plot_force_and_depth(result),
-        plot.plot_contact_path(result),
-        plot.plot_result(result),
-    ):
+    for figure in (plot.plot_force_and_depth(result), plot.plot_result(result)):
         assert NO_CONTACT in texts(figure)
-    assert len(plot.save_figures(result, tmp_path)) == 3
-
-
-def test_the_path_on_a_wall_is_seen_from_the_side_of_its_normal():
-    model = ball_model()
-    scene = a_scene(model, contact_pair(model, "ball", 0.05, plate()))
-    q = np.tile(ball_configuration(np.zeros(3)), (3, 1))
-    rows = [
-        {"row": k, "point_world": [0, 0.1 * k, 0.2], "normal_world": [-1.0, 0, 0]} for k in range(3)
-    ]
-    axis = plot.plot_contact_path(a_result([0, 1, 2], q, rows), scene).axes[0]
-    elevation, azimuth = np.deg2rad([axis.elev, axis.azim])
-    assert np.cos(elevation) * np.cos(azimuth) < -0.8
+    assert len(plot.save_figures(result, tmp_path)) == 2
 
 
 def test_every_shell_has_its_own_picture_and_every_pair_its_name():
@@ -118,10 +99,10 @@ def test_every_shell_has_its_own_picture_and_every_pair_its_name():
         for k in range(6)
     ]
     q = np.tile(ball_configuration(np.zeros(3)), (5, 1))
-    figure = plot.plot_contact_path(a_result(np.arange(5), q, rows, names), a_scene(model, *pairs))
+    figure = plot.plot_contact_map(a_result(np.arange(5), q, rows, names), a_scene(model, *pairs))
     written = " ".join(texts(figure))
     assert all(name in written for name in names)
-    assert all(f"on plate {k}" in written for k in range(3))
+    assert all(f"plate {k}" in written for k in range(3))
 
 
 def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
@@ -132,11 +113,11 @@ def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
     ]
     names = [f"pair {k}" for k in range(count)]
     result = a_result([0, 1], np.zeros((2, 8)), rows, names)
-    for kind in ("overview", "force", "path"):
+    for kind in ("overview", "force"):
         written = " ".join(texts(plot.plot_result(result, kind)))
         assert "pair 0" not in written
         assert f"pair {count - 1}" in written
-        assert ("3 pairs with smaller forces left out" in written) == (kind != "path")
+        assert "3 pairs with smaller forces left out" in written
 
 
 def test_a_long_run_keeps_its_one_row_peak():

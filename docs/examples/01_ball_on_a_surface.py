@@ -22,7 +22,7 @@ result = sp.Simulation(scene, sp.Adaptive()).run(q0, duration=1.5, record_dt=2e-
 scene
 
 # %% [markdown]
-# What happened, in numbers. A notebook shows the last value of a cell as a table.
+# What happened, in numbers. A notebook shows the last value of a cell.
 
 # %%
 figures = result.stats.pairs["ball-bowl"]

@@ -54,7 +54,6 @@ def blocks_of(data: Data) -> dict[str, str]:
         "integrators_costs": lambda rows: pivot(rows, row=(0,), column=1, value=3),
         "steps": lambda rows: [[row[0], row[1], row[4]] for row in rows],
     }
-    shown["steps_components"] = shown["steps"]
     for name in shown.keys() & tables.keys():
         tables[name] = markdown(shown[name](cells_of(tables[name])))
     return tables | {

@@ -21,8 +21,8 @@ MOST_ROWS = 24
 def compare(runs: list[Path], *, out: Path = Path("results/compare"), picture: bool = True) -> None:
     """Lay finished runs over each other: figures and curves, with their differences from the first.
 
-    Contacts, joints and sensors are matched by name. Curves are compared within the time that both
-    runs have, as lines between their recorded rows. Printed is what differs; the tables have all.
+    Contacts and joints are matched by name. Curves are compared within the time that both runs
+    have, as lines between their recorded rows. Printed is what differs; the tables have all.
 
     Example: sphshell-pin compare results/soft results/stiff
 
@@ -40,18 +40,17 @@ def compare(runs: list[Path], *, out: Path = Path("results/compare"), picture: b
     from sphshell_pin.study.compare import measured, tables_of
 
     labels = labels_of(runs)
-    comparison = compare_runs(
-        [measured(label, *with_scene(run)) for label, run in zip(labels, runs, strict=True)]
-    )
+    taken = [measured(label, *with_scene(run)) for label, run in zip(labels, runs, strict=True)]
+    differences = compare_runs(taken)
     files = {
-        f"{name}.csv": csv_text(table).encode() for name, table in tables_of(comparison).items()
+        f"{name}.csv": csv_text(table).encode() for name, table in tables_of(differences).items()
     }
     if picture:
         with common.if_installed():
-            files["compare.png"] = png(plot_compare(comparison))
+            files["compare.png"] = png(plot_compare(taken, differences))
     written = write_folder(out, files, ("figures.csv", "curves.csv", "compare.png"))
-    for other in comparison.others:
-        _print(comparison.runs[0].label, other)
+    for other in differences:
+        _print(labels[0], other)
     common.say(f"files in {out}: {', '.join(path.name for path in written)}")
 
 
@@ -91,8 +90,8 @@ def _print(first: str, other: Difference) -> None:
             f"{one.rms:.3g} {one.unit}",
             "-" if math.isnan(one.of_range) else f"{100 * one.of_range:.3g} %",
         )
-        for one in other.curves
-        if one.values.any()
+        for one in sorted(other.curves, key=lambda one: -one.of_range)
+        if one.largest
     ]
     titles = ("curve", "largest difference", "at", "rms", "of its range")
     common.print_table(titles, curves[:MOST_ROWS])
@@ -102,11 +101,10 @@ def _print(first: str, other: Difference) -> None:
             common.say(f"{len(rows) - MOST_ROWS} more {title} differ{see}")
     same = len(other.figures) - len(figures), len(other.curves) - len(curves)
     common.say(f"equal to the last bit: {same[0]} figures, {same[1]} curves")
-    if other.span is None:
-        common.say("no curves are compared: the runs have no time in common")
-    for label, parts in ((first, other.only_first), (other.label, other.only_other)):
-        if parts:
-            common.say(f"in {label} alone: {', '.join(parts)}")
+    for label, names in ((first, other.only_first), (other.label, other.only_other)):
+        if names:
+            more = f" and {len(names) - MOST_ROWS} more" if len(names) > MOST_ROWS else ""
+            common.say(f"in {label} alone: {', '.join(names[:MOST_ROWS])}{more}")
 
 
 def _shown(value: object) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,7 +24,6 @@ def export(
     run: common.RunArgument,
     to: str | None = None,
     out: Path | None = None,
-    start: str = "0",
     of: common.OfOption = None,
 ) -> None:
     """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.
@@ -40,7 +38,6 @@ def export(
     to FORMAT : mcap (ROS 2 messages), csv or parquet (tables); by default as --out ends.
     out : The .mcap file, or the folder of the tables; by default beside the run: RUN.mcap, RUN_csv,
         RUN_parquet.
-    start SECONDS : Of mcap: when t = 0 was, in seconds since 1970.
     """
     from sphshell_pin.scenario.running.replay import Replay
 
@@ -51,19 +48,15 @@ def export(
         if to == "rrd":
             must += "; Rerun's viewer opens .mcap files"
         raise InvalidParameter("--to", to, must)
-    begin = nanoseconds(start)
-    if begin and to != "mcap":
-        raise InvalidParameter("--start", start, "is for --to mcap: tables have the run's own t")
     words = ["export", str(run), "--to", to]
     words += [] if out is None else ["--out", str(out)]
-    words += ["--start", start] if begin else []
     words += [] if of is None else ["--scenario", of]
     command = shlex.join(["sphshell-pin", *words])
     if to == "mcap":
         from sphshell_pin.export.mcap import write_mcap
 
         replay, place = Replay(file_of(run), of), out or beside(run, ".mcap")
-        made = write_mcap(place, replay.result, replay.scene, start=begin, command=command)
+        made = write_mcap(place, replay.result, replay.scene, command=command)
         files = [made]
     else:
         from sphshell_pin.export.tables import write_tables
@@ -87,18 +80,6 @@ def beside(run: Path, ending: str) -> Path:
     run = run if run.name else run.absolute()  # "." has no name
     named = run if run.is_dir() else run.with_suffix("")
     return named.with_name(named.name + ending)
-
-
-def nanoseconds(text: str) -> int:
-    """Return the time that --start states, in nanoseconds since 1970."""
-    from decimal import Decimal, InvalidOperation
-
-    with contextlib.suppress(InvalidOperation):
-        seconds = Decimal(text)
-        # Larger ones are not written out in digits.
-        if seconds.is_finite() and seconds.adjusted() <= 12:
-            return round(seconds * 10**9)
-    raise InvalidParameter("--start", text, "must be seconds since 1970")
 
 
 def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | None]:

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import Annotated
 
 from sphshell_pin.cli import common
 from sphshell_pin.errors import SphshellError, UnitMissing
-
-if TYPE_CHECKING:
-    from sphshell_pin.study.against import Against
-
-MOST_ROWS = 16  # of the printed table
 
 ChordErrorOption = Annotated[
     float | None,
@@ -52,17 +44,8 @@ def check(
     face: FaceOption = None,
     time_limit: TimeLimitOption = None,
     memory_limit: MemoryLimitOption = None,
-    against: Path | None = None,
-    against_unit: str | None = None,
-    radius: str | None = None,
-    tolerance: float = 0.01,
-    json: Path | None = None,
-    map_: Path | None = None,
 ) -> None:
     """Print the health of a surface file: what was found, what was repaired, how far it is curved.
-
-    With --against, press spheres into all faces of two files of one part, and print the faces on
-    which contact differs. Exit code 1: it does.
 
     Example: sphshell-pin check blade.stl --unit mm
 
@@ -72,92 +55,25 @@ def check(
     unit : Length unit of the file: mm, cm, m, inch, ...
     side : Where spheres may be: both, outside, inside.
     scale : Use of the SCALE of a .shl file: apply, ignore, or a number instead.
-    against : Another file of the same part: compare contact on all faces of both.
-    against_unit : Length unit of that file.
-    radius : With --against: radius of the spheres, 2 % of the size unless given.
-    tolerance : With --against: share by which forces may differ.
-    json : With --against: write all figures to this file.
-    map_ : With --against: draw both parts to this .png, by what differs.
     """
     from sphshell_pin import Shell
-    from sphshell_pin.shell.cad import CAD_SUFFIXES
 
-    def load(file: Path, unit: str | None, unit_option: str, first: bool = True) -> Shell:
-        # Where there are two files, options of CAD belong to those that are CAD.
-        cad = against is None or file.suffix.lower() in CAD_SUFFIXES
-        try:
-            return Shell.from_file(
-                file,
-                unit,
-                _number_or_word(scale) if first else None,
-                chord_error=chord_error if cad else None,
-                bodies=body if cad and first else None,
-                faces=faces_of(face) if cad and first else None,
-                time_limit=time_limit if cad else None,
-                memory_limit=memory_limit if cad else None,
-                side=side if against is None else "both",
-            )
-        except UnitMissing as error:
-            raise SphshellError(f"the unit {error.must(unit_option + ' {}')}") from error
-
-    shell = load(file, unit, "--unit")
-    if against is None:
-        shell.curvature_report()
-        common.say(str(shell.health))
-        return
-    from sphshell_pin.study.against import compare_shells
-
-    other = load(against, against_unit, "--against-unit", False)
-    found = compare_shells(shell, other, common.length_of("--radius", radius), tolerance)
-    _print_against(found, (file.name, against.name))
-    if json is not None:
-        from sphshell_pin.base.atomic import write_whole
-
-        text = dumps({"files": [str(file), str(against)], **found.to_dict()}, indent=1)
-        write_whole(json, text.encode())
-    if map_ is not None:
-        from sphshell_pin.plot.contact_map import plot_differences
-        from sphshell_pin.plot.figure import write_figure
-        from sphshell_pin.study.against import differences_on
-
-        parts = [
-            (f"{'AB'[of]} {path.name}", one, differences_on(found, of, one))
-            for of, (path, one) in enumerate(((file, shell), (against, other)))
-        ]
-        title = f"{len(found.off)} of {len(found.faces)} faces differ"
-        common.say(f"wrote {write_figure(map_, plot_differences(title, parts))}")
-    raise typer.Exit(0 if found.same else common.MISSED)
-
-
-def _print_against(found: Against, names: tuple[str, str]) -> None:
-    """Print the faces that differ most, and the verdict."""
-    rows = [
-        (
-            f"{'AB'[one.of]} {one.name}",
-            one.kind,
-            f"{one.area:.1e}",
-            str(one.places),
-            f"{one.worst:+.1e}",
-            f"{one.worst / found.radius:+.1e}",
-            f"{one.median / found.radius:.0e}",
-            f"{one.worst / found.size:+.1e}",
-            "{:.2f}-{:.2f}".format(*one.force),
-            f"{one.lost}+{one.extra}",
+    try:
+        shell = Shell.from_file(
+            file,
+            unit,
+            _number_or_word(scale),
+            chord_error=chord_error,
+            bodies=body,
+            faces=faces_of(face),
+            time_limit=time_limit,
+            memory_limit=memory_limit,
+            side=side,
         )
-        for one in found.off[:MOST_ROWS]
-    ]
-    if rows:
-        columns = ("face", "kind", "[m^2]", "places", "worst [m]", "of r", "median", "of size")
-        common.print_table((*columns, "force", "lost+extra"), rows)
-    if len(found.off) > len(rows):
-        common.say(f"{len(found.off) - len(rows)} more faces differ")
-    if found.unreached:
-        common.say(
-            f"{found.unreached} faces are not compared: no sphere of this radius touches one alone"
-        )
-    spheres = f"spheres of radius {found.radius:.3g} m, {found.depth:.3g} m deep"
-    common.say(f"A {names[0]}, B {names[1]}; {spheres}")
-    common.say(found.verdict())
+    except UnitMissing as error:
+        raise SphshellError(f"the unit {error.must('--unit {}')}") from error
+    shell.curvature_report()
+    common.say(str(shell.health))
 
 
 @common.command()
@@ -175,15 +91,14 @@ def convert(
 ) -> None:
     """Write a surface file in another format, and measure how far apart the two are.
 
-    CAD becomes a mesh within the chord error, CAD to CAD keeps the exact surfaces, a mesh becomes
-    planar CAD faces.
+    CAD becomes a mesh within the chord error.
 
     Example: sphshell-pin convert blade.step blade.stl --chord-error 1e-4
 
     Options
     -------
     source : The file to read: .stl .obj .ply .off .shl, .step .iges .brep
-    target : The file to write; its suffix names the format.
+    target : The file to write: .stl .obj .ply .off .shl
     unit_in : Length unit of the file to read; STEP and IGES state it.
     unit_out : Length unit of the file to write; the same unless given.
     """
@@ -203,15 +118,12 @@ def convert(
         )
     except UnitMissing as error:
         raise SphshellError(f"the unit {error.must('--unit-in {}')}") from error
-    rows = []
-    for held in (done.source, done.target):
-        size, area = f"{held.size:.6g} m", f"{held.area:.6g} m^2"
-        rows.append((str(held.path), held.unit, f"{held.count} {held.kind}", size, area))
-    common.print_table(("file", "unit", "holds", "size", "area"), rows)
-    common.say(
-        f"deviation measured at {len(done.forth) + len(done.back)} points: "
-        f"largest {done.largest:.3g} m, root mean square {done.rms:.3g} m"
-    )
+    rows = [
+        (str(path), f"{held.num_elements}", f"{held.size:.6g} m", f"{held.health.area:.6g} m^2")
+        for path, held in ((source, done.source), (target, done.target))
+    ]
+    common.print_table(("file", "elements", "size", "area"), rows)
+    common.say(f"largest distance of a vertex of either from the other: {done.largest:.3g} m")
     for note in done.notes:
         common.say(f"note: {note}")
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from sphshell_pin.base.checks import stated_pairs
 from sphshell_pin.cli import common
 from sphshell_pin.errors import InvalidParameter, ScenarioError
 
@@ -25,7 +24,6 @@ def fit(
     param: list[str],
     experiment: list[str] | None = None,
     column: list[str] | None = None,
-    sigma: list[str] | None = None,
     out: Path | None = None,
     picture: bool = True,
     compiled: common.CompiledOption = False,
@@ -47,7 +45,6 @@ def fit(
     experiment 'DATA.csv KEY=VALUE...' : Data of an experiment with other values than the scenario;
         may be given several times.
     column NAME : Use this column; by default all; several times.
-    sigma NAME=VALUE : Standard deviation of a column, in SI; by default from the residuals.
     out : Folder of the files; by default results/SCENARIO.
     picture : Draw fit and residuals.
     """
@@ -80,7 +77,6 @@ def fit(
             wanted,
             changes=changes,
             columns=column,
-            sigma=_deviations(sigma),
             progress=progress,
         )
     files = _write(found, path, out or Path("results") / path.stem, changes, picture=picture)
@@ -100,17 +96,6 @@ def _experiment(text: str) -> Experiment:
     if not file or not all("=" in one for one in changes):
         raise InvalidParameter("--experiment", text, "must be 'DATA.csv KEY=VALUE ...'")
     return Experiment(file, common.changes_of(changes), " ".join([Path(file).stem, *changes]))
-
-
-def _deviations(stated: list[str] | None) -> dict[str, float]:
-    must = "must be NAME=VALUE, in SI units"
-    found = {}
-    for name, value in stated_pairs("--sigma", stated or [], must):
-        try:
-            found[name] = float(value)
-        except ValueError:
-            raise InvalidParameter("--sigma", f"{name}={value}", must) from None
-    return found
 
 
 def _write(

@@ -49,7 +49,6 @@ def run(
     duration: common.DurationOption = None,
     recording: bool = True,
     figures: bool = True,
-    audit_cad: bool = False,
     compiled: common.CompiledOption = False,
     set_: common.SetOption = None,
     package_dir: common.PackageDirOption = None,
@@ -63,7 +62,6 @@ def run(
     out : Results folder; by default results/SCENARIO.
     recording : Write recording.html.
     figures : Draw the figures.
-    audit_cad : Compare every contact with that on the exact faces of the CAD file.
     """
     from sphshell_pin.scenario import build, explain_built, run_built
 
@@ -79,7 +77,6 @@ def run(
             out,
             recording=recording,
             figures=figures,
-            audit_cad=audit_cad,
             progress=lambda fraction: update(completed=fraction),
         )
     _print_report(report)
@@ -173,16 +170,6 @@ def _print_report(report: RunReport) -> None:
         common.echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
     for warning in report.warnings:
         common.echo(f"warning: {warning}", err=True)
-    if report.audit is not None:
-        audited = [
-            (one.name, f"{one.contacts}", f"{one.unmatched}")
-            + tuple(f"{off:.3g} m" for off in one.depth)
-            + tuple(f"{off:.3g} rad" for off in one.normal)
-            for one in report.audit.pairs
-        ]
-        common.say("contacts beside those on the exact CAD faces, largest and rms difference")
-        heads = ("contact", "recorded", "on no face", "depth off", "rms", "normal off", "rms")
-        common.print_table(heads, audited)
     marks = {True: common.colored("as expected", "green"), False: common.colored("missed", "red")}
     judged = [(v.figure, v.expected, f"{v.measured:.6g}", marks[v.met]) for v in report.verdicts]
     common.print_table(("figure", "expected", "measured", "verdict"), judged)

@@ -26,13 +26,10 @@ def sweep(
     *,
     scenario: common.ScenarioArgument,
     vary: list[str] | None = None,
-    together: bool = False,
     dist: list[str] | None = None,
-    sample: str | None = None,
     n: int | None = None,
     seed: int = 0,
     indices: bool = False,
-    tornado: bool = False,
     out: Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -46,7 +43,7 @@ def sweep(
 ) -> None:
     """Run a scenario with many values, over processes or a Dask cluster; write one table.
 
-    With --dist the values are drawn from distributions: quantiles, tornado, Sobol indices.
+    With --dist the values are drawn from distributions: quantiles, Sobol indices.
 
     The same command resumes where an earlier one was stopped, and does failed runs again.
 
@@ -55,14 +52,11 @@ def sweep(
     Options
     -------
     vary KEY=VALUES : What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.
-    together : Take the values of all keys in step: no grid.
     dist 'KEY=DISTRIBUTION' : An uncertain input: normal(mean, deviation), uniform(low, high) or
         lognormal(median, factor): 68 % from median / factor to median * factor.
-    sample KIND : Points: sobol (a Sobol sequence) or lhs (a Latin hypercube).
-    n : Number of points; a power of 2 for sobol.
+    n : Number of points of a Sobol sequence, a power of 2.
     seed : Seed of the points.
     indices : Sobol indices: n (d + 2) runs for d uncertain inputs.
-    tornado : 2 d + 1 runs more: each input alone at 5 and at 95 %.
     out : Table, .parquet; by default sweep.parquet in results/SCENARIO.
     workers : Processes; by default one per processor; 0: this one alone.
     scheduler : Address of a Dask scheduler whose workers do the runs.
@@ -75,13 +69,10 @@ def sweep(
         scenario,
         vary,
         changes=common.changes_of(set_, dt, duration, compiled),
-        together=together,
         dist=dist,
-        sample=sample,
         n=n,
         seed=seed,
         indices=indices,
-        tornado=tornado,
     )
     name = plan.job.path.stem
     for figure in plot or ():
@@ -113,8 +104,8 @@ def sweep(
         _print_ranges(report.table)
     files = [file]
     for figure in figures:
-        analyses = _analyses(report.table, figure)
-        files += _draw(file, report.table, figure, analyses) if pictures else []
+        found = _indices(report.table, figure)
+        files += _draw(file, report.table, figure, found) if pictures else []
     _print_failures(plan, report)
     common.say(f"files: {', '.join(map(str, files))}")
     if report.failed == total:
@@ -128,9 +119,7 @@ def _first_figures(table: pd.DataFrame) -> list[str]:
     return [*own, *(name for name in names if name.endswith(".peak_force"))][:1]
 
 
-def _draw(
-    file: Path, table: pd.DataFrame, figure: str, analyses: dict[str, pd.DataFrame]
-) -> list[Path]:
+def _draw(file: Path, table: pd.DataFrame, figure: str, indices: pd.DataFrame | None) -> list[Path]:
     """Write the picture of `figure` beside the table's `file`; return its path, if any."""
     from sphshell_pin.plot.figure import write_figure
     from sphshell_pin.plot.sweep import plot_sweep
@@ -140,7 +129,7 @@ def _draw(
     try:
         with common.if_installed():
             if "design" in table:
-                return [write_figure(path, plot_uncertainty(table, figure, **analyses))]
+                return [write_figure(path, plot_uncertainty(table, figure, indices))]
             return [write_figure(path, plot_sweep(table, figure))]
     except InvalidParameter as fault:
         common.echo(f"no picture: {fault}", err=True)
@@ -169,10 +158,7 @@ def _print_sample(plan: Plan, table: pd.DataFrame) -> None:
         ends = (f"{end:.6g}" for end in one.ppf([0.05, 0.5, 0.95]))
         inputs.append((key, *ends, plan.units.get(key, "")))
     common.print_table(("input", "5 %", "median", "95 %", "unit"), inputs)
-    try:
-        found = quantiles(table)
-    except InvalidParameter:  # only a tornado
-        return
+    found = quantiles(table)
     rows, met = [], []
     for name, row in ((str(name), row) for name, row in found.iterrows()):
         if name.startswith("met."):
@@ -183,28 +169,23 @@ def _print_sample(plan: Plan, table: pd.DataFrame) -> None:
     common.print_table(("expectation", "met in"), met)
 
 
-def _analyses(table: pd.DataFrame, figure: str) -> dict[str, pd.DataFrame]:
-    """Print tornado and Sobol indices of a figure, and return them by these names.
+def _indices(table: pd.DataFrame, figure: str) -> pd.DataFrame | None:
+    """Print the Sobol indices of a figure and return them, if the sweep has them.
 
-    What cannot be computed is said.
+    Where they cannot be computed, that is said.
     """
-    from sphshell_pin.study import sweep
+    from sphshell_pin.study.sweep import sobol_indices
 
-    found, parts = {}, set(table.get("design", ()))
-    for name, part, compute in (
-        ("tornado", "median", sweep.tornado),
-        ("indices", "A", sweep.sobol_indices),
-    ):
-        if part not in parts:
-            continue
-        try:
-            found[name] = compute(table, figure)
-        except InvalidParameter as fault:
-            common.echo(f"no {name}: {fault}", err=True)
-            continue
-        titles = (f"{name} of {figure}", *map(str, found[name].columns))
-        rows = ((str(key), *(f"{x:.6g}" for x in row)) for key, row in found[name].iterrows())
-        common.print_table(titles, rows)
+    if "A" not in set(table.get("design", ())):
+        return None
+    try:
+        found = sobol_indices(table, figure)
+    except InvalidParameter as fault:
+        common.echo(f"no indices: {fault}", err=True)
+        return None
+    titles = (f"indices of {figure}", *map(str, found.columns))
+    rows = ((str(key), *(f"{x:.6g}" for x in row)) for key, row in found.iterrows())
+    common.print_table(titles, rows)
     return found
 
 

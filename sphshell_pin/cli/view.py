@@ -13,7 +13,7 @@ def view(
     *,
     set_: common.SetOption = None,
     package_dir: common.PackageDirOption = None,
-    speed: float = 1.0,
+    speed: float | None = None,
     paused: bool = False,
     host: str = "127.0.0.1",
     port: int = 0,
@@ -23,27 +23,38 @@ def view(
 ) -> None:
     """Run a scenario in a page: pause, push, change parameters; or play a finished run.
 
+    Of a finished run, run.html is written beside run.npz and opened.
+
     Example: sphshell-pin view fingertip_on_blade --speed 0.5
 
     Options
     -------
     scenario : Name of a shipped scenario, path of a .toml file, or a finished run: its run.npz or
         results folder.
-    speed : Simulated seconds per second.
+    speed : Simulated seconds per second; by default 1, of a finished run as its scenario has it.
     paused : Wait for the button Run.
     host : Address to serve the page at; 0.0.0.0 lets other machines in.
     port : Port of the page; 0 takes any that is free.
     open_ : Open the page in the web browser.
-    color : Colors of the shells: surface, patches, faces (by kind), or distance (of curved elements
-        from the flat ones).
+    color : Colors of the shells: surface, or faces (by kind).
     """
     from sphshell_pin.view import preview
+    from sphshell_pin.view.live.opening import result_file
 
+    changes = common.changes_of(set_)
+    finished = result_file(scenario)
+    if finished is not None:
+        if changes:
+            key = next(iter(changes))
+            raise InvalidParameter(key, changes[key], "cannot be changed: this is a finished run")
+        _play(finished, of, speed, color, open_=open_)
+        return
+    if of is not None:
+        raise SphshellError(f"{scenario} is a scenario itself: only a finished run needs one")
     preview(
         scenario,
-        changes=common.changes_of(set_),
-        scenario=of,
-        speed=speed,
+        changes=changes,
+        speed=1.0 if speed is None else speed,
         paused=paused,
         host=host,
         port=port,
@@ -51,6 +62,27 @@ def view(
         color=color,  # type: ignore[arg-type]
         told=lambda url: common.echo(f"{url}  (Ctrl-C ends the run)"),
     )
+
+
+def _play(file: Path, of: str | None, speed: float | None, color: str, *, open_: bool) -> None:
+    """Write the recording of a finished run beside it, and open it."""
+    from sphshell_pin.scenario.running.replay import Replay
+    from sphshell_pin.view.live.opening import open_file
+    from sphshell_pin.view.recording import write_recording
+
+    replay = Replay(file, of)
+    path = write_recording(
+        file.with_suffix(".html"),
+        replay.result,
+        replay.scene,
+        replay.visual_model,
+        title=replay.title,
+        speed=replay.speed if speed is None else speed,
+        color=color,  # type: ignore[arg-type]
+    )
+    common.echo(path)
+    if open_:
+        open_file(path)
 
 
 @common.command()
@@ -62,14 +94,14 @@ def render(
     from_: float | None = None,
     to: float | None = None,
     size: str = "1280x720",
-    fps: float | None = None,
+    fps: float = 30.0,
     speed: float | None = None,
     camera: str = "fit",
     chart: bool = True,
     dark: bool = False,
     of: common.OfOption = None,
 ) -> None:
-    """Draw a finished run: one picture, a film, or a folder of pictures for slides.
+    """Draw a finished run: one picture or a film.
 
     It needs the extra video, and Chromium.
 
@@ -77,12 +109,12 @@ def render(
 
     Options
     -------
-    out : A .png (one picture), a .gif or .mp4 (a film), or a folder for pictures.
+    out : A .png (one picture) or .mp4 (a film).
     time : Of a picture: time of the run [s]; by default its end.
     from_ : Of a film: time at which it begins [s].
     to : Of a film: time at which it ends [s].
     size : Width and height in pixels.
-    fps : Pictures per second; by default 30, of a .gif 20.
+    fps : Pictures per second of a film.
     speed : Simulated seconds per second; by default as the scenario has it.
     camera : From where: fit, front, side, top, follow, contact.
     chart : Forces and depth under the scene.

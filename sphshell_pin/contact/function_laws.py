@@ -4,7 +4,6 @@ import copy
 import ctypes
 import dataclasses
 import math
-import sys
 import warnings
 from _ctypes import CFuncPtr
 from collections.abc import Callable, Mapping
@@ -118,19 +117,13 @@ def _address(name: str, function: Any, count: int) -> int | None:
     if isinstance(function, CFuncPtr):
         _check_signature(name, function, count)
         found = ctypes.cast(function, ctypes.c_void_p).value
-    elif type(function).__module__ == "_cffi_backend":
-        ffi = sys.modules["_cffi_backend"].FFI()
-        found = int(ffi.cast("uintptr_t", function))
-    elif isinstance(function, int) and not isinstance(function, bool):
-        found = function
-    elif callable(function):
+        if not found:
+            raise InvalidParameter(name, function, "must not be null")
+        return found
+    if callable(function):
         return None
-    else:
-        must = "must be a C function pointer (numba.cfunc, ctypes, cffi) or a Python function"
-        raise InvalidParameter(name, function, must)
-    if not found or found < 0:
-        raise InvalidParameter(name, function, "must not be null")
-    return found
+    must = "must be a C function pointer (numba.cfunc, ctypes) or a Python function"
+    raise InvalidParameter(name, function, must)
 
 
 def _check_signature(name: str, pointer: Any, count: int) -> None:
@@ -180,10 +173,10 @@ class FunctionLaw(OwnFunctions, NormalLaw, kind="function"):
     Parameters
     ----------
     function : its force [N], `double force(double depth, double gap_rate, const double*
-        parameters)`, in m and m/s, the gap rate negative while closing. A numba cfunc, a function
-        pointer of ctypes or cffi, or an address, which must stay valid; a Python function, which
-        gets the parameters as a tuple, is slow and takes the GIL (SlowLawWarning). It must be
-        continuous and grow with the depth; below zero it counts as none
+        parameters)`, in m and m/s, the gap rate negative while closing. A numba cfunc or a function
+        pointer of ctypes, which must stay valid; a Python function, which gets the parameters as a
+        tuple, is slow and takes the GIL (SlowLawWarning). It must be continuous and grow with the
+        depth; below zero it counts as none
     energy : of the elastic part, that is of the force at rest [J], `double energy(double depth,
         const double* parameters)`; by default its integral, adaptive to about 1e-11 once for each
         set of parameters, kinks included

@@ -14,7 +14,6 @@ from sphshell_pin.dynamics.result.result_scene import find_scene
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.contact_map import plot_contact_map as plot_contact_map
 from sphshell_pin.plot.figure import write_figure
-from sphshell_pin.plot.on_shell import plot_contact_path as plot_contact_path
 from sphshell_pin.plot.over_time import plot_energy as plot_energy
 from sphshell_pin.plot.over_time import plot_force_and_depth as plot_force_and_depth
 from sphshell_pin.plot.over_time import plot_overview as plot_overview
@@ -33,7 +32,6 @@ KINDS: dict[str, Callable[..., Figure]] = {
     "overview": plot_overview,
     "force": plot_force_and_depth,
     "energy": plot_energy,
-    "path": plot_contact_path,
     "map": plot_contact_map,
     "sensors": plot_sensors,
 }
@@ -43,10 +41,9 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
     """Return one matplotlib Figure of `result`.
 
     `kind` is one of KINDS: force, depth and energy over time ("overview"), force and depth of each
-    pair ("force"), the energy audit ("energy"), the contacts' path on their shells ("path"), the
-    impulse that each element took ("map"), the readings over time ("sensors"). Path and map are
-    drawn on the shells of `scene` (default: the scene that ran, or that of the scenario the result
-    came from).
+    pair ("force"), the energy audit ("energy"), the path on the shells and the impulse that each
+    element took ("map"), the readings over time ("sensors"). The map needs `scene` (default: the
+    scene that ran, or that of the scenario the result came from).
 
     Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where "map"
     has no scene.
@@ -54,7 +51,7 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
     check_name("kind", kind)
     if kind not in KINDS:
         raise NameNotFound("kind of figure", kind, "a result", KINDS)
-    return KINDS[kind](result, *([scene] if kind in ("path", "map") else []))
+    return KINDS[kind](result, *([scene] if kind == "map" else []))
 
 
 def save_figures(
@@ -62,17 +59,15 @@ def save_figures(
 ) -> list[Path]:
     """Write the figures of `result` as .png files into `folder`; return their paths.
 
-    They are force_and_depth, energy, contact_path, of a result that touched a shell contact_map,
-    and of one with sensors sensors. Paths and map are drawn on the shells of `scene` (default: the
-    scene that ran, or that of the scenario the result came from; without any the path is drawn in
-    the world, and there is no map). Raises MissingExtra without matplotlib, ResultError if a file
-    cannot be written or the scene cannot be built again.
+    They are force_and_depth, energy, of a result that touched a shell contact_map, and of one with
+    sensors sensors. The map needs `scene` (default: the scene that ran, or that of the scenario the
+    result came from; without any there is no map). Raises MissingExtra without matplotlib,
+    ResultError if a file cannot be written or the scene cannot be built again.
     """
     scene = find_scene(result, scene)
     figures = {
         "force_and_depth.png": plot_force_and_depth(result),
         "energy.png": plot_energy(result),
-        "contact_path.png": plot_contact_path(result, scene),
     }
     touched = {int(pair) for pair in result.contacts.pair}
     if scene is not None and any(scene.pairs[pair].shells for pair in touched):

@@ -1,4 +1,4 @@
-"""Shells and the paths of contacts on them, in matplotlib's three-dimensional axes."""
+"""A shell with its elements colored, in matplotlib's three-dimensional axes."""
 
 from __future__ import annotations
 
@@ -8,90 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Longs, Mask
-from sphshell_pin.dynamics.result.result_scene import find_scene
-from sphshell_pin.plot.figure import INK, NO_CONTACT, new_figure, only_say, reading_unit
+from sphshell_pin.plot.figure import INK, new_figure, reading_unit
 from sphshell_pin.view.contact_path import ContactPath, contact_paths, spaced
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d import Axes3D
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
     from sphshell_pin.shell.shell import Shell
-
-MOST_NAMES = 8  # beside the paths with the largest forces
-
-
-def plot_contact_path(result: Result, scene: Scene | None = None) -> Figure:
-    """Return a Figure of the contact points' path colored by normal force.
-
-    There is one picture per shell of `scene` (default: the scene that ran, or that of the scenario
-    the result came from), in the shell's frame and on its elements, seen from the side of the
-    contact normals. Without a scene the picture is one of the world.
-    """
-    groups = group_paths(result, find_scene(result, scene))
-    if not groups:
-        return only_say("Path of the contact", NO_CONTACT)
-    forces = np.concatenate([path.force for group in groups for path in group.paths])
-    low, high = color_limits(forces)
-    factor, unit = reading_unit(high, "N")
-    figure, axes = shell_figure("Path of the contact", len(groups))
-    for axis, group in zip(axes, groups, strict=True):
-        lines = _draw(axis, group, [str(name) for name in result.pairs], factor)
-        lines.set_clim(low * factor, high * factor)
-    extend = "max" if forces.max() > high else "neither"
-    figure.colorbar(lines, ax=axes, label=f"normal force [{unit}]", shrink=0.8, extend=extend)
-    return figure
-
-
-def color_limits(forces: Array) -> tuple[float, float]:
-    """Return the range of `forces` (k,) [N] that gets the colors.
-
-    It ends below an impact far above the rest, and starts at zero unless that would leave only a
-    few colors to tell forces apart.
-    """
-    high, low = float(forces.max()), float(forces.min())
-    usual = float(np.percentile(forces, 98.0, method="lower"))
-    if high > 1.5 * usual > 0.0:
-        high = usual
-    return (low if 0.5 * high < low < high else 0.0), high or 1.0
-
-
-def _draw(axis: Axes3D, group: PathGroup, names: list[str], factor: float) -> Line3DCollection:
-    """Draw the paths of one shell; `factor` scales forces."""
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection
-
-    normals = np.concatenate([path.normals for path in group.paths])
-    normal = normals.mean(axis=0) if group.shell is not None else np.array([0.0, 0.0, 1.0])
-    if np.linalg.norm(normal) < 0.1:
-        normal = normals[0]
-    picture = Picture.of(axis, group.shell, normal, group.points)
-    if group.shell is not None:
-        picture.draw_shell(group.shell)
-    segments, colors = [], []
-    strongest = sorted(group.paths, key=lambda path: -float(path.force.max()))[:MOST_NAMES]
-    for path in group.paths:
-        for run in path.runs:
-            kept = run[picture.kept(path.points[run])]
-            # A touch that lasts one row is a segment without length: its round ends make a dot.
-            ends = np.stack((kept[:-1], kept[1:]), axis=1) if len(kept) > 1 else kept[[[0, 0]]]
-            segments.append(path.points[ends] * picture.factor)
-            colors.append(path.force[ends].mean(axis=1))
-        hidden = group.shell is not None and float(path.normals[0] @ picture.toward) < 0.0
-        name = names[path.pair] if any(path is one for one in strongest) else ""
-        picture.mark_start(path.points[0], name, hidden=hidden)
-    lines = Line3DCollection(
-        np.concatenate(segments), cmap="turbo", linewidths=2.4, capstyle="round", zorder=3
-    )
-    lines.set_array(np.concatenate(colors) * factor)
-    axis.add_collection3d(lines, autolim=False)
-    where = "in the world" if group.shell is None else f"on {group.shell.name}"
-    axis.set_title(f"{where} (dot: first touch)", fontsize=10)
-    return lines
-
 
 BARE = np.array([0.80, 0.86, 0.845, 1.0])  # an element that nothing touched
 EDGE = (0.35, 0.45, 0.43, 0.55)
@@ -105,26 +32,19 @@ LABEL_BOX = {"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 
 
 @dataclass(frozen=True)
 class PathGroup:
-    """The paths that share one picture: those on one shell, or all others in the world."""
+    """The paths on one shell, in its frame."""
 
-    shell: Shell | None
+    shell: Shell
     paths: list[ContactPath]
 
-    @property
-    def points(self) -> Array:
-        """All points (k, 3) [m] of the paths, in the frame of the shell or in the world."""
-        return np.concatenate([path.points for path in self.paths])
 
-
-def group_paths(result: Result, scene: Scene | None) -> list[PathGroup]:
+def group_paths(result: Result, scene: Scene) -> list[PathGroup]:
     """Return the paths of `result`, those on one shell together."""
     groups: dict[object, PathGroup] = {}
     for path in contact_paths(result, scene):
-        key, shell = None, None
-        if path.on_shell and scene is not None:
+        if path.on_shell:
             (side,) = scene.pairs[path.pair].shells
-            shell, key = side.shell, side.key
-        groups.setdefault(key, PathGroup(shell, [])).paths.append(path)
+            groups.setdefault(side.key, PathGroup(side.shell, [])).paths.append(path)
     return list(groups.values())
 
 
@@ -156,13 +76,13 @@ class Picture:
     factor: float
 
     @classmethod
-    def of(cls, axis: Axes3D, shell: Shell | None, normal: Array, touched: Array) -> Picture:
+    def of(cls, axis: Axes3D, shell: Shell, normal: Array, touched: Array) -> Picture:
         """Prepare `axis` for all of `shell`, or of a much larger one what is about `touched`.
 
         normal : mean contact normal (3,)
         touched : points (k, 3) [m]
         """
-        box = touched if shell is None else np.vstack((touched, np.asarray(shell.box)))
+        box = np.vstack((touched, np.asarray(shell.box)))
         low, high = box.min(axis=0), box.max(axis=0)
         least, most = touched.min(axis=0), touched.max(axis=0)
         half = 0.5 * CONTEXT * float((most - least).max())
@@ -178,10 +98,9 @@ class Picture:
         axis.view_init(
             elev=np.rad2deg(np.arcsin(toward[2])), azim=np.rad2deg(np.arctan2(toward[1], toward[0]))
         )
-        frame = "world" if shell is None else "shell"
         for k, name in enumerate("xyz"):
             getattr(axis, f"set_{name}lim")(low[k] * factor, high[k] * factor)
-            getattr(axis, f"set_{name}label")(f"{name} of the {frame} [{unit}]", fontsize=8)
+            getattr(axis, f"set_{name}label")(f"{name} of the shell [{unit}]", fontsize=8)
             ticks = max(1, round(4.0 * (high[k] - low[k]) / size))
             axis.locator_params(name, nbins=ticks)
             getattr(axis, f"{name}axis").set_pane_color((1.0, 1.0, 1.0, 0.0))
@@ -194,9 +113,7 @@ class Picture:
         """Largest extent [m]."""
         return float((self.high - self.low).max())
 
-    def draw_shell(
-        self, shell: Shell, values: Array | None = None, colors: Array | None = None
-    ) -> bool:
+    def draw_shell(self, shell: Shell, values: Array, colors: Array) -> bool:
         """Draw `shell`, its elements in `colors` (m, 4) where `values` (m,) are positive.
 
         Return whether the colored elements were too small to be seen: they are then widened, the
@@ -205,15 +122,13 @@ class Picture:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
         corners = element_corners(shell)
-        values = np.zeros(len(corners)) if values is None else values
         near = (corners.max(axis=1) >= self.low) & (corners.min(axis=1) <= self.high)
         inside = np.flatnonzero(near.all(axis=1))
         kept, corners = _fewer(corners[inside], values[inside] <= 0.0)
         kept = inside[kept]
         bare = values[kept] <= 0.0
         faces = np.tile(BARE, (len(kept), 1))
-        if colors is not None:
-            faces[~bare] = colors[kept][~bare]
+        faces[~bare] = colors[kept][~bare]
         plain = faces.copy()
         # The color of an element is a value: it is shaded less.
         shade = self._shade(corners)
@@ -237,16 +152,12 @@ class Picture:
         """Return the indices of those points of a path (k, 3) [m] that differ in the picture."""
         return spaced(points, self.size / MOST_STEPS)
 
-    def mark_start(self, point: Array, name: str, *, hidden: bool = False) -> None:
-        """Draw a dot where a pair touched first, `point` (3,) [m], hollow where it is behind."""
+    def mark_start(self, point: Array, name: str) -> None:
+        """Draw a dot where a pair touched first, `point` (3,) [m]."""
         place = point * self.factor
-        fill = "white" if hidden else INK
-        self.axis.plot(
-            *place[:, None], marker="o", markersize=5, color=INK, markerfacecolor=fill, zorder=7
-        )
+        self.axis.plot(*place[:, None], marker="o", markersize=5, color=INK, zorder=7)
         if name:
-            text = f"  {name} (behind)" if hidden else f"  {name}"
-            self.axis.text(*place, text, fontsize=8, bbox=LABEL_BOX, zorder=6)
+            self.axis.text(*place, f"  {name}", fontsize=8, bbox=LABEL_BOX, zorder=6)
 
     def _shade(self, corners: Array) -> Array:
         """Return the brightness (m,) of elements, lit from above the eye, equal on both sides."""

@@ -58,8 +58,6 @@ def plot_sensors(result: Result) -> Figure:
 
 FORCE_COLORS = {"normal": "#d4202a", "friction": "#f08a00"}
 DEPTH_COLOR = "#2f6fde"
-COUNT_COLOR = "#6b7280"
-COUNT_SHARE = 4.0  # the number of contacts takes up a quarter of its axis
 MOST_PAIRS = 8
 CONTROLLED = ("Adaptive", "Implicit")  # integrators that choose their steps
 
@@ -186,8 +184,6 @@ def _draw_depths(axis: Axes, result: Result, touched: list[PairSeries]) -> None:
     _draw_curves(axis, result, curves, "largest depth", "m", DEPTH_COLOR)
     if touched:
         axis.set_ylim(bottom=0.0)
-    if len(touched) == 1 and touched[0].count.max() > 1.0:
-        _draw_count(axis, result, touched[0])
 
 
 def _draw_curves(
@@ -208,24 +204,6 @@ def _draw_curves(
     for name, values in curves.items():
         _plot(axis, result, values * factor, label=name, color=color if alone else None)
     finish_axis(axis, legend=not alone)
-
-
-def _draw_count(axis: Axes, result: Result, pair: PairSeries) -> None:
-    """Draw, at the foot of `axis`, how many contacts share the load."""
-    beside = axis.twinx()
-    t, count = thinned(np.asarray(result.t), pair.count)
-    beside.fill_between(t, count, step="mid", color=COUNT_COLOR, alpha=0.15, linewidth=0.0)
-    # A line of its own: an area as narrow as a row would not be seen.
-    beside.step(t, count, where="mid", color=COUNT_COLOR, linewidth=0.7)
-    beside.margins(x=0.01)
-    most = int(pair.count.max())
-    beside.set_ylim(0.0, COUNT_SHARE * most)
-    beside.set_yticks(range(0, most + 1, -(-most // 4)))
-    beside.tick_params(colors=COUNT_COLOR, labelsize=8)
-    beside.set_ylabel("contacts at once", color=COUNT_COLOR, loc="bottom", fontsize=9)
-    # The depth is drawn on top.
-    axis.set_zorder(beside.get_zorder() + 1)
-    axis.patch.set_visible(False)
 
 
 def _draw_energies(axis: Axes, result: Result) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Bytes
+from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.checks import check_positive
-from sphshell_pin.base.films import check_film, write_film
 from sphshell_pin.errors import InvalidParameter, import_extra
 from sphshell_pin.plot.figure import new_figure, reading_unit
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 COLORS = "inferno"
 LARGE = 320  # pixels of a film's longer side, at least
 MOST_FRAMES = 100_000
-SAMPLES = 32  # frames that the colors of a .gif are chosen from
 
 
 def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
@@ -54,26 +54,28 @@ def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
 def save_film(
     path: str | PathLike[str], images: TaxelImages, *, fps: float = 30, speed: float = 1.0
 ) -> Path:
-    """Write a film of a grid's images at `path`, .gif or .mp4.
+    """Write a film of a grid's images at `path`, a .gif.
 
     `fps` frames a second, of which each shows `speed` / `fps` seconds of simulated time.
 
-    Raises InvalidParameter unless the images are those of a grid, for another suffix, and for an
-    `fps` or `speed` that is not positive or makes more than MOST_FRAMES; MissingExtra without
-    matplotlib, or for a .mp4 without imageio-ffmpeg.
+    Raises InvalidParameter unless the images are those of a grid, and for an `fps` or `speed` that
+    is not positive or makes more than MOST_FRAMES; MissingExtra without matplotlib, ResultError
+    where the file cannot be written.
     """
+    if Path(path).suffix.lower() != ".gif":
+        raise InvalidParameter("path", str(path), "must end in .gif")
     fps, speed = check_positive("fps", fps), check_positive("speed", speed)
-    path = Path(path)
-    check_film(path, (LARGE, LARGE), fps)
+    image = import_extra("PIL.Image", "view", "a film of taxels", "pillow")
     frames = _frames(images, fps, speed)
-    # Films of odd sizes are refused by some players.
-    times = 2 * (-(-LARGE // max(frames.shape[1:3])) // 2 + 1)
-
-    def enlarged(frame: Bytes) -> Bytes:
-        return np.asarray(frame.repeat(times, axis=0).repeat(times, axis=1))
-
-    samples = [enlarged(one) for one in frames[:: max(1, len(frames) // SAMPLES)]]
-    return write_film(path, map(enlarged, frames), fps, samples)
+    times = -(-LARGE // max(frames.shape[1:3]))
+    first, *others = (
+        image.fromarray(np.asarray(one.repeat(times, axis=0).repeat(times, axis=1)))
+        for one in frames
+    )
+    stream, duration = io.BytesIO(), 1000 / fps
+    more = {"save_all": True, "append_images": others, "duration": duration, "loop": 0}
+    first.save(stream, "gif", **more)
+    return write_whole(path, stream.getvalue())
 
 
 def _grid(images: TaxelImages) -> Array:

@@ -1,9 +1,7 @@
-"""Pictures of sampled runs: histogram, tornado, Sobol indices."""
+"""Pictures of sampled runs: histogram, Sobol indices."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,36 +20,27 @@ _MOST_INPUTS = 20
 
 
 def plot_uncertainty(
-    table: pd.DataFrame,
-    figure: str,
-    tornado: pd.DataFrame | None = None,
-    indices: pd.DataFrame | None = None,
+    table: pd.DataFrame, figure: str, indices: pd.DataFrame | None = None
 ) -> Figure:
     """Return a matplotlib Figure of how uncertain a figure of a sampled `table` is, and why.
 
-    It has a histogram with quantiles if the table has a sample, and what is given: `tornado` and
-    `indices`, as `sphshell_pin.study.sweep.tornado` and `sobol_indices` return them. Of more than
-    20 inputs those with the largest change or total index are drawn.
+    It has a histogram with quantiles and, if given, `indices`, as
+    `sphshell_pin.study.sweep.sobol_indices` returns them. Of more than 20 inputs those with the
+    largest total index are drawn.
 
     Raises
     ------
     MissingExtra
         matplotlib is not installed.
     """
-    panels: list[Callable[[Axes], None]] = []
+    count = 1 if indices is None else 2
+    canvas = new_figure(max(7.0, 5.4 * count), 5.5, figure)
+    first, *others = canvas.subplots(1, count, squeeze=False)[0]
+    first.set_xlabel(label_of(table, figure))
     rows = table[table["design"].isin(["sample", "A", "B"])]
-    if len(rows):
-        panels.append(partial(_draw_histogram, values=rows[figure].to_numpy(float)))
-    if tornado is not None:
-        panels.append(partial(_draw_tornado, found=tornado, table=table))
+    _draw_histogram(first, rows[figure].to_numpy(float))
     if indices is not None:
-        panels.append(partial(_draw_indices, found=indices))
-    canvas = new_figure(max(7.0, 5.4 * len(panels)), 5.5, figure)
-    for draw, axis in zip(
-        panels, canvas.subplots(1, len(panels) or 1, squeeze=False)[0], strict=False
-    ):
-        axis.set_xlabel(label_of(table, figure))
-        draw(axis)
+        _draw_indices(others[0], indices)
     return canvas
 
 
@@ -73,45 +62,18 @@ def _draw_histogram(axis: Axes, values: Array) -> None:
     finish_axis(axis, legend=True)
 
 
-def _draw_tornado(axis: Axes, found: pd.DataFrame, table: pd.DataFrame) -> None:
-    median = float(found["median"].iloc[0])
-    names = [label_of(table, str(key)) for key in found.index]
-    ends = {f"input at its {p} % quantile": found[kind] for kind, p in (("low", 5), ("high", 95))}
-    _draw_bars(axis, names, ends, start=median)
-    axis.set_title("one input at a time, others at their medians", fontsize=10)
-
-
 def _draw_indices(axis: Axes, found: pd.DataFrame) -> None:
-    shown = found.sort_values("total", ascending=False, kind="stable")
+    """Draw a bar of each kind for each input, the largest total at the top."""
+    shown = found.sort_values("total", ascending=False, kind="stable")[:_MOST_INPUTS]
+    places = np.arange(len(shown))[::-1]
     kinds = {"first": "first order: alone", "total": "total: with all others"}
-    errors = [
-        np.maximum([shown[kind] - shown[f"{kind}_low"], shown[f"{kind}_high"] - shown[kind]], 0.0)
-        for kind in kinds
-    ]
-    ends = {label: shown[kind] for kind, label in kinds.items()}
-    _draw_bars(axis, [str(key) for key in shown.index], ends, errors=errors)
+    for i, (kind, label) in enumerate(kinds.items()):
+        ends = [shown[kind] - shown[f"{kind}_low"], shown[f"{kind}_high"] - shown[kind]]
+        at, error = places + 0.2 - 0.4 * i, np.maximum(ends, 0.0)
+        axis.barh(at, shown[kind], height=0.38, xerr=error, capsize=2.5, label=label)
+    axis.set_yticks(places, [str(key) for key in shown.index], fontsize=8)
     axis.set_xlabel("share of the variance")
     axis.set_title("Sobol indices with 95 % intervals", fontsize=10)
-
-
-def _draw_bars(
-    axis: Axes,
-    names: list[str],
-    ends: dict[str, pd.Series],
-    *,
-    start: float = 0.0,
-    errors: list[Array] | None = None,
-) -> None:
-    """Draw a bar of each kind for each name, from `start` to its end, from the top down."""
-    most = _MOST_INPUTS
-    places = np.arange(len(names[:most]))[::-1]
-    for i, (label, values) in enumerate(ends.items()):
-        widths = values.to_numpy(float)[:most] - start
-        error = None if errors is None else errors[i][:, :most]
-        at = places + 0.2 - 0.4 * i
-        axis.barh(at, widths, left=start, height=0.38, xerr=error, capsize=2.5, label=label)
-    axis.axvline(start, color="#444444", linewidth=1.0)
-    axis.set_yticks(places, names[:most], fontsize=8)
     finish_axis(axis)
     # Bars fill the axis: the legend lies outside.
     axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8, frameon=False)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array, Bytes, Ints
 from sphshell_pin.base.checks import read_only
-from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 
@@ -128,21 +128,12 @@ class ContactSet(Summarized):
         facts = [Fact("contacts", len(self))]
         if len(self):
             found = [Feature(int(one)).name.lower() for one in np.unique(self.feature)]
-            facts += [
-                Fact("largest depth", float(self.depth.max()), "m"),
-                Fact("on", ", ".join(found), brief=len(found) == 1),
-            ]
+            facts.append(Fact("largest depth", float(self.depth.max()), "m"))
+            facts += [Fact("on", found[0])] if len(found) == 1 else []
         saddles, merge = int(np.count_nonzero(self.weight < 0)), "at which contacts merge"
         if saddles:
             facts.append(Fact(f"saddles {merge}", saddles, one=f"saddle {merge}"))
         return facts
-
-    def _rows(self) -> Detail:
-        headings = ("depth [m]", "point [m]", "normal", "feature", "element", "weight")
-        features = [Feature(int(one)).name.lower() for one in self.feature[:MOST_ROWS]]
-        columns = self.depth, self.point, self.normal, features, self.element, self.weight
-        rows = list(zip(*(one[:MOST_ROWS] for one in columns), strict=True))
-        return Detail(headings, rows, len(self))
 
     def force(self, law: ElasticLaw) -> Array:
         """Return the elastic force (3,) on the sphere [N], in the shell's frame: no damping."""

@@ -168,14 +168,6 @@ def _not_exact(shell: ShellBase, areas: Array) -> tuple[str, ...]:
     return not_exact(faces, share, off)
 
 
-def distances_at(shell: ShellBase, divisions: int) -> Array:
-    """Distances (t, k) [m] of points of the curved elements from the flat ones.
-
-    The points are those of `curved_mesh` with as many divisions.
-    """
-    return _distances(shell, np.arange(len(shell.triangles)), divisions)
-
-
 def _distances(shell: ShellBase, rows: Longs, divisions: int) -> Array:
     """Distances (n, k) [m] of points of the curved triangles `rows` from the flat ones."""
     parts = np.split(rows, range(AT_ONCE, len(rows), AT_ONCE))

@@ -78,7 +78,7 @@ def _load_cad(
             warn_caller(UnitWarning(text))
         return known[0]
     heard: list[Warning] = []
-    read: Read = run_in_child("read", arguments, file, purpose, cad, heard=heard)
+    read: Read = run_in_child(arguments, file, purpose, cad, heard=heard)
     # Unless the file was saved anew meanwhile.
     if KeptSurface.of(file, cad, (unit, number, crease_angle)) == kept:
         kept.save(read, heard)
@@ -391,7 +391,4 @@ class Shell(Queries):
             Fact("size", float(self.size), "m"),
             Fact("side", self.side),
             *([Fact("faces", len(self.faces))] if "faces" in vars(self) else []),
-            Fact("smooth patches", self.num_patches, brief=False),
-            Fact("file", self.source or "none", brief=False),
-            Fact("to look at", "; ".join(self.health.problems) or "nothing", brief=False),
         ]

@@ -6,22 +6,17 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import Table, quantity_of
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_columns import state_titles
-from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
-from sphshell_pin.patches.placed import poses_along
 from sphshell_pin.scenario.running.figures import NOT_REPEATABLE, recorded_figures
 
 
-@dataclass(frozen=True)
-class Curve:
+class Curve(NamedTuple):
     """A quantity over time: `t` (n,) [s] and `values` (n,) in `unit`, linear in between."""
 
     t: Array
@@ -31,14 +26,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class Measured:
-    """A run as it is compared: `figures` (value, unit) and `curves` by name, `settings` by key.
-
-    `parts` are its contacts, joints and sensors, `span` the times of its first and last row [s].
-    """
+    """A run as it is compared: `figures` (value, unit) and `curves` by name, `settings` by key."""
 
     label: str
-    parts: tuple[str, ...]
-    span: tuple[float, float]
     figures: Mapping[str, tuple[float, str]]
     curves: Mapping[str, Curve]
     settings: Mapping[str, object]
@@ -64,40 +54,22 @@ class FigureDifference(NamedTuple):
         return self.first == self.other or (math.isnan(self.first) and math.isnan(self.other))
 
 
-@dataclass(frozen=True)
-class CurveDifference:
+class CurveDifference(NamedTuple):
     """What a curve of another run is away from that of the first, over the time that both have.
 
-    `t` (k,) [s] are the recorded times of either, `values` (k,) the difference there, linear in
-    between as both curves are: `largest` is its largest size, at time `at` [s], `rms` the root of
-    its mean square over time. `of_range` is `largest` over the range of the first curve in that
-    time, nan where this is constant.
+    `difference` is the difference at the recorded times of either, linear in between as both curves
+    are: `largest` is its largest size, at time `at` [s], `rms` the root of its mean square over
+    time. `of_range` is `largest` over the range of the first curve in that time, nan where this is
+    constant.
     """
 
     name: str
     unit: str
-    t: Array
-    values: Array
+    largest: float
+    at: float
+    rms: float
     of_range: float
-
-    @property
-    def largest(self) -> float:
-        """The largest size of the difference, in `unit`."""
-        return float(np.abs(self.values).max())
-
-    @property
-    def at(self) -> float:
-        """When it is largest [s]."""
-        return float(self.t[np.abs(self.values).argmax()])
-
-    @property
-    def rms(self) -> float:
-        """Root of the mean square over time, exact for what is linear between the times."""
-        a, b, step = self.values[:-1], self.values[1:], np.diff(self.t)
-        time = float(self.t[-1] - self.t[0])
-        if not time > 0.0:
-            return self.largest
-        return float(np.sqrt(((a * a + a * b + b * b) * step).sum() / (3.0 * time)))
+    difference: Curve
 
 
 @dataclass(frozen=True)
@@ -105,8 +77,7 @@ class Difference:
     """One run beside the first: figures and curves of both, by name.
 
     `settings` are those of the scenarios that differ: key, of the first, of the other.
-    `only_first`, `only_other` are the parts that one alone has, `span` the time that both have [s],
-    None without any.
+    `only_first`, `only_other` are the curves that one alone has.
     """
 
     label: str
@@ -115,18 +86,34 @@ class Difference:
     settings: tuple[tuple[str, object, object], ...]
     only_first: tuple[str, ...]
     only_other: tuple[str, ...]
-    span: tuple[float, float] | None
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Two or more runs, each of `others` beside the first of `runs`."""
+def measured(label: str, result: Result, scene: Scene | None) -> Measured:
+    """Return what of `result` is compared; without a `scene` joints have numbers as names.
 
-    runs: tuple[Measured, ...]
-    others: tuple[Difference, ...]
+    The figures are those of its pairs, joints, sensors, energy and cost, and the last state; the
+    curves the columns of its rows. A run that diverged is compared up to where it did.
+
+    Raises ResultError where no row has finite numbers.
+    """
+    count = sound_rows(label, result.q, result.v)
+    recorded = recorded_figures(result, scene, count - 1)
+    settings = {} if result.origin is None else dict(_flat(result.origin.settings))
+    settings.pop("description", None)  # says what the run is, and changes nothing in it
+    columns = {quantity_of(title): one for title, one in result.row_columns(scene).items()}
+    return Measured(
+        label,
+        {name: figure for name, figure in recorded.items() if name not in NOT_REPEATABLE},
+        {
+            name: Curve(result.t[:count], np.asarray(values)[:count], unit)
+            for (name, unit), values in columns.items()
+            if name not in ("", "t")
+        },
+        settings,
+    )
 
 
-def compare(runs: Sequence[Measured]) -> Comparison:
+def compare(runs: Sequence[Measured]) -> tuple[Difference, ...]:
     """Compare each of `runs` with the first.
 
     Curves are compared at the recorded times of both runs, within the time that both have; between
@@ -137,56 +124,23 @@ def compare(runs: Sequence[Measured]) -> Comparison:
     InvalidParameter
         There are fewer than two.
     ResultError
-        Two runs have no contact, joint or sensor of the same name: they are of different models.
+        Two runs have no curve of the same name: they are of different models.
     """
     if len(runs) < 2:
         raise InvalidParameter("runs", len(runs), "must be two at least")
-    return Comparison(tuple(runs), tuple(_difference(runs[0], other) for other in runs[1:]))
+    return tuple(_difference(runs[0], other) for other in runs[1:])
 
 
-def measured(label: str, result: Result, scene: Scene | None) -> Measured:
-    """Return what of `result` is compared; without a `scene` joints have numbers as names.
-
-    The figures are those of its pairs, joints, sensors, energy and cost, and the last state; the
-    curves normal force, friction and depth of each pair, the positions of joints with one number,
-    and the path of each sphere in the world. A run that diverged is compared up to where it did.
-
-    Raises ResultError where no row has finite numbers.
-    """
-    count = sound_rows(label, result.q, result.v)
-    titles, _ = state_titles(result, scene)
-    if scene is None:
-        joints = [f"coordinate {title}" for title in titles]
-    else:
-        joints = [f"joint {name}" for name in list(scene.model.names)[1:]]
-    parts = [f"contact {name}" for name in result.pairs]
-    parts += joints + [f"sensor {name}" for name in result.sensors]
-    t, recorded = result.t[:count], recorded_figures(result, scene, count - 1)
-    settings = {} if result.origin is None else dict(_flat(result.origin.settings))
-    settings.pop("description", None)  # says what the run is, and changes nothing in it
-    return Measured(
-        label,
-        tuple(parts),
-        (float(t[0]), float(t[-1])),
-        {name: figure for name, figure in recorded.items() if name not in NOT_REPEATABLE},
-        _curves(result, titles, scene, count),
-        settings,
-    )
-
-
-def tables_of(comparison: Comparison) -> dict[str, Table]:
+def tables_of(differences: Sequence[Difference]) -> dict[str, Table]:
     """Return the tables "figures" and "curves": a row for each of another run."""
-    figures = [(other.label, *one) for other in comparison.others for one in other.figures]
-    curves = [
-        (other.label, one.name, one.unit, one.largest, one.at, one.rms, one.of_range)
-        for other in comparison.others
-        for one in other.curves
-    ]
     titles = {
         "figures": ("run", "figure", "unit", "first", "other", "difference", "relative"),
         "curves": ("run", "curve", "unit", "largest", "at [s]", "rms", "largest over range"),
     }
-    rows: dict[str, list[tuple[str | float, ...]]] = {"figures": [*figures], "curves": [*curves]}
+    rows: dict[str, list[tuple[str | float, ...]]] = {
+        "figures": [(other.label, *one) for other in differences for one in other.figures],
+        "curves": [(other.label, *one[:-1]) for other in differences for one in other.curves],
+    }
     return {
         name: {title: [row[k] for row in rows[name]] for k, title in enumerate(columns)}
         for name, columns in titles.items()
@@ -194,17 +148,16 @@ def tables_of(comparison: Comparison) -> dict[str, Table]:
 
 
 def _difference(first: Measured, other: Measured) -> Difference:
-    if not set(first.parts) & set(other.parts):
-        has = (f"{one.label} has {', '.join(one.parts[:6]) or 'none'}" for one in (first, other))
-        raise ResultError(
-            other.label,
-            f"has no contact, joint or sensor in common with {first.label}, so that nothing can be "
-            f"compared: {'; '.join(has)}",
-        )
-    begin, end = max(first.span[0], other.span[0]), min(first.span[1], other.span[1])
-    span = (begin, end) if begin <= end else None
+    if not first.curves.keys() & other.curves.keys():
+        reason = f"has no contact and no joint in common with {first.label}: nothing to compare"
+        raise ResultError(other.label, reason)
     keys = dict.fromkeys((*first.settings, *other.settings))
     settings = [(key, first.settings.get(key), other.settings.get(key)) for key in keys]
+    curves = (
+        _curve_difference(name, curve, other.curves[name])
+        for name, curve in first.curves.items()
+        if name in other.curves
+    )
     return Difference(
         other.label,
         tuple(
@@ -212,15 +165,10 @@ def _difference(first: Measured, other: Measured) -> Difference:
             for name, (value, unit) in first.figures.items()
             if name in other.figures
         ),
-        tuple(
-            _curve_difference(name, curve, other.curves[name], span)
-            for name, curve in first.curves.items()
-            if name in other.curves and span is not None
-        ),
+        tuple(one for one in curves if one is not None),
         tuple(one for one in settings if one[1] != one[2]),
-        tuple(part for part in first.parts if part not in other.parts),
-        tuple(part for part in other.parts if part not in first.parts),
-        span,
+        tuple(name for name in first.curves if name not in other.curves),
+        tuple(name for name in other.curves if name not in first.curves),
     )
 
 
@@ -230,52 +178,21 @@ def _figure_difference(name: str, unit: str, first: float, other: float) -> Figu
     return FigureDifference(name, unit, first, other, away, relative)
 
 
-def _curve_difference(
-    name: str, first: Curve, other: Curve, span: tuple[float, float]
-) -> CurveDifference:
-    t = np.union1d(first.t, other.t)
-    t = np.unique(np.clip(t, *span))
+def _curve_difference(name: str, first: Curve, other: Curve) -> CurveDifference | None:
+    """Return the difference of two curves; None where they have no time in common."""
+    begin, end = max(first.t[0], other.t[0]), min(first.t[-1], other.t[-1])
+    if begin > end:
+        return None
+    t = np.unique(np.clip(np.union1d(first.t, other.t), begin, end))
     a, b = (np.interp(t, one.t, one.values) for one in (first, other))
-    extent, values = float(np.ptp(a)), b - a
-    of_range = float(np.abs(values).max()) / extent if extent else math.nan
-    return CurveDifference(name, first.unit, t, values, of_range)
-
-
-def _curves(result: Result, titles: list[str], scene: Scene | None, count: int) -> dict[str, Curve]:
-    t = result.t[:count]
-    found: dict[str, Curve] = {}
-    for index, name in enumerate(result.pairs):
-        pair = PairSeries.of(result, index)
-        for what, values, unit in (
-            ("normal_force", pair.normal, "N"),
-            ("friction_force", pair.friction, "N"),
-            ("depth", pair.depth, "m"),
-        ):
-            found[f"pairs.{name}.{what}"] = Curve(t, values[:count], unit)
-    if scene is None:
-        positions = dict(zip(titles, result.q.T, strict=True))
-        return found | {name: Curve(t, q[:count], "") for name, q in positions.items()}
-    model = scene.model
-    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        if joint.nv != 1 or joint.shortname() == "JointModelMimic":
-            continue
-        q = result.q[:count, joint.idx_q]
-        if joint.nq == 2:  # cosine and sine
-            q = np.unwrap(np.arctan2(result.q[:count, joint.idx_q + 1], q))
-        unit = "rad" if joint.nq == 2 else quantity_of(titles[joint.idx_q])[1]
-        found[f"q.{name}"] = Curve(t, q, unit)
-    carried, rows = [one for one in scene.pairs if one.spheres], np.arange(count)
-    poses = {
-        joint: poses_along(result, scene, rows, joint, pin.SE3.Identity())
-        for joint in {one.joint_i for one in carried}
-    }
-    for one in carried:
-        turned, moved = poses[one.joint_i]
-        for axis, values in zip(
-            "xyz", (turned @ one.placement_i.translation + moved).T, strict=True
-        ):
-            found[f"sphere.{one.name}.{axis}"] = Curve(t, values, "m")
-    return found
+    extent, away = float(np.ptp(a)), b - a
+    largest, time = float(np.abs(away).max()), float(end - begin)
+    # Exact for what is linear between the times.
+    squares = away[:-1] ** 2 + away[:-1] * away[1:] + away[1:] ** 2
+    rms = math.sqrt(float(squares @ np.diff(t)) / (3.0 * time)) if time > 0.0 else largest
+    at, of_range = float(t[np.abs(away).argmax()]), largest / extent if extent else math.nan
+    whole = Curve(t, away, first.unit)
+    return CurveDifference(name, first.unit, largest, at, rms, of_range, whole)
 
 
 def _flat(value: object, key: str = "") -> Iterator[tuple[str, object]]:

@@ -25,8 +25,6 @@ POINT_COLOR = 0x101418
 HEAD_LENGTH = 6.5  # in half widths of the shaft
 SAME_CONTACT = 30.0  # likewise: farther away it is another contact
 
-ArrowKind = Literal["components", "total"]
-
 
 def nice(value: float) -> float:
     """Round a positive `value` to the nearest 1, 2 or 5 times a power of ten."""
@@ -125,12 +123,12 @@ class ArrowPool:
     """
 
     def __init__(
-        self, visualizer: Visualizer, size: int, width: float, kind: ArrowKind = "components"
+        self, visualizer: Visualizer, size: int, width: float, *, total: bool = False
     ) -> None:
         self.size = size
         self._width = width
         colors = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR}
-        if kind == "total":
+        if total:
             colors = {"total": TOTAL_COLOR}
         self._parts = len(colors)
         self._arrows: list[tuple[nodes.Move, nodes.Move]] = []

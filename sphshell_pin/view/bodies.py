@@ -21,9 +21,6 @@ SPHERE_COLOR = 0x2F6FDE
 PLANE_COLOR = 0x7A8794
 _CELLS = 12  # of the square that stands for a plane, along a side
 
-COLORINGS = ("distance", "faces", "patches")
-"""Ways to color a shell; of several that are on the first is seen."""
-
 
 def drawn_key(side: ShellSide) -> Hashable:
     """Return a key: shells with equal keys share a picture."""
@@ -50,39 +47,23 @@ class DrawnShell(nodes.OnJoint):
         self.shell = shell
         self._curved = side.is_smooth
         self._index = index
-        self._colorings: dict[str, bool] = {}
+        self._by_face: bool | None = None  # until it is drawn so
         surface.draw_shell(node, shell, index, curved=self._curved)
-
-    @property
-    def largest_distance(self) -> float:
-        """The largest distance of its curved elements from the flat ones [m], 0 without any."""
-        return self.shell.curvature_report().largest if self._curved else 0.0
 
     def show_curved(self, on: bool) -> None:
         """Draw the curved elements that contact uses, or the flat ones of the file."""
         if self._curved:
             surface.draw_shell(self.node, self.shell, self._index, curved=on)
-            nodes.show(self.node["surface"], not any(self._colorings.values()))
+            nodes.show(self.node["surface"], not self._by_face)
 
-    def show_coloring(self, part: str, on: bool, largest: float = 0.0) -> None:
-        """Show or hide one of COLORINGS; each is drawn when it is first shown.
-
-        largest : distance of the last color [m], of "distance"
-        """
-        if on and part not in self._colorings:
-            if part == "patches":
-                surface.draw_patches(self.node, self.shell, curved=self._curved)
-            elif part == "faces":
-                surface.draw_faces(self.node, self.shell, curved=self._curved)
-            elif self._curved:
-                surface.draw_distance(self.node, self.shell, largest)
-            else:
-                return
-        if on or part in self._colorings:
-            self._colorings[part] = on
-        seen = next((name for name in COLORINGS if self._colorings.get(name)), "surface")
-        for name in ("surface", *self._colorings):
-            nodes.show(self.node[name], name == seen)
+    def show_faces(self, on: bool) -> None:
+        """Show the colors of faces, which are drawn when they are first shown, or those of all."""
+        if on and self._by_face is None:
+            surface.draw_faces(self.node, self.shell, curved=self._curved)
+        if on or self._by_face is not None:
+            self._by_face = on
+            nodes.show(self.node["faces"], on)
+            nodes.show(self.node["surface"], not on)
 
 
 class DrawnSphere(nodes.OnJoint):

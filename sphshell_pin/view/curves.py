@@ -129,7 +129,6 @@ def run_curves(result: Result, count: int) -> list[Curves]:
             sum((one.friction for one in pairs), zero),
             np.max([zero, *(one.depth for one in pairs)], axis=0),
             zero,
-            zero,
         )
         curves.append(_curves(whole, t, {}))
     for one in sorted(pairs, key=lambda pair: -pair.peak)[:MOST_PAIRS]:

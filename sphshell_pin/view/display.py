@@ -12,9 +12,8 @@ from sphshell_pin.dynamics.result.result_parts import Patches
 from sphshell_pin.dynamics.scene.sides import PlaneSide
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import nodes
-from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, pushing
+from sphshell_pin.view.arrows import ArrowPool, ArrowScale, pushing
 from sphshell_pin.view.bodies import (
-    COLORINGS,
     DrawnPlane,
     DrawnShell,
     DrawnSphere,
@@ -27,7 +26,7 @@ from sphshell_pin.view.frames import FrameAxes, draw_grid, floor_height, grid_sp
 from sphshell_pin.view.nodes import show
 from sphshell_pin.view.patches import PatchPool, PatchScale
 from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, frame_of_body
-from sphshell_pin.view.surface import FACE_COLORS, Painting, range_text, tube
+from sphshell_pin.view.surface import FACE_COLORS, tube
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -49,7 +48,7 @@ Part = Literal[
     "curved",
     "frames",
     "grid",
-    Painting,
+    "faces",
 ]
 PARTS: tuple[Part, ...] = get_args(Part)
 """What `Display.show` can show and hide.
@@ -57,8 +56,8 @@ PARTS: tuple[Part, ...] = get_args(Part)
 "curved" are the curved elements of shells in contact by the method "smooth", in place of the flat
 ones.
 """
-HIDDEN_AT_FIRST: frozenset[Part] = frozenset({*get_args(Painting), "frames"})
-OF_SHELLS: frozenset[Part] = frozenset({*get_args(Painting), "wireframe", "trails", "curved"})
+HIDDEN_AT_FIRST: frozenset[Part] = frozenset({"faces", "frames"})
+OF_SHELLS: frozenset[Part] = frozenset({"faces", "wireframe", "trails", "curved"})
 
 
 class Display:
@@ -67,9 +66,8 @@ class Display:
     `visual_model` is any geometry model of `scene.model`, visual or collision; without one the
     joints are drawn as a skeleton. `visualizer` is an existing `meshcat.Visualizer`; without one
     a page is served as `meshcat.Visualizer()` does. `view` places the camera and sets the sizes of
-    arrows and points; without one it is chosen for the neutral configuration. `arrows` shows
-    normal and friction force apart ("components") or their sum ("total"); at most `pool` contacts
-    at a time. `arrow_scale` and `patch_scale` may be set at any time.
+    arrows and points; without one it is chosen for the neutral configuration. At most
+    `pool` contacts have arrows at a time. `arrow_scale` and `patch_scale` may be set at any time.
 
     Raises MissingExtra without meshcat, InvalidParameter for a geometry model that does not fit.
     """
@@ -81,12 +79,9 @@ class Display:
         visualizer: Visualizer | None = None,
         *,
         view: View | None = None,
-        arrows: ArrowKind = "components",
         arrow_scale: ArrowScale | None = None,
         pool: int = 8,
     ) -> None:
-        if arrows not in ("components", "total"):
-            raise InvalidParameter("arrows", arrows, 'must be "components" or "total"')
         self.scene = scene
         self.visualizer = nodes.new_visualizer() if visualizer is None else visualizer
         self._model = scene.model
@@ -108,9 +103,7 @@ class Display:
         self._pool = pool
         self._patches: PatchPool | None = None  # until there are some
         self._patches_on = True
-        self._arrows = ArrowPool(
-            self.visualizer["contacts"], pool, 0.0026 * self.view.distance, arrows
-        )
+        self._arrows = ArrowPool(self.visualizer["contacts"], pool, 0.0026 * self.view.distance)
         set_surroundings(self.visualizer)
         look(self.visualizer, self.view)
         self.update(neutral)
@@ -148,21 +141,6 @@ class Display:
     def data(self) -> pin.Data:
         """The joints' placements of the last `update`."""
         return self._data
-
-    @property
-    def largest_distance(self) -> float:
-        """The distance between curved and flat elements that has the last color [m].
-
-        It is the largest of all shells.
-        """
-        return max((shell.largest_distance for shell in self._shells.values()), default=0.0)
-
-    @property
-    def coloring(self) -> str | None:
-        """What the colors of the shells mean, if they are those of "distance"."""
-        if "distance" in self._hidden:
-            return None
-        return range_text(self.largest_distance)
 
     @property
     def grid(self) -> str | None:
@@ -278,8 +256,8 @@ class Display:
         return {path.lower(): frame for path, frame in held if frame is not None}
 
     def _show_of_shell(self, shell: DrawnShell, part: Part, on: bool) -> None:
-        if part in COLORINGS:
-            shell.show_coloring(part, on, self.largest_distance if on else 0.0)
+        if part == "faces":
+            shell.show_faces(on)
         elif part == "curved":
             shell.show_curved(on)
             show(shell.node["elements"], "wireframe" not in self._hidden)

@@ -1,4 +1,4 @@
-"""A finished run as a picture, a film, or a folder of pictures, drawn by a headless browser.
+"""A finished run as a picture or a film, drawn by a headless browser.
 
 The browser shows the page of `render_recording` and is told the time of each picture: what it
 draws does not depend on how fast it draws.
@@ -16,15 +16,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypedDict, TypeVar, get_args
+from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.atomic import write_whole
-from sphshell_pin.base.atomic.files import write_folder
 from sphshell_pin.base.checks import check_finite, check_vector
-from sphshell_pin.base.films import Pixels, check_film, write_film
+from sphshell_pin.base.films import Pixels, write_film
 from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.view.contact_path import LARGEST
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
 
-Drawn = TypeVar("Drawn")
 Camera = Literal["fit", "front", "side", "top", "follow", "contact"]
 CAMERAS: tuple[Camera, ...] = get_args(Camera)
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -44,9 +42,7 @@ PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 LAID_OUT = 1280 * 720  # pixels of the area for which text has its usual size
 LEAST_SIZE, MOST_SIZE = 64, 7680  # pixels
-SAMPLES = 6  # pictures that the colors of a .gif are chosen from
 PATIENCE = 120_000.0  # [ms] until the page is loaded
-FRAME = "frame_{:04d}.png"
 
 
 class FilmOptions(TypedDict, total=False):
@@ -55,7 +51,7 @@ class FilmOptions(TypedDict, total=False):
     time: float | None
     span: tuple[float | None, float | None]
     size: tuple[int, int]
-    fps: float | None
+    fps: float
     speed: float | None
     camera: Camera
     chart: bool
@@ -73,7 +69,7 @@ def render_film(
     time: float | None = None,
     span: tuple[float | None, float | None] = (None, None),
     size: tuple[int, int] = (1280, 720),
-    fps: float | None = None,
+    fps: float = 30.0,
     speed: float | None = None,
     camera: Camera = "fit",
     chart: bool = True,
@@ -86,19 +82,18 @@ def render_film(
     Parameters
     ----------
     path
-        A .png is one picture, a .gif or .mp4 a film, a path without suffix a folder of pictures
-        `frame_0001.png` and so on. It is written whole or not at all.
+        A .png is one picture, a .mp4 a film. It is written whole or not at all.
     scene, visual_model, title
         As in `Result.view`.
     time
         Of a picture, the time of the run [s]; by default its end.
     span
-        Of a film or folder, the times of the run from and to which it shows it [s]; None is its
+        Of a film, the times of the run from and to which it shows it [s]; None is its
         beginning or end.
     size
         Width and height [pixels].
     fps
-        Pictures per second; by default 30, of a .gif 20.
+        Pictures per second.
     speed
         Simulated seconds per second; by default as the scenario has it, or 1.
     camera
@@ -120,24 +115,23 @@ def render_film(
         There is no scene or no Chromium, or the file cannot be written.
     """
     path = Path(path)
-    still, film = path.suffix.lower() == ".png", path.suffix.lower() in (".gif", ".mp4")
-    if path.suffix and not (still or film):
-        must = "must end in .png, .gif or .mp4, or have no suffix (a folder of pictures)"
-        raise InvalidParameter("path", str(path), must)
+    still = path.suffix.lower() == ".png"
+    if not still and path.suffix.lower() != ".mp4":
+        raise InvalidParameter("path", str(path), "must end in .png or .mp4")
     if camera not in CAMERAS:
         raise InvalidParameter("camera", camera, f"must be one of {', '.join(CAMERAS)}")
-    for name, value in (("fps", fps), ("speed", speed), ("span", span)):
+    for name, value in (("speed", speed), ("span", span)):
         if still and value not in (None, (None, None)):
-            raise InvalidParameter(name, value, "is for a film or a folder of pictures, not a .png")
+            raise InvalidParameter(name, value, "is for a film, not a .png")
     if not still and time is not None:
         raise InvalidParameter("time", time, "is for a .png: a film has a span")
     size = _checked_size(size)
-    if fps is None:
-        fps = 20.0 if path.suffix.lower() == ".gif" else 30.0
+    if not still and (size[0] % 2 or size[1] % 2):
+        # Its colors are stored for squares of two by two pixels.
+        must = "must be even in both directions for a .mp4"
+        raise InvalidParameter("size", f"{size[0]}x{size[1]}", must)
     shown = Shown.of(result, scene, visual_model, title, speed)
     check_pace(fps, shown.speed)
-    if film:
-        check_film(path, size, fps)
     times = _times(result, (time, time) if still else span, still=still)
     stage = _Stage(shown.page(fps, times), size, camera, chart, dark, told)
 
@@ -145,19 +139,8 @@ def render_film(
         with stage.opened(path):
             if still:
                 write_whole(path, stage.picture(0))
-            elif film:
-                count = stage.count
-                wanted = SAMPLES if path.suffix.lower() == ".gif" else 1
-                chosen = sorted({round(k) for k in np.linspace(0, count - 1, wanted)})
-                samples = [stage.pixels(k) for k in chosen]
-                write_film(path, stage.all(stage.pixels), fps, samples)
             else:
-                # Other files of the folder stay.
-                files = (
-                    (FRAME.format(k), one) for k, one in enumerate(stage.all(stage.picture), 1)
-                )
-                old = [one.name for one in path.glob("frame_*.png")]
-                write_folder(path, files, [FRAME.format(1), *old])
+                write_film(path, stage.film(), size, fps)
 
     _interruptibly(draw, stage.stopped.set)
     return path
@@ -282,10 +265,10 @@ class _Stage:
         with Image.open(io.BytesIO(self.picture(number))) as image:
             return np.asarray(image.convert("RGB"))
 
-    def all(self, draw: Callable[[int], Drawn]) -> Iterator[Drawn]:
+    def film(self) -> Iterator[Pixels]:
         """Draw one picture after the other."""
         for number in range(self.count):
-            yield draw(number)
+            yield self.pixels(number)
             self.told(number + 1, self.count)
 
 

@@ -30,7 +30,7 @@ from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
 from sphshell_pin.view.robot import has_links
-from sphshell_pin.view.surface import RAMP, Coloring, check_coloring
+from sphshell_pin.view.surface import Coloring, check_coloring
 
 BARE = (
     "The robot is drawn by its joints, as the scene's model has no geometry: "
@@ -46,7 +46,6 @@ class RecordingOptions(TypedDict, total=False):
 
     fps: float
     speed: float
-    arrows: arrow.ArrowKind
     color: Coloring
 
 
@@ -78,7 +77,6 @@ def render_recording(
     fps: float = 30,
     speed: float = 1.0,
     title: str = "A finished run",
-    arrows: arrow.ArrowKind = "components",
     color: Coloring = "surface",
     span: tuple[float, float] | None = None,
     whole: bool = False,
@@ -89,12 +87,10 @@ def render_recording(
     `scene.model`, visual or collision; without one the joints are drawn as a skeleton. `fps` [1/s]
     frames are kept per second of the page, `speed` seconds of simulated time pass in one second of
     it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
-    two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
-    `color` is what the colors of the shells show: nothing ("surface"), the patches ("patches"),
-    how far curved elements are from the flat ones ("distance"), or the kinds of their faces
-    ("faces"). Of a `span` from and to a time
-    of the run [s] the scene has that part alone, in one frame where both are the same. With `whole`
-    the camera takes in all of the robot, else the surroundings of the contacts.
+    two frames, that touch at its peak. `color` is what the colors of the shells show: nothing
+    ("surface") or the kinds of their faces ("faces"). Of a `span` from and to a time of the run [s]
+    the scene has that part alone, in one frame where both are the same. With `whole` the
+    camera takes in all of the robot, else the surroundings of the contacts.
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
     positive, more than MOST_FRAMES frames, another `color`, or a geometry model that does not fit,
@@ -126,7 +122,8 @@ def render_recording(
     }
     view = views["fit"]
     length = arrow.arrow_length(scene, view.distance)
-    scale = arrow.ArrowScale.from_forces(_forces(shown, arrows), length)
+    # Friction is a fraction of the normal force: it shares its scale.
+    scale = arrow.ArrowScale.from_forces(shown.normal_force, length)
     most = int(np.bincount(shown.row).max(initial=0)) if len(shown.row) else 0
 
     window = FilmWindow()
@@ -135,12 +132,11 @@ def render_recording(
         visual_model,
         new_visualizer(window),
         view=view,
-        arrows=arrows,
         arrow_scale=scale,
         pool=min(most, MOST_ARROWS),
     )
     if color != "surface":
-        display.show(color, True)
+        display.show("faces", True)
     if shown.patches is not None:
         display.patch_scale = PatchScale.of(shown.patches, view.distance)
     for frame, row in enumerate(rows):
@@ -162,7 +158,7 @@ def render_recording(
     return render_page(
         [*window.commands(times), {**panel, "clock": clock}],
         title,
-        _legend(scene, scale, arrows, shown, trailed) + _color_keys(display, shown),
+        _legend(scene, scale, shown, trailed) + _color_keys(display, shown),
     )
 
 
@@ -300,14 +296,6 @@ def choose_rows(
     return rows, times
 
 
-def _forces(contacts: ContactRows, arrows: arrow.ArrowKind) -> Array:
-    """Magnitudes of all arrows that `contacts` bring into the picture [N]."""
-    if arrows == "total":
-        return arrow.largest_force(contacts)
-    # Friction is a fraction of the normal force: it shares its scale.
-    return contacts.normal_force
-
-
 def _draw_trails(
     display: Display, window: FilmWindow, result: Result, start: float, speed: float
 ) -> bool:
@@ -338,11 +326,7 @@ def _draw_trails(
 
 
 def _legend(
-    scene: Scene,
-    scale: arrow.ArrowScale,
-    arrows: arrow.ArrowKind,
-    shown: ContactRows,
-    trailed: bool,
+    scene: Scene, scale: arrow.ArrowScale, shown: ContactRows, trailed: bool
 ) -> list[tuple[str, str]]:
     legend = []
     radii = sorted({one.radius for pair in scene.pairs for one in pair.spheres})
@@ -355,12 +339,9 @@ def _legend(
         legend.append((css(SPHERE_COLOR), f"sphere, radius {sizes} mm"))
     if not len(shown.row):
         return [*legend, ("transparent", "no contact in this run")]
-    if arrows == "total":
-        legend.append((css(arrow.TOTAL_COLOR), f"force {on_what}, {scale}"))
-    else:
-        legend.append((css(arrow.NORMAL_COLOR), f"normal force {on_what}, {scale}"))
-        legend.append((css(arrow.FRICTION_COLOR), "friction force, same scale"))
-    if scale.cuts(_forces(shown, arrows)):
+    legend.append((css(arrow.NORMAL_COLOR), f"normal force {on_what}, {scale}"))
+    legend.append((css(arrow.FRICTION_COLOR), "friction force, same scale"))
+    if scale.cuts(shown.normal_force):
         cut = f"arrows longer than {scale.longest * 1e3:.0f} mm are cut"
         legend.append(("transparent", cut))
     if shown.patches is None:
@@ -372,10 +353,8 @@ def _legend(
 
 def _color_keys(display: Display, shown: ContactRows) -> list[tuple[str, str]]:
     """Return the legend of the colors of shells and patches, and of the grid."""
-    keys: list[tuple[tuple[str, ...], str]] = []
-    if display.coloring is not None:
-        keys.append((RAMP, display.coloring))
+    found = []
     if shown.patches is not None and len(shown.row):
-        keys.append((PRESSURE_RAMP, str(display.patch_scale)))
-    found = [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
+        ramp = f"linear-gradient(90deg, {', '.join(PRESSURE_RAMP)})"
+        found.append((ramp, str(display.patch_scale)))
     return [*found, *display.face_keys, (css(GRID_COLOR), str(display.grid))]

@@ -24,46 +24,14 @@ if TYPE_CHECKING:
 
     from sphshell_pin.shell.shell import Shell
 
-RAMP = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")
-"""From no distance to the largest: five colors of matplotlib's viridis, evenly spaced."""
-
-Painting = Literal["patches", "distance", "faces"]
-Coloring = Literal["surface", Painting]
+Coloring = Literal["surface", "faces"]
 """What the colors of shells can show."""
-
-FEW = 2
-"""Pieces of a side at which a shell of very many elements is measured; its elements have one color
-each."""
-
-
-def draw_distance(node: Visualizer, shell: Shell, largest: float) -> None:
-    """Draw the curved elements of `shell` below `node`, as "distance".
-
-    Its colors go from the first of RAMP, where a curved element is on the flat one, to the last,
-    at the distance `largest` [m].
-    """
-    from sphshell_pin.shell.curvature import curved_mesh, distances_at
-
-    if is_curved(shell, curved=True):
-        points, triangles, _ = curved_mesh(shell, divisions(shell))
-        distance = distances_at(shell, divisions(shell)).ravel()
-    else:
-        points = np.asarray(shell.vertices)[shell.triangles].reshape(-1, 3)
-        triangles = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
-        distance = distances_at(shell, FEW).max(axis=1).repeat(3)
-    share = distance / largest if largest > 0.0 else np.zeros(len(distance))
-    draw_colored(node["distance"], points, triangles, ramp_colors(share, RAMP))
 
 
 def check_coloring(color: str) -> None:
     """Raise InvalidParameter unless `color` is a Coloring."""
     if color not in get_args(Coloring):
         raise InvalidParameter("color", color, f"must be one of {', '.join(get_args(Coloring))}")
-
-
-def range_text(largest: float) -> str:
-    """Return the range of the colors as text."""
-    return f"distance of curved from flat: 0 to {largest * 1e3:.3g} mm"
 
 
 SURFACE_COLORS = (0x7FA8A0, 0xC4A878, 0x9A94C0, 0xB58C8C)
@@ -164,13 +132,6 @@ def draw_shell(node: Visualizer, shell: Shell, index: int, *, curved: bool = Fal
         )
 
 
-def draw_patches(node: Visualizer, shell: Shell, *, curved: bool = False) -> None:
-    """Draw `shell` below `node` with a color for each patch, as "patches"."""
-    mesh = SurfaceMesh.of(shell, curved=curved)
-    colors = patch_colors(int(mesh.patch.max(initial=0)) + 1)[mesh.patch]
-    draw_colored(node["patches"], mesh.vertices, mesh.triangles, colors)
-
-
 def draw_faces(node: Visualizer, shell: Shell, *, curved: bool = False) -> None:
     """Draw `shell` below `node` with a color for each kind of face in FACE_COLORS, as "faces"."""
     kinds, count = tuple(FACE_COLORS), len(FACE_COLORS)
@@ -197,14 +158,6 @@ def draw_colored(node: Visualizer, vertices: Array, triangles: IntArray, colors:
     """Draw a mesh at `node` with `colors` (n, 3) from 0 to 1 of its vertices."""
     look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10, **PUSHED_BACK)
     set_object(node, triangle_mesh(vertices, triangles, colors), look)
-
-
-def patch_colors(count: int) -> Array:
-    """Return `count` muted colors (n, 3) from 0 to 1, neighbors in number well apart."""
-    # Hues by the golden ratio: no two of any few in a row are close.
-    hue = (0.47 + 0.618033988749895 * np.arange(count)) % 1.0
-    ramp = np.abs((hue[:, None] * 6.0 + np.array([0.0, 4.0, 2.0])) % 6.0 - 3.0) - 1.0
-    return np.asarray(0.40 + 0.30 * np.clip(ramp, 0.0, 1.0))
 
 
 def great_circles(radius: float, points: int = 48) -> tuple[Array, IntArray]:

@@ -1,7 +1,6 @@
 """Sensitivities of runs, through touches, against differences of whole runs."""
 
 import pickle
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.errors import Interrupted, InvalidParameter, ResultError
+from sphshell_pin.errors import Interrupted, InvalidParameter
 from tests import differences, meshes, models
 from tests.dynamics.scenes import FRICTIONS
 from tests.results import assert_same_bits
@@ -212,35 +211,6 @@ def test_a_joint_that_meets_its_stop() -> None:
     assert "stop" in [event.kind for event in result.events]
 
 
-FIGURES: dict[str, Callable[[sp.Result], float]] = {
-    "height": lambda result: float(result.q[-1, 0]),
-    "speed": lambda result: float(result.v[-1, 0] ** 2),
-    "deepest": lambda result: float(result.contacts.depth.max()),
-    # Of the rows, at equal times: the force's integral over the row's spacing.
-    "impulse": lambda result: float(result.contacts.force_world[:, 2].sum()),
-    "mean force": lambda result: float(np.linalg.norm(result.contacts.force_world, axis=1).mean()),
-    "nothing": lambda result: 3.0,
-}
-
-
-@pytest.mark.parametrize("name", FIGURES)
-def test_of_a_figure(name: str) -> None:
-    figure = FIGURES[name]
-    case = drop(IMPACT, duration=0.05, record_dt=5e-4)
-    names = [f"{PAIR}.law.stiffness", f"{PAIR}.law.damping", "v0"]
-    result = case.run(names=names)
-    got = result.sensitivities.of(figure)
-    assert got.shape == (3,)
-    start = figure(result)
-    for k, column in enumerate(case.columns(names)):
-        f = lambda x, c=column: np.array([figure(case.moved(c, x)) - start])  # noqa: E731
-        scale = case.scale(column, 1e-3)[0]
-        error = differences.off(
-            got[k : k + 1], f, scale, tolerance=1e-5, known=1e-10 * max(abs(start), 1e-3)
-        )
-        assert error <= 1e-5
-
-
 def test_the_run_has_the_same_bits() -> None:
     for integrator in INTEGRATORS.values():
         case = drop(IMPACT, integrator, duration=0.03)
@@ -278,20 +248,6 @@ def test_a_controller_that_reads_sensors_is_refused() -> None:
     case = drop(IMPACT, controller=lambda t, q, v, contacts, sensors: 0.0 * q, control_dt=1e-3)
     with pytest.raises(InvalidParameter, match="controller"):
         case.run(names=["v0"])
-
-
-@pytest.mark.parametrize(
-    ("figure", "error", "said"),
-    [
-        (lambda result: float(result.energy.kinetic[-1]), ResultError, "energy"),
-        (lambda result: result.q, InvalidParameter, "returned ndarray, must return a number"),
-        (3.0, InvalidParameter, "must be a function"),
-    ],
-)
-def test_a_figure_that_has_no_derivative_is_refused(figure, error, said: str) -> None:  # type: ignore[no-untyped-def]
-    got = drop(IMPACT, duration=0.03).run(names=["v0"]).sensitivities
-    with pytest.raises(error, match=said):
-        got.of(figure)
 
 
 def test_an_interrupted_run_has_those_of_its_rows() -> None:

@@ -40,7 +40,7 @@ def test_files_keep_them_to_the_bit(bounced, file):
         assert not kept.flags.writeable
     assert np.abs(again.force_world).max() > 0
     assert {f.name for f in fields(before)} == {
-        "parameters", "q", "v", "force_world", "normal_force", "depth", "result"
+        "parameters", "q", "v", "force_world", "normal_force", "depth"
     }  # fmt: skip
 
 
@@ -51,18 +51,6 @@ def test_a_run_without_them_has_none_in_its_file(bounced, file, tmp_path):
         assert set(more) - set(arrays) == {
             f"sensitivities.{one}" for one in ("q", "v", "force_world", "normal_force", "depth")
         }
-
-
-def test_a_loaded_result_moves_its_rows_in_a_given_scene(bounced, file):
-    loaded = sp.Result.load(file)
-
-    def hardest(result):
-        return float(result.contacts.normal_force.max())
-
-    with pytest.raises(ResultError, match="has no scene"):
-        loaded.sensitivities.of(hardest)
-    again = replace(loaded, scene=bounced.scene).sensitivities.of(hardest)
-    assert (again == bounced.sensitivities.of(hardest)).all()
 
 
 def damaged(file, name, change):

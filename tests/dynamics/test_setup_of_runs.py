@@ -12,7 +12,6 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.dynamics.run import advance
 from sphshell_pin.dynamics.scene.explain import explain_pairs
-from sphshell_pin.dynamics.scene.sphere_arguments import seam_warning
 from tests import models
 
 LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
@@ -114,26 +113,3 @@ def test_a_run_whose_rows_fill_the_memory_ends_with_its_result(monkeypatch) -> N
     with pytest.raises(sp.errors.RowsFillMemory, match=r"rows fill 1e\+09 GB") as caught:
         sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(scene.neutral, duration=60.0)
     assert 0 < caught.value.result.t[-1] == caught.value.t < 60
-
-
-def test_shells_that_go_on_into_each_other_are_named() -> None:
-    """Side by side in one plane, not where one leans by more than the crease angle."""
-    turn = pin.utils.rotate("y", 0.8)
-    model = models.empty()
-    models.add_body(model, "tip", pin.JointModelTranslation())
-    plate = sp.Shell([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]], name="plate")
-    for rotation, radius, smooth in (
-        (np.eye(3), 0.01, True),
-        (turn, 0.01, False),
-        (np.eye(3), 0.02, False),  # of another sphere
-    ):
-        scene = sp.Scene(model)
-        for name, place in (
-            ("left", pin.SE3.Identity()),
-            ("right", pin.SE3(rotation, np.array([1.0, 0.0, 0.0]))),
-        ):
-            ball = sp.Sphere(0.01 if name == "left" else radius, "tip")
-            scene.add_contact(ball, plate, placement=place, law=LAW, friction=None, name=name)
-        said = seam_warning(*scene.pairs)
-        assert (said is not None) == smooth
-        assert smooth == ("push twice at their seam" in str(said))

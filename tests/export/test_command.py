@@ -7,8 +7,7 @@ import pytest
 from mcap.reader import make_reader
 
 import sphshell_pin as sp
-from sphshell_pin.cli.export import beside, nanoseconds
-from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.cli.export import beside
 from tests.command import call, refused, succeed
 from tests.scenario.files import without_pictures, write
 
@@ -23,13 +22,12 @@ def folder(tmp_path_factory):
 
 def test_files_are_written_beside_the_run(folder, monkeypatch):
     monkeypatch.chdir(folder)
-    printed = call("export", "drop", "--to", "mcap", "--start", "1795381200.5")
+    printed = call("export", "drop", "--to", "mcap")
     assert (printed.exit_code, printed.stdout) == (0, "drop.mcap\n"), printed.output
     with open("drop.mcap", "rb") as stream:
         reader = make_reader(stream)
-        assert reader.get_summary().statistics.message_start_time == 1795381200_500_000_000
         about = next(reader.iter_metadata()).metadata
-    command = "sphshell-pin export drop --to mcap --start 1795381200.5"
+    command = "sphshell-pin export drop --to mcap"
     assert about["command"] == command
     assert Path(about["scenario"]).name == "drop.toml"
     for format in ("csv", "parquet"):
@@ -47,14 +45,6 @@ def test_names_of_what_is_written(tmp_path, monkeypatch):
     assert beside(Path(), ".mcap") == tmp_path / "runs.mcap"
 
 
-def test_times_are_exact():
-    assert nanoseconds("0") == 0
-    assert nanoseconds("1800000000.123456789") == 1_800_000_000_123_456_789
-    for wrong in ("now", "nan", "1e99", "1970-01-02"):
-        with pytest.raises(InvalidParameter, match="seconds since 1970"):
-            nanoseconds(wrong)
-
-
 def test_faults(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(folder)
     damaged = tmp_path / "damaged.npz"
@@ -63,9 +53,6 @@ def test_faults(folder, tmp_path, monkeypatch):
         (["drop", "--to", "rrd"], "Rerun's viewer opens .mcap files"),
         (["drop"], "must be one of mcap, csv, parquet"),
         (["drop", "--to", "bag"], "must be one of mcap, csv, parquet"),
-        (["drop", "--to", "mcap", "--start", "soon"], "--start"),
-        (["drop", "--to", "mcap", "--start", "-1"], "give another start"),
-        (["drop", "--to", "csv", "--start", "5"], "is for --to mcap"),
         (["none", "--to", "csv"], "none: cannot read the results"),
         ([damaged, "--to", "csv"], "damaged.npz: is not a file that Result.save wrote"),
         (["drop", "--to", "csv", "--scenario", "gear_contact"], "its model had nq = 7"),

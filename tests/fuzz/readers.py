@@ -26,7 +26,6 @@ from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.study.compare import compare, measured, tables_of
 from sphshell_pin.study.fit import fit
 from sphshell_pin.study.robot_check.models import load_subject
-from sphshell_pin.view.live.opening import player_of
 from sphshell_pin.view.recording import render_recording
 from tests.fuzz.folders import results_corpus, unpacked
 from tests.fuzz.tables import prepare
@@ -47,8 +46,8 @@ def read_result(path: Path) -> None:
     if (by := result.sensitivities) is not None:
         assert by.q.shape == (*result.v.shape, len(by.parameters))
     assert result.energy.exchanged >= 0.0 or np.isnan(result.energy.exchanged)
-    replay = Replay(result)
-    replay.advance(1e-2)
+    Replay(result)
+    result.contacts.at_row(0)
 
 
 def read_scenario(path: Path) -> None:
@@ -120,11 +119,9 @@ look_in = in_folder(read_run)
 
 
 def _replay(home: Path) -> None:
-    player = player_of(home)
-    player.advance(1e-2)
-    player.seek(0.02)
-    for kind in player.series:
-        kind.values(player.now)
+    replay = Replay(home / "run.npz")
+    for row in range(len(replay.result.t)):
+        replay.result.contacts.at_row(row)
 
 
 def _taxels(home: Path) -> None:
@@ -142,10 +139,10 @@ def _compare(home: Path) -> None:
     (home / "whole.npz").write_bytes(unpacked(results_corpus()[0])["run.npz"])
     runs = [measured(name, *with_scene(home / name)) for name in ("run.npz", "whole.npz")]
     for pair in (runs, runs[::-1]):
-        comparison = compare(pair)
-        for table in tables_of(comparison).values():
+        differences = compare(pair)
+        for table in tables_of(differences).values():
             csv_text(table)
-    plot_compare(comparison)
+        plot_compare(pair, differences)
 
 
 def _save(home: Path) -> None:
@@ -171,6 +168,6 @@ def _plot(kind: str) -> Callable[[Path], None]:
 
 LOOKS = (
     *(_replay, _mcap, _export("csv"), _export("parquet"), _compare, _recording, _taxels),
-    *(_save, *map(_plot, ("overview", "force", "energy", "sensors", "path", "map"))),
+    *(_save, *map(_plot, ("overview", "force", "energy", "sensors", "map"))),
 )
 """Everything that shows or exports the results in a folder."""

@@ -78,7 +78,7 @@ def npz_corpus() -> tuple[bytes, ...]:
         shapes = {"q": (len(result.t), nv), "v": (len(result.t), nv), "force_world": (m, 3)}
         shapes |= {"normal_force": (m,), "depth": (m,)}
         rows = {name: np.ones((*shape, 2)) for name, shape in shapes.items()}
-        by = Sensitivities(("v0.0", "v0.1"), **rows, result=None)
+        by = Sensitivities(("v0.0", "v0.1"), **rows)
         result = replace(result, sensitivity_rows=by)
         return (reproducible(result.save(Path(home, "run.npz"))),)
 

@@ -11,7 +11,6 @@ import importlib.util
 import io
 import json
 import os
-import signal
 import site
 import sys
 import tempfile
@@ -88,6 +87,8 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     from sphshell_pin.cli import main
     from sphshell_pin.patches import TaxelGrid
     from sphshell_pin.plot import KINDS
+    from sphshell_pin.scenario import build
+    from sphshell_pin.scenario.format.functions import load_function
     from sphshell_pin.scenario.running.replay import Replay
 
     def command(*words: str) -> Callable[[], None]:
@@ -100,13 +101,6 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
                     raise RuntimeError(f"exit code {end.code}") from None
 
         return run
-
-    def live() -> None:
-        """End the page a second after it is there, as Ctrl-C does."""
-        signal.signal(signal.SIGALRM, signal.default_int_handler)
-        page = importlib.import_module("sphshell_pin.cli.common")
-        page.echo = lambda _: signal.setitimer(signal.ITIMER_REAL, 1.0)
-        command("view", "run", "--no-open")()
 
     def load() -> Result:
         return Result.load("run/run.npz")
@@ -124,14 +118,14 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
         "compare": command("compare", "run", "run", "--out", "compared"),
         "taxels": command("taxels", "run", "--contact", "ball-plate"),
         "render": command("render", "run", "--out", "picture.png"),
-        "view": live,
-        "Replay": lambda: Replay("run/run.npz").advance(1.0),
+        "view": command("view", "run", "--no-open"),
+        "Replay": lambda: Replay("run/run.npz"),
         "Result.view": lambda: load().view().save("page.html"),
         "Result.to_mcap": lambda: load().to_mcap("again.mcap"),
         "Result.save": lambda: load().save("again.npz"),
         "TaxelGrid": taxels,
-        "trusted": lambda: Replay("run/run.npz", trust_code=True),
-        "another scenario": lambda: Replay("run/run.npz", scenario, trust_code=True),
+        "routine": lambda: load_function("routine.py:find", Path(scenario), "source", {}),
+        "built": lambda: build(scenario),
     }
 
 

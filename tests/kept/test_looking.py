@@ -19,7 +19,7 @@ from tests.studies import mostly_studies
 
 pytestmark = pytest.mark.browser  # `render` opens one, where there is one
 
-TRUSTED = ("trusted", "another scenario")
+TRUSTED = ("routine", "built")
 WAYS = [name for name in looks("") if name not in TRUSTED]
 
 
@@ -93,11 +93,11 @@ def test_looking_reads_nothing_else_and_executes_nothing(seen, home):
     if seen["place"]["is"] == "alone":
         assert "no such file" in str(seen["failed"][TRUSTED[1]])
         return
-    routine, scenario = (str(seen["found"][one]) for one in TRUSTED)
+    routine, built = (str(seen["found"][one]) for one in TRUSTED)
     # Its text, or what an earlier process compiled of it, is read.
     source = home / "routine.py"
     cached = Path(importlib.util.cache_from_source(str(source)))
     assert f"open: {source}'" in routine or f"open: {cached}'" in routine
     assert f"exec: {source}'" in routine
-    assert "subprocess.Popen: " in scenario
-    assert f"open: {home / 'all.toml'}" in scenario
+    assert "subprocess.Popen: " in built
+    assert f"open: {home / 'all.toml'}" in built

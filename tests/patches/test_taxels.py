@@ -127,7 +127,7 @@ def test_films(tmp_path):
     with image.open(film) as opened:
         assert opened.n_frames == 11
         assert opened.width * 4 == opened.height * 6
-    with pytest.raises(InvalidParameter, match=r"\.gif or \.mp4"):
+    with pytest.raises(InvalidParameter, match=r"must end in \.gif"):
         save_film(tmp_path / "taxels.avi", images)
     for t, speed in ((-1e308, 1.0), (np.nan, 1.0), (0.0, 1e-300)):
         odd = dataclasses.replace(images, t=np.concatenate([[t], images.t[1:]]))

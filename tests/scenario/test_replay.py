@@ -32,57 +32,6 @@ def replay(folder):
     return Replay(folder / "out" / "run.npz")
 
 
-def test_it_stands_at_the_row_of_its_time(replay):
-    result = replay.result
-    assert replay.time == result.t[0]
-    assert replay.duration == pytest.approx(0.05)
-    touched = result.contacts.row[0]
-    replay.seek(result.t[touched] + 1e-9)
-    np.testing.assert_array_equal(replay.q, result.q[touched])
-    np.testing.assert_array_equal(replay.v, result.v[touched])
-    # The log is that of the model: what the scene finds at the row is what was recorded.
-    found = replay.scene.contacts(replay.q, replay.v)
-    np.testing.assert_allclose(replay.contacts.depth, found.depth, rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(replay.contacts.point_world, found.point_world, atol=1e-12)
-
-
-def test_steps_add_up_to_the_whole(replay):
-    passed = [replay.advance(0.0007, 1.0) for _ in range(80)]
-    result = replay.result
-    np.testing.assert_array_equal(np.concatenate([rows.t for rows in passed]), result.t)
-    force = np.concatenate([rows.normal_force for rows in passed])[:, 0]
-    by_hand = [result.contacts.normal_force[result.contacts.row == r].sum() for r in range(51)]
-    np.testing.assert_allclose(force, by_hand)
-    assert force.max() > 0
-    assert replay.ended
-    assert len(replay.advance(1.0, 1.0)) == 0
-    replay.reset()
-    assert replay.ended is None
-    assert replay.time == 0.0
-    assert len(replay.advance(0.0, 1.0)) == 1
-
-
-def test_the_clock_stops_at_both_ends(replay):
-    replay.seek(-5.0)
-    assert replay.time == 0.0
-    replay.seek(99.0)
-    assert replay.time == replay.result.t[-1]
-    with pytest.raises(SphshellError):
-        replay.seek(float("nan"))
-
-
-def test_energy_goes_with_the_row(replay):
-    energy = replay.result.energy
-    assert replay.exchanged == 0.0
-    replay.seek(99.0)
-    assert replay.residual == energy.residual[-1]
-    assert replay.exchanged == pytest.approx(energy.exchanged)
-    # Until it first touches, it changes potential into kinetic energy, seen from both sides.
-    replay.seek(0.01)
-    lost = energy.potential[0] - energy.potential[replay.row]
-    assert replay.exchanged == pytest.approx(0.5 * (energy.kinetic[replay.row] + lost), rel=1e-12)
-
-
 def test_a_shipped_scenario_is_found_by_its_name(tmp_path):
     report = run_built(
         build("sphere_on_shell", {"run.duration": "0.01"}), tmp_path, recording=False
@@ -103,7 +52,7 @@ def test_a_file_of_an_older_version_loads(folder, tmp_path):
     assert sp.Result.load(tmp_path / "old.npz").origin is None
     with pytest.raises(ResultError, match=r"old.npz: does not say .*--scenario"):
         Replay(tmp_path / "old.npz")
-    assert Replay(tmp_path / "old.npz", scenario=folder / "drop.toml").duration > 0
+    assert Replay(tmp_path / "old.npz", scenario=folder / "drop.toml").scene.pairs
 
 
 def test_a_scenario_of_another_robot_is_refused(folder):
@@ -115,14 +64,6 @@ def test_a_scenario_of_other_contacts_is_refused(folder, tmp_path):
     other = write(tmp_path, DROP.replace("ball-plate", "ball-table"))
     with pytest.raises(ResultError, match="were ball-plate, the scene has ball-table"):
         Replay(folder / "out" / "run.npz", scenario=other)
-
-
-def test_a_finished_run_has_nothing_to_turn(replay):
-    assert replay.parameters == () == replay.bodies
-    with pytest.raises(SphshellError, match="finished"):
-        replay.change("contact.ball-plate.law.stiffness", 1.0)
-    with pytest.raises(SphshellError, match="finished"):
-        replay.push("ball", np.zeros(3), 1.0)
 
 
 def test_a_scene_of_ones_own_is_played_where_it_ran():
@@ -165,17 +106,11 @@ def with_code(tmp_path):
     return tmp_path
 
 
-def test_the_routine_is_loaded_where_it_is_trusted(with_code):
-    file = with_code / "out" / "run.npz"
-    replay = Replay(file)
-    with pytest.raises(SphshellError, match=r"routine.py:find.*trust_code=True"):
-        replay.scene.contacts(replay.q)
-    trusted = Replay(file, trust_code=True)
-    assert (with_code / "executed").exists()
-    trusted.seek(trusted.result.contacts.t[3])
-    assert len(trusted.contacts)
-    found = trusted.scene.contacts(trusted.q, trusted.v)
-    np.testing.assert_allclose(found.depth, trusted.contacts.depth, atol=1e-12)
+def test_the_routine_is_not_loaded(with_code):
+    replay = Replay(with_code / "out" / "run.npz")
+    with pytest.raises(SphshellError, match=r"routine.py:find.*build the scenario again"):
+        replay.scene.contacts(replay.result.q[0])
+    assert not (with_code / "executed").exists()
 
 
 def test_elements_that_the_surface_does_not_have_are_refused(folder):

@@ -200,15 +200,14 @@ def of_fit(value):
 
 
 def of_film(count):
-    """Writes a folder of as many pictures, which no browser draws."""
-    pictures = [b"picture" * (k + count) for k in range(count)]
-    drawn = Mock(opened=lambda _: contextlib.nullcontext(), all=lambda _: iter(pictures))
+    """Writes a picture of that size, which no browser draws."""
+    drawn = Mock(opened=lambda _: contextlib.nullcontext(), picture=lambda _: b"picture" * count)
     stands_in = {"_Stage": lambda *_: drawn, "Shown": Mock(of=lambda *_: Mock(speed=1.0))}
     run = SimpleNamespace(t=[0.0, 1.0], q=np.zeros((2, 1)))
 
     def write_film(place):
         with patch.multiple("sphshell_pin.view.film", **stands_in):
-            render_film(place / "film", run)
+            render_film(place / "film.png", run)
 
     return write_film
 

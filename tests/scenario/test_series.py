@@ -4,12 +4,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
-from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.scenario.running.rows import motion_series
-from sphshell_pin.scenario.running.run import run_built
 from tests.scenario.files import FINGER, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -60,24 +57,6 @@ def test_torques_are_recorded_once_they_are_asked_for(tmp_path) -> None:
     assert torque.values(live.now)[0] == pytest.approx(expected, rel=1e-9)
     live.reset()  # and in the next run
     assert np.isfinite(torque.values(live.advance(0.02))[1:]).all()
-
-
-def test_a_finished_run_offers_what_it_recorded(built, tmp_path) -> None:
-    run_built(built, tmp_path / "out", recording=False)
-    result = Result.load(tmp_path / "out" / "run.npz")
-    replay = Replay(result)
-    curves = {one.key: one for one in replay.series}
-    rows = replay.advance(1.0)
-    np.testing.assert_array_equal(curves["torque.knuckle"].values(rows), result.torque[:, 0])
-    np.testing.assert_array_equal(curves["q.knuckle"].values(rows), np.rad2deg(result.q[:, 0]))
-    np.testing.assert_array_equal(curves["residual"].values(rows), result.energy.residual)
-    log = result.sensors["wrist"]
-    np.testing.assert_array_equal(
-        curves["sensor.wrist.force_z"].values(rows), [log.at(t)[2] for t in result.t]
-    )
-    replay.seek(0.0525)
-    assert replay.now.t == [0.0525]
-    assert curves["q.knuckle"].values(replay.now) == np.rad2deg(replay.q[0])
 
 
 def test_a_joint_that_turns_without_end_has_an_angle() -> None:

@@ -47,7 +47,7 @@ def serve(source, target):
     global answers
     answers = target
     name = "sphshell_pin.shell.cad.jobs"
-    sys.modules[name] = types.SimpleNamespace(JOBS=dict(read=job))
+    sys.modules[name] = types.SimpleNamespace(read=job)
     child.require_kernel = lambda purpose: None
     child.serve(source, target)
 """

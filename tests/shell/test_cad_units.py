@@ -125,7 +125,7 @@ def test_several_units_hold_for_their_own_parts(step, tmp_path):
 
 def test_units_without_a_name_are_converted_to_one(step, tmp_path):
     path = written(tmp_path, with_unit(step, converted("FURLONG", "201168.")))
-    done = convert(path, tmp_path / "out.step")
+    done = convert(path, tmp_path / "out.ply")
     assert done.target.unit == "mm"
     assert done.target.size == pytest.approx(done.source.size, rel=1e-12)
 

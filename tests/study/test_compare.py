@@ -27,21 +27,19 @@ def table():
     return turntable_run()
 
 
-def run(label, t, values, figures=None, parts=("contact a",)):
-    t = np.asarray(t, dtype=float)
-    curve = Curve(t, np.asarray(values, dtype=float), "N")
+def run(label, t, values, figures=None, curves=("force",)):
+    curve = Curve(np.asarray(t, dtype=float), np.asarray(values, dtype=float), "N")
     figures = {name: (value, "N") for name, value in (figures or {}).items()}
-    return Measured(label, parts, (t[0], t[-1]), figures, {"force": curve}, {})
+    return Measured(label, figures, dict.fromkeys(curves, curve), {})
 
 
 def test_curves_on_different_times_are_compared_as_lines():
     """Between the rows |t| and a constant differ linearly: extremes and mean square are exact."""
     first = run("first", [-1, 0, 2], [1, 0, 2])
     other = run("other", [-0.5, 0.7, 3], [0.25, 0.25, 0.25])
-    (curve,) = compare([first, other]).others[0].curves
-    assert compare([first, other]).others[0].span == (-0.5, 2)
-    np.testing.assert_array_equal(curve.t, [-0.5, 0, 0.7, 2])
-    np.testing.assert_allclose(curve.values, [-0.25, 0.25, -0.45, -1.75], atol=1e-15)
+    (curve,) = compare([first, other])[0].curves
+    np.testing.assert_array_equal(curve.difference.t, [-0.5, 0, 0.7, 2])
+    np.testing.assert_allclose(curve.difference.values, [-0.25, 0.25, -0.45, -1.75], atol=1e-15)
     assert (curve.largest, curve.at) == (1.75, 2)
     # The integral of (0.25 - |t|)^2 from -0.5 to 2, over its length.
     square = (0.25**3 + 0.25**3) / 3 + (0.25**3 + 1.75**3) / 3
@@ -52,7 +50,7 @@ def test_curves_on_different_times_are_compared_as_lines():
 def test_figures_have_absolute_and_relative_differences():
     first = run("first", [0, 1], [0, 0], {"peak": -2.0, "zero": 0.0, "nan": np.nan})
     other = run("other", [0, 1], [0, 0], {"peak": -1.5, "zero": 1.0, "nan": np.nan})
-    peak, zero, unknown = compare([first, other]).others[0].figures
+    peak, zero, unknown = compare([first, other])[0].figures
     assert (peak.absolute, peak.relative, peak.same) == (0.5, 0.25, False)
     assert zero.absolute == 1.0
     assert np.isnan(zero.relative)
@@ -61,21 +59,19 @@ def test_figures_have_absolute_and_relative_differences():
 
 def test_runs_without_common_time_have_no_curves():
     early, late = run("early", [0, 1], [0, 1]), run("late", [2, 3], [0, 1])
-    other = compare([early, late]).others[0]
-    assert (other.span, other.curves) == (None, ())
-    instant = compare([early, run("late", [1, 2], [3, 4])]).others[0]
-    assert instant.span == (1, 1)
+    assert compare([early, late])[0].curves == ()
+    instant = compare([early, run("late", [1, 2], [3, 4])])[0]
     assert (instant.curves[0].largest, instant.curves[0].rms) == (2, 2)
 
 
 def test_what_one_run_alone_has_is_listed():
-    first = run("first", [0, 1], [0, 1], {"x": 1.0}, parts=("contact a", "joint b"))
-    other = run("other", [0, 1], [0, 1], {"y": 1.0}, parts=("sensor c", "contact a"))
-    found = compare([first, other]).others[0]
-    assert (found.only_first, found.only_other) == (("joint b",), ("sensor c",))
+    first = run("first", [0, 1], [0, 1], {"x": 1.0}, ("a", "b"))
+    other = run("other", [0, 1], [0, 1], {"y": 1.0}, ("c", "a"))
+    (found,) = compare([first, other])
+    assert (found.only_first, found.only_other) == (("b",), ("c",))
     assert found.figures == ()
-    with pytest.raises(ResultError, match=r"nothing can be compared: first has contact a.*joint z"):
-        compare([first, run("alien", [0, 1], [0, 1], parts=("joint z",))])
+    with pytest.raises(ResultError, match=r"alien.* in common with first"):
+        compare([first, run("alien", [0, 1], [0, 1], curves=("z",))])
     with pytest.raises(InvalidParameter, match="two at least"):
         compare([first])
 
@@ -84,25 +80,19 @@ def test_a_run_equals_itself_and_others_are_beside_the_first(finger):
     one = measured("one", finger, finger.scene)
     slower = replace(finger, t=2 * finger.t, q=finger.q)
     other = measured("slower", slower, finger.scene)
-    same, late = compare([one, one, other]).others
+    same, late = compare([one, one, other])
     assert all(figure.same for figure in same.figures)
-    assert not any(curve.values.any() for curve in same.curves)
-    some = {"q.knuckle", "pairs.tip-wall.depth", "sphere.tip-wall.x"}
+    assert not any(curve.largest for curve in same.curves)
+    some = {"q.knuckle", "v.knuckle", "pairs.tip-wall.depth"}
     assert {curve.name for curve in same.curves} >= some
     knuckle = next(curve for curve in late.curves if curve.name == "q.knuckle")
     k = list(finger.scene.model.names).index("knuckle") - 1
-    first, second = (np.interp(knuckle.t, n * finger.t, finger.q[:, k]) for n in (1, 2))
-    np.testing.assert_allclose(knuckle.values, second - first, atol=1e-15)
+    first, second = (np.interp(knuckle.difference.t, n * finger.t, finger.q[:, k]) for n in (1, 2))
+    np.testing.assert_allclose(knuckle.difference.values, second - first, atol=1e-15)
 
 
-def test_paths_and_angles_of_a_free_ball_and_a_turntable(table):
-    curves = measured("table", table, table.scene).curves
-    path = np.column_stack([curves[f"sphere.1st ball/disc.{axis}"].values for axis in "xyz"])
-    np.testing.assert_allclose(path, table.q[:, 2:5], rtol=0, atol=1e-16)
-    turned = np.unwrap(np.arctan2(table.q[:, 1], table.q[:, 0]))
-    np.testing.assert_array_equal(curves["q.axle"].values, turned)
-    assert "q.ball_moves" not in curves
-    assert measured("x", table, None).curves["q.8"].values[0] == 1.0
+def test_joints_without_a_scene_have_numbers(table):
+    assert measured("x", replace(table, scene=None), None).curves["q.8"].values[0] == 1.0
 
 
 def test_settings_that_differ_are_listed_by_their_keys(finger):
@@ -114,7 +104,7 @@ def test_settings_that_differ_are_listed_by_their_keys(finger):
         measured(label, replace(finger, origin=Origin("x", stated)), finger.scene)
         for label, stated in (("a", settings), ("b", other))
     ]
-    assert compare(runs).others[0].settings == (("contact.tip.law.stiffness", 1e6, 2e6),)
+    assert compare(runs)[0].settings == (("contact.tip.law.stiffness", 1e6, 2e6),)
 
 
 def test_tables_have_every_run(finger):
@@ -131,22 +121,23 @@ def test_a_diverged_run_is_compared_up_to_there(finger):
     q = finger.q.copy()
     q[10:] = np.inf
     part = measured("part", replace(finger, q=q), finger.scene)
-    assert part.span == (0, finger.t[9])
+    assert part.curves["q.knuckle"].t[-1] == finger.t[9]
     with pytest.raises(ResultError, match="no row of finite numbers"):
         measured("none", replace(finger, q=np.full_like(q, np.nan)), finger.scene)
 
 
-def test_the_picture_has_every_run_and_its_difference(finger, table):
+def test_the_picture_has_every_run_and_its_difference(finger):
     one = measured("one", finger, finger.scene)
-    figure = plot_compare(compare([one, measured("two", finger, finger.scene)]))
+    runs = [one, measured("two", finger, finger.scene)]
+    figure = plot_compare(runs, compare(runs))
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     name = "pairs.tip-wall.normal_force"
     assert titles[:2] == [name, f"{name}, less that of one"]
     assert [line.get_label() for line in figure.axes[0].lines] == ["one", "two"]
     assert [line.get_label() for line in figure.axes[1].lines] == ["two"]
-    assert "force [N]" in figure.axes[0].get_ylabel()
-    still = run("still", [0, 1], [0, 0])
-    plot_compare(compare([still, still]))
+    assert "[N]" in figure.axes[0].get_ylabel()
+    still = [run("still", [0, 1], [0, 0]), run("late", [2, 3], [0, 0])]
+    plot_compare(still, compare(still))
 
 
 def drop(folder, name, **changes):
@@ -187,5 +178,5 @@ def test_faults_of_compare(tmp_path, monkeypatch):
     other = DROP.replace("ball-plate", "elsewhere")
     succeed("run", write(tmp_path, other), "--out", "other", "--no-recording")
     printed = succeed("compare", soft, "other", "--out", "x", "--no-picture")
-    assert "in soft alone: contact ball-plate" in printed.output
-    assert "in other alone: contact elsewhere" in printed.output
+    assert "in soft alone: pairs.ball-plate.normal_force" in printed.output
+    assert "in other alone: pairs.elsewhere.normal_force" in printed.output

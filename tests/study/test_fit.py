@@ -177,8 +177,13 @@ def test_wrong_deviations_are_said(bounce):
     columns = noisy(columns_of(bounce, t, [FORCE]), 0.02)
     largest = float(np.max(next(iter(columns.values()))))
     data = {"t [s]": t, **columns}
-    assert not sp.fit(bounce, data, [STIFFNESS], sigma={FORCE: 0.02 * largest}).remarks
-    (remark,) = sp.fit(bounce, data, [STIFFNESS], sigma={FORCE: 0.01 * largest}).remarks
+
+    def remarks(share):
+        sigma = {f"{FORCE}.sigma [N]": np.full(len(t), share * largest)}
+        return sp.fit(bounce, {**data, **sigma}, [STIFFNESS]).remarks
+
+    assert not remarks(0.02)
+    (remark,) = remarks(0.01)
     assert "times the standard deviations that were given" in remark
 
 

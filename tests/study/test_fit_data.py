@@ -63,8 +63,8 @@ def test_units_empty_cells_and_comments(read):
 
 def test_columns_may_be_chosen(read):
     text = f"t [s],{HEIGHT} [m],remark [1]\n0,1,7\n"
-    (column,) = read(text, only=[HEIGHT], sigma={HEIGHT: 0.5}).columns
-    assert column.sigma.tolist() == [0.5]
+    (column,) = read(text, only=[HEIGHT]).columns
+    assert column.values.tolist() == [1.0]
     with pytest.raises(NameNotFound, match="no column 'depth'"):
         read(text, only=["depth"])
 
@@ -171,7 +171,7 @@ def test_the_command_ends_with_2(built, tmp_path, monkeypatch):
     (tmp_path / "wrong.csv").write_text(HEAD + "0,1\n0,1\n")
     command = ["fit", "wrong.csv", built.path, "--param", "gravity.2"]
     assert refused(*command).startswith("error: wrong.csv, line 3: time 0 s is the same")
-    for wrong in ("--experiment=wrong.csv speed", "--sigma=height=high", "--set=no"):
+    for wrong in ("--experiment=wrong.csv speed", "--set=no"):
         assert "must be " in refused(*command, wrong)
     assert not (tmp_path / "results").exists()
 

@@ -66,7 +66,6 @@ def panda(*, quick, progress):
     names = steps.WHOLE[:-1]
     whole = {name: times(2e-6 + 2e-7 * k) for k, name in enumerate(names)}
     whole[steps.CONTROL_TOUCHING] = times(3.5e-6)
-    whole |= {name: times(4e-6) for name in steps.ADDED}
     imports = {"sphshell_pin": times(0.14), "pinocchio": times(0.13)}
     return steps.assemble(whole, imports)
 

@@ -165,7 +165,7 @@ def test_what_would_be_lost_or_mixed_is_refused(tmp_path):
 
     refused("holds 3 runs", {STIFFNESS: [1e4, 5e4]})
     refused("holds 4 runs", changes={"run.duration": "2.0"})
-    refused("holds 4 runs", None, dist={STIFFNESS: "uniform(1,2)"}, sample="lhs", n=2)
+    refused("holds 4 runs", None, dist={STIFFNESS: "uniform(1,2)"}, n=2)
     figures = tmp_path / "figures.py"
     figures.write_text(figures.read_text() + "\n# changed\n")
     refused("holds 4 runs .*files")
@@ -220,14 +220,16 @@ def test_a_routine_that_breaks_or_remembers_touches_no_other_run(tmp_path):
     assert table["figures.count"].tolist() == [1.0] * 4
 
 
-def test_words_lists_values_in_step_and_expectations(scenario):
+def test_words_lists_and_expectations(scenario):
     vary = {"contact.method": "smooth,facets", "gravity": "[0,0,-9.81],[0,0,-1.62]"}
-    table = sweep(scenario, vary, workers=0, together=True)
-    assert table["contact.method"].tolist() == ["smooth", "facets"]
-    assert table["gravity"].tolist() == ["[0, 0, -9.81]", "[0, 0, -1.62]"]
-    deep, shallow = table["figures.depth"]
+    table = sweep(scenario, vary, workers=0)
+    assert table["contact.method"].tolist() == ["smooth", "smooth", "facets", "facets"]
+    assert table["gravity"].tolist() == ["[0, 0, -9.81]", "[0, 0, -1.62]"] * 2
+    deep, shallow = table["figures.depth"][:2]
     assert shallow / deep == pytest.approx((1.62 / 9.81) ** (1 / 1.5), rel=1e-8)
-    assert table["met.figures.depth"].tolist() == [float(one <= 1e-4) for one in (deep, shallow)]
+    assert (
+        table["met.figures.depth"].tolist() == [float(one <= 1e-4) for one in (deep, shallow)] * 2
+    )
 
 
 def test_a_worker_with_other_files_or_versions_is_told(scenario, tmp_path):

@@ -1,4 +1,4 @@
-"""Uncertain inputs: points, Sobol indices and tornados against closed forms, and their pictures."""
+"""Uncertain inputs: points and Sobol indices against closed forms, and their pictures."""
 
 import math
 
@@ -9,7 +9,7 @@ from scipy import stats
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError
 from sphshell_pin.plot.uncertainty import plot_uncertainty
-from sphshell_pin.study.sweep import plan_sweep, quantiles, sample_of, sobol_indices, sweep, tornado
+from sphshell_pin.study.sweep import plan_sweep, quantiles, sample_of, sobol_indices, sweep
 from tests.command import succeed
 from tests.study.resting import GRAVITY
 
@@ -49,7 +49,7 @@ def table_of(design, values):
 
 def ishigami_table(n, **design):
     """Return the table of a sweep of n (d + 2) runs, with the function in place of a scenario."""
-    made = sample_of(ANGLES, "sobol", n, indices=True, **design)
+    made = sample_of(ANGLES, n, indices=True, **design)
     return table_of(made, ishigami(*columns(made).T))
 
 
@@ -62,7 +62,7 @@ def test_quantiles_are_those_of_the_textbook():
     below = 0.5 * (1 + math.erf(math.sqrt(0.5)))
     shares = np.array([1 - below, 0.5, below])
     texts = ["a = normal(10, 2e0)", "b=Uniform(10,12)", "c=lognormal(6,1.5)"]
-    dists = sample_of(texts, tornado=True).dists
+    dists = sample_of(texts, 2).dists
     assert list(dists) == ["a", "b", "c"]
     np.testing.assert_allclose(dists["a"].ppf(shares), [8, 10, 12], rtol=1e-12)
     np.testing.assert_allclose(dists["b"].ppf(shares), 10 + 2 * shares, rtol=1e-12)
@@ -88,31 +88,26 @@ def test_quantiles_are_those_of_the_textbook():
 )
 def test_wrong_distributions_are_told(dist, words):
     with pytest.raises(InvalidParameter, match=words):
-        sample_of(dist, "lhs", 8)
+        sample_of(dist, 8)
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         ({}, "vary must say what varies, as .* or dist what is uncertain"),
-        ({"vary": ["a=1,2"], "sample": "lhs"}, "sample = 'lhs' is for uncertain inputs"),
+        ({"vary": ["a=1,2"], "n": 8}, "n = 8 is for uncertain inputs"),
         ({"vary": ["a=1,2"], "dist": DIST}, "vary = .* is for values in a grid"),
-        ({"dist": DIST, "together": True}, "together = True is for values in a grid"),
-        ({"dist": DIST}, "sample must be given with dist"),
-        ({"dist": DIST, "n": 8, "tornado": True}, "sample must be given with dist"),
-        ({"dist": DIST, "sample": "soboll", "n": 8}, "must be sobol or lhs"),
-        ({"dist": DIST, "sample": "sobol"}, "n = None must be a whole number"),
-        ({"dist": DIST, "sample": "sobol", "n": 100}, "power of 2 .* such as 64 or 128"),
-        ({"dist": DIST, "sample": "lhs", "n": 8, "seed": -1}, "whole number, 0 or more"),
-        ({"dist": DIST, "sample": "lhs", "n": 8, "indices": True}, "indices need .* = sobol"),
-        ({"dist": DIST, "sample": "sobol", "n": 2**19, "indices": True}, "1000000 at most"),
+        ({"dist": DIST}, "n = None must be a whole number"),
+        ({"dist": DIST, "n": 100}, "power of 2, such as 64 or 128"),
+        ({"dist": DIST, "n": 8, "seed": -1}, "whole number, 0 or more"),
+        ({"dist": DIST, "n": 2**19, "indices": True}, "1000000 at most"),
         # Beyond the bounds: not cut off, not made a failed run, but told before anything runs.
         (
-            {"dist": {STIFFNESS: "normal(1e5,6e4)"}, "sample": "lhs", "n": 64},
+            {"dist": {STIFFNESS: "normal(1e5,6e4)"}, "n": 64},
             r"3 points of 64 have a value that is not allowed; the first: .*stiffness: should be "
             r"greater than 0 \(given: -.*lognormal\(median,factor\) is positive",
         ),
-        ({"dist": DIST | {"contact.ball-plate.law.stiffness": "uniform(1,2)"}, "tornado": True},
+        ({"dist": DIST | {"contact.ball-plate.law.stiffness": "uniform(1,2)"}, "n": 8},
          "dist = .* is given twice: leave one of the two out"),
     ],
 )  # fmt: skip
@@ -131,34 +126,28 @@ def test_arguments_that_do_not_go_together_are_told(scenario, arguments, words):
 )
 def test_a_key_without_a_number_is_told(scenario, key, words):
     with pytest.raises(ScenarioError, match=words):
-        plan_sweep(scenario, dist={key: "normal(1,2)"}, sample="lhs", n=64)
+        plan_sweep(scenario, dist={key: "normal(1,2)"}, n=64)
 
 
-@pytest.mark.parametrize("sample", ["sobol", "lhs"])
-def test_each_interval_of_equal_probability_has_one_point(sample):
+def test_each_interval_of_equal_probability_has_one_point():
     dist = {"a": "normal(3,2)", "b": "lognormal(2,3)", "c": stats.uniform(-1, 2)}
-    found = columns(sample_of(dist, sample, 64)).T
+    found = columns(sample_of(dist, 64)).T
     exact = [stats.norm(3, 2), stats.lognorm(math.log(3), scale=2), stats.uniform(-1, 2)]
     for values, one in zip(found, exact, strict=True):
         assert sorted((64 * one.cdf(values)).astype(int)) == list(range(64))
-    again, other = (columns(sample_of(dist, sample, 64, seed=seed)).T for seed in (0, 1))
+    again, other = (columns(sample_of(dist, 64, seed=seed)).T for seed in (0, 1))
     assert np.array_equal(again, found)
     assert not np.any(other == found)
 
 
-def test_the_design_is_saltellis_and_the_tornado_moves_one_input_at_a_time():
-    design = sample_of({"x": "uniform(0,1)", "y": "uniform(2,3)"}, "sobol", 16, indices=True)
+def test_the_design_is_saltellis():
+    design = sample_of({"x": "uniform(0,1)", "y": "uniform(2,3)"}, 16, indices=True)
     assert design.parts == ("A", "B", "AB x", "AB y") * 16
     a, b, x, y = (columns(design)[i::4] for i in range(4))
     np.testing.assert_array_equal(x, np.column_stack([b[:, 0], a[:, 1]]))
     np.testing.assert_array_equal(y, np.column_stack([a[:, 0], b[:, 1]]))
     both = np.column_stack([a, b]) - [0, 2, 0, 2]
     assert all(sorted((16 * one).astype(int)) == list(range(16)) for one in both.T)
-    design = sample_of({"x": "uniform(0,1)", "y": "normal(2,1)"}, tornado=True)
-    assert design.parts == ("median", "5 % x", "95 % x", "5 % y", "95 % y")
-    z = 1.6448536269514722
-    expected = [[0.5, 2], [0.05, 2], [0.95, 2], [0.5, 2 - z], [0.5, 2 + z]]
-    np.testing.assert_allclose(columns(design), expected, rtol=1e-12)
 
 
 def test_the_indices_of_ishigamis_function():
@@ -181,7 +170,7 @@ def test_the_indices_of_ishigamis_function():
 def test_intervals_cover_95_percent_where_the_points_are_random():
     """The bootstrap takes the points for independent: with such points it must be right."""
     rng, n, tables, hits = np.random.default_rng(5), 512, 300, []
-    design = sample_of(ANGLES, "sobol", n, indices=True)
+    design = sample_of(ANGLES, n, indices=True)
     for _ in range(tables):
         a, b = rng.uniform(-np.pi, np.pi, (2, n, 3))
         swaps = [np.where(np.arange(3) == i, b, a) for i in range(3)]
@@ -192,38 +181,27 @@ def test_intervals_cover_95_percent_where_the_points_are_random():
     assert abs(np.mean(hits) - 0.95) < 2.4 * np.sqrt(0.95 * 0.05 / tables)
 
 
-def test_a_step_function_of_one_input_and_the_order_of_a_tornado():
-    design = sample_of({"x": "uniform(0,1)", "y": "uniform(0,1)"}, "sobol", 1024, indices=True)
+def test_a_step_function_of_one_input():
+    design = sample_of({"x": "uniform(0,1)", "y": "uniform(0,1)"}, 1024, indices=True)
     found = sobol_indices(table_of(design, np.floor(4 * columns(design)[:, 0]).astype(int)), "f")
     np.testing.assert_allclose(found[["first", "total"]].loc["x"], [1, 1], atol=0.02)
     assert found.loc["y", ["first", "total", "first_low", "total_high"]].tolist() == [0, 0, 0, 0]
-    design = sample_of(dict.fromkeys("ab", "uniform(0,1)") | {"c": "uniform(-1,1)"}, tornado=True)
-    a, b, c = columns(design).T
-    found = tornado(table_of(design, a + 3 * b + 10 * c**2), "f")
-    assert found.index.tolist() == ["c", "b", "a"]
-    # Both ends of c lie on one side of its median.
-    np.testing.assert_allclose(found.loc["c"], [-0.9, 0.9, 2 + 8.1, 2, 2 + 8.1], rtol=1e-12)
-    np.testing.assert_allclose(found.loc["b"], [0.05, 0.95, 0.65, 2, 3.35], rtol=1e-12)
 
 
 def test_tables_that_have_no_such_answer_are_told():
     table = ishigami_table(8)
-    alone = sample_of(ANGLES, tornado=True)
-    moved = table_of(alone, ishigami(*columns(alone).T))
+    alone = sample_of(ANGLES, 8)
+    plain = table_of(alone, ishigami(*columns(alone).T))
     constant = table.assign(f=0.3 * (1 + 1e-16 * np.arange(len(table))))  # but for rounding
-    holes, broken = table.copy(), moved.copy()
+    holes = table.copy()
     holes.loc[7, "f"] = np.inf
-    broken.loc[2, ["f", "error"]] = np.nan, "it broke"
     for compute, words in (
         (lambda: sobol_indices(table.iloc[1:], "f"), "table lacks rows"),
-        (lambda: tornado(table, "f"), "no runs for a tornado"),
         (lambda: sobol_indices(table.drop(columns="design"), "f"), "no column 'design'"),
         (lambda: sobol_indices(table, "f", confidence=95), "between 0 and 1"),
-        (lambda: sobol_indices(moved, "f"), "no runs for Sobol indices"),
-        (lambda: quantiles(moved), "no runs for a sample"),
+        (lambda: sobol_indices(plain, "f"), "no runs for Sobol indices"),
         (lambda: sobol_indices(constant, "f"), "'f' is 0.3 in all runs: without a variance"),
         (lambda: sobol_indices(holes, "f"), r"1 of 40 runs \(AB x, run 7: it is inf\)"),
-        (lambda: tornado(broken, "f"), r"run 2: it broke\): a tornado of the others would be wr"),
     ):
         with pytest.raises(InvalidParameter, match=words):
             compute()
@@ -240,30 +218,23 @@ def test_a_sample_has_the_closed_form_of_rest_is_told_and_drawn(scenario):
     # The depth falls with the stiffness, which alone decides it.
     out = scenario.parent / "told.parquet"
     options = [f"--dist={key}={one}" for key, one in DIST.items()]
-    options += ["--sample", "sobol", "--n", 32, "--indices", "--tornado"]
+    options += ["--n", 32, "--indices"]
     told = succeed("sweep", scenario, *options, "--workers", 0, "--out", out)
     table, words = pd.read_parquet(out), " ".join(told.output.split())
     assert table.columns[:6].tolist() == ["run", STIFFNESS, DAMPING, "status", "error", "design"]
-    assert table["design"].value_counts().to_dict() == {
-        **dict.fromkeys(["A", "B", f"AB {STIFFNESS}", f"AB {DAMPING}"], 32),
-        **dict.fromkeys(["median", *(f"{i} % {key}" for key in DIST for i in (5, 95))], 1),
-    }
+    counts = table["design"].value_counts().to_dict()
+    assert counts == dict.fromkeys(["A", "B", f"AB {STIFFNESS}", f"AB {DAMPING}"], 32)
     found = quantiles(table).loc["figures.depth"]
     assert found["runs"] == 64
     share = np.array([0.95, 0.75, 0.5, 0.25, 0.05])
     expected = depth_of(stats.lognorm(math.log(1.5), scale=1e5).ppf(share))
     np.testing.assert_allclose(found[[5, 25, 50, 75, 95]].to_numpy(float), expected, rtol=0.03)
-    moved = tornado(table, "figures.depth")
-    assert moved.index.tolist() == [STIFFNESS, DAMPING]
-    ends = depth_of(stats.lognorm(math.log(1.5), scale=1e5).ppf(np.array([0.05, 0.5, 0.95])))
-    np.testing.assert_allclose(moved.loc[STIFFNESS, ["low", "median", "high"]].tolist(), ends, 1e-8)
-    np.testing.assert_allclose(moved.loc[DAMPING, ["low", "high"]].tolist(), [ends[1]] * 2, 1e-4)
     indices = sobol_indices(table, "figures.depth")
     assert abs(indices.loc[DAMPING, ["first", "total"]]).max() < 1e-3
     row = indices.loc[STIFFNESS]
     assert row["first_low"] < 1 < row["first_high"]
     for part in (
-        "resting: 133 runs, 133 done, 0 failed",
+        "resting: 128 runs, 128 done, 0 failed",
         f"{STIFFNESS} 51328.2 100000 194825 N/m^1.5",
         "figures.depth 0 % of the runs",
         f"{STIFFNESS} {row['first']:.6g} {row['first_low']:.6g}",
@@ -275,7 +246,7 @@ def test_a_sample_has_the_closed_form_of_rest_is_told_and_drawn(scenario):
 def test_failed_runs_are_left_out_of_quantiles_and_refused_by_indices(scenario):
     # A radius above 24 mm starts deeper than its half.
     dist = {"contact.sphere.radius": "normal(0.018,0.005)", STIFFNESS: "uniform(1e5,2e5)"}
-    table = sweep(scenario, dist=dist, sample="sobol", n=8, indices=True, workers=0)
+    table = sweep(scenario, dist=dist, n=8, indices=True, workers=0)
     failed = int((table[table["design"].isin(["A", "B"])]["status"] == "failed").sum())
     assert 0 < failed < 8
     assert quantiles(table).loc["figures.depth", "runs"] == 16 - failed
@@ -303,17 +274,12 @@ def test_the_histogram_counts_every_run_that_has_the_figure(values):
 
 
 def test_bars_of_inputs_have_their_ends_and_intervals():
-    """Of many inputs the largest are drawn, from the top; a bar begins at the median, or at 0."""
-    keys = [f"key {i}" for i in range(30)]
-    ends = {"low_value": -1.0, "high_value": 1.0, "low": np.linspace(-2, 0.5, 30)}
-    moved = pd.DataFrame({**ends, "median": 1.0, "high": 3.0}, index=keys)
-    found = sobol_indices(ishigami_table(64), "f").sort_values("total", ascending=False)
-    left, right = plot_uncertainty(pd.DataFrame({"design": []}), "f", moved, found).axes
-    assert [label.get_text() for label in left.get_yticklabels()] == keys[:20]
-    assert np.all(np.diff(left.get_yticks()) < 0)
-    assert {bar.get_x() for bar in left.patches} == {1.0}
-    drawn = [bar.get_x() + bar.get_width() for bar in left.patches]
-    assert drawn == pytest.approx([*moved["low"][:20], *moved["high"][:20]])
+    """Of many inputs the largest are drawn, from the top."""
+    table = ishigami_table(64)
+    found = sobol_indices(table, "f").sort_values("total", ascending=False)
+    _, right = plot_uncertainty(table, "f", found).axes
+    assert [label.get_text() for label in right.get_yticklabels()] == list(found.index)
+    assert np.all(np.diff(right.get_yticks()) < 0)
     assert [bar.get_width() for bar in right.patches] == [*found["first"], *found["total"]]
     for kind, lines in zip(("first", "total"), right.collections, strict=True):
         drawn = [segment[:, 0].tolist() for segment in lines.get_segments()]

@@ -15,18 +15,6 @@ class StandIn:
 TAB, OTHER_TAB, WATCHER = StandIn(), StandIn(), StandIn()
 
 
-class ForeignWindow:
-    """Stands in for the window of somebody's meshcat server."""
-
-    web_url = "http://127.0.0.1:7000/static/"
-
-    def __init__(self):
-        self.commands = []
-
-    def send(self, command):
-        self.commands.append(command.lower())
-
-
 def say(live, kind, client=TAB, **fields):
     live.server.take(client, {"type": kind, **fields})
 

@@ -22,7 +22,6 @@ class BallPlayer:
     patches = None
     visual_model = None
     start = 0.0
-    duration = None
     planned = None
 
     def __init__(self, height=0.049, stiffness=5e3, friction=None, wall_per_second=0.0):
@@ -101,34 +100,6 @@ class BallPlayer:
 
     def push(self, body, force_world, seconds):
         self.force, self.push_end = np.asarray(force_world), self.time + seconds
-
-    def seek(self, t):
-        raise InvalidParameter("t", t, "is for finished runs")
-
-
-class FilmPlayer(BallPlayer):
-    """A finished run: the ball moves along x with 0.1 m/s for two seconds, whatever happens."""
-
-    duration = 2.0
-    planned = None
-    bodies = ()
-    parameters = ()
-
-    def reset(self):
-        super().reset()
-        self.seek(0.0)
-
-    def seek(self, t):
-        self.time = min(max(t, 0.0), self.duration)
-        self.q = np.array([0.1 * self.time, 0.0, self.height])
-        self.ended = "The recorded run ends here." if self.time == self.duration else None
-
-    def advance(self, duration, wall=np.inf):
-        before = self.time
-        self.seek(self.time + duration)
-        t = np.arange(before, self.time, ROW_DT) + ROW_DT
-        column = np.full((len(t), 1), 5.0)
-        return Rows(t, column, 0.1 * column, 1e-3 * column)
 
 
 class ArmPlayer(BallPlayer):

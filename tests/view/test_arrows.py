@@ -48,7 +48,7 @@ def test_an_arrow_goes_from_the_contact_along_the_force():
 
 
 def test_the_total_force_is_one_arrow():
-    where = last_transforms(1, forces(4.0, friction=[[0.0, 1.0, 0.0]]), ArrowScale(), kind="total")
+    where = last_transforms(1, forces(4.0, friction=[[0.0, 1.0, 0.0]]), ArrowScale(), total=True)
     tip = (where["total_0/head"] @ [0, 0.5, 0, 1])[:3]
     np.testing.assert_allclose(tip - [0, 1, 2], np.array([2.4, 1.0, 3.2]) * 0.01, atol=1e-12)
     assert not any(name.startswith("normal") for name in where)

@@ -1,4 +1,4 @@
-"""Shells coloured by how far curved elements stand off the flat ones, and by kinds of faces."""
+"""Shells coloured by kinds of faces."""
 
 import coal
 import numpy as np
@@ -7,12 +7,10 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.shell.curvature import curved_mesh
 from sphshell_pin.view.display import Display
 from sphshell_pin.view.recording import render_recording
-from sphshell_pin.view.surface import FACE_COLORS, RAMP, hex_colors, ramp_colors
+from sphshell_pin.view.surface import FACE_COLORS, hex_colors
 from tests import models
-from tests.shell.test_curvature import ball
 from tests.view.drawn import Film, attribute
 
 
@@ -41,39 +39,13 @@ class Sheet(Film):
         return [path.rpartition("/")[2] for path, on in self.visible.items() if on]
 
 
-def test_colours_run_from_none_to_the_largest_distance():
-    shell = ball(8)
-    sheet = Sheet(scene_of(shell))
-    assert sheet.display.coloring is None
-    assert not sheet.drawn("distance")
-    sheet.display.show("distance", True)
-    ((points, colors),) = sheet.drawn("distance")
-    largest = shell.curvature_report().largest
-    np.testing.assert_allclose(points, curved_mesh(shell, 6)[0], atol=1e-6)
-    on_flat = np.abs(points[:, None] - shell.vertices[None]).sum(axis=2).min(axis=1) < 1e-6
-    none, most = ramp_colors(np.array([0.0, 1.0]), RAMP)
-    np.testing.assert_allclose(colors[on_flat], np.tile(none, (on_flat.sum(), 1)), atol=1e-6)
-    # The lightest point is next to the place of the report, or to one that is as far off.
-    lightest = colors[:, 1].argmax()
-    np.testing.assert_allclose(colors[lightest], most, atol=0.05)
-    assert f"{1e3 * largest:.3g} mm" in sheet.display.coloring
-    assert sheet.shown() == ["distance"]
-    sheet.display.show("patches", True)
-    assert sheet.shown() == ["distance"]
-    sheet.display.show("distance", False)
-    assert sheet.shown() == ["patches"]
-    assert sheet.display.coloring is None
-    ((_, colors),) = sheet.drawn("patches")
-    assert 0.0 < colors.min() <= colors.max() < 1.0
-    sheet.display.show("patches", False)
-    assert sheet.shown() == ["surface"]
-
-
 @pytest.mark.parametrize("method", ["smooth", "facets"])
 def test_each_kind_has_its_color(method):
     shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3), segments=36)
     sheet = Sheet(scene_of(shell, method=method))
+    assert sheet.shown() == []
     sheet.display.show("faces", True)
+    assert sheet.shown() == ["faces"]
     ((points, colors),) = sheet.drawn("faces")
     flat = np.isclose(np.abs(points[:, 2]), 0.15)
     kinds = dict(zip(FACE_COLORS, hex_colors(tuple(FACE_COLORS.values())), strict=True))
@@ -84,22 +56,19 @@ def test_each_kind_has_its_color(method):
     assert np.allclose(np.linalg.norm(points[is_cylinder, :2], axis=1), 0.1, rtol=5e-3)
     assert is_cylinder.any()
     assert is_plane.any()
+    sheet.display.show("faces", False)
+    assert sheet.shown() == ["surface"]
 
 
-def test_a_recording_states_range_and_kinds():
+def test_a_recording_states_the_kinds():
     shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3))
     scene = scene_of(shell)
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
         [0.0, 0.0, 0.3], np.zeros(3), 0.01
     )
-    largest = f"0 to {1e3 * shell.curvature_report().largest:.3g} mm"
-    said = {
-        "distance": f"distance of curved from flat: {largest}",
-        "faces": "on no face recognized",
-    }
-    for color in ("surface", *said):
+    for color in ("surface", "faces"):
         page = render_recording(result, scene, color=color)
-        assert {one for one, text in said.items() if text in page} == {color} - {"surface"}
+        assert ("on no face recognized" in page) == (color == "faces")
     assert FACE_COLORS["torus"] in page
-    with pytest.raises(InvalidParameter, match="surface, patches, distance"):
+    with pytest.raises(InvalidParameter, match="surface, faces"):
         render_recording(result, scene, color="depth")

@@ -120,8 +120,6 @@ def test_geometry_of_another_model_is_refused():
 def test_wrong_arguments_are_named():
     scene = turntable_scene()
     canvas = Film().canvas
-    with pytest.raises(InvalidParameter, match="arrows"):
-        Display(scene, visualizer=canvas, arrows="both")
     display = Display(scene, visualizer=canvas)
     with pytest.raises(InvalidParameter, match=r"\(8,\)"):
         display.update(np.zeros(3))

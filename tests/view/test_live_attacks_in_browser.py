@@ -78,9 +78,3 @@ def test_another_site_can_neither_frame_nor_drive_nor_read_it(live, tab, other_s
     seen = tab.evaluate(ATTACK, [address, address.partition("?")[0], live.url])
     assert seen == ["closed", "refused"] * 3
     assert not live.server.watched
-
-
-def test_a_notebook_shows_it_in_a_frame(live, tab, other_site):
-    other_site.body = live._repr_html_()
-    tab.goto(f"http://localhost:{other_site.port}/")
-    tab.frames[1].wait_for_function(READY)

@@ -44,10 +44,8 @@ def started(*arguments):
     return process, process.stdout.readline().split()[0]
 
 
-@pytest.mark.parametrize("kind", ["scenario", "folder"])
-def test_it_serves_a_page_and_ctrl_c_ends_it(kind, tmp_path, finished):
-    what = {"scenario": write(tmp_path), "folder": finished}[kind]
-    process, url = started(what)
+def test_it_serves_a_page_and_ctrl_c_ends_it(tmp_path):
+    process, url = started(write(tmp_path))
     try:
         assert get(url)[0] == 200
         time.sleep(0.3)
@@ -58,6 +56,14 @@ def test_it_serves_a_page_and_ctrl_c_ends_it(kind, tmp_path, finished):
     assert (process.returncode, rest, errors) == (0, "", "")
 
 
+def test_a_finished_run_is_a_recording_beside_it(finished):
+    told = view(finished, "--no-open", "--color", "faces", "--speed", "0.5")
+    assert told.exit_code == 0, told.output
+    page = finished / "run.html"
+    assert told.output.strip() == str(page)
+    assert page.read_text(encoding="utf-8").startswith("<!")
+
+
 def test_faults_are_one_sentence(tmp_path, finished):
     scenario = write(tmp_path)
     with Live(BallPlayer()) as live:
@@ -65,7 +71,7 @@ def test_faults_are_one_sentence(tmp_path, finished):
             (["no_such"], "fingertip_on_blade"),
             ([tmp_path / "no.npz"], "no.npz"),
             ([scenario, "--speed", "0"], "must be from 0.01 to 10"),
-            ([scenario, "--color", "red"], "surface, patches, distance"),
+            ([scenario, "--color", "red"], "surface, faces"),
             ([scenario, "--port", "70000"], "65535"),
             ([scenario, "--port", live.server.port], "another port"),
             ([scenario, "--scenario", "gear_contact"], "only a finished run"),

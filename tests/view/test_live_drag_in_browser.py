@@ -143,14 +143,12 @@ def test_a_word_is_a_menu_and_views_have_switches(opened, tmp_path):  # noqa: F8
     # At rest and standing still: this leaves the machine time to draw.
     tab.click("#run")
     tab.wait("!state.running")
-    visible = '[data-part="distance"]'
+    visible = '[data-part="curved"]'
     assert tab.page.locator(visible).is_visible()
-    tab.click('[data-part="distance"]')
-    tab.wait("!document.getElementById('coloring').hidden")
     tab.click('[data-part="pressure"]')
     tab.wait("document.getElementById('pressure').innerText.includes('MPa')")
     tab.page.select_option("#parameters select", "facets")
     tab.wait("state.parameters['contact.ball-plate.method'] === 'facets'")
-    tab.wait("!('distance' in state.show)")
+    tab.wait("!('curved' in state.show)")
     assert not tab.page.locator(visible).is_visible()
     assert live.player.scene.pairs[0].side_j.method == "facets"

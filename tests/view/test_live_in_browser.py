@@ -9,7 +9,7 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.live import Live
-from tests.view.live_player import BallPlayer, FilmPlayer
+from tests.view.live_player import BallPlayer
 from tests.view.test_recording_in_browser import count, is_blue, is_greenish, pixels_of, watch
 
 pytestmark = pytest.mark.browser
@@ -173,21 +173,6 @@ def test_a_push_moves_the_ball_and_holding_pushes_on(opened):
     np.testing.assert_allclose(live.player.v[:2], velocity[:2], atol=1e-12)
     along = velocity[:2] / np.linalg.norm(velocity[:2])
     assert along @ right[:2] / np.linalg.norm(right[:2]) > 0.999
-
-
-def test_a_finished_run_scrubs(opened):
-    live, tab = opened(FilmPlayer(), running=False)
-    assert tab.page.locator("#scrub").is_visible()
-    tab.page.keyboard.press("d")  # of other runs the key for drags: no fault
-    absent = ("push-section", "drag-mode", "drag-section", "targets-section")
-    for selector in (*(f"#{name}" for name in absent), '[data-part="pressure"]'):
-        assert not tab.page.locator(selector).is_visible()
-    tab.slide("#scrubber", 0.75)
-    tab.wait("state.t === 1.5")
-    assert live.player.time == 1.5
-    assert "1.500 / 2.000" in tab.page.locator("#scrub-value").inner_text()
-    tab.page.keyboard.press(" ")
-    tab.wait("state.t === 2 && !state.running")
 
 
 def test_contacts_of_a_hand_have_names_that_differ(opened):

@@ -4,7 +4,6 @@ import time
 import warnings
 from unittest.mock import Mock
 
-import meshcat
 import numpy as np
 import pytest
 
@@ -16,8 +15,8 @@ from sphshell_pin.view.live import Live, loop, preview
 from sphshell_pin.view.live.loop import BUDGET, FPS
 from sphshell_pin.view.live.opening import player_of
 from tests.scenario.files import DROP, write
-from tests.view.live_driver import TAB, ForeignWindow, frames, say
-from tests.view.live_player import BallPlayer, FilmPlayer
+from tests.view.live_driver import TAB, frames, say
+from tests.view.live_player import BallPlayer
 
 START_KNOB = '\n[[knob]]\nkey = "robot.ball.start.root_joint.2"\n'
 
@@ -131,27 +130,6 @@ def test_what_fails_stops_the_run_says_why_and_can_start_again(make, monkeypatch
     assert live._state()["ended"] is None
 
 
-def test_a_finished_run_scrubs_and_starts_again_at_its_end(make):
-    live = make(FilmPlayer())
-    say(live, "charts", keys=["normal"])
-    say(live, "seek", t=1.5)
-    live.frame(0.0)
-    assert live.player.time == 1.5
-    # The chart shows what led there: 5 N all the way.
-    assert live._points[0][0] < 0.02
-    assert 1.48 < live._points[-1][0] <= 1.5
-    assert {value for _, value in live._points} == {5.0}
-    frames(live, 60)
-    assert live.player.time == 2.0
-    assert not live.running
-    say(live, "run", on=True)
-    frames(live, 6)
-    assert 0.0 < live.player.time < 0.2
-    say(live, "push", body="ball", direction=[1, 0, 0], newtons=1.0, seconds=1.0)
-    live.frame(0.0)
-    assert "this run has: none" in live.told[-1][1]
-
-
 class Clock:
     """Stands in for the module `time`: only sleeping takes time."""
 
@@ -173,26 +151,6 @@ def test_it_keeps_real_time(make, monkeypatch):
     monkeypatch.setattr(loop, "time", clock)
     live.run()
     assert live.player.time == pytest.approx(0.5 * (clock.now - 5.0), abs=1.0 / FPS)
-
-
-def test_a_picture_in_somebody_elses_window(make):
-    window = ForeignWindow()
-    live = make(visualizer=meshcat.Visualizer(window=window))
-    assert any(command["type"] == "set_object" for command in window.commands)
-    window.commands.clear()
-    for _ in range(5):
-        live.frame(1 / 60)
-        time.sleep(0.04)
-    moved = [c["path"] for c in window.commands if c["type"] == "set_transform"]
-    assert "/meshcat/spheres/0_ball" in moved
-    assert not any(path.startswith("/meshcat/shells") for path in moved)  # it stands still
-    assert live._foreign.url == ForeignWindow.web_url
-    window.commands.clear()
-    say(live, "look")
-    live.frame(0.0)
-    told = [(c["type"], c["path"]) for c in window.commands]
-    assert ("set_object", "/Cameras/default/rotated") in told
-    assert ("set_property", "/Background") in told
 
 
 def test_what_can_be_previewed():

@@ -1,4 +1,4 @@
-"""What only the live picture has: friction cones, growing trails, spheres that change size."""
+"""What only the live picture has: growing trails, spheres that change size."""
 
 from types import SimpleNamespace
 
@@ -7,7 +7,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin.contact import CoulombFriction
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.arrows import Forces
@@ -40,22 +39,6 @@ class Easel:
         return self.draw().matrices[f"/meshcat/{name}"]
 
 
-def test_the_rim_of_a_cone_is_the_limit_of_friction():
-    easel = Easel(BallPlayer(friction=CoulombFriction(0.4, 0.3, 0.01, 0.1)))
-    easel.draw()
-    easel.picture.show("cones", True)
-    contacts, scale = easel.player.contacts, easel.draw() and easel.picture.arrow_scale
-    force = contacts.normal_force[0] * scale.meters_per_newton
-    cone = easel.where("cones/cone_0")
-    # three.js's cone lies along y from -1/2, the apex, to 1/2, a rim of radius one.
-    np.testing.assert_allclose((cone @ [0, -0.5, 0, 1])[:3], contacts.point_world[0], atol=1e-6)
-    rim = (cone @ [1.0, 0.5, 0, 1])[:3] - contacts.point_world[0]
-    np.testing.assert_allclose(rim[2], force, rtol=1e-5)
-    np.testing.assert_allclose(np.hypot(rim[0], rim[1]), 0.4 * force, rtol=1e-5)
-    easel.player.q = np.array([0.0, 0.0, 1.0])
-    assert np.abs(easel.where("cones/cone_0")[:3, :3]).max() < 1e-5
-
-
 def test_a_sphere_that_changes_size_is_drawn_anew_and_nothing_else_is():
     easel = Easel(BallPlayer())
     easel.draw()
@@ -74,7 +57,6 @@ def test_a_trail_grows_on_its_shell_and_moves_with_it():
     player = SimpleNamespace(
         patches=None,
         time=0.0,
-        duration=None,
         scene=SimpleNamespace(
             model=model, pairs=(contact_pair(model, "ball", 0.05, plate(), "table"),)
         ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack, get_args
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_finite, read_only
-from sphshell_pin.base.summary import Detail, Fact, Summarized
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.result import result_columns, result_parts
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene.joint_components import moving_joints
@@ -85,34 +85,19 @@ class Result(Summarized):
 
     def _facts(self) -> list[Fact]:
         pairs = self.stats.pairs.values()
-        facts = [
+        return [
             Fact("simulated", self.stats.duration, "s"),
             Fact("rows", len(self.t)),
             Fact("contact pairs", len(self.pairs)),
             Fact("touches", sum(one.touches for one in pairs), one="touch"),
             Fact("peak force", max((one.peak_force for one in pairs), default=0.0), "N"),
             Fact("energy residual", float(self.energy.residual[-1]) if len(self.t) else 0.0, "J"),
-            Fact("energy exchanged", self.energy.exchanged, "J", brief=False),
-            Fact("logged contacts", len(self.contacts), brief=False),
-            Fact("events", len(self.events), brief=False),
-            Fact("integrator", self.stats.integrator, brief=False),
-            Fact("steps", self.stats.steps, brief=False),
-            Fact("wall time", self.stats.wall_time, "s", brief=False),
         ]
-        if self.sensors:
-            facts.append(Fact("sensors", ", ".join(self.sensors), brief=False))
-        if self.origin is not None:
-            facts.append(Fact("scenario", self.origin.scenario, brief=False))
-        return facts
-
-    def _rows(self) -> Detail | None:
-        return self.stats._rows() if len(self.pairs) else None
 
     @property
     def sensitivities(self) -> Sensitivities | None:
         """How the rows change with parameters and the start; None where this was not asked for."""
-        rows = self.sensitivity_rows
-        return None if rows is None else replace(rows, result=self)
+        return self.sensitivity_rows
 
     @classmethod
     def _from_record(
@@ -252,10 +237,9 @@ class Result(Summarized):
         """Return a figure, which a notebook shows.
 
         `kind` is "overview" (forces, depth and energy over time), "force" (force and depth of each
-        pair), "energy" (the audit), "sensors" (their readings), "path" (of the contacts on their
-        shells) or "map" (the impulse that each element took). The last two need a scene: `scene`,
-        or the one that ran, or that of the scenario the result came from; without any, the path is
-        drawn in the world.
+        pair), "energy" (the audit), "sensors" (their readings) or "map" (the path on the shells,
+        and the impulse that each element took). The map needs a scene: `scene`, or the one that
+        ran, or that of the scenario the result came from.
 
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
         there is no scene for the map or it cannot be built again.
@@ -299,7 +283,7 @@ class Result(Summarized):
         visual_model: pin.GeometryModel | None = None,
         **options: Unpack[FilmOptions],
     ) -> Path:
-        """Draw this result as a picture (.png), a film (.gif, .mp4) or a folder of pictures.
+        """Draw this result as a picture (.png) or a film (.mp4).
 
         `scene` and `visual_model` are as in `view`; the options are those of
         `sphshell_pin.view.film.render_film`, among them `time` of a picture and `span` of a film

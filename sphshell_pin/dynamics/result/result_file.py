@@ -216,7 +216,7 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
         read_only(patches)
     sensitivities = None
     if columns := part("sensitivities."):
-        sensitivities = Sensitivities(tuple(header.sensitivities), **columns, result=None)
+        sensitivities = Sensitivities(tuple(header.sensitivities), **columns)
     origin = None
     if header.origin is not None:
         keep = None

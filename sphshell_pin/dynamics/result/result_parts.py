@@ -97,7 +97,7 @@ def split_states(
 class PairSeries:
     """Forces [N] and depth [m] of one pair at every recorded row, zero where nothing touches.
 
-    Where a row has several contacts (`count`), the forces are their sums, the depth the largest:
+    Where a row has several contacts, the forces are their sums, the depth the largest:
     neighbors that take over a share of the load let the depth dip while the force stays.
     `friction` (n,) is the size of the sum, `force_world` (n, 3) the whole force on the sphere.
     """
@@ -106,7 +106,6 @@ class PairSeries:
     normal: Array
     friction: Array
     depth: Array
-    count: Array
     force_world: Array
 
     @property
@@ -133,9 +132,8 @@ class PairSeries:
         np.add.at(friction, row, across)
         np.add.at(force, row, along[:, None] * np.asarray(log.normal_world)[own] + across)
         np.maximum.at(depth, row, np.asarray(log.depth, dtype=float)[own])
-        count = np.bincount(row, minlength=rows).astype(np.float64)
         size = np.linalg.norm(friction, axis=1)
-        return cls(str(result.pairs[pair]), normal, size, depth, count, force)
+        return cls(str(result.pairs[pair]), normal, size, depth, force)
 
 
 @dataclass(frozen=True, repr=False)
@@ -147,13 +145,6 @@ class ContactLog(SceneContacts):
 
     t: Array
     row: Longs
-
-    def _facts(self) -> list[Fact]:
-        rows = len(np.unique(self.row))
-        return [*super()._facts(), Fact("recorded rows with contact", rows, brief=False)]
-
-    def _rows(self) -> None:
-        return None  # its entries are those of many moments
 
     def select(self, chosen: slice | Longs | Mask) -> Self:
         """Return the entries that `chosen`, a slice, mask or indices, picks."""
@@ -208,15 +199,10 @@ class EnergyAudit(Summarized):
     control_work: Array
 
     def _facts(self) -> list[Fact]:
-        parts = [
-            Fact(f"{f.name.replace('_', ' ')} at the end", _last(getattr(self, f.name)), "J", False)
-            for f in fields(self)
-        ]
         return [
             Fact("rows", len(self.kinetic)),
             Fact("exchanged", self.exchanged, "J"),
             Fact("residual at the end", _last(self.residual), "J"),
-            *parts,
         ]
 
     @property

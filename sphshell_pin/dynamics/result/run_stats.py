@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-from sphshell_pin.base.summary import Detail, Fact, Summarized
+from sphshell_pin.base.summary import Fact, Summarized
 
 # Kinds of events in the order of the compiled core; from "stop" on, of joints.
 EventKind = Literal[
@@ -132,25 +132,4 @@ class RunStats(Summarized):
             Fact("simulated", self.duration, "s"),
             Fact("steps", self.steps),
             Fact("wall time", self.wall_time, "s"),
-            Fact("integrator", self.integrator, brief=False),
-            Fact("step", self.dt, "s", brief=False),
-            Fact("rejected steps", self.rejected, brief=False),
         ]
-
-    def _rows(self) -> Detail:
-        headings = (
-            "pair",
-            "peak force [N]",
-            "mean force [N]",
-            "impulse [N s]",
-            "largest depth [m]",
-            "duration [s]",
-            "touches",
-        )
-        listed = sorted(self.pairs.items(), key=lambda item: -item[1].peak_force)
-        rows = [
-            (name, one.peak_force, one.mean_force, one.impulse, one.max_depth)
-            + (one.contact_time, one.touches)
-            for name, one in listed
-        ]
-        return Detail(headings, rows, len(rows))

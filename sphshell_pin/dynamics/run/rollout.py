@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from sphshell_pin import _core, errors
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_floats, read_only
-from sphshell_pin.base.summary import Detail, Fact, Summarized, names
+from sphshell_pin.base.summary import Fact, Summarized, names
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.run_stats import PairFigures
 from sphshell_pin.dynamics.run import advance
@@ -307,18 +307,7 @@ class Rollout(Summarized, Sequence[Result]):
             Fact("failed", len(self.failures)),
             Fact("until", ended, "s"),
             Fact("varied", names(self.varied)),
-            Fact("steps", int(self.steps.sum()), brief=False),
-            Fact("threads", self.threads, brief=False),
-            Fact("wall time", self.wall_time, "s", brief=False),
         ]
-
-    def _rows(self) -> Detail | None:
-        rows: list[tuple[object, ...]] = []
-        for name, values in self.figures.items():
-            known = values[np.isfinite(values)]
-            if len(known):
-                rows.append((name, known.min(), float(np.median(known)), known.max()))
-        return Detail(("figure [SI units]", "least", "median", "largest"), rows, len(rows))
 
     def __iter__(self) -> Iterator[Result]:
         """Go through the results of all runs."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NoReturn
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import read_only
@@ -21,16 +19,11 @@ from sphshell_pin.base.named_numbers import (
 from sphshell_pin.base.summary import Fact, Summarized, names
 from sphshell_pin.dynamics.control.controllers import reads_sensors
 from sphshell_pin.dynamics.scene.derivatives import core_parameters
-from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
     from sphshell_pin import _core
-    from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.dynamics.scene.scene import Scene
-
-
-# The share of its size by which a row is moved where a figure is differenced.
-_STEP = 1e-6
 
 
 @dataclass(frozen=True, repr=False)
@@ -49,7 +42,6 @@ class Sensitivities(Summarized):
     force_world: Array
     normal_force: Array
     depth: Array
-    result: Result | None = None
 
     def _facts(self) -> list[Fact]:
         return [
@@ -64,88 +56,6 @@ class Sensitivities(Summarized):
             must = f"must be one of {', '.join(self.parameters)}"
             raise InvalidParameter("column", name, must)
         return self.parameters.index(name)
-
-    def of(self, figure: Callable[[Result], float]) -> Array:
-        """Return the derivatives (p,) of a figure of the result by the parameters.
-
-        `figure` gets results whose rows q, v and contacts are moved a little along each column; it
-        is differenced between them. What is no row has no derivative here: `stats`, `events`,
-        `energy`, `sensors` and `patches` raise ResultError. A result that was loaded has no scene,
-        and its q cannot be moved (ResultError). InvalidParameter for what returns no number.
-        """
-        if not callable(figure):
-            raise InvalidParameter("figure", figure, "must be a function of a Result")
-        return np.array([self._of(figure, k) for k in range(len(self.parameters))])
-
-    def _of(self, figure: Callable[[Result], float], column: int) -> float:
-        result = self.result
-        assert result is not None
-        log = result.contacts
-        sizes = [
-            _largest(self.q[..., column]),
-            _largest(self.v[..., column]) / (_largest(result.v) or 1.0),
-            _largest(self.force_world[..., column]) / (_largest(log.normal_force) or 1.0),
-            _largest(self.depth[..., column]) / (_largest(log.depth) or 1.0),
-        ]
-        if max(sizes) == 0:
-            return 0.0
-        step = _STEP / max(sizes)
-        more, less = (_number(figure(self._moved(result, column, sign * step))) for sign in (1, -1))
-        return (more - less) / (2 * step)
-
-    def _moved(self, result: Result, column: int, step: float) -> Result:
-        if result.scene is None:
-            raise ResultError("the result", "has no scene, so that its rows cannot be moved")
-        model, log = result.scene.model, result.contacts
-        force, normal = self.force_world[..., column], self.normal_force[..., column]
-        by_q = self.q[..., column]
-        moved = [pin.integrate(model, q, step * by) for q, by in zip(result.q, by_q, strict=True)]
-        contacts = replace(
-            log,
-            depth=log.depth + step * self.depth[..., column],
-            normal_force=log.normal_force + step * normal,
-            friction_force_world=log.friction_force_world
-            + step * (force - normal[:, None] * log.normal_world),
-        )
-        others: dict[str, Any] = {
-            part: _NoRow(part) for part in ("stats", "events", "energy", "sensors")
-        }
-        return replace(
-            result,
-            q=np.array(moved),
-            v=result.v + step * self.v[..., column],
-            contacts=contacts,
-            patch_rows=None,
-            sensitivity_rows=None,
-            **others,
-        )
-
-
-class _NoRow:
-    """Stands for a part of a result that has no derivative."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def _refuse(self, *_: object) -> NoReturn:
-        raise ResultError(
-            f"result.{self._name}",
-            "has no derivatives: a figure can take t, q, v and contacts of the result",
-        )
-
-    __getattr__ = __getitem__ = __iter__ = __len__ = _refuse
-
-
-def _number(value: object) -> float:
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        given = f"returned {type(value).__name__},"
-        raise InvalidParameter("figure", value, "must return a number", given) from None
-
-
-def _largest(values: Array) -> float:
-    return float(np.abs(values).max(initial=0.0))
 
 
 class Asked:

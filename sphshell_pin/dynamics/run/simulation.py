@@ -44,11 +44,8 @@ class Simulation(Summarized):
         self.sensors = check_sensors(sensors)
 
     def _facts(self) -> list[Fact]:
-        return [
-            Fact("integrator", repr(self.integrator)),
-            *self.scene._facts(),
-            Fact("sensors", len(self.sensors), brief=bool(self.sensors)),
-        ]
+        sensors = [Fact("sensors", len(self.sensors))] if self.sensors else []
+        return [Fact("integrator", repr(self.integrator)), *self.scene._facts(), *sensors]
 
     def run(
         self,

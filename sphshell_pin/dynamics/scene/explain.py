@@ -17,7 +17,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
-from sphshell_pin.dynamics.scene.sphere_arguments import corner_warning, seam_warning
+from sphshell_pin.dynamics.scene.sphere_arguments import corner_warning
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.pairs import ContactPair
@@ -339,8 +339,6 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
     out += [corners] if corners else []
     if not pair.spheres:
         return out
-    earlier = scene.pairs[: scene.pairs.index(pair)]
-    out += [text for one in earlier if (text := seam_warning(one, pair))]
     weak = weakness(pair, figures)
     if weak is not None:
         out.append(weak)

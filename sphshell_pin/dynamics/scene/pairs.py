@@ -54,11 +54,7 @@ class ContactPair(Summarized):
         return f"ContactPair '{self.name}'"
 
     def _facts(self) -> list[Fact]:
-        labels = ("sphere", "with", "normal law", "friction")
-        return [
-            Fact(label, text, brief=label in labels[:2])
-            for label, text in zip(labels, self.shown[1:], strict=True)
-        ]
+        return [Fact("sphere", self.side_i.text), Fact("with", self.side_j.text)]
 
     @property
     def frame_i(self) -> str:
@@ -170,12 +166,6 @@ class ContactPair(Summarized):
         if isinstance(self.side_i, ends.PlaneSide):
             return self.side_j, self.side_i
         return self.side_i, self.side_j
-
-    @property
-    def shown(self) -> tuple[str, str, str, str, str]:
-        """Name, sphere, what it touches, law and friction, each in a few words."""
-        friction = "none" if self.friction is None else self.friction.text
-        return self.name, self.side_i.text, self.side_j.text, self.law.text, friction
 
     @cached_property
     def modelled(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array, Bytes, Ints
 from sphshell_pin.base.checks import read_only
-from sphshell_pin.base.summary import MOST_ROWS, Detail, Fact, Summarized
+from sphshell_pin.base.summary import Fact, Summarized
 
 Columns = dict[str, NDArray[Any]]  # of numbers of several kinds
 Rows = bytes | bytearray | Bytes
@@ -54,20 +54,11 @@ class SceneContacts(Summarized):
         facts = [Fact("contacts", len(self))]
         if not len(self):
             return facts
-        slip = np.linalg.norm(self.slip_velocity_world, axis=1)
         return [
             *facts,
             Fact("largest normal force", float(self.normal_force.max()), "N"),
             Fact("largest depth", float(self.depth.max()), "m"),
-            Fact("fastest slip", float(slip.max()), "m/s", brief=False),
         ]
-
-    def _rows(self) -> Detail | None:
-        headings = ("pair", "normal force [N]", "friction force [N]", "depth [m]", "point [m]")
-        friction = np.linalg.norm(self.friction_force_world, axis=1)
-        columns = self.pair, self.normal_force, friction, self.depth, self.point_world
-        rows = list(zip(*(one[:MOST_ROWS] for one in columns), strict=True))
-        return Detail(headings, rows, len(self))
 
     @property
     def force_world(self) -> Array:

@@ -23,7 +23,7 @@ from sphshell_pin.base.checks import (
     check_names,
     check_vector,
 )
-from sphshell_pin.base.summary import Detail, Fact, Summarized, names
+from sphshell_pin.base.summary import Fact, Summarized, names
 from sphshell_pin.contact import Friction, FunctionFriction, ImpactLaw, NormalLaw, Plane, Sphere
 from sphshell_pin.dynamics.compiled.robot import load_compiled
 from sphshell_pin.dynamics.scene import models
@@ -94,14 +94,8 @@ class SceneParts(Summarized):
             Fact("model", model.name or "without a name"),
             Fact("joints", model.njoints - 1),
             Fact("degrees of freedom", model.nv, one="degree of freedom"),
-            Fact("contact pairs", len(pairs), brief=False),
             Fact("contact", names(pairs)),
         ]
-
-    def _rows(self) -> Detail:
-        headings = ("contact", "sphere", "with", "normal law", "friction")
-        rows = [pair.shown for pair in self._pairs]
-        return Detail(headings, rows, len(rows))
 
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""

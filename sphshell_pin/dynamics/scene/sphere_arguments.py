@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import coal
-import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.checks import check_name, check_placement, check_type
@@ -152,36 +151,6 @@ def corner_warning(pair: ContactPair) -> str | None:
         f"contact '{pair.name}': shell '{shell.name}' has a flat face with a notch or rounded "
         f"borders, which with {type(pair.law).__name__} stands on one point at a time and rattles: "
         "take a FoundationLaw, for which the face is one contact"
-    )
-
-
-def seam_warning(pair: ContactPair, other: ContactPair) -> str | None:
-    """Say so where a sphere touches two shells that go on smoothly into each other."""
-    if not (pair.shells and other.shells) or pair.spheres != other.spheres:
-        return None
-    a, b = pair.shells[0].shell, other.shells[0].shell
-    if a.is_closed or b.is_closed:
-        return None
-    if pair.joint_j != other.joint_j or isinstance(pair.law, FoundationLaw):
-        return None
-    # Places of border vertices, on a grid, and the normal of a triangle there.
-    borders = []
-    for one, shell in ((pair, a), (other, b)):
-        pose = one.placement_j
-        normals = np.zeros_like(shell.vertices)
-        normals[shell.triangles] = shell.triangle_normals[:, None]
-        on = np.unique(shell.edge_vertices[shell.edge_class == 2])
-        places = (shell.vertices[on] @ pose.rotation.T + pose.translation) / (1e-6 * a.size)
-        borders.append(
-            dict(zip(map(tuple, np.rint(places)), normals[on] @ pose.rotation.T, strict=True))
-        )
-    shared = borders[0].keys() & borders[1].keys()
-    smooth = [k for k in shared if abs(borders[0][k] @ borders[1][k]) > np.cos(a.crease_angle)]
-    if len(smooth) < 2:
-        return None
-    return (
-        f"contacts '{pair.name}' and '{other.name}': shells '{a.name}' and '{b.name}' go on into "
-        "each other, and push twice at their seam: make them one shell"
     )
 
 

@@ -48,12 +48,7 @@ class SensorLog(Summarized):
         return len(self.t)
 
     def _facts(self) -> list[Fact]:
-        last = zip(self.columns, self.values[-1], strict=True) if len(self) else ()
-        return [
-            Fact("readings", len(self)),
-            Fact("of", ", ".join(self.columns)),
-            *(Fact(f"last {name}", float(value), brief=False) for name, value in last),
-        ]
+        return [Fact("readings", len(self)), Fact("of", ", ".join(self.columns))]
 
     def at(self, t: float) -> Array:
         """Return the last reading (k,) that had arrived at time `t` [s]; nan before the first."""

@@ -64,7 +64,6 @@ class Built(Summarized):
         return [
             Fact("title", self.scenario.title),
             Fact("duration", self.scenario.run.duration, "s"),
-            Fact("file", self.path, brief=False),
             *(fact for fact in self.simulation._facts() if fact.label != "title"),
         ]
 

@@ -70,7 +70,7 @@ def unloaded(where: str, path: Path, key: str, modules: Modules) -> Callable[...
     def refuse(*arguments: object, **keywords: object) -> object:
         raise SphshellError(
             f"{path}: {key}: '{where}' was not loaded, as no code is executed to show a finished "
-            "run: if you trust it, use Replay(result, trust_code=True)"
+            "run: build the scenario again"
         )
 
     return refuse

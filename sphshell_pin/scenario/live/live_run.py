@@ -41,7 +41,6 @@ class LiveRun:
     Raises what `Simulation.run` raises of a start that cannot be.
     """
 
-    duration: float | None = None
     can_record_patches = True
 
     def __init__(self, built: Built) -> None:
@@ -398,16 +397,6 @@ class LiveRun:
         seconds = check_not_negative("seconds", seconds, "s")
         self._run.push(body, force)
         self._push, self._drag = (body, force, self.time + seconds), None
-
-    def seek(self, t: float) -> None:
-        """Refuse: what has not happened yet cannot be shown.
-
-        Raises
-        ------
-        SphshellError
-            Always.
-        """
-        raise SphshellError(f"a live run cannot go to t = {t!r} s: only a finished run can")
 
     def _end_push(self) -> None:
         self._run.push(self.bodies[0], np.zeros(3))

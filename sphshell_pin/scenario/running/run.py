@@ -22,8 +22,6 @@ from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.scenario.format.build import Built, build
 from sphshell_pin.scenario.format.reading import shipped_scenarios
-from sphshell_pin.scenario.running.cad_audit import CadAudit, check_audit
-from sphshell_pin.scenario.running.cad_audit import audit_cad as compare_with_cad
 from sphshell_pin.scenario.running.figures import Verdict, check_expectations, judge, measure_energy
 from sphshell_pin.scenario.running.kept_scenario import keep
 
@@ -40,7 +38,7 @@ RESULTS = (
     SUMMARY,
     "force_and_depth.png",
     "energy.png",
-    "contact_path.png",
+    "contact_path.png",  # of earlier versions
     "contact_map.png",
     "sensors.png",
     RECORDING,
@@ -61,8 +59,6 @@ class RunReport:
     verdicts: tuple[Verdict, ...]
     stopped: errors.SphshellError | None
     """Why the run ended early: Interrupted or SimulationDiverged."""
-    audit: CadAudit | None = None
-    """Differences of the contacts from those on the exact CAD faces, if that was asked for."""
     warnings: tuple[str, ...] = ()
     """What in the run shows that the scenario is probably a mistake; one sentence each."""
 
@@ -74,7 +70,6 @@ def run_scenario(
     changes: Mapping[str, str] | None = None,
     recording: bool = True,
     figures: bool = True,
-    audit_cad: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> RunReport:
     """Build and run the scenario called `name` (shipped, or a path) and write its results folder.
@@ -84,9 +79,7 @@ def run_scenario(
     has the results of a complete run, it is written to the subfolder `stopped`. Files take the
     place of an earlier run's all at once, when all are on disk (`base.atomic`). Without
     `recording` or `figures` no recording.html or no pictures are made, which take most of the time
-    of a short run. With
-    `audit_cad` each contact with a CAD surface is compared with that on the exact faces (see
-    `scenario.audit`).
+    of a short run.
 
     Raises
     ------
@@ -94,15 +87,11 @@ def run_scenario(
         The scenario cannot be built.
     ResultError
         The folder cannot be written, or another run is writing it; raised before the run starts.
-    SphshellError
-        There is no CAD surface to audit.
     KeyboardInterrupt
         On Ctrl-C while the results are written; its text says so if they are there.
     """
     built = build(name, changes)
-    return run_built(
-        built, out, recording=recording, figures=figures, audit_cad=audit_cad, progress=progress
-    )
+    return run_built(built, out, recording=recording, figures=figures, progress=progress)
 
 
 def run_built(
@@ -111,13 +100,10 @@ def run_built(
     *,
     recording: bool = True,
     figures: bool = True,
-    audit_cad: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> RunReport:
     """Run a scenario that is already built; see `run_scenario`."""
     check_expectations(built)
-    if audit_cad:
-        check_audit(built)
     folder = Path("results") / built.name if out is None else Path(out)
     with contextlib.ExitStack() as held:
         place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
@@ -128,15 +114,14 @@ def run_built(
             notes.append(f"the complete results of an earlier run stay in {folder}")
             folder = folder / STOPPED
             place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
-        audit = compare_with_cad(built, result) if audit_cad else None
         try:
             staging = place.staging()
             result.save(staging / "run.npz", home=folder)
-            write_contacts(staging / "contacts.csv", result, audit)
+            write_contacts(staging / "contacts.csv", result)
             if result.sensors:
                 write_sensors(staging / "sensors.csv", result)
             interrupted = _draw(built, result, staging, notes, recording=recording, figures=figures)
-            _write_summary(staging, built, result, verdicts, stopped, audit)
+            _write_summary(staging, built, result, verdicts, stopped)
             files = tuple(folder / name for name in RESULTS if (staging / name).exists())
             if folder / RECORDING not in files and (folder / RECORDING).exists():
                 notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
@@ -150,7 +135,7 @@ def run_built(
     said = _beyond_hertz(result)
     if stopped is None and isinstance(built.controller, Controller):
         said = (*said, *built.controller._result_warnings(result))
-    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit, said)
+    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, said)
 
 
 def _beyond_hertz(result: Result) -> tuple[str, ...]:
@@ -260,10 +245,9 @@ def _draw(
     return False
 
 
-def write_contacts(path: Path, result: Result, audit: CadAudit | None = None) -> None:
+def write_contacts(path: Path, result: Result) -> None:
     """Write the contact log of `result` as comma-separated values, one row for each contact."""
-    columns = result.contact_columns() | ({} if audit is None else audit.columns())
-    path.write_text(csv_text(columns), encoding="utf-8", newline="")
+    path.write_text(csv_text(result.contact_columns()), encoding="utf-8", newline="")
 
 
 def write_sensors(path: Path, result: Result) -> None:
@@ -277,7 +261,6 @@ def _write_summary(
     result: Result,
     verdicts: Iterable[Verdict],
     stopped: errors.SphshellError | None,
-    audit: CadAudit | None,
 ) -> None:
     summary = {
         "scenario": built.name,
@@ -290,7 +273,6 @@ def _write_summary(
             {"figure": v.figure, "expected": v.expected, "measured": v.measured, "met": v.met}
             for v in verdicts
         ],
-        **({} if audit is None else {"cad_audit": audit.figures()}),
         "versions": versions(),
         "files": {name: _digest(staging / name) for name in RESULTS if (staging / name).exists()},
         "settings": origin_of(built).settings,

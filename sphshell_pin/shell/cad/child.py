@@ -19,7 +19,7 @@ from pathlib import Path
 
 from sphshell_pin.base.limits import limit_memory
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.shell.cad.messages import ALIVE, WRITE, Parent, pack
+from sphshell_pin.shell.cad.messages import pack
 from sphshell_pin.shell.cad.options import require_kernel
 
 IDLE = 90.0
@@ -51,7 +51,7 @@ def serve(source: int, target: int) -> None:
         except EOFError:
             break
         _end_with_parent(source, True)
-        answer = _answer(requests, answers, message)
+        answer = _answer(message)
         _end_with_parent(source, False)
         answers.send_bytes(answer)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -89,19 +89,9 @@ def _end_with_parent(pipe: int, wanted: bool) -> None:
         os._exit(0)
 
 
-def _answer(requests: Connection, answers: Connection, message: bytes) -> bytes:
-    """Do one job; return what `process.run_in_child` reads, and the warnings."""
-    job, arguments, purpose, folder, time_limit, memory_limit = pickle.loads(message)
-
-    def alive() -> None:
-        signal.setitimer(signal.ITIMER_REAL, time_limit + GRACE)
-        answers.send_bytes(ALIVE)
-
-    def write(content: bytes) -> None:
-        _end_with_parent(requests.fileno(), False)
-        answers.send_bytes(WRITE + content)
-        requests.recv_bytes()
-        _end_with_parent(requests.fileno(), True)
+def _answer(message: bytes) -> bytes:
+    """Read one file; return what `process.run_in_child` reads, and the warnings."""
+    arguments, purpose, folder, time_limit, memory_limit = pickle.loads(message)
 
     content: object = None
     with warnings.catch_warnings(record=True) as caught:
@@ -109,7 +99,7 @@ def _answer(requests: Connection, answers: Connection, message: bytes) -> bytes:
         try:
             signal.setitimer(signal.ITIMER_REAL, time_limit + GRACE)
             require_kernel(purpose)
-            from sphshell_pin.shell.cad.jobs import JOBS
+            from sphshell_pin.shell.cad.jobs import read
 
             if not gc.isenabled():
                 gc.freeze()
@@ -117,7 +107,7 @@ def _answer(requests: Connection, answers: Connection, message: bytes) -> bytes:
             if folder:
                 os.chdir(folder)
             limit_memory(memory_limit)
-            kind, content = "done", JOBS[job](Parent(alive, write), *arguments)
+            kind, content = "done", read(*arguments)
         except SphshellError as error:
             kind, content = "error", error.with_traceback(None)
         except Exception as error:

@@ -249,33 +249,6 @@ class FaceSurface:
                 break
         return distance
 
-    def stationary(self, point: Array, uv: Array, settled: float) -> Array | None:
-        """Parameters (2,) of a stationary point of the distance to `point` (3,), next to `uv` (2,).
-
-        A closest point or a saddle of the distance, without the trimming; None if there is none.
-        Newton's method ends with a step shorter than `settled`: the error left is about its square.
-        """
-        place, u, v, uu, vv, uv_ = gp_Pnt(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec()
-        at = np.array(uv, np.float64)
-        for _ in range(MOST_STATIONARY_STEPS):
-            self._surface.D2(*at.tolist(), place, u, v, uu, vv, uv_)
-            offset, by_u, by_v = (np.array(one.Coord()) for one in (place, u, v))
-            offset -= point
-            bend_uu, bend_vv, bend_uv = (offset @ np.array(one.Coord()) for one in (uu, vv, uv_))
-            first = np.array([[by_u @ by_u, by_u @ by_v], [by_u @ by_v, by_v @ by_v]])
-            scale = first[0, 0] * first[1, 1]
-            if not np.linalg.det(first) > SINGULAR * scale:
-                return None
-            gradient = np.array([offset @ by_u, offset @ by_v])
-            full = first + np.array([[bend_uu, bend_uv], [bend_uv, bend_vv]])
-            # At a center of curvature all directions are alike: the tangent plane decides.
-            flat = abs(np.linalg.det(full)) <= 1e-6 * scale
-            step = -np.linalg.solve(first if flat else full, gradient)
-            at = np.clip(at + step, self._lowest, self._highest)
-            if np.linalg.norm(step[0] * by_u + step[1] * by_v) <= settled:
-                return at
-        return None
-
 
 def stationary_parameters(
     curves: list[Occ], points: Array, seeds: Array, ends: Array, settled: float

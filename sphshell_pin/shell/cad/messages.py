@@ -3,22 +3,7 @@
 import hashlib
 import io
 import pickle
-from collections.abc import Callable
-from typing import Any, NamedTuple
-
-ALIVE = b"alive"
-"""What a child sends in the middle of a long job: the time limit begins anew."""
-
-WRITE = b"write"
-"""What a child, which can write no file, sends before the content of the one that it makes."""
-
-
-class Parent(NamedTuple):
-    """What a job may ask of the process that started it."""
-
-    alive: Callable[[], None]
-    write: Callable[[bytes], object]
-
+from typing import Any
 
 _MADE_BY = {
     "builtins.UserWarning",

@@ -21,7 +21,7 @@ from typing import Any
 
 from sphshell_pin.base.limits import child_command, last_line
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError, SphshellError
-from sphshell_pin.shell.cad.messages import ALIVE, WRITE, unpack
+from sphshell_pin.shell.cad.messages import unpack
 from sphshell_pin.shell.cad.options import CadOptions
 
 TIME_LIMIT = 600.0
@@ -56,28 +56,23 @@ _NO_ANSWER = f"gets no valid answer from OpenCASCADE: {_ADVICE}"
 
 
 def run_in_child(
-    job: str,
     arguments: tuple[object, ...],
     path: Path,
     purpose: str,
     options: CadOptions,
-    target: Path | None = None,
     heard: list[Warning] | None = None,
-) -> Any:  # what the job returns
-    """Do a job of `jobs.JOBS` in a child, and return its result.
+) -> Any:  # what `read` returns
+    """Read a file by `jobs.read` in a child, and return its result.
 
     path : of the file that is read, for messages; purpose : what needs OpenCASCADE
-    target : the file that the job has written, if it has one written
     heard : receives the warnings that are given
 
     Raises
     ------
     SphshellError
-        As the job raises it.
+        As `jobs.read` raises it.
     ShellFileError
         If OpenCASCADE crashes, or exceeds the time or memory limit of `options`.
-    OSError
-        If `target` cannot be written.
     """
     time_limit = TIME_LIMIT if options.time_limit is None else min(options.time_limit, LONGEST)
     memory_limit = MEMORY_LIMIT if options.memory_limit is None else options.memory_limit
@@ -85,12 +80,12 @@ def run_in_child(
         folder = os.getcwd()
     except OSError:  # it was removed
         folder = ""
-    request = pickle.dumps((job, arguments, purpose, folder, time_limit, memory_limit))
+    request = pickle.dumps((arguments, purpose, folder, time_limit, memory_limit))
     child = _take()
     fine = False
     try:
         try:
-            answer: Any = child.ask(request, time_limit, target)
+            answer: Any = child.ask(request, time_limit)
         except EOFError:
             raise ShellFileError(path, child.why_ended(memory_limit)) from None
         except ValueError:
@@ -143,27 +138,20 @@ class _Child:
         self._process.stdout.close()
         self._jobs, self._since = 0, 0.0
 
-    def ask(self, request: bytes, limit: float, target: Path | None) -> object:
-        """Return the answer, None if it takes more than `limit` [s]; write `target` if asked to.
+    def ask(self, request: bytes, limit: float) -> object:
+        """Return the answer, None if it takes more than `limit` [s].
 
         Raises EOFError if the child ends before, ValueError if the answer is damaged.
         """
         self._jobs += 1
-        while True:
-            try:
-                if request:
-                    self._requests.send_bytes(request)
-                if not self._answers.poll(limit):
-                    return None
-                answer = self._answers.recv_bytes(LARGEST)
-            except OSError as error:
-                raise EOFError from error
-            request = b""
-            if target is not None and answer.startswith(WRITE):
-                target.write_bytes(memoryview(answer)[len(WRITE) :])
-                request = b"written"
-            elif answer != ALIVE:
-                return unpack(answer)
+        try:
+            self._requests.send_bytes(request)
+            if not self._answers.poll(limit):
+                return None
+            answer = self._answers.recv_bytes(LARGEST)
+        except OSError as error:
+            raise EOFError from error
+        return unpack(answer)
 
     def why_ended(self, memory_limit: float) -> str:
         """Return why the child has ended, or no longer answers."""

@@ -95,7 +95,7 @@ class CadSurface:
 
     Attributes
     ----------
-    whole, model : the faces as they were read, and with those that have a kink divided
+    model : the faces, those that have a kink divided
     size : box diagonal [units of the model]
     unit : the unit taken
     sewn : how borders were joined
@@ -103,7 +103,6 @@ class CadSurface:
     stated : chord error asked for [units of the model]
     """
 
-    whole: CadModel
     model: CadModel
     size: float
     unit: str
@@ -195,7 +194,7 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     size = box_size(model.shape)
     held, taken, note = take_unit(path, model.unit, unit, size)
     notes = (*model.notes, note) if note else model.notes
-    whole = model = replace(model, unit=held, notes=notes)
+    model = replace(model, unit=held, notes=notes)
     model, kinked = without_kinks(model)
     if kinked:
         note = f"{kinked} of the faces with a kink inside, divided along it"
@@ -204,4 +203,4 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     stated = size * CHORD_ERROR if chord_error is None else chord_error / model.meters
     sewn = sew(model, size, None if options.sew is None else options.sew / model.meters)
     found = tessellate(sewn.faces, size, stated, model.meters)
-    return CadSurface(whole, model, size, taken, sewn, found, stated)
+    return CadSurface(model, size, taken, sewn, found, stated)

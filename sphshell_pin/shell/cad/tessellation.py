@@ -18,7 +18,7 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS
 
-from sphshell_pin.base.arrays import Array, Ints, Longs
+from sphshell_pin.base.arrays import Ints, Longs
 from sphshell_pin.errors import InvalidParameter, InvalidShell
 from sphshell_pin.shell.cad.face_mesh import FaceMesh, count_laid, take_mesh
 from sphshell_pin.shell.cad.model import CadModel, compound, count_open_edges
@@ -89,17 +89,6 @@ class Tessellation:
                 mesh = self.meshes[face := int(faces[own[0]])]
                 assert mesh is not None  # it has triangles
                 yield face, mesh, own
-
-    def locate(
-        self, triangles: Ints | Longs, points: Array
-    ) -> Iterator[tuple[int, FaceMesh, Longs, Array]]:
-        """Find the parameters of points (n, 3) near `triangles` (n,) [units of the model].
-
-        Yields, face by face, what `by_face` does and the parameters (k, 2) of these points.
-        """
-        for face, mesh, own in self.by_face(triangles):
-            at = mesh.parameters_at(triangles[own] - self.starts[face], points[own])
-            yield face, mesh, own, at
 
 
 @dataclass(frozen=True)

@@ -122,12 +122,10 @@ def read_experiment(
     duration: float,
     *,
     only: Collection[str] | None = None,
-    sigma: Mapping[str, float] | None = None,
 ) -> Measured:
     """Return the checked data of an experiment whose run lasts `duration` [s].
 
-    `known` are the quantities that can be measured, `only` the columns to take (None: all),
-    `sigma` standard deviations by column, in SI.
+    `known` are the quantities that can be measured, `only` the columns to take (None: all).
 
     Raises
     ------
@@ -168,22 +166,21 @@ def read_experiment(
             if label not in known:
                 unknown = NameNotFound("quantity", label, "a run of this scenario", known)
                 raise table.fault(str(unknown))
-            columns.append(_column(table, known[label], (sigma or {}).get(label)))
+            columns.append(_column(table, known[label]))
     if not columns:
         raise table.fault(f"has no column of data beside the time, as in '{_EXAMPLE}'")
     return Measured(name, np.minimum(t, duration), tuple(columns))
 
 
-def _column(table: _Table, quantity: Quantity, sigma: float | None) -> Column:
+def _column(table: _Table, quantity: Quantity) -> Column:
     name = quantity.name
     values = table.values(name, quantity.unit)
     rows = np.flatnonzero(~np.isnan(values))
     if not len(rows):
         raise table.fault(f"column '{name}' has no value")
-    given = None if sigma is None else np.full(len(values), sigma)
+    given = None
     if name + SIGMA in table.headers:
         given = table.values(name + SIGMA, quantity.unit)
-    if given is not None:
         usable = (given >= 1 / _LARGEST) & (given <= _LARGEST)
         must = f"must be positive wherever '{name}' has a value, and not too small to compute with"
         table.check(~np.isnan(values) & ~usable, given, f"'{name}{SIGMA}' {must}")

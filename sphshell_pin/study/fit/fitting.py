@@ -4,7 +4,6 @@ from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
-from sphshell_pin.base.checks import check_positive
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.format import reading
 from sphshell_pin.scenario.format.build import Built, build_scenario
@@ -26,7 +25,6 @@ def fit(
     *,
     changes: Mapping[str, object] | None = None,
     columns: Collection[str] | None = None,
-    sigma: Mapping[str, float] | None = None,
     level: float = 0.95,
     progress: Progress | None = None,
 ) -> Fit:
@@ -36,14 +34,13 @@ def fit(
     ----------
     scenario : name of a shipped scenario, or path of a file
     data : a csv file, columns by their headers, an Experiment, or a sequence of these. A header is
-        a name with its unit: "t [s]", "pairs.PAIR.normal_force [N]", "q.JOINT [rad]"
+        a name with its unit: "t [s]", "pairs.PAIR.normal_force [N]", "q.JOINT [rad]". A column
+        "NAME.sigma" has the standard deviations of NAME; others are estimated from the residuals
     parameters : keys such as "contact.tip.law.stiffness", or a mapping from keys to ranges
         (low, high) that the values must stay in (None: the bounds of the key). The scenario's
         values are where the search starts
     changes : values by dotted key that differ from the file's in all experiments
     columns : names of the columns to use; by default all
-    sigma : standard deviations by the name of a column, in its SI unit. Those of columns without,
-        and without a column "NAME.sigma" beside them, are estimated from the residuals
     level : probability of the intervals
     progress : called after each run with the number of runs and the misfit: the root of the mean
         square of the weighted residuals
@@ -63,13 +60,11 @@ def fit(
     """
     if not 0.0 < level < 1.0:
         raise InvalidParameter("level", level, "must lie between 0 and 1")
-    for name, value in (sigma or {}).items():
-        check_positive(f"sigma of '{name}'", value)
     path = reading.find_scenario(scenario)
     texts = {key: str(value) for key, value in (changes or {}).items()}
     base = reading.read_scenario(path, texts)
     free = free_parameters(parameters, base, path)
-    trials = _trials(base, path, free, data, columns, sigma)
+    trials = _trials(base, path, free, data, columns)
     search = Search(trials, free, progress)
     search.run()
     return search.report(str(scenario), level)
@@ -81,7 +76,6 @@ def _trials(
     free: Sequence[Free],
     data: Data,
     columns: Collection[str] | None,
-    sigma: Mapping[str, float] | None,
 ) -> list[Trial]:
     several = isinstance(data, Sequence) and not isinstance(data, str)
     given: Sequence[Source | Experiment] = data if several else [data]  # type: ignore[list-item, assignment]
@@ -89,7 +83,6 @@ def _trials(
         raise InvalidParameter("data", [], "must be at least one csv file or experiment")
     trials: list[Trial] = []
     reuse: Built | None = None
-    used: set[str] = set()
     for number, one in enumerate(given, 1):
         experiment = one if isinstance(one, Experiment) else Experiment(one)
         texts = {key: str(value) for key, value in experiment.changes.items()}
@@ -99,20 +92,9 @@ def _trials(
         scenario = reading.change_scenario(base, texts, path) if texts else base
         check_knobs(scenario, path, ranges=False)
         built = reuse = build_scenario(scenario, path, reuse)
-        read = read_experiment(
-            experiment,
-            number,
-            quantities_of(built),
-            scenario.run.duration,
-            only=columns,
-            sigma=sigma,
-        )
-        used |= {column.name for column in read.columns}
+        known = quantities_of(built)
+        read = read_experiment(experiment, number, known, scenario.run.duration, only=columns)
         trials.append(Trial(built, read))
-    for name in sigma or {}:
-        if name not in used:
-            must = f"names no column; there are: {', '.join(sorted(used))}"
-            raise InvalidParameter("sigma", name, must, given=f"of '{name}'")
     size = sum(len(column.values) for trial in trials for column in trial.data.columns)
     if size <= len(free):
         raise InvalidParameter(

@@ -14,7 +14,7 @@ from scipy import stats
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.atomic import write_whole
-from sphshell_pin.base.summary import Detail, Fact, Summarized
+from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.base.texts import json_text
 from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.study.fit.parameters import TIE
@@ -113,15 +113,7 @@ class Fit(Summarized):
             *(Fact(one.key, one.value, one.unit) for one in self.parameters),
             Fact("search", "converged" if self.converged else "stopped before it converged"),
             Fact("determined", self.determined),
-            Fact("runs", self.runs, brief=False),
-            Fact("degrees of freedom", self.dof, brief=False),
-            *(Fact("note", remark, brief=False) for remark in self.remarks),
         ]
-
-    def _rows(self) -> Detail:
-        rows = [(one.key, interval_text(one), one.unit, one.start) for one in self.parameters]
-        headings = ("parameter", f"interval of {100 * self.level:g} %", "unit", "start")
-        return Detail(headings, rows, len(rows))
 
     @property
     def values(self) -> dict[str, float]:

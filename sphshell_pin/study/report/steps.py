@@ -2,7 +2,7 @@
 
 Semi-implicit Euler of a Panda with locked fingers and a 12 mm fingertip on a wavy sheet of 200 k
 triangles, forces, losses and figures of every pair included, against Pinocchio's ABA and integrate
-alone, in a compiled loop. What components add is the difference to the scene without contact.
+alone, in a compiled loop.
 """
 
 import time
@@ -21,53 +21,35 @@ from sphshell_pin.study.report.timing import measure_import, part, silent, take_
 
 Times = dict[str, Array]
 DT, STEPS, RADIUS = 1e-5, 5000, 0.012
-FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
+FINGERS = ("panda_finger_joint1", "panda_finger_joint2")  # locked
 START = np.array([0, 0.35, 0, -2.0, 0, 2.35, 0.8])
 PRESSED, AWAY = 5e-4, -1.0  # of the sheet above the height at which it just touches [m]
 LAW = sp.ImpactLaw(1e4, 1.5, 50.0, 1e-4)
-UNDAMPED = sp.ImpactLaw(1e4, 1.5)
 FRICTION = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
 
 
-def panda(lock: tuple[str, ...] = FINGERS) -> sp.Scene:
+def panda() -> sp.Scene:
     """Return the Panda without contacts."""
-    return sp.Scene(robots.load("panda").model, lock=lock)
+    return sp.Scene(robots.load("panda").model, lock=FINGERS)
 
 
-def start_of(scene: sp.Scene) -> Array:
-    """Return the start (nq,) of the arm, with open fingers if they are not locked."""
-    return START if scene.model.nq == len(START) else np.r_[START, 0.02, 0.02]
-
-
-def tip_position(scene: sp.Scene, q: Array) -> Array:
-    """Return where the fingertip is (3,) [m]."""
-    data = scene.model.createData()
-    pin.framesForwardKinematics(scene.model, data, q)
-    return np.asarray(data.oMf[scene.model.getFrameId("panda_hand_tcp")].translation)
-
-
-def with_sheet(
-    scene: sp.Scene,
-    shell: sp.Shell,
-    rise: float,
-    law: sp.ImpactLaw = LAW,
-    friction: sp.CoulombFriction | None = FRICTION,
-) -> sp.Scene:
+def with_sheet(scene: sp.Scene, shell: sp.Shell, rise: float) -> sp.Scene:
     """Put the sheet under the fingertip, `rise` [m] above the height at which it just touches."""
-    q = start_of(scene)
-    placement = pin.SE3(np.eye(3), tip_position(scene, q) + [0, 0, rise - RADIUS])
-    ball = sp.Sphere(RADIUS, "panda_hand_tcp")
-    scene.add_contact(ball, shell, placement=placement, law=law, friction=friction)
+    data, tip = scene.model.createData(), "panda_hand_tcp"
+    pin.framesForwardKinematics(scene.model, data, START)
+    place = data.oMf[scene.model.getFrameId(tip)].translation
+    placement = pin.SE3(np.eye(3), place + [0, 0, rise - RADIUS])
+    ball = sp.Sphere(RADIUS, tip)
+    scene.add_contact(ball, shell, placement=placement, law=LAW, friction=FRICTION)
     return scene
 
 
 def runner(scene: sp.Scene, controller: AnyController = None) -> Callable[[], float]:
     """Seconds per step of a run that records two rows."""
     simulation = sp.Simulation(scene, sp.SemiImplicitEuler(DT))
-    q = start_of(scene)
 
     def run() -> float:
-        result = simulation.run(q, None, STEPS * DT, controller, record_dt=STEPS * DT)
+        result = simulation.run(START, None, STEPS * DT, controller, record_dt=STEPS * DT)
         return float(result.stats.wall_time) / STEPS
 
     return run
@@ -80,8 +62,7 @@ def bare(scene: sp.Scene) -> Callable[[], float]:
     """
     model = scene.model
     pool = pin.ModelPool(model, 1)
-    q = start_of(scene)
-    start = np.asfortranarray(np.tile(q[:, None], STEPS))
+    start = np.asfortranarray(np.tile(START[:, None], STEPS))
     torque, acceleration = np.zeros((2, STEPS, model.nv))
 
     def run() -> float:
@@ -101,57 +82,8 @@ CONTROL_FREE, CONTROL_TOUCHING = "joint PD + gravity, no contact", "joint PD + g
 WHOLE = (BARE, FREE, FAR, TOUCHING, CONTROL_FREE, CONTROL_TOUCHING)
 
 
-PYTHON = "... and a Python controller"
-ADDED = (
-    "fingers not locked, no contact",
-    "far sphere, no damping, no friction",
-    "touching, no damping, no friction",
-    "... and damping",
-    "... and friction",
-    "... and a far second sphere",
-    "... and a touching second sphere",
-    PYTHON,
-)
-
-
-def components(shell: sp.Shell) -> dict[str, Callable[[], float]]:
-    """Return the runs of ADDED, of a fingertip on a sheet."""
-
-    def on_sheet(law: sp.ImpactLaw, friction: sp.CoulombFriction | None, *rises: float) -> sp.Scene:
-        scene = panda()
-        for rise in rises or (PRESSED,):
-            with_sheet(scene, shell, rise, law, friction)
-        return scene
-
-    def zero(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
-        return np.zeros_like(v)
-
-    scenes = (
-        panda(lock=()),
-        on_sheet(UNDAMPED, None, AWAY),
-        on_sheet(UNDAMPED, None),
-        on_sheet(LAW, None),
-        on_sheet(UNDAMPED, FRICTION),
-        on_sheet(UNDAMPED, None, PRESSED, AWAY),
-        on_sheet(UNDAMPED, None, PRESSED, PRESSED),
-    )
-    runs = {name: runner(scene) for name, scene in zip(ADDED[:-1], scenes, strict=True)}
-    return {**runs, PYTHON: runner(on_sheet(UNDAMPED, None), zero)}
-
-
-def components_table(steps: Times) -> contents.Table:
-    """Return what components add to the step of the scene without contact."""
-    rows = [
-        (name, *contents.Spread.of(steps[name]), float(np.median(steps[name] - steps[FREE])))
-        for name in ADDED
-    ]
-    caption = "What components add to a step; a scene without them does not pay."
-    heads = contents.columns("scene", contents.TIME_COLUMNS, "added_s: added [us]")
-    return contents.Table("steps_components", caption, heads, rows)
-
-
 def measure(rounds: int, progress: contents.Progress = silent) -> Times:
-    """Return the times of a step [s] of WHOLE and of ADDED."""
+    """Return the times of a step [s] of WHOLE."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
     pd = sp.JointPD(100.0, 10.0)
     runs = {
@@ -161,7 +93,6 @@ def measure(rounds: int, progress: contents.Progress = silent) -> Times:
         TOUCHING: runner(with_sheet(panda(), shell, PRESSED)),
         CONTROL_FREE: runner(panda(), pd),
         CONTROL_TOUCHING: runner(with_sheet(panda(), shell, PRESSED), pd),
-        **components(shell),
     }
     return take_turns(runs, rounds, progress)
 
@@ -193,8 +124,5 @@ def assemble(steps: Times, imports: Times) -> contents.Section:
     ]
     caption, over = "Whole steps, in turn in one process.", "over_bare: over ABA + integrate"
     whole = {name: steps[name] for name in WHOLE}
-    tables = [
-        contents.times_table("steps", caption, "scene", whole, BARE, over),
-        components_table(steps),
-    ]
+    tables = [contents.times_table("steps", caption, "scene", whole, BARE, over)]
     return contents.Section(KEY, TITLE, TEXT, findings, tables=tables)

@@ -1,7 +1,7 @@
 """Sweeps: one scenario run many times with other values, over processes or a Dask cluster."""
 
 from sphshell_pin.study.sweep.driver import SweepReport, run_plan, sweep
-from sphshell_pin.study.sweep.indices import quantiles, sobol_indices, tornado
+from sphshell_pin.study.sweep.indices import quantiles, sobol_indices
 from sphshell_pin.study.sweep.plan import Plan, plan_sweep
 from sphshell_pin.study.sweep.points import Points, grid_of, sample_of
 
@@ -16,5 +16,4 @@ __all__ = [
     "sample_of",
     "sobol_indices",
     "sweep",
-    "tornado",
 ]

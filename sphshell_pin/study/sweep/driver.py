@@ -50,17 +50,14 @@ def sweep(
     vary: Vary | Iterable[str] | None = None,
     *,
     changes: Mapping[str, str] | None = None,
-    together: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
     out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
     dist: Dist | Iterable[str] | None = None,
-    sample: str | None = None,
     n: int | None = None,
     seed: int = 0,
     indices: bool = False,
-    tornado: bool = False,
 ) -> pd.DataFrame:
     """Run a scenario many times with other values and return the table of its figures.
 
@@ -71,8 +68,6 @@ def sweep(
         to texts "lo:hi:n", "lo:hi:log:n", "a,b,c"; or texts "key=lo:hi:n". All combinations are
         run; the last key varies fastest.
     changes : values by dotted key that are the same in all runs.
-    together : let all keys take their first values in the first run, and so on, in place of all
-        combinations.
     workers : processes of this machine; by default as many as there are processors. 0 does the
         runs in this process.
     scheduler : address of a Dask scheduler, "tcp://host:port", whose workers do the runs instead.
@@ -83,21 +78,18 @@ def sweep(
     dist : in place of `vary`, what is uncertain: a mapping from dotted keys of numbers to texts
         such as "normal(1e5,1e4)" or distributions of scipy.stats such as norm(1e5, 1e4); or texts
         "key=normal(1e5,1e4)". Inputs are independent of each other.
-    sample : "sobol" (points of a scrambled Sobol sequence) or "lhs" (a Latin hypercube).
-    n : number of points; a power of 2 for "sobol".
+    n : number of points of a scrambled Sobol sequence, a power of 2.
     seed : of the points.
     indices : make n (d + 2) runs for d uncertain inputs, from which `sobol_indices` follow.
-    tornado : add 2 d + 1 runs: all inputs at their medians, and each in turn at its quantiles of
-        5 and 95 %; see `sphshell_pin.study.sweep.tornado`. Alone, without a sample, too.
 
     Returns
     -------
     pandas.DataFrame : row i is run i: `run`, the varied keys, `status` ("done", "failed"), `error`
         (why it failed, in one sentence), with `dist` also `design` (what the run is for: "sample";
-        "A", "B", "AB KEY" of Saltelli's design; "median", "5 % KEY", "95 % KEY"), the figures of a
-        run's summary [SI units] (NaN where a run has none), `met.FIGURE` (1 where an expectation
-        of the scenario was met, else 0), `settings`, the digest of all that the run depends on.
-        Bit for bit the same however and wherever the runs were made, on one kind of processor.
+        "A", "B", "AB KEY" of Saltelli's design), the figures of a run's summary [SI units] (NaN
+        where a run has none), `met.FIGURE` (1 where an expectation of the scenario was met, else
+        0), `settings`, the digest of all that the run depends on. Bit for bit the same however and
+        wherever the runs were made, on one kind of processor.
 
     The units of columns, by their names, are attrs["units"] of the table: those of keys as the
     file states their values, those of figures in SI.
@@ -119,13 +111,10 @@ def sweep(
         scenario,
         vary,
         changes=changes,
-        together=together,
         dist=dist,
-        sample=sample,
         n=n,
         seed=seed,
         indices=indices,
-        tornado=tornado,
     )
     return run_plan(plan, workers=workers, scheduler=scheduler, out=out, progress=progress).table
 

@@ -1,4 +1,4 @@
-"""What a table of sampled runs says: quantiles, Sobol indices with intervals, the tornado."""
+"""What a table of sampled runs says: quantiles, Sobol indices with intervals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound, import_extra
-from sphshell_pin.study.sweep.points import DRAWN, HIGH, LOW, MEDIAN, A, B, at_quantile, swapped
+from sphshell_pin.study.sweep.points import DRAWN, A, B, swapped
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,7 +50,7 @@ def quantiles(table: pd.DataFrame) -> pd.DataFrame:
     InvalidParameter
         The table is not that of a sweep with `sample`.
     """
-    rows = _rows(table, DRAWN, "a sample: make the sweep with sample = sobol")[figures_of(table)]
+    rows = _rows(table, DRAWN, "a sample: make the sweep with dist")[figures_of(table)]
     found = rows.quantile([one / 100 for one in QUANTILES]).T.set_axis(list(QUANTILES), axis=1)
     return found.assign(mean=rows.mean(), runs=rows.count())
 
@@ -119,42 +119,6 @@ def sobol_indices(
         columns |= dict(zip((kind, f"{kind}_low", f"{kind}_high"), three, strict=True))
     pandas = import_extra("pandas", "sweep", "Sobol indices")
     return pandas.DataFrame(columns, index=keys)
-
-
-def tornado(table: pd.DataFrame, figure: str) -> pd.DataFrame:
-    """Return what a figure is with each input at its quantiles, of a sweep with `tornado`.
-
-    Returns
-    -------
-    pandas.DataFrame : a row for each input, by its key, the one with the largest change first:
-        columns `low_value`, `high_value` (the input's quantiles of 5 and 95 %), `low`, `median`,
-        `high` (the figure there, all other inputs at their medians).
-
-    Raises
-    ------
-    NameNotFound
-        The table has no such figure.
-    InvalidParameter
-        The table is not that of a sweep with `tornado`, or one of its runs has no such figure.
-    """
-    keys = varied_keys(table)
-    ends = {key: [at_quantile(key, one) for one in (LOW, HIGH)] for key in keys}
-    parts = [MEDIAN, *(part for both in ends.values() for part in both)]
-    rows = _rows(table, parts, "a tornado: make the sweep with tornado")
-    _check_complete(rows, figure, "a tornado")
-    inputs = rows.set_index(DESIGN)
-    values = inputs[figure].astype(float)
-    lines = [
-        [*inputs.loc[both, key], values[both[0]], values[MEDIAN], values[both[1]]]
-        for key, both in ends.items()
-    ]
-    columns = ["low_value", "high_value", "low", "median", "high"]
-    found = import_extra("pandas", "sweep", "a tornado").DataFrame(
-        lines, index=keys, columns=columns
-    )
-    found.attrs = dict(table.attrs)
-    change = np.ptp(found[["low", "median", "high"]].to_numpy(float), axis=1)
-    return found.iloc[np.argsort(-change, kind="stable")]
 
 
 def _rows(table: pd.DataFrame, parts: Iterable[str], purpose: str) -> pd.DataFrame:

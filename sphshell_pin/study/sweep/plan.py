@@ -75,27 +75,24 @@ def plan_sweep(
     vary: Vary | Iterable[str] | None = None,
     *,
     changes: Changes | None = None,
-    together: bool = False,
     dist: Dist | Iterable[str] | None = None,
-    sample: str | None = None,
     n: int | None = None,
     seed: int = 0,
     indices: bool = False,
-    tornado: bool = False,
 ) -> Plan:
     """Check all runs of a sweep, see `sweep`, and return what it will do."""
-    refused: dict[str, object] = {"vary": vary, "together": together}
+    refused: dict[str, object] = {"vary": vary}
     must = "is for values in a grid, dist for a sample: leave one of the two out"
     if dist is None:
-        refused = {"sample": sample, "n": n, "seed": seed, "indices": indices, "tornado": tornado}
+        refused = {"n": n, "seed": seed, "indices": indices}
         must = "is for uncertain inputs: say them with dist"
     for name, value in refused.items():
         if value:
             raise InvalidParameter(name, value, must)
     if dist is not None:
-        points = sample_of(dist, sample, n, seed=seed, indices=indices, tornado=tornado)
+        points = sample_of(dist, n, seed=seed, indices=indices)
     elif vary is not None:
-        points = grid_of(vary, together)
+        points = grid_of(vary)
     else:
         what = f"what varies, as {HOW}; or dist what is uncertain, as key=normal(mean,deviation)"
         raise InvalidParameter("vary", None, what, "must say")

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import stated_pairs
 from sphshell_pin.errors import InvalidParameter, import_extra
 from sphshell_pin.study.sweep.distributions import Dist, Frozen, distributions_of
@@ -29,9 +28,6 @@ _RANGE = re.compile(rf"({_PLAIN}):({_PLAIN}):(\s*log\s*:)?\s*(\d+)\s*")
 
 DRAWN = SAMPLE, A, B = "sample", "A", "B"
 """Parts of a design whose runs are drawn from the distributions, each independent of the others."""
-MEDIAN = "median"
-LOW, HIGH = 5, 95
-"""Between these quantiles [%] an input moves in the tornado."""
 # Sobol points are whole multiples of 2^-30. Half a step more keeps them off 0 and 1, where a
 # quantile may be infinite, and in the intervals that make them even.
 _HALF_STEP = 2.0**-31
@@ -43,7 +39,7 @@ class Points:
 
     values: Mapping[str, Sequence[Value]]
     parts: tuple[str, ...] = ()
-    """What each run of a sample is for: "sample"; "A", "B", "AB KEY"; "median", "5 % KEY", ..."""
+    """What each run of a sample is for: "sample"; "A", "B", "AB KEY"."""
     dists: Mapping[str, Frozen] = field(default_factory=dict)
 
     @property
@@ -58,24 +54,17 @@ def swapped(key: str) -> str:
     return f"AB {key}"
 
 
-def at_quantile(key: str, percent: int) -> str:
-    """Return the part of the design in which `key` is at a quantile, all others at the median."""
-    return f"{percent} % {key}"
-
-
-def grid_of(vary: Vary | Iterable[str], together: bool = False) -> Points:
+def grid_of(vary: Vary | Iterable[str]) -> Points:
     """Return the grid of a mapping from keys to values, or of texts such as "run.dt=1e-5,1e-4".
 
     Values are a sequence, or a text: "lo:hi:n" (n equal steps, ends included), "lo:hi:log:n" (n
     values, each the same multiple of the one before), "a,b,c" (numbers, words, TOML lists). The
-    last key varies fastest; with `together` the first run takes the first value of every key, and
-    so on.
+    last key varies fastest.
 
     Raises
     ------
     InvalidParameter
-        A text that says no values, a key or a value given twice, nothing to vary, too many runs,
-        or keys of different lengths with `together`.
+        A text that says no values, a key or a value given twice, nothing to vary, too many runs.
     """
     axes: dict[str, tuple[Value, ...]] = {}
     for key, given in stated_pairs("--vary", vary, f"must be {HOW}"):
@@ -96,33 +85,21 @@ def grid_of(vary: Vary | Iterable[str], together: bool = False) -> Points:
         axes[key] = values
     if not axes:
         raise InvalidParameter("vary", {}, f"must say what varies: {HOW}")
-    lengths = {key: len(values) for key, values in axes.items()}
-    if together:
-        if len(set(lengths.values())) > 1:
-            given = ", ".join(f"{key} has {n}" for key, n in lengths.items())
-            raise InvalidParameter("together", True, f"needs as many values of every key: {given}")
-        return Points(axes)
-    if (runs := math.prod(lengths.values())) > MOST_RUNS:
+    if (runs := math.prod(map(len, axes.values()))) > MOST_RUNS:
         raise InvalidParameter("vary", runs, f"runs are too many: {MOST_RUNS} at most")
     columns = zip(*itertools.product(*axes.values()), strict=True)
     return Points(dict(zip(axes, columns, strict=True)))
 
 
 def sample_of(
-    dist: Dist | Iterable[str],
-    sample: str | None = None,
-    n: int | None = None,
-    *,
-    seed: int = 0,
-    indices: bool = False,
-    tornado: bool = False,
+    dist: Dist | Iterable[str], n: int | None, *, seed: int = 0, indices: bool = False
 ) -> Points:
     """Return the runs for inputs distributed as `dist`; see `sphshell_pin.study.sweep.sweep`.
 
-    The points of "sobol" are those of a scrambled Sobol sequence, those of "lhs" a Latin hypercube
-    [scipy.stats.qmc]. With `indices` the design is Saltelli's: A and B are the halves of one
-    sequence in 2 d dimensions, and each AB is A with one column of B [Saltelli et al., Computer
-    Physics Communications 181 (2010), 259-270]. The d + 2 runs of a point follow each other.
+    The points are those of a scrambled Sobol sequence [scipy.stats.qmc]. With `indices` the design
+    is Saltelli's: A and B are the halves of one sequence in 2 d dimensions, and each AB is A with
+    one column of B [Saltelli et al., Computer Physics Communications 181 (2010), 259-270]. The
+    d + 2 runs of a point follow each other.
 
     Raises
     ------
@@ -132,24 +109,25 @@ def sample_of(
         scipy is not installed.
     """
     dists = distributions_of(dist)
-    _check(sample, n, seed, indices=indices, tornado=tornado)
+    for name, value, least in (("n", n, 2), ("seed", seed, 0)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise InvalidParameter(name, value, f"must be a whole number, {least} or more")
+    assert n is not None
     d = len(dists)
-    shares, parts = np.empty((0, d)), list[str]()
-    if sample is not None and n is not None:
-        runs = n * (d + 2 if indices else 1)
-        if runs > MOST_RUNS:
-            raise InvalidParameter("n", n, f"makes {runs} runs, too many: {MOST_RUNS} at most")
-        shares, parts = _unit_points(sample, n, 2 * d if indices else d, seed), [SAMPLE] * n
-        if indices:
-            a, b = shares[:, :d], shares[:, d:]
-            swaps = [np.where(np.arange(d) == i, b, a) for i in range(d)]
-            shares = np.stack([a, b, *swaps], axis=1).reshape(-1, d)
-            parts = [A, B, *map(swapped, dists)] * n
-    if tornado:
-        alone = np.full((d, 2, d), 0.5)
-        alone[range(d), :, range(d)] = LOW / 100, HIGH / 100
-        shares = np.vstack([shares, np.full((1, d), 0.5), alone.reshape(-1, d)])
-        parts += [MEDIAN, *(at_quantile(key, one) for key in dists for one in (LOW, HIGH))]
+    if n & (n - 1):
+        below = 1 << (n.bit_length() - 1)
+        must = f"must be a power of 2, such as {below} or {2 * below}"
+        raise InvalidParameter("n", n, must)
+    if (runs := n * (d + 2 if indices else 1)) > MOST_RUNS:
+        raise InvalidParameter("n", n, f"makes {runs} runs, too many: {MOST_RUNS} at most")
+    qmc = import_extra("scipy.stats", "sweep", "a sweep").qmc
+    shares = np.asarray(qmc.Sobol(2 * d if indices else d, rng=seed).random(n)) + _HALF_STEP
+    parts = [SAMPLE] * n
+    if indices:
+        a, b = shares[:, :d], shares[:, d:]
+        swaps = [np.where(np.arange(d) == i, b, a) for i in range(d)]
+        shares = np.stack([a, b, *swaps], axis=1).reshape(-1, d)
+        parts = [A, B, *map(swapped, dists)] * n
     values = {}
     for (key, one), share in zip(dists.items(), shares.T, strict=True):
         with np.errstate(over="ignore", invalid="ignore"):
@@ -157,31 +135,6 @@ def sample_of(
         if not np.all(np.isfinite(values[key])):
             raise InvalidParameter("dist", key, "has values that are not finite")
     return Points(values, tuple(parts), dists)
-
-
-def _check(sample: str | None, n: int | None, seed: int, *, indices: bool, tornado: bool) -> None:
-    if sample is None and (n is not None or not tornado):
-        must = "with dist: sobol or lhs, and n points (or tornado alone)"
-        raise InvalidParameter("sample", None, must, "must be given")
-    if sample not in (None, "sobol", "lhs"):
-        raise InvalidParameter("sample", sample, "must be sobol or lhs")
-    for name, value, least in (("n", 2 if sample is None else n, 2), ("seed", seed, 0)):
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise InvalidParameter(name, value, f"must be a whole number, {least} or more")
-    if indices and sample != "sobol":
-        raise InvalidParameter("indices", True, "the points of a sequence: sample = sobol", "need")
-    if sample == "sobol" and n is not None and n & (n - 1):
-        below = 1 << (n.bit_length() - 1)
-        must = f"must be a power of 2 with sample = sobol, such as {below} or {2 * below}"
-        raise InvalidParameter("n", n, must)
-
-
-def _unit_points(sample: str, n: int, d: int, seed: int) -> Array:
-    """Return `n` points in the unit cube (n, d)."""
-    qmc = import_extra("scipy.stats", "sweep", "a sweep").qmc
-    if sample == "sobol":
-        return np.asarray(qmc.Sobol(d, rng=seed).random(n)) + _HALF_STEP
-    return np.asarray(qmc.LatinHypercube(d, rng=seed).random(n))
 
 
 def text_of(value: Value) -> str:

@@ -23,6 +23,7 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",  # the address holds the token
     "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
 }
 _NO_TOKEN = (
     "open the page at the whole address that was printed (in Python: live.url), with its token"
@@ -45,25 +46,20 @@ def process_token() -> str:
 
 
 class Access:
-    """The rules of one server: tokens, names of this machine, headers.
+    """The rules of one server: its token, names of this machine, headers.
 
     No cookie takes part: browsers send cookies to every port of a machine, and a page that is
     opened without its address has no rights. The page's own files and its websocket lie in a
     folder named as the token.
     """
 
-    def __init__(self, host: str, address: str, framed: str | None = None) -> None:
+    def __init__(self, host: str, address: str) -> None:
         self.token = process_token()
-        self.frame_token = secrets.token_urlsafe(24)
-        """Token of an address that another page, such as a notebook, may show in a frame."""
         self.is_open = not ipaddress.ip_address(address.partition("%")[0]).is_loopback
         self._names = {"localhost", host.lower(), socket.gethostname().lower()} - {""}
-        # The picture that the page itself has in a frame.
-        site = re.match(r"https?://[\w.:\[\]-]+", framed or "")
-        self._framed = site[0] if site else "'none'"
 
-    def check(self, request: HTTPServerRequest) -> tuple[str, str]:
-        """Return the token that `request` has, and the file that it names.
+    def check(self, request: HTTPServerRequest) -> str:
+        """Return the file that `request` names.
 
         Raises PermissionError, whose text is one sentence for the user.
         """
@@ -78,10 +74,9 @@ class Access:
         if not given and "/" in name:
             folder, _, name = name.partition("/")
             given = folder.encode()
-        for token in (self.token, self.frame_token):
-            if secrets.compare_digest(given, token.encode()):
-                return token, name
-        raise PermissionError(_NO_TOKEN)
+        if not secrets.compare_digest(given, self.token.encode()):
+            raise PermissionError(_NO_TOKEN)
+        return name
 
     def is_own(self, host: str) -> bool:
         """Tell whether `host`, of a request's header, is a name of this server.
@@ -101,8 +96,8 @@ class Access:
             return False
         return "%" not in name and (self.is_open or literal.is_loopback)
 
-    def headers(self, host: str = "", token: str = "") -> dict[str, str]:
-        """Return the headers of an answer to a request for `host` with `token`, both checked."""
+    def headers(self, host: str = "") -> dict[str, str]:
+        """Return the headers of an answer to a request for `host`, which was checked."""
         # Not all browsers count websockets as 'self'.
         sockets = f" ws://{host} wss://{host}" if host else ""
         policy = [
@@ -111,12 +106,9 @@ class Access:
             "style-src 'self' 'unsafe-inline'",
             "img-src 'self' data: blob:",
             f"connect-src 'self' data: blob:{sockets}",
-            f"frame-src {self._framed}",
+            "frame-src 'none'",
+            "frame-ancestors 'none'",
             "base-uri 'self'",
             "form-action 'none'",
         ]
-        headers = dict(_HEADERS)
-        if token != self.frame_token:
-            policy.append("frame-ancestors 'none'")
-            headers["X-Frame-Options"] = "DENY"
-        return headers | {"Content-Security-Policy": "; ".join(policy)}
+        return _HEADERS | {"Content-Security-Policy": "; ".join(policy)}

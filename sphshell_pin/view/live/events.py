@@ -102,10 +102,8 @@ FIELDS: dict[str, _Fields] = {
     "target": {"joint": _text, "value": _number},
     "show": {"part": _text, "on": _switch},
     "arrows": {"value": _not_negative},
-    "look": {},
     "charts": {"keys": _keys},
     "keep": {},
-    "seek": {"t": _number},
     "seen": {"frame": _number},
 }
 """The fields of each kind of event, and the check of each value."""
@@ -149,7 +147,7 @@ def newest(events: list[tuple[Client, Event]]) -> list[tuple[Client, Event]]:
     kept: list[tuple[Client, Event]] = []
     seen: set[tuple[object, ...]] = set()
     for client, event in reversed(events):
-        if event["type"] in ("parameter", "speed", "arrows", "seek", "target", "drag"):
+        if event["type"] in ("parameter", "speed", "arrows", "target", "drag"):
             key = (event["type"], event.get("key", event.get("joint")))
             if key in seen:
                 continue

@@ -24,17 +24,16 @@ G = 9.81
 # Share of the width of the picture: how far a free body hangs below the cursor, of the spring
 # unless the user chooses another one.
 SAG = 0.05
-NOT_HERE = "this run cannot be dragged or aimed: it is a finished one, or its player cannot"
+NOT_HERE = "this run cannot be dragged or aimed: its player cannot"
 
 
 class Interaction:
     """Passes pushes, drags and joint targets of browsers to `player`; one drags at a time."""
 
-    def __init__(self, player: Player, picture: Picture, window: LiveWindow | None) -> None:
+    def __init__(self, player: Player, picture: Picture, window: LiveWindow) -> None:
         self._player = player
         self._interactive = player if isinstance(player, Interactive) else None
         self._picture = picture
-        # Where the picture is in a window of others, nothing is known of the mouse.
         self._window = window
         self._dragger: Client | None = None
         self._holds: dict[Client, Event] = {}
@@ -66,7 +65,7 @@ class Interaction:
     def offer(self) -> Json:
         """Return what there is to do, for the first message to a browser."""
         drag = None
-        if self._interactive is not None and self._window is not None:
+        if self._interactive is not None:
             stiffness = float(f"{G / (SAG * self._picture.view.distance):.2g}")
             drag = {"nodes": self._picture.display.grips(), "stiffness": stiffness}
         names = ("joint", "rotates", "low", "high", "limited", "value")

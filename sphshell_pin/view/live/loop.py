@@ -18,7 +18,7 @@ from sphshell_pin.view.live.events import BadMessage, Client, Event, newest
 from sphshell_pin.view.live.interaction import Interaction
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture
 from sphshell_pin.view.live.server import Server
-from sphshell_pin.view.live.window import ForeignWindow, LiveWindow, window_of
+from sphshell_pin.view.live.window import LiveWindow
 from sphshell_pin.view.nodes import Json, new_visualizer
 
 if TYPE_CHECKING:
@@ -38,19 +38,16 @@ class Live:
     """A live page of `player`, served at `url` until `stop`.
 
     `start` plays it in a thread of its own and returns; `run` plays it in the caller's until
-    `stop` or Ctrl-C. `visualizer` is an existing meshcat.Visualizer or pinocchio
-    MeshcatVisualizer: the scene is then drawn there, and the page shows its own controls round a
-    frame with that picture. `speed` is simulated seconds per second, from 0.01 to 10. Not
-    `running`, it waits for the button; with `wait`, for the first browser.
+    `stop` or Ctrl-C. `speed` is simulated seconds per second, from 0.01 to 10. Not `running`, it
+    waits for the button; with `wait`, for the first browser.
 
     Raises MissingExtra without meshcat, SphshellError where the port is taken, InvalidParameter
-    for a `speed` or a `visualizer` that is none.
+    for a `speed` that is none.
     """
 
     def __init__(
         self,
         player: Player,
-        visualizer: object = None,
         *,
         host: str = "127.0.0.1",
         port: int = 0,
@@ -65,9 +62,6 @@ class Live:
         """What stopped the run, where that was no end of its own."""
         self._waiting = wait
         self._window = LiveWindow()
-        self._foreign: ForeignWindow | None = None
-        if visualizer is not None:
-            self._foreign = ForeignWindow(window_of(visualizer))
         self._panel = panel.Panel()
         self._charts = Charts(player)
         self._points: list[Point] = []
@@ -83,14 +77,11 @@ class Live:
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         # First of all the port: a picture takes time.
-        framed = None if self._foreign is None else self._foreign.url
-        self.server = Server(self._window, self._panel, host, port, framed)
+        self.server = Server(self._window, self._panel, host, port)
         try:
-            canvas = new_visualizer(self._foreign or self._window)
-            self.picture = Picture(player, canvas)
-            own = self._window if self._foreign is None else None
-            self._interaction = Interaction(player, self.picture, own)
-            hello = {"type": "hello", **panel.greeting(player, framed, self._interaction.offer())}
+            self.picture = Picture(player, new_visualizer(self._window))
+            self._interaction = Interaction(player, self.picture, self._window)
+            hello = {"type": "hello", **panel.greeting(player, self._interaction.offer())}
             self._panel.post("hello", hello | {"series": self._charts.descriptions()})
             self.draw()
         except BaseException:
@@ -141,11 +132,6 @@ class Live:
             pass
         finally:
             self.stop()
-
-    def _repr_html_(self) -> str:
-        """Show the page in a notebook's cell."""
-        address = self.server.frame_url
-        return f'<iframe src="{address}" style="width: 100%; height: 720px; border: 0"></iframe>'
 
     def __enter__(self) -> Live:
         return self.start()
@@ -199,13 +185,13 @@ class Live:
             self._follow(self.speed * min(wall, 2.0 * BUDGET))
         else:
             self._pace.clear()
-        if watched or self._foreign is not None:
+        if watched:
             self.draw()
 
     def draw(self) -> None:
         """Bring the scene up to date for all browsers, and now and then the panel."""
         now = time.perf_counter()
-        if self._changed and (self._foreign is None or self._foreign.due(now)):
+        if self._changed:
             self._changed = False
             try:
                 # A diverging run is reported in the panel, not on the terminal.
@@ -295,16 +281,12 @@ class Live:
                 self.picture.show(event["part"], event["on"])
             case "arrows":
                 self.picture.magnify_arrows(min(max(event["value"], 1e-2), 1e2))
-            case "look":
-                self.picture.look()
             case "charts":
                 if self._charts.ask(client, event["keys"]):
                     self._send_curves()
             case "keep":
                 self._charts.keep()
                 self._post_earlier("kept")
-            case "seek":
-                self._seek(event["t"])
 
     def _change(self, key: str, value: float | str) -> None:
         labels = {one.key: one.label for one in self.player.parameters}
@@ -320,8 +302,6 @@ class Live:
 
     def _run(self, on: bool) -> None:
         self._waiting = False
-        if on and self.player.ended is not None and self.player.duration is not None:
-            self._reset()
         if on:
             self._check_can_go_on()
         self.running = on
@@ -344,26 +324,11 @@ class Live:
         self.fault = None
         self._interaction.forget()
         self._ahead = 0.0
-        if self.player.duration is None:
-            self._charts.start_anew()
-            if "last" in self._charts.earlier:
-                self._post_earlier("last")
+        self._charts.start_anew()
+        if "last" in self._charts.earlier:
+            self._post_earlier("last")
         self._clear_charts()
         self.picture.clear()
-
-    def _seek(self, t: float) -> None:
-        if self.player.duration is None:
-            raise BadMessage("only a finished run has a time to go to")
-        back = t < self.player.time
-        self._clear_charts()
-        # Up to there from a little earlier, for the charts: nothing is computed again.
-        span = panel.STRIP_SECONDS * self.speed
-        self.player.seek(t - span)
-        rows = self.player.advance(max(0.0, t - self.player.time), BUDGET)
-        self._points = self._charts.add(rows, self._spacing)
-        self.player.seek(t)
-        if back:
-            self.picture.clear()
 
     def _clear_charts(self) -> None:
         self._charts.clear()
@@ -412,7 +377,6 @@ class Live:
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
-            "coloring": self.picture.display.coloring,
             "pressure": self.picture.pressure,
             "grid": self.picture.display.grid,
             **self._interaction.state(),

@@ -1,4 +1,4 @@
-"""From whatever there is to see to a live page: scenarios, built ones, results, players."""
+"""From whatever there is to run to a live page: scenarios, built ones, players."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
+from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.view.live.loop import Live
 from sphshell_pin.view.live.panel import check_speed
 from sphshell_pin.view.surface import Coloring, check_coloring
@@ -27,10 +27,8 @@ RESULT = "run.npz"
 
 def preview(
     what: object,
-    visualizer: object = None,
     *,
     changes: Mapping[str, str] | None = None,
-    scenario: str | PathLike[str] | None = None,
     speed: float = 1.0,
     paused: bool = False,
     host: str = "127.0.0.1",
@@ -44,15 +42,9 @@ def preview(
     Parameters
     ----------
     what
-        A scenario (name, path, or built), a finished run (Result, its file or results folder), or
-        any Player.
-    visualizer
-        An existing meshcat.Visualizer or pinocchio MeshcatVisualizer to draw in, else the page's
-        own.
+        A scenario (name, path, or built), or any Player.
     changes
         Values of a scenario by dotted key.
-    scenario
-        The scenario that a finished run is shown in, where it does not know its own.
     speed
         Simulated seconds per second, 0.01 to 10.
     paused
@@ -62,9 +54,8 @@ def preview(
     open
         Open the page in the web browser, where there is a screen.
     color
-        What the colors of the shells show: nothing ("surface"), the patches ("patches"), how far
-        curved elements are from the flat ones ("distance"), or the kinds of their faces ("faces").
-        The page can change it.
+        What the colors of the shells show: nothing ("surface") or the kinds of their faces
+        ("faces"). The page can change it.
     told
         Called with the page's address, which ends with a token and gives access.
 
@@ -75,11 +66,9 @@ def preview(
     """
     check_speed(speed)  # before anything is built
     check_coloring(color)
-    player = player_of(what, changes=changes, scenario=scenario)
+    player = player_of(what, changes=changes)
     _warn(player)
-    live = Live(
-        player, visualizer, host=host, port=port, speed=speed, running=not paused, wait=True
-    )
+    live = Live(player, host=host, port=port, speed=speed, running=not paused, wait=True)
     if color != "surface":
         live.picture.show(color, True)
     try:
@@ -109,36 +98,19 @@ def _warn(player: Player) -> None:
             print(f"warning: {warning}", file=sys.stderr)
 
 
-def player_of(
-    what: object,
-    *,
-    changes: Mapping[str, str] | None = None,
-    scenario: str | PathLike[str] | None = None,
-) -> Player:
+def player_of(what: object, *, changes: Mapping[str, str] | None = None) -> Player:
     """Return the player of `what`; see `preview`."""
-    from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.scenario import Built, build
     from sphshell_pin.scenario.live.live_run import LiveRun
-    from sphshell_pin.scenario.running.replay import Replay
 
     if isinstance(what, str | PathLike):
-        finished = result_file(what)
-        if finished is None:
-            if scenario is not None:
-                raise SphshellError(f"{what} is a scenario itself: only a finished run needs one")
-            return LiveRun(build(what, changes))
-        if changes:
-            key = next(iter(changes))
-            raise InvalidParameter(key, changes[key], "cannot be changed: this is a finished run")
-        return Replay(finished, scenario)
+        return LiveRun(build(what, changes))
     if isinstance(what, Built):
         return LiveRun(what)
-    if isinstance(what, Result):
-        return Replay(what, scenario)
     if callable(getattr(what, "advance", None)):
         return what  # type: ignore[return-value]
     raise InvalidParameter(
-        "what", type(what).__name__, "must be a scenario, a finished run, or a player"
+        "what", type(what).__name__, "must be a scenario or a player (a Result has .view())"
     )
 
 
@@ -164,10 +136,7 @@ def open_browser(url: str) -> None:
 
     Other users see the arguments of the browser, but not the file that sends it to `url`.
     """
-    on_a_screen = sys.platform in ("darwin", "win32") or any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
-    )
-    if not on_a_screen:
+    if not _on_a_screen():
         return
     # At home, as a browser in a sandbox of its own (snap, flatpak) has another /tmp.
     home = Path.home()
@@ -176,5 +145,17 @@ def open_browser(url: str) -> None:
     atexit.register(Path(name).unlink, missing_ok=True)
     with os.fdopen(number, "w", encoding="utf-8") as file:
         file.write(f'<meta http-equiv="refresh" content="0; url={html.escape(url)}">\n')
-    with contextlib.suppress(webbrowser.Error):
-        webbrowser.open(Path(name).as_uri())
+    open_file(Path(name))
+
+
+def open_file(path: Path) -> None:
+    """Open a page in the web browser, unless there is no screen to show it on."""
+    if _on_a_screen():
+        with contextlib.suppress(webbrowser.Error):
+            webbrowser.open(path.absolute().as_uri())
+
+
+def _on_a_screen() -> bool:
+    return sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )

@@ -15,10 +15,8 @@ from sphshell_pin.base.checks import check_finite
 from sphshell_pin.base.texts import plain
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR
-from sphshell_pin.view.live.picture import CONE_COLOR
 from sphshell_pin.view.nodes import Json, css
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
-from sphshell_pin.view.surface import RAMP
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene.scene import ContactPair, SceneContacts
@@ -30,7 +28,7 @@ SLOWEST, FASTEST = 0.01, 10.0  # speeds that the page offers
 STRIP_SECONDS = 6.0  # of the clock on the wall, that the strip shows at the speed of now
 
 _PARAMETER = ("key", "label", "unit", "low", "high", "log", "value")
-_COLORS = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR, "cone": CONE_COLOR}
+_COLORS = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR}
 
 
 def check_speed(speed: float) -> float:
@@ -41,8 +39,8 @@ def check_speed(speed: float) -> float:
     return value
 
 
-def greeting(player: Player, picture: str | None, offer: Json) -> Json:
-    """Return what does not change while `player` runs; `picture` is the page of the scene, if any.
+def greeting(player: Player, offer: Json) -> Json:
+    """Return what does not change while `player` runs.
 
     `offer` is what there is to do with the mouse. The "session" differs from one run to the next on
     the same port.
@@ -59,12 +57,9 @@ def greeting(player: Player, picture: str | None, offer: Json) -> Json:
             for one in player.parameters
         ],
         "start": player.start,
-        "duration": player.duration,
         "planned": player.planned,
         "speeds": [SLOWEST, FASTEST],
         "window": STRIP_SECONDS,
-        "picture": picture,
-        "ramp": list(RAMP),
         "pressure_ramp": list(PRESSURE_RAMP),
         "colors": {name: css(color) for name, color in _COLORS.items()},
         **offer,

@@ -12,30 +12,27 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result_parts import Patches
 from sphshell_pin.view import nodes
 from sphshell_pin.view.arrows import ArrowPool, ArrowScale, Forces, arrow_length
-from sphshell_pin.view.camera import View, choose_view, look, set_surroundings
+from sphshell_pin.view.camera import View, choose_view
 from sphshell_pin.view.display import HIDDEN_AT_FIRST, PARTS, Display
-from sphshell_pin.view.nodes import show
 from sphshell_pin.view.patches import PatchScale
 from sphshell_pin.view.surface import is_curved
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
 
-    from sphshell_pin.dynamics.scene.scene import ContactPair, Scene, SceneContacts
+    from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
     from sphshell_pin.scenario.live.acting import Dragged
     from sphshell_pin.view.live.player import Player
 
 POOL = 16
-CONE_COLOR = 0x1F8A8A
 # More of the robot than in a recording: here one looks round before one looks closely.
 FAR = 18.0
-STILLS = 24  # of a finished run, to place the camera
 # Frames with contact from which the scale of the arrows is taken.
 FRAMES_TO_SCALE = 45
 # A trail is drawn in pieces of so many points; the oldest piece makes room for the newest.
 POINTS_OF_PIECE, PIECES = 48, 60
 
-LIVE_PARTS: tuple[str, ...] = (*PARTS, "cones", "pressure")
+LIVE_PARTS: tuple[str, ...] = (*PARTS, "pressure")
 DRAG_COLOR = 0x16A34A
 
 
@@ -44,10 +41,9 @@ class Picture:
 
     def __init__(self, player: Player, visualizer: Visualizer) -> None:
         scene = player.scene
-        q, points, normals = _seen_in(player)
-        whole = player.duration is not None
-        view = choose_view(scene, q, points, normals, player.visual_model, FAR, whole=whole)
-        view = lowered(view)
+        seen = player.contacts
+        places = seen.point_world, seen.normal_world
+        view = lowered(choose_view(scene, player.q[None], *places, player.visual_model, FAR))
         self.display = Display(scene, player.visual_model, visualizer, view=view, pool=_pool(scene))
         self.view: View = view
         self.shown = {part: part in PARTS and part not in HIDDEN_AT_FIRST for part in LIVE_PARTS}
@@ -55,11 +51,9 @@ class Picture:
         self._pairs = scene.pairs
         self._empty = _empty_parts(scene)
         self._scale = _Scale(scene, view)
-        self._cones = ConePool(visualizer["cones"], _pool(scene))
-        show(visualizer["cones"], False)
         self._trails = _Trails(self.display)
         width = 0.0026 * view.distance
-        self._push = ArrowPool(visualizer["push"], 1, width, "total")
+        self._push = ArrowPool(visualizer["push"], 1, width, total=True)
         self._drag: DragLine | None = None  # until something is dragged
         self.cut = False
         """Whether a force is larger than its arrow: no arrow is longer than the longest."""
@@ -102,8 +96,6 @@ class Picture:
         if patches is not None:
             self.display.patch_scale = self._scale.of_patches(patches)
         self.display.update(player.q, contacts, patches)
-        if self.shown["cones"]:
-            self._cones.update(contacts, self._pairs, scale)
         if self.shown["trails"]:
             self._trails.add(contacts)
         self._push.update(push, scale)
@@ -117,17 +109,10 @@ class Picture:
     def show(self, part: str, on: bool) -> None:
         """Show or hide one of LIVE_PARTS."""
         self.shown[part] = on
-        if part == "cones":
-            show(self.display.visualizer["cones"], on)
-        elif part == "pressure":
+        if part == "pressure":
             self.display.show_patches(on)
         else:
             self.display.show(part, on)  # type: ignore[arg-type]
-
-    def look(self) -> None:
-        """Place the camera again, and the background: other pages than ours may forget both."""
-        set_surroundings(self.display.visualizer)
-        look(self.display.visualizer, self.view)
 
     def magnify_arrows(self, factor: float) -> None:
         """Draw arrows `factor` times as long as by themselves."""
@@ -169,40 +154,6 @@ class DragLine:
         self._line(
             nodes.hidden_at(points[0]) if short else nodes.rod_along(points[0], span, self._width)
         )
-
-
-class ConePool:
-    """Friction cones: `size` of them below `visualizer`, from the contact point along the normal.
-
-    Height is the normal force and radius its mu-fold, at the scale of the arrows: an arrow of
-    friction that reaches the rim is at its limit.
-    """
-
-    def __init__(self, visualizer: Visualizer, size: int) -> None:
-        self._moves: list[nodes.Move] = []
-        for index in range(size):
-            node = visualizer[f"cone_{index}"]
-            look = nodes.material("MeshBasic", CONE_COLOR, 0.22, depthTest=False, depthWrite=False)
-            nodes.set_object(node, nodes.rod(0.0, 1.0), look, order=8)
-            self._moves.append(nodes.mover(node))
-            self._moves[-1](nodes.hidden_at(np.zeros(3)))
-
-    def update(
-        self, contacts: SceneContacts, pairs: tuple[ContactPair, ...], scale: ArrowScale
-    ) -> None:
-        """Show the cones of `contacts`, the largest forces first; hide the others."""
-        order = np.argsort(-contacts.normal_force, kind="stable")
-        for slot, move in enumerate(self._moves):
-            matrix = nodes.hidden_at(np.zeros(3))
-            if slot < len(order):
-                k = int(order[slot])
-                law = pairs[int(contacts.pair[k])].friction
-                mu = 0.0 if law is None else law.largest_coefficient
-                height = min(contacts.normal_force[k] * scale.meters_per_newton, scale.longest)
-                if min(mu, 1.0) * height > nodes.HIDDEN_SCALE:
-                    along = height * contacts.normal_world[k]
-                    matrix = nodes.rod_along(contacts.point_world[k], along, mu * height)
-            move(matrix)
 
 
 class _Scale:
@@ -311,8 +262,6 @@ def _empty_parts(scene: Scene) -> frozenset[str]:
     """Return the parts that show nothing of `scene`."""
     shells = [(one.shell, one.is_smooth) for pair in scene.pairs for one in pair.shells]
     has = {
-        "patches": any(np.ptp(shell.element_patch) for shell, _ in shells),
-        "distance": any(smooth for _, smooth in shells),
         "curved": any(is_curved(shell, smooth) for shell, smooth in shells),
         "faces": any(shell.element_face is None for shell, _ in shells),
         "pressure": bool(scene.pairs),
@@ -327,25 +276,6 @@ def lowered(view: View) -> View:
     """
     lift = np.array([0.0, 0.0, 0.05 * view.distance])
     return View(view.eye + lift + 0.08 * (view.eye - view.target), view.target + lift)
-
-
-def _seen_in(player: Player) -> tuple[Array, Array, Array]:
-    """Return configurations (n, nq), and points and normals (k, 3) of the contacts seen in them.
-
-    They are those of now, of a finished run those of all of it.
-    """
-    now, length = player.time, player.duration
-    times = [now] if length is None else player.start + np.linspace(0.0, length, STILLS)
-    found = []
-    for t in times:
-        if length is not None:
-            player.seek(float(t))
-        found.append((player.q[None], player.contacts.point_world, player.contacts.normal_world))
-    if length is not None:
-        player.seek(now)
-    q, points, normals = (np.concatenate(column) for column in zip(*found, strict=True))
-    sound = np.isfinite(points).all(axis=1)  # at the end of a run that diverged it may not be
-    return q, points[sound], normals[sound]
 
 
 def _pool(scene: Scene) -> int:

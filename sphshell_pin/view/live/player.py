@@ -1,4 +1,4 @@
-"""What the live page plays: a run that has no end, or a finished one."""
+"""What the live page plays."""
 
 from __future__ import annotations
 
@@ -68,15 +68,11 @@ class Player(Protocol):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Frames that can be pushed; none in a replay."""
-
-    @property
-    def duration(self) -> float | None:
-        """Length of a replay [s]; None where it has no end."""
+        """Frames that can be pushed."""
 
     @property
     def planned(self) -> float | None:
-        """Length of the motion that the scenario states [s]; None of a replay."""
+        """Length of the motion that the scenario states [s], None if it states none."""
 
     @property
     def ended(self) -> str | None:
@@ -93,9 +89,6 @@ class Player(Protocol):
 
     def push(self, body: str, force_world: Array, seconds: float) -> None:
         """Push the origin of a body with `force_world` (3,) [N] for `seconds` [s]."""
-
-    def seek(self, t: float) -> None:
-        """Go to time `t` [s] of a replay."""
 
 
 @runtime_checkable

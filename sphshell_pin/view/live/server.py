@@ -49,14 +49,12 @@ class Server:
     """Serves the page and one websocket per browser at `url`, until `stop`.
 
     What changed it takes from `window` and `panel`, in its thread. Events of all browsers are
-    gathered by `events`. `framed` is the address of a picture that the page has in a frame.
+    gathered by `events`.
 
     Raises MissingExtra without meshcat, SphshellError where the port is taken.
     """
 
-    def __init__(
-        self, window: LiveWindow, panel: Panel, host: str, port: int, framed: str | None
-    ) -> None:
+    def __init__(self, window: LiveWindow, panel: Panel, host: str, port: int) -> None:
         viewer = viewer_script()
         try:
             import tornado.netutil
@@ -88,7 +86,7 @@ class Server:
             ) from fault
         address, self.port = sockets[0].getsockname()[:2]
         self.host = host
-        self.access = Access(host, address, framed)
+        self.access = Access(host, address)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(
             target=self._serve, args=(sockets, viewer), daemon=True, name="live-page"
@@ -98,16 +96,9 @@ class Server:
     @property
     def url(self) -> str:
         """The address of the page, which gives access to it."""
-        return self._address(self.access.token)
-
-    @property
-    def frame_url(self) -> str:
-        """Where the page is for another page, such as a notebook, that shows it in a frame."""
-        return self._address(self.access.frame_token)
-
-    def _address(self, token: str) -> str:
         name = "localhost" if self.host in ("", "0.0.0.0", "::") else self.host
-        return f"http://{f'[{name}]' if ':' in name else name}:{self.port}/?token={token}"
+        place = f"[{name}]" if ":" in name else name
+        return f"http://{place}:{self.port}/?token={self.access.token}"
 
     @property
     def is_open(self) -> bool:
@@ -243,13 +234,12 @@ def _handlers() -> tuple[type, type]:
             self._set_headers()
 
         def _set_headers(self, **checked: str) -> None:
-            self.clear_header("X-Frame-Options")
             for name, value in self.application.settings["access"].headers(**checked).items():
                 self.set_header(name, value)
 
         def prepare(self) -> None:
             try:
-                self.token, self.name = self._server.access.check(self.request)
+                self.name = self._server.access.check(self.request)
             except PermissionError as refused:
                 self.refused = str(refused)
                 raise tornado.web.HTTPError(403) from None
@@ -277,11 +267,11 @@ def _handlers() -> tuple[type, type]:
             path = self._files.get(self.name)
             if path is None:
                 raise tornado.web.HTTPError(404)
-            self._set_headers(host=self.request.host.lower(), token=self.token)
+            self._set_headers(host=self.request.host.lower())
             self.set_header("Content-Type", f"{_TYPES[path.suffix]}; charset=utf-8")
             content = read_bytes(path)
             if path.suffix == ".html":
-                content = content.replace(b"@@token@@", self.token.encode())
+                content = content.replace(b"@@token@@", self._server.access.token.encode())
             self.write(content)
 
     class SocketHandler(Checked, tornado.websocket.WebSocketHandler):

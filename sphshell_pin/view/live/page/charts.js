@@ -30,7 +30,6 @@ on("hello", (data) => {
   fill(element("quantity"), [...quantities.keys()].map((name) => [name, name]));
   span = data.window;
   chart.begin = data.start;
-  element("keep").hidden = data.duration !== null;
   choose([...quantities.keys()][0]);
 });
 on("joined", ask);

@@ -125,7 +125,7 @@ function show({ drag, running }) {
 
 on("picture", (one) => { picture = one; });
 on("hello", ({ drag }) => {
-  if (!drag || !picture) return; // a finished run, or a picture in a frame
+  if (!drag || !picture) return;
   nodes = drag.nodes;
   stiffness = drag.stiffness;
   button.setAttribute("aria-pressed", "false");

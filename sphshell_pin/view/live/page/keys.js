@@ -26,8 +26,7 @@ export function add_key(entry) {
 function belongs_to_control(event) {
   const { target, key } = event;
   if (target.type === "text" || target.tagName === "SELECT") return true;
-  // That of the time of a recording goes by frames.
-  if (target.type === "range") return key === "ArrowRight" && target.id !== "scrub";
+  if (target.type === "range") return key === "ArrowRight";
   // A button that was reached with the keyboard is pressed by it.
   return key === " " && target.closest("button, summary, input[type=checkbox]") !== null;
 }

@@ -26,8 +26,6 @@ const unless = (why) => { if (element("notice").dataset.why === why) notice(null
 on("error", (data) => toast(data.text));
 on("lost", (text) => notice(text, "lost"));
 on("joined", () => unless("lost"));
-on("hello", (data) => {
-  on("state", (state) => {
-    if (state.ended && data.duration === null) notice(state.ended, "ended"); else unless("ended");
-  });
+on("state", (state) => {
+  if (state.ended) notice(state.ended, "ended"); else unless("ended");
 });

@@ -18,17 +18,13 @@ export function add_section(id, title) {
 }
 
 on("hello", (data) => {
-  for (const [name, ramp] of [["ramp", data.ramp], ["pressure", data.pressure_ramp]])
-    element(`${name}-swatch`).style.background = `linear-gradient(90deg, ${ramp.join(", ")})`;
+  element("pressure-swatch").style.background =
+    `linear-gradient(90deg, ${data.pressure_ramp.join(", ")})`;
   for (const [name, color] of Object.entries(data.colors))
     element(`${name}-swatch`).style.background = color;
   document.title = data.title;
   element("title").textContent = data.title;
   element("title").title = data.title;
-  if (data.picture) {
-    document.body.classList.add("framed");
-    element("legend").hidden = true;
-  }
 });
 
 on("state", (data) => {
@@ -41,9 +37,8 @@ on("state", (data) => {
     ? "energy residual" : `residual, ${number(data.relative, 2)} of exchanged`;
   element("scale").textContent = data.scale;
   element("cut").hidden = !data.cut;
-  element("cone-key").hidden = !data.show.cones;
   element("axes").hidden = !data.show.frames;
-  for (const name of ["pressure", "coloring", "grid"]) {
+  for (const name of ["pressure", "grid"]) {
     element(name).hidden = !data[name];
     element(name).lastChild.textContent = data[name] ?? "";
   }

@@ -7,7 +7,6 @@ import { element, make_parameter } from "./controls.js";
 const sliders = new Map();
 
 on("hello", (data) => {
-  element("parameter-section").hidden = data.duration !== null;
   if (!data.parameters.length) {
     element("parameters").innerHTML = '<p class="hint">This scenario lists no parameters: add [[knob]] tables to it.</p>';
   }

@@ -83,14 +83,7 @@ export class Picture {
 
 let picture = null;
 on("frame", (buffer) => picture?.draw(buffer));
-on("hello", (data) => {
-  if (data.picture) {
-    const frame = document.createElement("iframe");
-    frame.src = data.picture;
-    frame.title = "meshcat";
-    element("scene").append(frame);
-    return;
-  }
+on("hello", () => {
   try {
     picture = new Picture(element("scene"));
   } catch {

@@ -1,11 +1,11 @@
-// Run, step, reset, speed, and the time of a finished run.
+// Run, step, reset, speed.
 "use strict";
 
 import { on, send } from "./connection.js";
 import { element, number, Slider } from "./controls.js";
 import { add_key } from "./keys.js";
 
-let running = null, scrubbed = -Infinity, speed = null, over = false;
+let running = null, speed = null, over = false;
 
 const toggle = () => running !== null && send({ type: "run", on: !running });
 const step = () => send({ type: "step", seconds: Number(element("step-size").value) });
@@ -31,19 +31,6 @@ on("hello", (data) => {
   on("state", ({ t }) => {
     over = data.planned !== null && t - data.start >= data.planned;
     element("reset").textContent = over ? "Repeat" : "Reset";
-  });
-  if (data.duration === null) return;
-  element("scrub").hidden = false;
-  const scrubber = element("scrubber");
-  scrubber.addEventListener("input", () => {
-    scrubbed = performance.now();
-    send({ type: "seek", t: data.start + (data.duration * scrubber.value) / 10000 });
-  });
-  on("state", ({ t }) => {
-    const share = data.duration > 0 ? (t - data.start) / data.duration : 0;
-    if (performance.now() - scrubbed > 400) scrubber.value = Math.round(10000 * share);
-    element("scrub-value").textContent =
-      `${(t - data.start).toFixed(3)} / ${data.duration.toFixed(3)} s`;
   });
 });
 

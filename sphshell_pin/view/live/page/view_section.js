@@ -6,12 +6,12 @@ import { element, number, Slider } from "./controls.js";
 
 const PARTS = {
   robot: "Robot", spheres: "Spheres", arrows: "Force arrows", points: "Contact points",
-  trails: "Trails", cones: "Friction cones", wireframe: "Wireframe", patches: "Patch colors",
+  trails: "Trails", wireframe: "Wireframe",
   curved: "Curved surface", frames: "Axes of frames", grid: "Grid",
-  distance: "Curved-flat distance", faces: "Face colors", pressure: "Pressure patches",
+  faces: "Face colors", pressure: "Pressure patches",
 };
 const boxes = new Map();
-let arrows = null, picture = null, framed = false;
+let arrows = null, picture = null;
 
 for (const [part, label] of Object.entries(PARTS)) {
   const node = document.createElement("label");
@@ -25,8 +25,7 @@ for (const [part, label] of Object.entries(PARTS)) {
 }
 
 on("picture", (one) => { picture = one; });
-on("hello", (data) => {
-  framed = Boolean(data.picture);
+on("hello", () => {
   arrows = new Slider(element("arrows"), {
     low: 0.1, high: 10, log: true, value: 1, output: element("arrows-value"),
     tell: (value) => `${number(value, 2)} \u00d7`,
@@ -39,4 +38,4 @@ on("state", (data) => {
     box.checked = data.show[part] ?? false;
   }
 });
-element("look").onclick = () => (framed ? send({ type: "look" }) : picture?.look());
+element("look").onclick = () => picture?.look();
