@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.joints.boxes import BOXES
-from tests.joints.running import TRIMMED, walk_file, walk_part
+from tests.joints.running import walk_file, walk_part
 from tests.joints.solids import FAMILIES
 from tests.joints.verdict import ALLOWED, Verdict
 from tests.parts.occ import OccFailed
@@ -79,8 +79,6 @@ def arguments() -> argparse.Namespace:
     options = parser.parse_args()
     if not {*options.only} <= {*NAMES}:
         parser.error(f"--only takes {', '.join(NAMES)}")
-    if options.moved and {*options.only} & {*TRIMMED}:
-        parser.error(f"--moved is for {', '.join(FAMILIES)}")
     return options
 
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy import ndimage, sparse
 
 import sphshell_pin as sp
 from tests.joints.boxes import BOXES, mitred, rounded_box
 from tests.joints.plates import PLATES
-from tests.joints.running import walk_file, walk_outline, walk_part
+from tests.joints.running import walk_file, walk_part
+from tests.joints.solid_walk import spheres_of
 from tests.joints.solids import (
     Part,
     bar,
@@ -26,7 +26,7 @@ from tests.joints.solids import (
 )
 from tests.joints.trimmed import TrimmedSolid
 from tests.joints.verdict import MM
-from tests.joints.walk import spheres
+from tests.oracle.cad import ExactShape
 
 PARTS = [
     disc(40.0, 0.2),
@@ -53,8 +53,8 @@ PARTS = [
 
 
 def assert_right(part: Part, tmp_path, stl: bool) -> None:
-    verdict = walk_outline(part, tmp_path, np.random.default_rng(1), stl, count=2000)
-    assert verdict.found() == {}
+    path = write_step(part.solid(), tmp_path / "part.step")
+    assert walk_file(path, part.name, 2000, np.random.default_rng(1), stl).found() == {}
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
@@ -103,7 +103,7 @@ def test_none_is_between_faces_that_are_tangent_but_for_rounding(part, height, t
     """They cross at 1e-5 rad: a center is beside one of them, or else over their joint."""
     path, rng = tmp_path / "part.stl", np.random.default_rng(0)
     shell = sp.Shell.from_file(write_stl(part.solid(), path, 3e-4 * part.size), unit="mm")
-    radius = max(piece.begin[0] for piece in part.profile.pieces)
+    radius = max(piece.begin[0] for piece in part.pieces)
     away, turn = rng.uniform(1.0, 12.0, 20_000), rng.uniform(0, 2 * np.pi, 20_000)
     level = height + rng.choice([-1, 1], 20_000) * 10 ** rng.uniform(-6, -3, 20_000)
     off = radius + away
@@ -156,56 +156,12 @@ def test_one_face_has_a_sphere_where_two_fillets_begin_to_cross(plate, tmp_path)
     "part", [disc(40.0, 2.0), shaft(20.0, 2.0), cones(30.0, 0.3, 4.0), d_shaft(20.0, 0.1)],
     ids=lambda part: part.name,
 )  # fmt: skip
-def test_the_trimmed_faces_are_those_of_the_outline(part):
-    """The two truths, of different numbers, against each other."""
-    asked = spheres(part, 300, np.random.default_rng(0))
-    truth = part.profile.truth(asked.flat, asked.radii / MM)
-    found = TrimmedSolid(part.solid()).minima(asked.centers / MM, asked.radii / MM)
-    for row, minima in enumerate(found):
-        assert minima.depths.max() == pytest.approx(truth.depth[row], rel=1e-9, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    "part", [disc(12.0, 2.0), shaft(6.0, 3.0), ring(20.0, 1.5)], ids=lambda part: part.name
-)
-def test_the_truth_is_that_of_a_grid_of_points(part):
-    """Depths, and components as those of a graph of points of the surface."""
-    rng = np.random.default_rng(0)
-    asked = spheres(part, 60, rng)
-    flat, radii = asked.flat, rng.uniform(0.5, 12.0, len(asked.flat))
-    truth = part.profile.truth(flat, radii)
-    away = np.linalg.norm(sampled(part, 5000)[None] - flat[:, None], axis=2)
-    assert np.abs(truth.depth - (radii - away.min(axis=1))).max() < 0.01
-    points = sampled(part, 150)
-    angles = np.linspace(0, 2 * np.pi, 180, endpoint=False)
-    around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    space = np.concatenate(
-        [points[:, None, :1] * around, np.repeat(points[:, None, 1:], 180, 1)], axis=2
-    )
-    compared = 0
-    for center, radius, count in zip(flat, radii, truth.count, strict=True):
-        sizes = part.profile.truth(np.array([center] * 3), radius * np.array([0.98, 1.0, 1.02]))
-        if len({*sizes.count}) == 1:
-            inside = np.linalg.norm(space - [center[0], 0.0, center[1]], axis=2) < radius
-            assert components(inside, part.profile.closed) == count
-            compared += 1
-    assert compared > 30
-
-
-def sampled(part: Part, count: int) -> np.ndarray:
-    """Points of an outline, `count` on each piece."""
-    pieces = part.profile.pieces
-    return np.concatenate([piece.at(np.linspace(0, piece.length, count))[0] for piece in pieces])
-
-
-def components(inside: np.ndarray, closed: bool) -> int:
-    """Connected components of a grid that is periodic in its second, perhaps its first index."""
-    labels, count = ndimage.label(inside)
-    pairs = [(labels[:, 0], labels[:, -1])] + ([(labels[0], labels[-1])] if closed else [])
-    if not closed:
-        # Both ends are points on the axis.
-        pairs += [(row[:-1], row[1:]) for row in (labels[0], labels[-1])]
-    one, two = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    both = (one > 0) & (two > 0)
-    graph = sparse.coo_array((both[both], (one[both], two[both])), shape=(count + 1, count + 1))
-    return int(sparse.csgraph.connected_components(graph, directed=False)[0]) - 1
+def test_the_judge_agrees_with_distances_of_opencascade(part):
+    """Beside seams OpenCASCADE misses a few closest points."""
+    solid = TrimmedSolid(part.solid())
+    asked = spheres_of(solid, 300, np.random.default_rng(0))
+    far = ExactShape(part.solid(), meters=1.0).distances(asked.centers)
+    found = [one.depths.max() for one in solid.minima(asked.centers, asked.radii)]
+    off = np.array(found) - (asked.radii - far)
+    assert off.min() > -1e-12
+    assert np.mean(off < 1e-12) > 0.98
