@@ -163,5 +163,5 @@ def test_the_judge_agrees_with_distances_of_opencascade(part):
     far = ExactShape(part.solid(), meters=1.0).distances(asked.centers)
     found = [one.depths.max() for one in solid.minima(asked.centers, asked.radii)]
     off = np.array(found) - (asked.radii - far)
-    assert off.min() > -1e-12
-    assert np.mean(off < 1e-12) > 0.98
+    assert off.min() > -1e-9
+    assert np.mean(off < 1e-9) > 0.98
