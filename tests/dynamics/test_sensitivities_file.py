@@ -44,15 +44,6 @@ def test_files_keep_them_to_the_bit(bounced, file):
     }  # fmt: skip
 
 
-def test_a_run_without_them_has_none_in_its_file(bounced, file, tmp_path):
-    alone = replace(bounced, sensitivity_rows=None).save(tmp_path / "alone.npz")
-    assert sp.Result.load(alone).sensitivities is None
-    with np.load(alone) as arrays, np.load(file) as more:
-        assert set(more) - set(arrays) == {
-            f"sensitivities.{one}" for one in ("q", "v", "force_world", "normal_force", "depth")
-        }
-
-
 def test_a_loaded_result_moves_its_rows_in_a_given_scene(bounced, file):
     loaded = sp.Result.load(file)
 

@@ -38,14 +38,6 @@ def test_a_run_without_figures_writes_all_else_and_imports_no_matplotlib(tmp_pat
     assert {"run.npz", "contacts.csv", "summary.json"} == set(os.listdir(out))
 
 
-def test_figures_of_an_earlier_run_go_with_its_numbers(tmp_path):
-    built, out = build(write(tmp_path)), tmp_path / "out"
-    run_built(built, out, recording=False)
-    assert "energy.png" in os.listdir(out)
-    run_built(built, out, recording=False, figures=False)
-    assert not [name for name in os.listdir(out) if name.endswith(".png")]
-
-
 def test_the_folder_holds_what_was_computed(tmp_path):
     built, seen = build(write(tmp_path)), []
     out = tmp_path / "a" / "b"
