@@ -48,6 +48,30 @@ def test_stiffness_of_equal_bodies() -> None:
     assert STICKS.torsional_stiffness(0.01) == pytest.approx(16 / 3 * G_TWIST * 1e-6, rel=1e-14)
 
 
+def after(depth: float, motion: pin.Motion, time: float) -> tuple[pin.Force, pin.Force]:
+    """Wrenches after a motion at constant depth, from a touch that carries nothing."""
+    state, still = sp.BristleState(R), pin.Motion.Zero()
+    point = np.zeros(3)
+    state.advance(point, UP, depth, still, still, LAW, STICKS, dt=0.0)
+    for _ in range(10):
+        state.advance(point, UP, depth, motion, still, LAW, STICKS, dt=time / 10)
+    return sp.contact_wrench(point, UP, depth, still, still, LAW, STICKS, state)
+
+
+@pytest.mark.parametrize("depth", [1e-8, 1e-5, 1e-3])
+def test_slope_of_load_and_displacement(depth: float) -> None:
+    shift = 1e-3 * depth
+    on_i, on_j = after(depth, pin.Motion(shift / 0.1 * ALONG, np.zeros(3)), 0.1)
+    assert -on_i.linear[0] / shift == pytest.approx(8 * G_STAR * disc(depth), rel=1e-12)
+    assert on_i.linear + on_j.linear == pytest.approx(np.zeros(3), abs=0)
+
+
+@pytest.mark.parametrize("depth", [1e-8, 1e-5, 1e-3])
+def test_slope_of_torque_and_twist(depth: float) -> None:
+    on_i, _ = after(depth, pin.Motion(np.zeros(3), 1e-2 * UP), 0.1)
+    assert -on_i.angular[2] / 1e-3 == pytest.approx(16 / 3 * G_TWIST * disc(depth) ** 3, rel=1e-12)
+
+
 def held_ball(joint: pin.JointModel, depth: float, friction, inertia: pin.Inertia) -> sp.Scene:
     """A ball at a constant depth in a plate, on a joint along or about an axis."""
     model = models.empty(0.0)

@@ -1,5 +1,6 @@
 """Sensitivities of runs, through touches, against differences of whole runs."""
 
+import pickle
 from collections.abc import Callable
 from itertools import product
 
@@ -305,3 +306,9 @@ def test_an_interrupted_run_has_those_of_its_rows() -> None:
         simulation.run(case.q0, case.v0, 100.0, sensitivities=["v0"], progress=stop)
     result = stopped.value.result
     assert result.sensitivities.q.shape == (len(result.t), case.scene.model.nv, case.scene.model.nv)
+
+
+def test_they_are_pickled() -> None:
+    result = drop(IMPACT, duration=0.03).run(names=["v0"])
+    again = pickle.loads(pickle.dumps(result))
+    assert again.sensitivities.q.tobytes() == result.sensitivities.q.tobytes()

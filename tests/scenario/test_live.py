@@ -70,6 +70,17 @@ def test_a_value_that_cannot_be_changes_nothing(live: LiveRun) -> None:
     assert live.ended is None
 
 
+def test_a_push_moves_the_ball_for_its_time_only(live: LiveRun) -> None:
+    live.change("gravity.2", 0.0)
+    start = live.v.copy()
+    live.push("ball", [0.5, 0.0, 0.0], 0.1)
+    live.advance(0.05)
+    live.advance(0.3)
+    mass = float(live.scene.model.inertias[1].mass)
+    assert live.v[0] - start[0] == pytest.approx(0.5 * 0.1 / mass, rel=2e-3)
+    assert abs(live.residual) < 1e-9
+
+
 def test_a_fault_of_the_users_own_function_ends_the_run_until_it_is_reset(tmp_path) -> None:
     (tmp_path / "mine.py").write_text(
         "def tau(t, q, v, contacts):\n"

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin.dynamics.scene.models import apparent_mass
-from sphshell_pin.errors import NameNotFound
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from tests import models
@@ -91,6 +91,22 @@ def test_no_stiffness_makes_a_fixed_step_diverge(tmp_path, dt, integrator) -> No
     np.testing.assert_allclose(live.drag.point_world, [0.05, 0.0, 0.2 - sag], atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("given", "fault", "says"),
+    [
+        (("bal", [0, 0, 0], [0, 0, 0], 1.0), FrameNotFound, "no frame 'bal'"),
+        (("universe", [0, 0, 0], [0, 0, 0], 1.0), InvalidParameter, "fixed to the world"),
+        (("ball", [0, 0], [0, 0, 0], 1.0), InvalidParameter, "point"),
+        (("ball", [0, 0, 0], [0, 0, np.nan], 1.0), InvalidParameter, "target_world"),
+        (("ball", [0, 0, 0], [0, 0, 0], 0.0), InvalidParameter, "stiffness"),
+    ],
+)
+def test_a_drag_that_cannot_be_changes_nothing(ball, given, fault, says) -> None:
+    with pytest.raises(fault, match=says):
+        ball.pull(*given)
+    assert ball.drag is None
+
+
 def test_the_mass_that_a_force_moves() -> None:
     """Against 3 / sum of 1/m over the axes: of a free body off its center by the tensor."""
     model = models.ball(mass=2.0, radius=0.1)
@@ -170,6 +186,19 @@ def test_without_a_posture_there_are_no_targets(tmp_path, controller) -> None:
     assert live.targets == ()
     with pytest.raises(NameNotFound, match="none"):
         live.aim("elbow", 0.0)
+
+
+def test_patches_are_computed_when_they_are_wanted(ball) -> None:
+    settle(ball)
+    assert ball.patches is None
+    ball.record_patches(True)
+    assert len(ball.patches) == len(ball.contacts.depth) == 1
+    ball.change("gravity.2", -5.0)
+    ball.advance(0.05)
+    assert len(ball.patches) == len(ball.contacts.depth)
+    ball.record_patches(False)
+    ball.advance(0.01)
+    assert ball.patches is None
 
 
 def test_a_parameter_of_the_posture_takes_the_place_of_its_target(tmp_path) -> None:
