@@ -9,6 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, WeakLawWarning
+from sphshell_pin.testing.found import crossed
 from tests import meshes
 from tests.contact.smooth.surfaces import shell_of
 from tests.models import (
@@ -310,3 +311,17 @@ def test_a_sphere_that_passes_is_told() -> None:
         testing.assert_not_passed_through(replace(free, scene=scene))
     stopped = sp.Simulation(scene, sp.Adaptive()).run(free_q([0, 0, 0.1]), v, 0.1)
     assert testing.assert_not_passed_through(stopped) == 0.0
+
+
+def test_ways_through_triangles() -> None:
+    corners = np.array(
+        [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 1]]], float
+    )
+
+    def through(start, end):
+        return crossed(np.array(start, float), np.array(end, float), corners).tolist()
+
+    assert through([0.2, 0.2, -1], [0.2, 0.2, 2]) == [0, 1]
+    assert through([0.2, 0.2, 2], [0.2, 0.2, 0.5]) == [1]
+    assert through([0.2, 0.2, 0.4], [0.2, 0.2, 0.6]) == []
+    assert through([0.9, 0.9, -1], [0.9, 0.9, 2]) == []
