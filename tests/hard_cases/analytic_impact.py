@@ -16,7 +16,6 @@ from sphshell_pin.study.report.closed_forms import FALL, bounce
 from tests import models
 from tests.hard_cases import balls
 from tests.hard_cases.verdict import Verdict, Verdicts, case, compare
-from tests.validation.restitution import hunt_crossley_restitution
 
 PRECISE = sp.Adaptive(1e-9)
 GAP = 1e-4
@@ -35,7 +34,7 @@ class Impact:
     restitution: float
 
 
-def impact(law: sp.ImpactLaw | sp.HuntCrossleyLaw, speed: float, expected: float) -> Impact:
+def impact(law: sp.ImpactLaw, speed: float, expected: float) -> Impact:
     """Shoot the ball at the plate; `expected` [s] is about how long it stays in touch."""
     scene = balls.scene_of(models.square(), law, model=balls.free_ball(gravity=0.0))
     q0, v0 = balls.state([0.1, 0.03, balls.RADIUS + GAP], [0.0, 0.0, -speed], [0.0, 0.0, 0.0])
@@ -72,19 +71,6 @@ def undamped() -> Verdicts:
             "largest depth", tried, "((e + 1) m v^2 / (2 k))^(1 / (e + 1))", depth, seen.depth, 1e-6
         )
         yield compare("restitution", tried, "1", 1.0, seen.restitution, 1e-6)
-
-
-@case("impact of Hunt and Crossley")
-def hunt_crossley() -> Verdicts:
-    for wanted, speed in ((0.9, 0.5), (0.5, 0.5), (0.5, 5.0), (0.1, 1.0)):
-        # The dissipation gives `wanted` at 0.5 m/s; at other speeds restitution is another.
-        law = sp.ImpactLaw.hertz(balls.RADIUS, 1e9, 0.3, 1e9, 0.3, restitution=wanted, speed=0.5)
-        expected = hunt_crossley_restitution(speed, law.dissipation)
-        about = touch_time(1.5, (1.25 * balls.MASS * speed**2 / law.stiffness) ** 0.4, speed)
-        seen = impact(law, speed, 3 * about)
-        tried = f"b = {law.dissipation:.4g} s/m, {speed:g} m/s"
-        formula = "x - ln(1 + x) = -y - ln(1 - y), x = b v, y = b v'"
-        yield compare("restitution", tried, formula, expected, seen.restitution, 1e-6, scale=1.0)
 
 
 def bouncing_error(integrator: object) -> float:
