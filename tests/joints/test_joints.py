@@ -5,8 +5,7 @@ import pytest
 
 import sphshell_pin as sp
 from tests.joints import solids
-from tests.joints.boxes import BOXES, mitred, rounded_box
-from tests.joints.plates import PLATES
+from tests.joints.boxes import BOXES, PLATES, mitred, plate, rounded_box
 from tests.joints.running import walk_file, walk_part
 from tests.joints.solid_walk import spheres_of
 from tests.joints.trimmed import TrimmedSolid
@@ -123,18 +122,10 @@ def test_none_is_lost_where_a_mitre_ends_in_a_plane(radii, tmp_path):
         assert depths.min() > 0
 
 
-@pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
-def test_one_face_has_a_sphere_where_two_fillets_begin_to_cross(plate, tmp_path):
-    """A plate is convex: one contact, and the distance is that of its rounded sides."""
-    shell = sp.Shell.from_file(solids.write_step(plate.solid(), tmp_path / "part.step"))
-    rng = np.random.default_rng(0)
-    centers, far = plate.spheres(300, rng)
-    radii = far * (1 + 10 ** rng.uniform(-5, -0.5, len(far)))
-    for center, distance, radius in zip(centers, far, radii, strict=True):
-        terms = shell.contacts(center * MM, radius * MM).terms
-        assert terms.weight.sum() == 1
-        off = abs(terms.depth.max() / MM - (radius - distance))
-        assert off < 1e-10 * radius + 2e-12 * shell.size / MM
+@pytest.mark.parametrize("name", PLATES)
+def test_none_is_lost_where_two_fillets_begin_to_cross(name, tmp_path):
+    path = solids.write_step(plate(*PLATES[name]), tmp_path / "part.step")
+    assert walk_file(path, name, 2000, np.random.default_rng(1)).found() == {}
 
 
 @pytest.mark.parametrize(
