@@ -8,8 +8,9 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.shell.curvature import curved_mesh
-from tests.contact.test_faces import VALVE_BODY, written
+from tests.contact.test_faces import VALVE_BODY
 from tests.joints.boxes import BOXES
+from tests.joints.solids import write_step
 from tests.parts import occ
 
 MM = 1e-3
@@ -21,7 +22,7 @@ def folder(tmp_path_factory):
 
 
 def step_of(solid, folder: Path) -> Path:
-    return written(solid, folder / f"{len(list(folder.iterdir()))}.step")
+    return write_step(solid, folder / f"{len(list(folder.iterdir()))}.step")
 
 
 def test_no_sphere_is_lost_beside_the_rounded_rim_of_the_valve_body():

@@ -89,9 +89,7 @@ class Side:
 
 def plate(*sides: Side) -> Solid:
     """A corner of two fillets, whose crossing begins where both touch the top."""
-    solid = occ.box([-60, -60, 0], [60, 60, SIDES[2]])
-    for one in sides:
-        solid = occ.common(solid, one.tool())
+    solid = occ.common(occ.box([-60, -60, 0], [60, 60, SIDES[2]]), *(one.tool() for one in sides))
     edges = [(e, one.fillet) for one in sides for e in occ.edges_where(solid, one.ends_in)]
     return occ.checked(occ.filleted_each(solid, edges))
 
