@@ -8,15 +8,7 @@ from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.plot.figure import NO_CONTACT
 from sphshell_pin.plot.over_time import MOST_PAIRS, MOST_POINTS
-from tests.view.stand_ins import (
-    a_result,
-    a_scene,
-    ball_configuration,
-    ball_model,
-    ball_on_plate,
-    contact_pair,
-    plate,
-)
+from tests.view import stand_ins
 
 
 def texts(figure):
@@ -33,14 +25,14 @@ def labels(figure):
 
 
 def without_contact():
-    q = np.tile(ball_configuration(np.ones(3)), (5, 1))
-    return a_result(np.arange(5.0), q)
+    q = np.tile(stand_ins.ball_configuration(np.ones(3)), (5, 1))
+    return stand_ins.a_result(np.arange(5.0), q)
 
 
 def test_the_figures_are_written_and_not_blank(tmp_path):
     from PIL import Image
 
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     paths = plot.save_figures(result, tmp_path / "new", scene)
     assert [path.name for path in paths] == [
         "force_and_depth.png",
@@ -54,14 +46,14 @@ def test_the_figures_are_written_and_not_blank(tmp_path):
 
 
 def test_axes_carry_their_units():
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     assert {"force [N]", "largest depth [mm]", "time [s]"} <= labels(
         plot.plot_force_and_depth(result)
     )
     assert {"x of the shell [m]", "y of the shell [m]"} <= labels(
         plot.plot_contact_map(result, scene)
     )
-    energetic = a_result(
+    energetic = stand_ins.a_result(
         [0, 1], np.zeros((2, 8)), kinetic=np.array([0, 2e-3]), residual=np.array([0, 3e-9])
     )
     assert {"energy [mJ]", "residual [nJ]"} <= labels(plot.plot_energy(energetic))
@@ -73,7 +65,7 @@ def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
         {"row": 1, "normal_force": 3.0, "friction_force_world": [-1.0, 0, 0], "depth": 2e-3},
         {"row": 2, "pair": 1, "normal_force": 9.0},
     ]
-    series = PairSeries.of(a_result([0, 1, 2], np.zeros((3, 8)), rows, ("one", "two")), 0)
+    series = PairSeries.of(stand_ins.a_result([0, 1, 2], np.zeros((3, 8)), rows, ("one", "two")), 0)
     np.testing.assert_array_equal(series.normal, [0, 5, 0])
     np.testing.assert_array_equal(series.friction, [0, 0, 0])
     np.testing.assert_array_equal(series.depth, [0, 2e-3, 0])
@@ -87,10 +79,11 @@ def test_a_run_without_contact_is_told_in_words(tmp_path):
 
 
 def test_every_shell_has_its_own_picture_and_every_pair_its_name():
-    model = ball_model()
-    shells = [plate(name=f"plate {k}") for k in range(3)]
+    model = stand_ins.ball_model()
+    shells = [stand_ins.plate(name=f"plate {k}") for k in range(3)]
     pairs = [
-        contact_pair(model, "ball", 0.05, shells[k // 2], name=f"finger {k}") for k in range(6)
+        stand_ins.contact_pair(model, "ball", 0.05, shells[k // 2], name=f"finger {k}")
+        for k in range(6)
     ]
     names = [pair.name for pair in pairs]
     rows = [
@@ -98,8 +91,10 @@ def test_every_shell_has_its_own_picture_and_every_pair_its_name():
         for row in range(5)
         for k in range(6)
     ]
-    q = np.tile(ball_configuration(np.zeros(3)), (5, 1))
-    figure = plot.plot_contact_map(a_result(np.arange(5), q, rows, names), a_scene(model, *pairs))
+    q = np.tile(stand_ins.ball_configuration(np.zeros(3)), (5, 1))
+    figure = plot.plot_contact_map(
+        stand_ins.a_result(np.arange(5), q, rows, names), stand_ins.a_scene(model, *pairs)
+    )
     written = " ".join(texts(figure))
     assert all(name in written for name in names)
     assert all(f"plate {k}" in written for k in range(3))
@@ -112,7 +107,7 @@ def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
         for k in range(count)
     ]
     names = [f"pair {k}" for k in range(count)]
-    result = a_result([0, 1], np.zeros((2, 8)), rows, names)
+    result = stand_ins.a_result([0, 1], np.zeros((2, 8)), rows, names)
     for kind in ("overview", "force"):
         written = " ".join(texts(plot.plot_result(result, kind)))
         assert "pair 0" not in written
@@ -122,8 +117,8 @@ def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
 
 def test_a_long_run_keeps_its_one_row_peak():
     count = 300_000
-    result = a_result(np.arange(count) * 1e-4, np.zeros((count, 1)), pairs=("tip",))
-    result.contacts = a_result(
+    result = stand_ins.a_result(np.arange(count) * 1e-4, np.zeros((count, 1)), pairs=("tip",))
+    result.contacts = stand_ins.a_result(
         [0], [[0]], [{"row": 123_457, "normal_force": 77.0, "depth": 1e-3}]
     ).contacts
     line = plot.plot_force_and_depth(result).axes[0].lines[0]

@@ -132,18 +132,12 @@ def of_gallery(data: dict[str, Any]) -> list[dict[str, Any]]:
     return [{**cards, "notes": notes}]
 
 
-def of_parts(data: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the kinds of files, and the triangles of one of them."""
-    return data["sections"][:3]
-
-
 SHORT: dict[str, Callable[[dict[str, Any]], list[dict[str, Any]]]] = {
     "robots": of_robots,
     "hard_cases": of_hard_cases,
     "contact_cases": of_contact_cases,
     "validation": of_validation,
     "peers": of_peers,
-    "mesh_parts": of_parts,
     "gallery": of_gallery,
 }
 """What is too long for a page: its summary."""

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidShell, SphshellError
+from sphshell_pin.errors import SphshellError
 from tests import meshes, models
 from tests.contact.helpers import shell_of
 from tests.contact.test_function_friction import OWN
@@ -109,13 +109,6 @@ REFUSED: list[tuple[str, Call]] = [
 def test_a_wrong_argument_is_named(words: str, call: Call) -> None:
     with pytest.raises(SphshellError, match=words):
         call()
-
-
-def test_a_file_without_a_sound_element_is_named(tmp_path) -> None:
-    path = tmp_path / "deg.obj"
-    path.write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
-    with pytest.raises(InvalidShell, match=r"deg\.obj: no element is left"):
-        sp.Shell.from_file(path, "mm")
 
 
 def test_nothing_in_reach() -> None:

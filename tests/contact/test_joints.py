@@ -8,8 +8,9 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.shell.curvature import curved_mesh
-from tests.contact.test_faces import VALVE_BODY, written
+from tests.contact.test_faces import VALVE_BODY
 from tests.joints.boxes import BOXES
+from tests.joints.solids import write_step
 from tests.parts import occ
 
 MM = 1e-3
@@ -21,37 +22,7 @@ def folder(tmp_path_factory):
 
 
 def step_of(solid, folder: Path) -> Path:
-    return written(solid, folder / f"{len(list(folder.iterdir()))}.step")
-
-
-def disc(radius: float, fillet: float):
-    """With rounded rims, upright from z = 0 to 20 [mm]."""
-    solid = occ.cylinder(radius, 20.0)
-    return occ.filleted(solid, occ.edges_where(solid, lambda p: np.ptp(p[:, 2]) < 1e-6), fillet)
-
-
-@pytest.mark.parametrize(
-    ("radius", "fillet"), [(100.0, 2.0), (40.0, 1.0), (40.0, 0.2), (20.0, 8.0), (5.0, 0.05)]
-)
-def test_no_sphere_is_lost_beside_a_rounded_rim(radius, fillet, folder):
-    shell = sp.Shell.from_file(step_of(disc(radius, fillet), folder))
-    assert all(face.exact for face in shell.faces)
-    rng, count, ball, depth = np.random.default_rng(0), 4000, 6e-3, 0.7e-3
-    rim = (radius - fillet) * MM
-    # Over the last of the plane and the first of the fillet, in its joint and next to it.
-    widest = min(2e-4, 0.2 * fillet * MM)
-    off = np.where(rng.random(count) < 0.5, widest, 1e-9) * rng.uniform(-1, 1, count)
-    off[:100] = 0.0
-    angle = rng.uniform(0, 2 * np.pi, count)
-    lean = np.clip(off / (fillet * MM), 0, None)  # of the normal, over the fillet
-    away = ball - depth
-    beside = rim + np.where(off < 0, off, (fillet * MM + away) * np.sin(lean))
-    height = np.where(off < 0, 20 * MM + away, 20 * MM + away * np.cos(lean))
-    height -= np.where(off < 0, 0, fillet * MM * (1 - np.cos(lean)))
-    centers = np.stack([beside * np.cos(angle), beside * np.sin(angle), height], axis=1)
-    deepest, counts = shell.contacts_batch(centers, np.full(count, ball))
-    assert (counts == 1).all()
-    assert np.abs(deepest - depth).max() <= 1e-10 * ball
+    return write_step(solid, folder / f"{len(list(folder.iterdir()))}.step")
 
 
 def test_no_sphere_is_lost_beside_the_rounded_rim_of_the_valve_body():

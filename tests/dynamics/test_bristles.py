@@ -77,15 +77,6 @@ def test_break_away_and_stribeck() -> None:
     assert force[-1] == pytest.approx(0.3, rel=1e-5)
 
 
-@every
-def test_a_slide_ends_where_coulomb_says(integrator) -> None:
-    """v^2 / (2 mu g), and it stays there, but for the stretch mu g m / k."""
-    scene = block(sp.BristleFriction(0.3, 0.3, K, 300.0))
-    rows = run(scene, integrator, REST, [0.5, 0, 0], 0.5, record_dt=1e-2)
-    assert rows.q[-1, 0] == pytest.approx(0.5**2 / (2 * 0.3 * G), abs=2.5 * 0.3 * G / K + 4e-5)
-    assert abs(rows.v[-1, 0]) < 1e-8
-
-
 @pytest.mark.parametrize("speed", [0.1, 2.0])
 def test_a_bristle_that_slides_stores_what_it_holds(speed: float) -> None:
     """(mu N)^2 / 2k beside the normal law's (m g)^2 / 2K, however fast it slides."""

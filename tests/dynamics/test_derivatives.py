@@ -14,52 +14,32 @@ from sphshell_pin.base.arrays import Array
 from tests import differences, meshes, models
 from tests.contact.smooth.surfaces import SURFACES
 from tests.dynamics import scenes
-from tests.dynamics.scenes import (
-    ARM_V,
-    BRISTLE,
-    BRISTLES,
-    COULOMB,
-    FRICTIONS,
-    LAWS,
-    State,
-    assert_rate_jacobian,
-    free_ball,
-    in_bowl,
-    in_groove,
-    in_touch,
-    moving,
-    on_surface,
-    stretched,
-    stuck,
-    turned,
-    two_spheres,
-)
 from tests.dynamics.test_external_forces import CASES
 from tests.dynamics.test_mimic import CASES as MIMIC
 from tests.models import ARM_Q, TURNING, free_q
 
-IMPACT = LAWS["impact"]
-WHERE: dict[str, Callable[..., State]] = {
+IMPACT = scenes.LAWS["impact"]
+WHERE: dict[str, Callable[..., scenes.State]] = {
     "on a plate": scenes.on_plate,
-    "in a bowl": in_bowl,
-    "moving": moving,
-    "in a groove": in_groove,
+    "in a bowl": scenes.in_bowl,
+    "moving": scenes.moving,
+    "in a groove": scenes.in_groove,
 }
-WHERE |= {name: partial(on_surface, name) for name in SURFACES}
+WHERE |= {name: partial(scenes.on_surface, name) for name in SURFACES}
 ELLIPSES = ("dome", "torus inside", "wavy above")
 HERTZ = sp.HertzLaw(1e5, 0.3, restitution=0.8, speed=1.0)
 
 
-def at_corner(center: list[float], method: str) -> State:
-    scene = free_ball(sp.Shell(*meshes.cube(2.0)), friction=COULOMB, method=method)
-    return scene, turned(free_q(center), 2), np.full(6, 0.1)
+def at_corner(center: list[float], method: str) -> scenes.State:
+    scene = scenes.free_ball(sp.Shell(*meshes.cube(2.0)), friction=scenes.COULOMB, method=method)
+    return scene, scenes.turned(free_q(center), 2), np.full(6, 0.1)
 
 
-def on_elements() -> State:
+def on_elements() -> scenes.State:
     """They are exact on a plane."""
     shell = sp.Shell(*meshes.grid_plate(1, 1, 4.0, quads=True))
-    scene = free_ball(shell, friction=COULOMB, method="elements")
-    return scene, turned(free_q([0.3, 0.1, 0.95]), 1), np.full(6, 0.1)
+    scene = scenes.free_ball(shell, friction=scenes.COULOMB, method="elements")
+    return scene, scenes.turned(free_q([0.3, 0.1, 0.95]), 1), np.full(6, 0.1)
 
 
 CHAINS = {" ".join(map(str, one)): partial(scenes.on_chain, *one) for one in CASES[::4]}
@@ -69,27 +49,35 @@ CHAINS |= {
     for seed, (i, j) in enumerate([(joint, "prismatic"), ("spherical", joint), (joint, joint)])
 }
 NOT_IN_PINOCCHIO = {f"JointModel{name}" for name in ("SphericalZYX", "Universal", "Composite")}
-SCENES: dict[str, Callable[[], State]] = {
+SCENES: dict[str, Callable[[], scenes.State]] = {
     **{
-        f"{where}, {law}": partial(WHERE[where], LAWS[law], COULOMB)
-        for where, law in product(("in a bowl", "moving"), LAWS)
+        f"{where}, {law}": partial(WHERE[where], scenes.LAWS[law], scenes.COULOMB)
+        for where, law in product(("in a bowl", "moving"), scenes.LAWS)
     },
     **{
-        f"{where}, {name}": partial(WHERE[where], IMPACT, FRICTIONS[name])
-        for where, name in product(("on a plate", "in a bowl", "moving", "in a groove"), FRICTIONS)
+        f"{where}, {name}": partial(WHERE[where], IMPACT, scenes.FRICTIONS[name])
+        for where, name in product(
+            ("on a plate", "in a bowl", "moving", "in a groove"), scenes.FRICTIONS
+        )
     },
     **{
-        f"{name}, {friction}": partial(on_surface, name, IMPACT, FRICTIONS[friction], seed)
+        f"{name}, {friction}": partial(
+            scenes.on_surface, name, IMPACT, scenes.FRICTIONS[friction], seed
+        )
         for name in SURFACES
-        for seed, friction in enumerate(FRICTIONS)
+        for seed, friction in enumerate(scenes.FRICTIONS)
     },
     # Mindlin's disc follows the curvature of the shell, with its slopes.
     **{
-        f"{name}, hertz, {friction}": partial(on_surface, name, HERTZ, FRICTIONS[friction])
+        f"{name}, hertz, {friction}": partial(
+            scenes.on_surface, name, HERTZ, scenes.FRICTIONS[friction]
+        )
         for name, friction in product(ELLIPSES, ("soft finger", "mindlin", "rings"))
     },
     **{
-        f"{name}, facets {seed}": partial(on_surface, name, IMPACT, COULOMB, seed, method="facets")
+        f"{name}, facets {seed}": partial(
+            scenes.on_surface, name, IMPACT, scenes.COULOMB, seed, method="facets"
+        )
         for name, seed in product(ELLIPSES, range(2))
     },
     **{
@@ -99,10 +87,10 @@ SCENES: dict[str, Callable[[], State]] = {
     },
     **{
         f"two spheres, {law}, {friction}": lambda law=law, friction=friction: (
-            two_spheres(LAWS[law], FRICTIONS[friction]),
-            *in_touch(3),
+            scenes.two_spheres(scenes.LAWS[law], scenes.FRICTIONS[friction]),
+            *scenes.in_touch(3),
         )
-        for law, friction in product(("impact", "hertz, two materials"), FRICTIONS)
+        for law, friction in product(("impact", "hertz, two materials"), scenes.FRICTIONS)
     },
     **CHAINS,
     **{
@@ -110,14 +98,14 @@ SCENES: dict[str, Callable[[], State]] = {
         for name, seed in product(MIMIC, (3, 4))
     },
     # In a stop, with damping, armature and dry friction; ARM_Q is 0.1 rad beyond the range.
-    "joint components": partial(in_bowl, IMPACT, COULOMB, joints=scenes.STOPS),
+    "joint components": partial(scenes.in_bowl, IMPACT, scenes.COULOMB, joints=scenes.STOPS),
     "elements": on_elements,
     "locked joint": scenes.locked,
     "shell alone moves": scenes.shell_alone_moves,
     "through a sheet": scenes.through_a_sheet,
     "source": scenes.held_in_frame_j,
-    "two pairs": partial(scenes.two_pairs, IMPACT, COULOMB),
-    "no contacts": lambda: (sp.Scene(models.arm()), ARM_Q, ARM_V),
+    "two pairs": partial(scenes.two_pairs, IMPACT, scenes.COULOMB),
+    "no contacts": lambda: (sp.Scene(models.arm()), ARM_Q, scenes.ARM_V),
 }
 
 
@@ -155,9 +143,9 @@ def test_derivatives(name: str) -> None:
 
 
 def test_scenes_touch_as_they_are_meant_to() -> None:
-    scene, q, v = in_groove(IMPACT, COULOMB)
+    scene, q, v = scenes.in_groove(IMPACT, scenes.COULOMB)
     assert np.sign(scene.contacts(q, v).normal_force).tolist() == [1, 1, -1]
-    assert len(SCENES["two pairs"]()[0].contacts(ARM_Q, ARM_V)) == 2
+    assert len(SCENES["two pairs"]()[0].contacts(ARM_Q, scenes.ARM_V)) == 2
     scene, q, v = SCENES["joint components"]()
     assert scene.joint_forces(q, v)[1] < -1.0
     assert SCENES["locked joint"]()[0].model.nv == 2
@@ -165,7 +153,7 @@ def test_scenes_touch_as_they_are_meant_to() -> None:
 
 def test_forces_of_several_pairs_add_up() -> None:
     scene, q, v = SCENES["two pairs"]()
-    scene.replace_pair("second", law=IMPACT, friction=COULOMB)
+    scene.replace_pair("second", law=IMPACT, friction=scenes.COULOMB)
     testing.assert_forces_balance(scene, q, v)
 
 
@@ -173,7 +161,7 @@ def test_forces_of_several_pairs_add_up() -> None:
 def test_a_cluster_shown_as_one(friction: str, tolerance: float) -> None:
     """With friction it acts as one contact, right but for the square of the normals' angle."""
     shell = sp.Shell(*meshes.v_groove(np.radians(0.1), size=8.0, cells=2), crease_angle=1e-5)
-    scene = free_ball(shell, friction=FRICTIONS[friction])
+    scene = scenes.free_ball(shell, friction=scenes.FRICTIONS[friction])
     found = shell.contacts(np.array([4e-4, 0.3, 0.97]), 1.0)
     assert (found.weight.tolist(), found.terms.weight.tolist()) == ([1.0], [1.0, 1.0, -1.0])
     assert_derivatives(scene, free_q([4e-4, 0.3, 0.97]), np.full(6, 0.1), tolerance)
@@ -216,47 +204,51 @@ def assert_rows(scene: sp.Scene, q: Array, v: Array) -> None:
 @pytest.mark.parametrize("name", CHAINS)
 def test_rates_of_chains_of_joints(name: str) -> None:
     """The joints of "apart" are not in depth-first order."""
-    assert_rate_jacobian(*CHAINS[name](), np.zeros(0))
+    scenes.assert_rate_jacobian(*CHAINS[name](), np.zeros(0))
 
 
 # 1e-2 m of stretch are far over the limit, so that the sphere slides.
 @pytest.mark.parametrize("stretch", [1e-4, 1e-2])
-@pytest.mark.parametrize("friction", BRISTLES)
+@pytest.mark.parametrize("friction", scenes.BRISTLES)
 @pytest.mark.parametrize("where", [one for one in WHERE if one != "in a bowl"])
 def test_rates_of_bristles(where: str, friction: str, stretch: float) -> None:
     """On curved shells and edges how the turning of normals changes is left out."""
-    scene, q, v = WHERE[where](IMPACT, friction=FRICTIONS[friction])
+    scene, q, v = WHERE[where](IMPACT, friction=scenes.FRICTIONS[friction])
     curved = where == "in a groove" or where in SURFACES
     turning = stretch * (30 if "rings" in friction else 1) if curved else 1e-6
     step = 1e-7 if where == "in a groove" else 1e-6
-    assert_rate_jacobian(scene, q, v, stretched(scene, stretch), step=step, turning=turning)
+    scenes.assert_rate_jacobian(
+        scene, q, v, scenes.stretched(scene, stretch), step=step, turning=turning
+    )
 
 
 @pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
 def test_rates_of_bristles_on_the_ellipses_of_hertz(friction: str) -> None:
     for name in ELLIPSES:
-        scene, q, v = on_surface(name, HERTZ, FRICTIONS[friction])
-        assert_rate_jacobian(scene, q, v, stretched(scene, 1e-4), turning=1e-2)
+        scene, q, v = scenes.on_surface(name, HERTZ, scenes.FRICTIONS[friction])
+        scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-4), turning=1e-2)
 
 
-@pytest.mark.parametrize("friction", BRISTLES)
+@pytest.mark.parametrize("friction", scenes.BRISTLES)
 def test_rates_of_bristles_of_two_spheres(friction: str) -> None:
-    scene = two_spheres(IMPACT, FRICTIONS[friction])
+    scene = scenes.two_spheres(IMPACT, scenes.FRICTIONS[friction])
     turning = 0.3 if "rings" in friction else 1e-2
-    assert_rate_jacobian(scene, *in_touch(4, spin=2.0), stretched(scene, 2e-6), turning=turning)
+    scenes.assert_rate_jacobian(
+        scene, *scenes.in_touch(4, spin=2.0), scenes.stretched(scene, 2e-6), turning=turning
+    )
 
 
 def test_rates_of_several_pairs_and_of_mimic_joints() -> None:
     scene, q, v = SCENES["two pairs"]()
-    assert_rate_jacobian(scene, q, v, stretched(scene, 1e-4))
+    scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-4))
     for name in MIMIC:
         scene, q, v = scenes.mimicking(name)
-        assert_rate_jacobian(scene, q, v, stretched(scene, 1e-5))
+        scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-5))
 
 
 def test_bristles_of_a_state() -> None:
     """Their stretch is held, in the shell's frame: by all numbers, the shell's place too."""
-    (scene, q, v), state = stuck()
+    (scene, q, v), state = scenes.stuck()
     tau, names = np.array([0.3, -0.2, 0.1]), differences.names_of(scene)
     got = scene.dynamics_derivatives(q, v, tau, parameters=names, state=state)
     without = scene.dynamics_derivatives(q, v, tau, parameters=names)
@@ -266,7 +258,7 @@ def test_bristles_of_a_state() -> None:
     force, normal = resting.force_world[0], resting.normal_world[0]
     along = force - normal * (normal @ force)
     z = np.zeros(scene._binding.bristle_size)
-    z[:3] = -scene.pairs[0].side_j.placement.rotation.T @ along / BRISTLE.stiffness
+    z[:3] = -scene.pairs[0].side_j.placement.rotation.T @ along / scenes.BRISTLE.stiffness
 
     def rates(scene: sp.Scene, q: Array, v: Array, tau: Array) -> Array:
         return scene._binding.rates(q, v, z, tau)[:3]

@@ -1,6 +1,6 @@
 """Files of results keep the sensitivities of the rows, and damaged ones are refused."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -42,15 +42,6 @@ def test_files_keep_them_to_the_bit(bounced, file):
     assert {f.name for f in fields(before)} == {
         "parameters", "q", "v", "force_world", "normal_force", "depth"
     }  # fmt: skip
-
-
-def test_a_run_without_them_has_none_in_its_file(bounced, file, tmp_path):
-    alone = replace(bounced, sensitivity_rows=None).save(tmp_path / "alone.npz")
-    assert sp.Result.load(alone).sensitivities is None
-    with np.load(alone) as arrays, np.load(file) as more:
-        assert set(more) - set(arrays) == {
-            f"sensitivities.{one}" for one in ("q", "v", "force_world", "normal_force", "depth")
-        }
 
 
 def damaged(file, name, change):

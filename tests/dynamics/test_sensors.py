@@ -27,33 +27,6 @@ def sine(frequency, amplitude=3.0):
     return lambda t, q, v, contacts: [amplitude * np.sin(2 * np.pi * frequency * t)]
 
 
-def response(log, frequency, skip):
-    """Gain and phase [rad] of a log against a sine of amplitude 3."""
-    t, x = log.sampled[log.sampled >= skip], log.values[log.sampled >= skip, 0]
-    waves = np.column_stack([np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)])
-    (a, b), *_ = np.linalg.lstsq(waves, x, rcond=None)
-    return np.hypot(a, b) / 3.0, np.arctan2(b, a)
-
-
-@pytest.mark.parametrize("share", [0.1, 1.0, 10.0])
-@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.RungeKutta4(5e-5)])
-def test_the_filter_is_of_first_order(integrator, share):
-    """-3 dB and -45 degrees at the cutoff; far from the rate of sampling too."""
-    frequency = 50.0
-    cutoff = frequency / share
-    sensors = [torque("fast", rate=4000, cutoff=cutoff), torque("slow", rate=90, cutoff=cutoff)]
-    if share < 1:
-        sensors = sensors[:1]
-    skip = 5 / cutoff
-    result = slider(integrator, sensors).run([0.0], None, skip + 0.2, sine(frequency))
-    for log in result.sensors.values():
-        gain, phase = response(log, frequency, skip)
-        assert abs(gain * np.hypot(1, share) - 1) < 2e-3
-        assert abs(phase + np.arctan(share)) < 2e-2
-    if share == 1:
-        assert abs(20 * np.log10(gain) + 3.0103) < 0.02
-
-
 @pytest.mark.parametrize("steps_over_tau", [0.02, 0.1, 0.3, 0.7, 3.0])
 @pytest.mark.parametrize("slope", [0.0, 5.0])
 def test_the_filter_follows_a_parabola_exactly(steps_over_tau, slope):

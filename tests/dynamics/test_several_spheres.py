@@ -108,13 +108,6 @@ def test_a_fast_pad_passes_through_nothing(integrator, speed: float) -> None:  #
     assert {event.kind for event in result.events} == {"touch", "lift_off"}
 
 
-def test_bristles_share_the_room_for_contacts_that_begin() -> None:
-    # 16 spare slots of 3 numbers for the group, 4 for each pair alone.
-    assert scene_of(pad(), together=True)._binding.bristle_size == 48
-    assert scene_of(pad(), together=False)._binding.bristle_size == 64 * 4 * 3
-    assert scene_of(pad(1), together=True)._binding.bristle_size == 12
-
-
 @pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(2e-5), sp.Adaptive(1e-7, 1e-9)])
 def test_more_contacts_begin_at_once_than_there_is_room_for(integrator) -> None:  # type: ignore[no-untyped-def]
     # 64 spheres land at the same instant, and hold on a slope of 0.3 with friction 0.6.

@@ -164,23 +164,6 @@ def test_a_ball_agrees_with_its_fine_mesh(friction: str) -> None:
             assert np.allclose(a.vector, b.vector, rtol=0, atol=1e-4 * size)
 
 
-def test_scene_says_what_it_models() -> None:
-    scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
-    pair = scene.pairs[0]
-    assert pair.shells == ()
-    assert [one.radius for one in pair.spheres] == [R, OTHER]
-    q, v = in_touch(5)
-    explained = scene.explain(q, v)
-    assert (
-        "sphere of radius 50 mm on frame 'one' against sphere of radius 80 mm on frame 'two'"
-        in explained.pairs[0].modelled
-    )
-    assert np.isclose(explained.pairs[0].gap, -0.004)
-    # Along the line of their centers two bodies move as one of the mass 1 / (1 / m_1 + 1 / m_2),
-    # less for the turning of the second one.
-    assert 0.1 < explained.pairs[0].effective_mass < 2 / 3
-
-
 def test_a_deep_start_is_refused_by_the_smaller_radius() -> None:
     scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
     q, v = in_touch(6, depth=0.6 * R)

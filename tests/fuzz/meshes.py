@@ -3,24 +3,26 @@
 import random
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from tests.fuzz.mutate import NUMBERS
+from tests.fuzz.mutate import NUMBERS, alter, word
 
 Corner = tuple[float, float, float]
 
 
 @dataclass
 class Mesh:
-    """Vertices, faces by index from 0, and how many a header says there are (None: the truth)."""
+    """Vertices, faces by index from 0, normals, and what its file says of them.
 
-    vertices: list[list[str]]
-    faces: list[list[int]]
-    normals: list[list[str]] | None = None
-    said_vertices: int | None = None
-    said_faces: int | None = None
-    corner_lie: int = 0
-    """Added to the count of corners of the first face."""
+    In a damaged one any value may stand in the place of another.
+    """
+
+    vertices: list[Any]
+    faces: list[Any]
+    normals: list[Any] = field(default_factory=list)
+    said: dict[str, Any] = field(default_factory=dict)
+    """The counts of vertices and faces, and of corners of the first face, where they are wrong."""
 
 
 def _mesh(vertices: list[Corner], faces: list[list[int]]) -> Mesh:
@@ -64,180 +66,143 @@ def damaged_mesh(rng: random.Random) -> Mesh:
     if rng.random() < 0.3:
         mesh.normals = [["0", "0", "1"] for _ in mesh.vertices]
     for _ in range(rng.choice((1, 1, 2, 3, 6))):
-        rng.choice(_WAYS)(rng, mesh)
-        if not mesh.vertices or not mesh.faces:
-            break
+        part = rng.choice(("vertices", "vertices", "normals", "faces", "faces", "said", "all"))
+        if part == "all":
+            _stretch(rng, mesh)
+        elif part == "said":
+            lies = (-3, -1, 0, 1, 2, 1000, 2**31 - 1, 2**31, 2**32, 10**12, 10**30)
+            mesh.said[rng.choice(("vertices", "faces", "corners"))] = rng.choice(lies)
+        elif old := getattr(mesh, part):
+            near = (-2, -1, 0, len(mesh.vertices), len(mesh.vertices) + 1)
+            values = near if part == "faces" else NUMBERS
+            mesh = replace(mesh, **{part: _rows(alter(rng, old, values))})
     return mesh
 
 
-def _coordinate(rng: random.Random, mesh: Mesh) -> None:
-    table = mesh.normals if mesh.normals and rng.random() < 0.3 else mesh.vertices
-    rng.choice(table)[rng.randrange(3)] = rng.choice(NUMBERS)
-
-
-def _merge(rng: random.Random, mesh: Mesh) -> None:
-    a, b = rng.randrange(len(mesh.vertices)), rng.randrange(len(mesh.vertices))
-    mesh.vertices[a] = list(mesh.vertices[b])
-    if rng.random() < 0.5:
-        mesh.vertices[a][0] += "00000001" if "." in mesh.vertices[a][0] else ".00000001"
-
-
-def _flatten(rng: random.Random, mesh: Mesh) -> None:
-    axis, scale = rng.randrange(3), rng.choice(("0", "1e-12", "1e30", "1e-30"))
-    for vertex in mesh.vertices:
-        vertex[axis] = scale
-
-
-def _scale(rng: random.Random, mesh: Mesh) -> None:
+def _stretch(rng: random.Random, mesh: Mesh) -> None:
+    """Scale all vertices by a power of ten, or put them into a plane."""
     power = rng.choice((-300, -40, -20, -9, 9, 20, 38, 150, 300))
+    axes = rng.choice(((0, 1, 2), (rng.randrange(3),)))
     for vertex in mesh.vertices:
-        for axis, number in enumerate(vertex):
-            mantissa = number.partition("e")[0]
-            vertex[axis] = f"{mantissa or 0}e{power}"
+        for axis in axes[: len(vertex)]:
+            old = word(vertex[axis % len(vertex)]).partition("e")[0]
+            vertex[axis % len(vertex)] = f"{(len(axes) > 1 and old) or 1}e{power}"
 
 
-def _index(rng: random.Random, mesh: Mesh) -> None:
-    face = rng.choice(mesh.faces)
-    if face:
-        n = len(mesh.vertices)
-        face[rng.randrange(len(face))] = rng.choice(
-            (-1, -2, n, n + 1, 0, rng.randrange(n), 2**31 - 1, 2**31, 2**40, -(2**31) - 1, 10**25)
-        )
+def _rows(table: Any) -> list[list[Any]]:
+    """Return a table whose rows are lists, whatever they were altered to."""
+    return [one if isinstance(one, list) else [one] for one in table]
 
 
-def _corners(rng: random.Random, mesh: Mesh) -> None:
-    size = rng.choice((0, 1, 2, 3, 4, 5, 9, 30, 300))
-    face = [rng.randrange(len(mesh.vertices)) for _ in range(size)]
-    mesh.faces[rng.randrange(len(mesh.faces))] = face
+def _text(row: list[Any]) -> str:
+    return " ".join(map(word, row))
 
 
-def _drop(rng: random.Random, mesh: Mesh) -> None:
-    del mesh.faces[rng.randrange(len(mesh.faces)) : rng.choice((None, None, len(mesh.faces) - 1))]
+def _index(corner: Any, first: int = 0) -> Any:
+    return corner + first if isinstance(corner, int) else corner
 
 
-def _double(rng: random.Random, mesh: Mesh) -> None:
-    face = list(rng.choice(mesh.faces))
-    if rng.random() < 0.5:
-        face.reverse()
-    mesh.faces += [list(face) for _ in range(rng.choice((1, 2, 50)))]
-
-
-def _counts(rng: random.Random, mesh: Mesh) -> None:
-    lie = rng.choice((-1, 0, 1, 2, 3, 1000, 2**31 - 1, 2**31, 2**32, 10**12, 10**30))
-    if rng.random() < 0.5:
-        mesh.said_vertices = lie
-    else:
-        mesh.said_faces = lie
-
-
-def _corner_lie(rng: random.Random, mesh: Mesh) -> None:
-    mesh.corner_lie = rng.choice((-3, -1, 1, 2, 100, 2**31))
-
-
-_WAYS = (
-    *(_coordinate, _coordinate, _merge, _flatten, _scale, _index, _index, _corners, _drop),
-    *(_double, _counts, _corner_lie),
-)
-
-
-def _reals(row: list[str]) -> list[float]:
-    def real(text: str) -> float:
+def _reals(row: list[Any]) -> list[float]:
+    def real(value: Any) -> float:
         try:
-            return float(text)
+            return float(word(value))
         except ValueError:
             return 0.0
 
     return [real(one) for one in row]
 
 
-def _said(mesh: Mesh) -> tuple[int, int]:
-    vertices = len(mesh.vertices) if mesh.said_vertices is None else mesh.said_vertices
-    return vertices, len(mesh.faces) if mesh.said_faces is None else mesh.said_faces
+def _counts(mesh: Mesh) -> tuple[int, int]:
+    said = mesh.said
+    return said.get("vertices", len(mesh.vertices)), said.get("faces", len(mesh.faces))
+
+
+def _size(mesh: Mesh, face: list[Any]) -> int:
+    return len(face) + (mesh.said.get("corners", 0) if face is mesh.faces[0] else 0)
 
 
 def _counted(mesh: Mesh, first: int) -> str:
-    rows = []
-    for k, face in enumerate(mesh.faces):
-        size = len(face) + (mesh.corner_lie if k == 0 else 0)
-        rows.append(" ".join(map(str, (size, *(i + first for i in face)))))
-    return "\n".join(rows)
+    rows = [[_size(mesh, face), *(_index(i, first) for i in face)] for face in mesh.faces]
+    return "\n".join(map(_text, rows))
+
+
+def _with_normals(mesh: Mesh) -> list[list[Any]]:
+    """Return the vertices, each with its normal."""
+    normals = mesh.normals or [[]] * len(mesh.vertices)
+    return [vertex + normal for vertex, normal in zip(mesh.vertices, normals, strict=False)]
+
+
+def _corners(mesh: Mesh, face: list[Any]) -> list[list[Any]]:
+    """Return three corners of a face."""
+    places = [i if isinstance(i, int) else 0 for i in (*face, 0, 0, 0)[:3]]
+    return [mesh.vertices[i % len(mesh.vertices)] for i in places]
 
 
 def write_obj(mesh: Mesh) -> bytes:
-    rows = ["v " + " ".join(one) for one in mesh.vertices]
-    rows += ["vn " + " ".join(one) for one in mesh.normals or ()]
+    rows = [f"v {_text(one)}" for one in mesh.vertices]
+    rows += [f"vn {_text(one)}" for one in mesh.normals]
     mark = "{0}//{0}" if mesh.normals else "{0}"
-    rows += ["f " + " ".join(mark.format(i + (i >= 0)) for i in one) for one in mesh.faces]
+    for face in mesh.faces:
+        corners = (word(_index(i, isinstance(i, int) and i >= 0)) for i in face)
+        rows.append("f " + " ".join(map(mark.format, corners)))
     return "\n".join(rows).encode()
 
 
 def write_off(mesh: Mesh) -> bytes:
-    vertices, faces = _said(mesh)
     kind = "NOFF" if mesh.normals else "OFF"
-    normals = mesh.normals or [[]] * len(mesh.vertices)
-    rows = [" ".join(v + n) for v, n in zip(mesh.vertices, normals, strict=False)]
-    return "\n".join((kind, f"{vertices} {faces} 0", *rows, _counted(mesh, 0))).encode()
+    rows = map(_text, _with_normals(mesh))
+    return "\n".join((kind, _text([*_counts(mesh), 0]), *rows, _counted(mesh, 0))).encode()
 
 
 def write_shl(mesh: Mesh) -> bytes:
-    vertices, faces = _said(mesh)
-    rows = [" ".join(one) for one in mesh.vertices]
-    if mesh.normals is None:
+    vertices, faces = _counts(mesh)
+    rows = map(_text, mesh.vertices)
+    if not mesh.normals:
         return "\n".join((f"{vertices} {faces} 0.001", *rows, _counted(mesh, 1))).encode()
     head = ("Version: 2", f"{vertices} {faces} {len(mesh.normals)} 0.001")
-    normals = [" ".join(one) for one in mesh.normals]
-    return "\n".join((*head, *rows, _counted(mesh, 1), *normals)).encode()
+    return "\n".join((*head, *rows, _counted(mesh, 1), *map(_text, mesh.normals))).encode()
 
 
 def write_stl(mesh: Mesh) -> bytes:
     rows = ["solid s"]
     for face in mesh.faces:
         rows += ["facet normal 0 0 1", "outer loop"]
-        for i in face[:3]:
-            rows.append("vertex " + " ".join(mesh.vertices[i % len(mesh.vertices)]))
+        rows += [f"vertex {_text(corner)}" for corner in _corners(mesh, face)]
         rows += ["endloop", "endfacet"]
     return "\n".join((*rows, "endsolid s")).encode()
 
 
 def write_binary_stl(mesh: Mesh) -> bytes:
-    data = bytearray(b"\0" * 80 + struct.pack("<I", _said(mesh)[1] % 2**32))
+    data = bytearray(b"\0" * 80 + struct.pack("<I", _counts(mesh)[1] % 2**32))
     for face in mesh.faces:
-        data += struct.pack("<3f", 0.0, 0.0, 1.0)
-        for i in (*face, 0, 0, 0)[:3]:
-            data += struct.pack("<3f", *map(_single, mesh.vertices[i % len(mesh.vertices)]))
-        data += b"\0\0"
+        row = [0.0, 0.0, 1.0]
+        for corner in _corners(mesh, face):
+            row += [float("inf") if abs(x) > 3e38 else x for x in _reals(corner)]
+        data += struct.pack(f"<{len(row)}f2x", *row)
     return bytes(data)
 
 
-def _single(text: str) -> float:
-    (value,) = _reals([text])
-    return float("inf") if abs(value) > 3e38 else value
-
-
-def _ply_head(mesh: Mesh, form: str, real: str) -> str:
-    vertices, faces = _said(mesh)
+def _ply_head(mesh: Mesh, form: str) -> str:
+    vertices, faces = _counts(mesh)
     names = ("x", "y", "z", "nx", "ny", "nz") if mesh.normals else ("x", "y", "z")
     rows = ["ply", f"format {form} 1.0", f"element vertex {vertices}"]
-    rows += [f"property {real} {name}" for name in names]
+    rows += [f"property double {name}" for name in names]
     rows += [f"element face {faces}", "property list uchar int vertex_indices", "end_header", ""]
     return "\n".join(rows)
 
 
 def write_ply(mesh: Mesh) -> bytes:
-    normals = mesh.normals or [[]] * len(mesh.vertices)
-    rows = [" ".join(v + n) for v, n in zip(mesh.vertices, normals, strict=False)]
-    return (_ply_head(mesh, "ascii", "double") + "\n".join((*rows, _counted(mesh, 0)))).encode()
+    rows = map(_text, _with_normals(mesh))
+    return (_ply_head(mesh, "ascii") + "\n".join((*rows, _counted(mesh, 0)))).encode()
 
 
 def write_binary_ply(mesh: Mesh) -> bytes:
-    data = bytearray(_ply_head(mesh, "binary_little_endian", "double").encode())
-    normals = mesh.normals or [[]] * len(mesh.vertices)
-    for vertex, normal in zip(mesh.vertices, normals, strict=False):
-        row = _reals(vertex + normal)
+    data = bytearray(_ply_head(mesh, "binary_little_endian").encode())
+    for row in map(_reals, _with_normals(mesh)):
         data += struct.pack(f"<{len(row)}d", *row)
-    for k, face in enumerate(mesh.faces):
-        data.append((len(face) + (mesh.corner_lie if k == 0 else 0)) % 256)
-        data += b"".join(struct.pack("<I", i % 2**32) for i in face)
+    for face in mesh.faces:
+        data.append(_size(mesh, face) % 256)
+        data += b"".join(struct.pack("<I", i % 2**32) for i in face if isinstance(i, int))
     return bytes(data)
 
 

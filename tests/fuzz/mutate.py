@@ -160,20 +160,31 @@ _WAYS = (
 )
 
 
-def alter(rng: random.Random, tree: Any) -> Any:
-    """Return a copy of `tree`, dicts and lists of plain values, with some of its nodes changed."""
+def alter(rng: random.Random, tree: Any, values: Sequence[Any] = ()) -> Any:
+    """Return a copy of `tree`, dicts and lists of plain values, with some of its nodes changed.
+
+    Most of what is put in is one of `values`, if there are any, as a reader takes them.
+    """
     tree = copy.deepcopy(tree)
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         places = list(_places(tree)) if isinstance(tree, dict | list) else []
         if not places:
-            return odd_value(rng)
+            return odd_value(rng, values)
         node, key = rng.choice(places)
-        _change(rng, node, key, places)
+        _change(rng, node, key, places, values)
     return tree
 
 
-def odd_value(rng: random.Random) -> Any:
+def word(value: Any) -> str:
+    """Return `value` as a word of a text; of one that holds others, an empty list."""
+    text = str(value) if not isinstance(value, list | dict) else "[]"
+    return "".join(c for c in text if c >= " ")
+
+
+def odd_value(rng: random.Random, values: Sequence[Any] = ()) -> Any:
     """Return a value that most places do not expect."""
+    if values and rng.random() < 0.8:
+        return copy.deepcopy(rng.choice(values))
     if rng.random() < 0.05:
         value: Any = 1
         for _ in range(rng.choice((3, 40, 3000))):
@@ -196,7 +207,7 @@ def _places(tree: Any) -> Any:
                 waiting.append(value)
 
 
-def _change(rng: random.Random, node: Any, key: Any, places: list[tuple[Any, Any]]) -> None:
+def _change(rng, node, key, places, values):
     way = rng.randrange(8)
     other, other_key = rng.choice(places)
     try:
@@ -207,10 +218,12 @@ def _change(rng: random.Random, node: Any, key: Any, places: list[tuple[Any, Any
         elif way == 2 and isinstance(node, dict):
             node[rng.choice((f"{key}x", str(other_key), "", "\u00e9", "a.b"))] = node.pop(key)
         elif way == 3 and isinstance(node[key], list):
-            node[key] = node[key] * rng.choice((0, 2, 3)) + [odd_value(rng)] * rng.randrange(2)
+            node[key] = node[key] * rng.choice((0, 2, 3)) + [
+                odd_value(rng, values)
+            ] * rng.randrange(2)
         elif way == 4 and isinstance(node[key], int | float):
             node[key] *= rng.choice((-1, 0, 10, 1e-3, 1e3, 1e9, 1e-9, 1e100))
         else:
-            node[key] = odd_value(rng)
+            node[key] = odd_value(rng, values)
     except (LookupError, OverflowError, RecursionError):
         return  # an earlier change took the place away, or made a number or a tree too large

@@ -19,7 +19,7 @@ from sphshell_pin import robots
 from sphshell_pin.results import Sensitivities
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
-from tests.fuzz.mutate import NUMBERS, alter, damage, odd_value
+from tests.fuzz.mutate import NUMBERS, alter, damage, word
 from tests.scenario.files import DROP, write
 from tests.texts import text_of
 
@@ -222,78 +222,43 @@ def damaged_xml(rng: random.Random, data: bytes) -> bytes:
     """Return XML some of whose elements, attributes, names and texts were changed."""
     ET.register_namespace("xacro", "http://www.ros.org/wiki/xacro")
     root = ET.fromstring(data.replace(b" xmlns=", b" xmlns_="))  # written with no prefixes
-    for _ in range(rng.choice((1, 1, 2, 3))):
-        parents = [one for one in root.iter() if len(one)]
-        every = list(root.iter())
-        parent = rng.choice(parents or every)
-        rng.choice(_XML_WAYS)(rng, parent, rng.choice(every))
-    try:
-        text = ET.tostring(root).replace(b" xmlns_=", b" xmlns=")
-    except RecursionError:  # a link inside itself
-        return b"<robot>" + b"<link>" * 3000
+    text = ET.tostring(_element(alter(rng, _tree(root), _IN_XML))).replace(b" xmlns_=", b" xmlns=")
     if rng.random() < 0.05:
         encoding = rng.choice((b"utf-8", b"utf-16", b"latin-1", b"rot13", b"x"))
         return b'<?xml version="1.0" encoding="' + encoding + b'"?>' + text
     return text
 
 
-def _xml_drop(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
-    if len(parent):
-        parent.remove(rng.choice(list(parent)))
+def _tree(element: ET.Element) -> dict[str, Any]:
+    """Return an element as a table, its texts as lists of words."""
+    attributes = {name: text.split() for name, text in element.attrib.items()}
+    texts = (element.text or "").split()
+    return {"tag": element.tag, "is": attributes, "text": texts, "in": [*map(_tree, element)]}
 
 
-def _xml_copy(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
-    parent.append(ET.fromstring(ET.tostring(other)))
+def _element(tree: Any) -> ET.Element:
+    """Return the element of a table, also of one that was altered."""
+    tree = tree if isinstance(tree, dict) else {"tag": tree}
+    attributes, inner = tree.get("is"), tree.get("in")
+    made = ET.Element(word(tree.get("tag", "x")))
+    if isinstance(attributes, dict):
+        made.attrib.update({word(name): _words(value) for name, value in attributes.items()})
+    made.text = _words(tree.get("text", ""))
+    made.extend(map(_element, inner if isinstance(inner, list) else []))
+    return made
 
 
-def _xml_attribute(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
-    if not other.attrib:
-        return
-    name = rng.choice(list(other.attrib))
-    way = rng.randrange(4)
-    if way == 0:
-        del other.attrib[name]
-    elif way == 1:
-        words = other.attrib[name].split() or [""]
-        words[rng.randrange(len(words))] = rng.choice(NUMBERS)
-        other.attrib[name] = " ".join(words * rng.choice((1, 1, 2)))
-    elif way == 2:
-        other.attrib[name] = rng.choice(
-            ("", "base", "tip", "universe", "root_joint", "world", "floating", "x", *EXPRESSIONS)
-        )
-    else:
-        value = odd_value(rng)
-        text = str(value) if not isinstance(value, list | dict) else "[]"
-        other.attrib[name] = "".join(c for c in text if c >= " ")
+def _words(value: Any) -> str:
+    return " ".join(map(word, value if isinstance(value, list) else [value]))
 
 
-def _xml_text(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
-    words = (other.text or "").split() or [""]
-    words[rng.randrange(len(words))] = rng.choice((*NUMBERS, *EXPRESSIONS))
-    other.text = " ".join(words)
-
-
-def _xml_tag(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
-    other.tag = rng.choice(("link", "joint", "mimic", "geometry", "sphere", "mesh", "x", "robot"))
-
-
-def _xml_swap(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
-    parent.attrib, other.attrib = other.attrib, parent.attrib
-
-
-def _xml_kind(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
-    kinds = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical", "x")
-    other.set("type", rng.choice(kinds))
-
-
-def _xml_mesh(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
-    files = ("box.off", "package://x/y.stl", "/", "finger.urdf", "", "http://x/y.stl", "x.dae")
-    other.append(
-        ET.Element("mesh", filename=rng.choice(files), scale=rng.choice(("1 1 1", "0", "x")))
-    )
-
-
-_XML_WAYS = (
-    *(_xml_drop, _xml_copy, _xml_attribute, _xml_attribute, _xml_attribute, _xml_attribute),
-    *(_xml_tag, _xml_swap, _xml_kind, _xml_mesh, _xml_text),
+_IN_XML = (
+    *(*NUMBERS, *EXPRESSIONS, "base", "tip", "universe", "root_joint", "world", "floating"),
+    *("revolute", "continuous", "prismatic", "fixed", "planar", "spherical"),
+    *("link", "joint", "mimic", "geometry", "sphere", "mesh", "robot"),
+    *(
+        {"tag": "mesh", "is": {"filename": file, "scale": scale}}
+        for file in ("box.off", "package://x/y.stl", "/", "finger.urdf", "", "http://x/y.stl")
+        for scale in ("1 1 1", "0", "x")
+    ),
 )

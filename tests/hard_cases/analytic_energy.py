@@ -18,26 +18,7 @@ from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.surfaces import Mesh, icosphere
 from tests import models
-from tests.hard_cases.analytic_impact import (
-    BY_TOLERANCE,
-    FIXED,
-    falls,
-    order_by_step,
-    order_by_tolerance,
-)
-from tests.hard_cases.balls import (
-    GRAVITY,
-    MASS,
-    PRECISE,
-    RADIUS,
-    bristle,
-    exact_scene,
-    free_ball,
-    scene_of,
-    spring,
-    state,
-    velocities,
-)
+from tests.hard_cases import analytic_impact, balls
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 from tests.oracle.mechanics import total_momentum
 
@@ -82,7 +63,7 @@ def swings() -> Verdicts:
 def exact_swings() -> Verdicts:
     """What the surface has no part in: a contact source is called at every evaluation."""
     tried = "20 swings, the surface by its formula (contact source)"
-    yield from of_energy(tried, drift(exact_scene(), 20), 1e-8)
+    yield from of_energy(tried, drift(balls.exact_scene(), 20), 1e-8)
 
 
 def free_body(moments: tuple[float, float, float]) -> pin.Model:
@@ -101,7 +82,7 @@ def top_error(integrator: object) -> float:
     """Return how far a free symmetric top is from its closed form after 0.1 s [rad]."""
     first, third, end = 3e-5, 5e-5, 0.1
     spin = SPIN * np.array([0.6, 0.0, 0.8])
-    q0, v0 = state(np.zeros(3), [1.0, 2.0, 3.0], spin)
+    q0, v0 = balls.state(np.zeros(3), [1.0, 2.0, 3.0], spin)
     scene = sp.Scene(free_body((first, first, third)))
     q = sp.Simulation(scene, integrator).run(q0, v0, end).q[-1]
     momentum = np.array([first, first, third]) * spin
@@ -113,15 +94,15 @@ def top_error(integrator: object) -> float:
 @case("order of the steppers with a free top")
 def top() -> Verdicts:
     tried, name = "symmetric top, 300 rad/s, 0.1 s, against its closed form", "order of {}"
-    for integrator, order in FIXED:
+    for integrator, order in analytic_impact.FIXED:
         steps = (2e-4, 1e-4) if order == 4 else (1e-6, 5e-7)
-        seen = order_by_step(top_error, integrator, steps)
+        seen = analytic_impact.order_by_step(top_error, integrator, steps)
         title = name.format(integrator.__name__)
         yield compare(title, tried, "error ~ dt^p", order, seen, 0.1, scale=1.0)
-    for integrator, span in BY_TOLERANCE:
-        power, last = order_by_tolerance(top_error, integrator, span)
+    for integrator, span in analytic_impact.BY_TOLERANCE:
+        power, last = analytic_impact.order_by_tolerance(top_error, integrator, span)
         title = f"{integrator.__name__}, rtol {span[0]:g} to {span[1]:g}"
-        yield falls(title, tried, power)
+        yield analytic_impact.falls(title, tried, power)
         yield at_most(f"{integrator.__name__}({span[1]:g}) [rad]", tried, "0", last, 1e2 * span[1])
 
 
@@ -133,7 +114,7 @@ FIRST_ORDER = (sp.SemiImplicitEuler, sp.LinearlyImplicitEuler)
 def tumbling(integrator: object, duration: float = 0.5) -> tuple[Array, float]:
     """Return the energy at the rows and the change of momentum of a free body, both relative."""
     model = free_body((3e-5, 2e-5, 4e-5))
-    q0, v0 = state(np.zeros(3), [1.0, 0.0, 0.0], SPIN * np.array([2.0, -1.5, 1.66]) / 3.0)
+    q0, v0 = balls.state(np.zeros(3), [1.0, 0.0, 0.0], SPIN * np.array([2.0, -1.5, 1.66]) / 3.0)
     result = sp.Simulation(sp.Scene(model), integrator).run(q0, v0, duration)
     energy = result.energy.kinetic
     before, after = (total_momentum(model, result.q[row], result.v[row]).angular for row in (0, -1))
@@ -151,7 +132,7 @@ def free_tumbling() -> Verdicts:
         yield at_most("change of energy", tried, "0", np.abs(energy).max(), bound)
         yield at_most("change of angular momentum", tried, "0", momentum, bound)
     for kind in FIRST_ORDER:
-        seen = order_by_step(
+        seen = analytic_impact.order_by_step(
             lambda stepper: np.abs(tumbling(stepper, 0.05)[0]).max(), kind, (1e-6, 5e-7)
         )
         title, tried = f"order of the energy, {kind.__name__}", f"{body}, 0.05 s"
@@ -164,8 +145,8 @@ def free_tumbling() -> Verdicts:
 @case("a fast spin under a rolling ball")
 def spinning_ball() -> Verdicts:
     """A ball that rolls on while it spins about the vertical: neither changes."""
-    law = spring(1e5)
-    depth = law.depth_at(MASS * GRAVITY)
+    law = balls.spring(1e5)
+    depth = law.depth_at(balls.MASS * balls.GRAVITY)
     speed = 0.1
     for integrator, bound in (
         (sp.SemiImplicitEuler(), 1e-8),
@@ -174,11 +155,11 @@ def spinning_ball() -> Verdicts:
         (sp.Adaptive(1e-9), 1e-8),
         (sp.Implicit(1e-7), 1e-7),
     ):
-        scene = scene_of(models.square(), law, bristle(0.3, 1e5))
-        spin = [0.0, speed / (RADIUS - depth), SPIN]
-        q0, v0 = state([-0.5, 0.0, RADIUS - depth], [speed, 0.0, 0.0], spin)
+        scene = balls.scene_of(models.square(), law, balls.bristle(0.3, 1e5))
+        spin = [0.0, speed / (balls.RADIUS - depth), SPIN]
+        q0, v0 = balls.state([-0.5, 0.0, balls.RADIUS - depth], [speed, 0.0, 0.0], spin)
         result = sp.Simulation(scene, integrator).run(q0, v0, 2.0, record_dt=0.1)
-        seen = velocities(result)
+        seen = balls.velocities(result)
         tried = f"0.1 m/s, {SPIN:g} rad/s about the vertical, 2 s, {integrator}"
         turn = np.abs(result.v[:, 5] / SPIN - 1).max()
         yield at_most("change of speed", tried, "0", np.abs(seen[:, 0] / speed - 1).max(), bound)
@@ -188,15 +169,17 @@ def spinning_ball() -> Verdicts:
 @case("a fast ball put on a turntable")
 def on_turntable() -> Verdicts:
     """Friction between the two only takes: their energy never rises."""
-    law = spring(1e5)
-    for integrator in (sp.RungeKutta4(2e-5), PRECISE, sp.Implicit(1e-7)):
-        model = free_ball()
+    law = balls.spring(1e5)
+    for integrator in (sp.RungeKutta4(2e-5), balls.PRECISE, sp.Implicit(1e-7)):
+        model = balls.free_ball()
         disc = pin.Inertia(1.0, np.zeros(3), 1e-2 * np.eye(3))
         models.add_body(model, "table", pin.JointModelRUBZ(), inertia=disc)
-        friction = bristle(0.3, 1e5)
-        scene = scene_of(models.square(), law, friction, model=model, frame="table")
+        friction = balls.bristle(0.3, 1e5)
+        scene = balls.scene_of(models.square(), law, friction, model=model, frame="table")
         spin = SPIN * np.array([0.5, 0.5, math.sqrt(0.5)])
-        q0, v0 = state([0.1, 0.0, RADIUS - law.depth_at(MASS * GRAVITY)], np.zeros(3), spin)
+        q0, v0 = balls.state(
+            [0.1, 0.0, balls.RADIUS - law.depth_at(balls.MASS * balls.GRAVITY)], np.zeros(3), spin
+        )
         simulation = sp.Simulation(scene, integrator)
         result = simulation.run(np.append(q0, [1.0, 0.0]), np.append(v0, 6.0), 1.0)
         energy = result.energy.kinetic + result.energy.potential + result.energy.elastic

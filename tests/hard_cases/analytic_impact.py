@@ -14,22 +14,12 @@ import numpy as np
 import sphshell_pin as sp
 from sphshell_pin.study.report.closed_forms import FALL, bounce
 from tests import models
-from tests.hard_cases.balls import (
-    GRAVITY,
-    MASS,
-    RADIUS,
-    event_times,
-    free_ball,
-    scene_of,
-    state,
-    velocities,
-)
+from tests.hard_cases import balls
 from tests.hard_cases.verdict import Verdict, Verdicts, case, compare
-from tests.validation.restitution import hunt_crossley_restitution
 
 PRECISE = sp.Adaptive(1e-9)
 GAP = 1e-4
-STEEL = sp.ImpactLaw.hertz(RADIUS, 2.1e11, 0.3, 2.1e11, 0.3)
+STEEL = sp.ImpactLaw.hertz(balls.RADIUS, 2.1e11, 0.3, 2.1e11, 0.3)
 FIXED = ((sp.SemiImplicitEuler, 1), (sp.LinearlyImplicitEuler, 1), (sp.RungeKutta4, 4))
 BY_TOLERANCE = ((sp.Adaptive, (1e-4, 1e-9)), (sp.Implicit, (1e-3, 1e-7)))
 
@@ -44,15 +34,15 @@ class Impact:
     restitution: float
 
 
-def impact(law: sp.ImpactLaw | sp.HuntCrossleyLaw, speed: float, expected: float) -> Impact:
+def impact(law: sp.ImpactLaw, speed: float, expected: float) -> Impact:
     """Shoot the ball at the plate; `expected` [s] is about how long it stays in touch."""
-    scene = scene_of(models.square(), law, model=free_ball(gravity=0.0))
-    q0, v0 = state([0.1, 0.03, RADIUS + GAP], [0.0, 0.0, -speed], [0.0, 0.0, 0.0])
+    scene = balls.scene_of(models.square(), law, model=balls.free_ball(gravity=0.0))
+    q0, v0 = balls.state([0.1, 0.03, balls.RADIUS + GAP], [0.0, 0.0, -speed], [0.0, 0.0, 0.0])
     duration = GAP / speed + 2 * expected
     result = sp.Simulation(scene, PRECISE).run(q0, v0, duration, record_dt=expected / 4000)
-    (touch,), (left,) = event_times(result, "touch"), event_times(result, "lift_off")
-    back = float(velocities(result)[-1, 2])
-    return Impact(touch, left - touch, float(RADIUS - result.q[:, 2].min()), back / speed)
+    (touch,), (left,) = balls.event_times(result, "touch"), balls.event_times(result, "lift_off")
+    back = float(balls.velocities(result)[-1, 2])
+    return Impact(touch, left - touch, float(balls.RADIUS - result.q[:, 2].min()), back / speed)
 
 
 def touch_time(exponent: float, depth: float, speed: float) -> float:
@@ -71,7 +61,7 @@ def undamped() -> Verdicts:
         ("exponent 2.2", sp.ImpactLaw(1e9, 2.2), 1.0),
     ):
         e = law.exponent
-        depth = ((e + 1) * MASS * speed**2 / (2 * law.stiffness)) ** (1 / (e + 1))
+        depth = ((e + 1) * balls.MASS * speed**2 / (2 * law.stiffness)) ** (1 / (e + 1))
         duration = touch_time(e, depth, speed)
         seen = impact(law, speed, duration)
         tried = f"{title}, {speed:g} m/s"
@@ -83,41 +73,31 @@ def undamped() -> Verdicts:
         yield compare("restitution", tried, "1", 1.0, seen.restitution, 1e-6)
 
 
-@case("impact of Hunt and Crossley")
-def hunt_crossley() -> Verdicts:
-    for wanted, speed in ((0.9, 0.5), (0.5, 0.5), (0.5, 5.0), (0.1, 1.0)):
-        # The dissipation gives `wanted` at 0.5 m/s; at other speeds restitution is another.
-        law = sp.ImpactLaw.hertz(RADIUS, 1e9, 0.3, 1e9, 0.3, restitution=wanted, speed=0.5)
-        expected = hunt_crossley_restitution(speed, law.dissipation)
-        about = touch_time(1.5, (1.25 * MASS * speed**2 / law.stiffness) ** 0.4, speed)
-        seen = impact(law, speed, 3 * about)
-        tried = f"b = {law.dissipation:.4g} s/m, {speed:g} m/s"
-        formula = "x - ln(1 + x) = -y - ln(1 - y), x = b v, y = b v'"
-        yield compare("restitution", tried, formula, expected, seen.restitution, 1e-6, scale=1.0)
-
-
 def bouncing_error(integrator: object) -> float:
     """Return the error after five bounces, in the sixth flight, over the height of fall."""
     height, stiffness, end = FALL, 1e4, 0.75
-    model = models.slider(GRAVITY, MASS)
-    scene = scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
-    result = sp.Simulation(scene, integrator).run([RADIUS + height], None, end)
+    model = models.slider(balls.GRAVITY, balls.MASS)
+    scene = balls.scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
+    result = sp.Simulation(scene, integrator).run([balls.RADIUS + height], None, end)
     z, speed = bounce(np.array(end), stiffness)
-    fall = math.sqrt(2 * GRAVITY * height)
-    return math.hypot((result.q[-1, 0] - RADIUS - z) / height, (result.v[-1, 0] - speed) / fall)
+    fall = math.sqrt(2 * balls.GRAVITY * height)
+    return math.hypot(
+        (result.q[-1, 0] - balls.RADIUS - z) / height, (result.v[-1, 0] - speed) / fall
+    )
 
 
 def oscillation_error(integrator: object) -> float:
     """Return the error of a ball that bobs on a spring without leaving it, over its amplitude."""
     stiffness, end = 1e4, 0.05
-    omega, sag = math.sqrt(stiffness / MASS), MASS * GRAVITY / stiffness
+    omega, sag = math.sqrt(stiffness / balls.MASS), balls.MASS * balls.GRAVITY / stiffness
     start = 0.8 * sag
-    model = models.slider(GRAVITY, MASS)
-    scene = scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
-    result = sp.Simulation(scene, integrator).run([RADIUS - sag + start], None, end)
+    model = models.slider(balls.GRAVITY, balls.MASS)
+    scene = balls.scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
+    result = sp.Simulation(scene, integrator).run([balls.RADIUS - sag + start], None, end)
     z, speed = start * math.cos(omega * end), -start * omega * math.sin(omega * end)
     return math.hypot(
-        (result.q[-1, 0] - RADIUS + sag - z) / start, (result.v[-1, 0] - speed) / (start * omega)
+        (result.q[-1, 0] - balls.RADIUS + sag - z) / start,
+        (result.v[-1, 0] - speed) / (start * omega),
     )
 
 

@@ -13,24 +13,10 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.study.report.swing import ball_model
 from tests import models
-from tests.hard_cases import surfaces
-from tests.hard_cases.balls import (
-    GRAVITY,
-    INERTIA,
-    MASS,
-    PRECISE,
-    RADIUS,
-    beta,
-    bristle,
-    scene_of,
-    spring,
-    state,
-    tilted,
-    velocities,
-)
+from tests.hard_cases import balls, surfaces
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
-SOFT = spring(1e5)
+SOFT = balls.spring(1e5)
 
 
 def coulomb(mu: float) -> sp.CoulombFriction:
@@ -40,28 +26,31 @@ def coulomb(mu: float) -> sp.CoulombFriction:
 @case("incline")
 def incline() -> Verdicts:
     for degrees, mu, make in (
-        (5, 0.3, bristle),
-        (30, 0.5, bristle),
+        (5, 0.3, balls.bristle),
+        (30, 0.5, balls.bristle),
         (30, 0.5, coulomb),
-        (30, 0.1, bristle),
+        (30, 0.1, balls.bristle),
         (30, 0.1, coulomb),
-        (60, 0.2, bristle),
+        (60, 0.2, balls.bristle),
     ):
         angle = math.radians(degrees)
-        depth = SOFT.depth_at(MASS * GRAVITY * math.cos(angle))
-        b = beta(depth)
+        depth = SOFT.depth_at(balls.MASS * balls.GRAVITY * math.cos(angle))
+        b = balls.beta(depth)
         rolls = mu >= b / (1 + b) * math.tan(angle)
         if rolls:
-            expected, law = GRAVITY * math.sin(angle) / (1 + b), "g sin A / (1 + b), 5/7 g sin A"
+            expected, law = (
+                balls.GRAVITY * math.sin(angle) / (1 + b),
+                "g sin A / (1 + b), 5/7 g sin A",
+            )
         else:
-            expected = GRAVITY * (math.sin(angle) - mu * math.cos(angle))
+            expected = balls.GRAVITY * (math.sin(angle) - mu * math.cos(angle))
             law = "g (sin A - mu cos A)"
-        slope, friction = tilted(angle), make(mu)
-        scene = scene_of(models.square(), SOFT, friction, placement=slope)
+        slope, friction = balls.tilted(angle), make(mu)
+        scene = balls.scene_of(models.square(), SOFT, friction, placement=slope)
         rest = np.zeros(3)
-        q0, v0 = state(slope.act(np.array([-0.5, 0.0, RADIUS - depth])), rest, rest)
-        result = sp.Simulation(scene, PRECISE).run(q0, v0, 0.2, record_dt=0.1)
-        along = velocities(result) @ slope.rotation[:, 0]
+        q0, v0 = balls.state(slope.act(np.array([-0.5, 0.0, balls.RADIUS - depth])), rest, rest)
+        result = sp.Simulation(scene, balls.PRECISE).run(q0, v0, 0.2, record_dt=0.1)
+        along = balls.velocities(result) @ slope.rotation[:, 0]
         tried = f"A = {degrees} deg, mu = {mu:g}, {type(friction).__name__}"
         name = "rolling acceleration" if rolls else "sliding acceleration"
         seen = (along[2] - along[1]) / (result.t[2] - result.t[1])
@@ -71,14 +60,14 @@ def incline() -> Verdicts:
 @case("from sliding to rolling")
 def sliding_to_rolling() -> Verdicts:
     speed, mu = 0.5, 0.2
-    depth = SOFT.depth_at(MASS * GRAVITY)
-    b = beta(depth)
-    for make in (bristle, coulomb):
-        scene = scene_of(models.square(), SOFT, make(mu))
-        q0, v0 = state([-0.5, 0.0, RADIUS - depth], [speed, 0.0, 0.0], [0.0, 0.0, 0.0])
-        slide = speed / (mu * GRAVITY * (1 + 1 / b))
-        result = sp.Simulation(scene, PRECISE).run(q0, v0, 2.5 * slide, record_dt=slide / 4)
-        along = velocities(result)[:, 0]
+    depth = SOFT.depth_at(balls.MASS * balls.GRAVITY)
+    b = balls.beta(depth)
+    for make in (balls.bristle, coulomb):
+        scene = balls.scene_of(models.square(), SOFT, make(mu))
+        q0, v0 = balls.state([-0.5, 0.0, balls.RADIUS - depth], [speed, 0.0, 0.0], [0.0, 0.0, 0.0])
+        slide = speed / (mu * balls.GRAVITY * (1 + 1 / b))
+        result = sp.Simulation(scene, balls.PRECISE).run(q0, v0, 2.5 * slide, record_dt=slide / 4)
+        along = balls.velocities(result)[:, 0]
         # The line of the slide, through a quarter and a half of it, meets the speed of rolling.
         pace = (along[1] - along[2]) / (result.t[2] - result.t[1])
         seen = result.t[1] + (along[1] - along[-1]) / pace
@@ -99,17 +88,19 @@ def v_groove() -> Verdicts:
     """
     for half, degrees in ((45, 20), (30, 20), (60, 10)):
         angle, opening = math.radians(degrees), math.radians(half)
-        depth = SOFT.depth_at(MASS * GRAVITY * math.cos(angle) / (2 * math.sin(opening)))
-        h = (RADIUS - depth) * math.sin(opening)
-        expected = GRAVITY * math.sin(angle) / (1 + INERTIA / (MASS * h**2))
+        depth = SOFT.depth_at(
+            balls.MASS * balls.GRAVITY * math.cos(angle) / (2 * math.sin(opening))
+        )
+        h = (balls.RADIUS - depth) * math.sin(opening)
+        expected = balls.GRAVITY * math.sin(angle) / (1 + balls.INERTIA / (balls.MASS * h**2))
         # The groove runs along y: turn it into x, then let it fall.
-        slope = tilted(angle) * pin.SE3(pin.utils.rotate("z", -math.pi / 2), np.zeros(3))
-        scene = scene_of(surfaces.groove(opening), SOFT, bristle(1.0), placement=slope)
+        slope = balls.tilted(angle) * pin.SE3(pin.utils.rotate("z", -math.pi / 2), np.zeros(3))
+        scene = balls.scene_of(surfaces.groove(opening), SOFT, balls.bristle(1.0), placement=slope)
         rest = np.zeros(3)
-        height = (RADIUS - depth) / math.sin(opening)
-        q0, v0 = state(slope.act(np.array([0.0, -0.5, height])), rest, rest)
-        result = sp.Simulation(scene, PRECISE).run(q0, v0, 0.2, record_dt=0.1)
-        along = velocities(result) @ slope.rotation[:, 1]
+        height = (balls.RADIUS - depth) / math.sin(opening)
+        q0, v0 = balls.state(slope.act(np.array([0.0, -0.5, height])), rest, rest)
+        result = sp.Simulation(scene, balls.PRECISE).run(q0, v0, 0.2, record_dt=0.1)
+        along = balls.velocities(result) @ slope.rotation[:, 1]
         tried = f"walls at {half} deg from the middle, A = {degrees} deg"
         law = "g sin A / (1 + 2 r^2 / (5 h^2)), h = (r - depth) sin(half angle)"
         seen = (along[2] - along[1]) / (result.t[2] - result.t[1])
@@ -124,18 +115,18 @@ def creep(integrator: object, friction: object, duration: float) -> float:
 
     The sphere cannot turn: it would roll.
     """
-    slope = tilted(math.atan(OF_CONE * MU_SLOPE))
+    slope = balls.tilted(math.atan(OF_CONE * MU_SLOPE))
     model = ball_model()
-    scene = scene_of(models.square(), SOFT, friction, model=model, placement=slope)
-    depth = SOFT.depth_at(MASS * GRAVITY * slope.rotation[2, 2])
-    q0 = slope.act(np.array([0.0, 0.0, RADIUS - depth]))
+    scene = balls.scene_of(models.square(), SOFT, friction, model=model, placement=slope)
+    depth = SOFT.depth_at(balls.MASS * balls.GRAVITY * slope.rotation[2, 2])
+    q0 = slope.act(np.array([0.0, 0.0, balls.RADIUS - depth]))
     result = sp.Simulation(scene, integrator).run(q0, None, duration, record_dt=duration / 2)
     return float(np.linalg.norm(result.q[2] - result.q[1]) / (duration / 2))
 
 
 @case("stands on a slope")
 def stands() -> Verdicts:
-    friction = bristle(MU_SLOPE, stiffness=1e5, mass=MASS)
+    friction = balls.bristle(MU_SLOPE, stiffness=1e5, mass=balls.MASS)
     steppers = (sp.Adaptive(1e-6), sp.Implicit(1e-6), sp.LinearlyImplicitEuler(1e-3))
     tried = "slope of 0.9 mu_s, 60 s, BristleFriction, {}"
     for stepper in steppers:
@@ -156,5 +147,5 @@ def creeps() -> Verdicts:
         expected = v_static * 2 * math.sin(math.asin(OF_CONE) / 3)
         tried = f"slope of 0.9 mu_s, CoulombFriction, v_static = {v_static:g} m/s"
         law = "mu_s (3 x - x^3) / 2 = tan A, x = s / v_static"
-        seen = creep(PRECISE, friction, 1.0)
+        seen = creep(balls.PRECISE, friction, 1.0)
         yield compare("creep [m/s]", tried, law, expected, seen, 1e-6)

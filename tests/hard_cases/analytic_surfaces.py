@@ -14,21 +14,7 @@ import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.swing import ball_model, downward_crossings, mean_period
-from tests.hard_cases import surfaces
-from tests.hard_cases.balls import (
-    GRAVITY,
-    MASS,
-    PRECISE,
-    RADIUS,
-    STIFF,
-    beta,
-    bristle,
-    center_at,
-    event_times,
-    scene_of,
-    spring,
-    state,
-)
+from tests.hard_cases import balls, surfaces
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
 STILL = np.zeros(3)
@@ -43,16 +29,18 @@ def period_along_x(result: Result, velocity: Array, periods: int) -> float:
 def dome() -> Verdicts:
     """Energy (1 + b) v^2 / 2 = g L (1 - cos) + (1 + b) v0^2 / 2 and m g cos = m v^2 / L."""
     # Strong damping would let the ball off before its depth is zero.
-    law, depth = spring(1e8, ratio=0.02), MASS * GRAVITY / 1e8
+    law, depth = balls.spring(1e8, ratio=0.02), balls.MASS * balls.GRAVITY / 1e8
     for speed, rolls in ((0.05, True), (0.4, True), (0.05, False)):
-        scene = scene_of(surfaces.sphere(DOME), law, bristle(1e4, 1e8) if rolls else None)
-        arm, b = DOME + RADIUS, beta() if rolls else 0.0
-        expected = (2 + (1 + b) * speed**2 / (GRAVITY * arm)) / (3 + b)
-        q0, v0 = state([0.0, 0.0, arm - depth], [speed, 0.0, 0.0], STILL)
-        v0[4] = speed / (RADIUS - depth) if rolls else 0.0
-        result = sp.Simulation(scene, PRECISE).run(q0, v0, 1.0, record_dt=1e-4)
-        left = event_times(result, "lift_off")[0]
-        center, _ = center_at(result, left)
+        scene = balls.scene_of(
+            surfaces.sphere(DOME), law, balls.bristle(1e4, 1e8) if rolls else None
+        )
+        arm, b = DOME + balls.RADIUS, balls.beta() if rolls else 0.0
+        expected = (2 + (1 + b) * speed**2 / (balls.GRAVITY * arm)) / (3 + b)
+        q0, v0 = balls.state([0.0, 0.0, arm - depth], [speed, 0.0, 0.0], STILL)
+        v0[4] = speed / (balls.RADIUS - depth) if rolls else 0.0
+        result = sp.Simulation(scene, balls.PRECISE).run(q0, v0, 1.0, record_dt=1e-4)
+        left = balls.event_times(result, "lift_off")[0]
+        center, _ = balls.center_at(result, left)
         seen = float(center[2] / np.linalg.norm(center))
         tried = f"R = 4 r, v0 = {speed:g} m/s, {'rolling' if rolls else 'frictionless'}"
         formula = (
@@ -74,13 +62,13 @@ def tautochrone() -> Verdicts:
     """
     periods = []
     shell = surfaces.cycloid_trough(GENERATOR, reach=2.9, width=0.02)
-    scene = scene_of(shell, spring(), model=ball_model())
-    expected = 4 * math.pi * math.sqrt(GENERATOR / GRAVITY)
+    scene = balls.scene_of(shell, balls.spring(), model=ball_model())
+    expected = 4 * math.pi * math.sqrt(GENERATOR / balls.GRAVITY)
     for degrees in (20, 90, 150):
         start = np.array([math.radians(degrees)])
         points, normals = surfaces.cycloid(GENERATOR, start)
-        depth = MASS * GRAVITY * normals[0, 2] / STIFF
-        result = sp.Simulation(scene, PRECISE).run(
+        depth = balls.MASS * balls.GRAVITY * normals[0, 2] / balls.STIFF
+        result = sp.Simulation(scene, balls.PRECISE).run(
             points[0] - depth * normals[0], None, 2.35 * expected, record_dt=1e-3
         )
         periods.append(period_along_x(result, result.v, 2))
@@ -100,18 +88,20 @@ def cone() -> Verdicts:
         sine, cosine = math.sin(half), math.cos(half)
         out = 0.035
         # Along the normal, up and inward: N sin = m g.
-        depth = MASS * GRAVITY / (sine * STIFF)
-        height = (out + (RADIUS - depth) * cosine) / math.tan(half) + (RADIUS - depth) * sine
-        orbit = math.sqrt(GRAVITY / (math.tan(half) * out))
+        depth = balls.MASS * balls.GRAVITY / (sine * balls.STIFF)
+        height = (out + (balls.RADIUS - depth) * cosine) / math.tan(half) + (
+            balls.RADIUS - depth
+        ) * sine
+        orbit = math.sqrt(balls.GRAVITY / (math.tan(half) * out))
         push = 2e-3 * orbit * out
         center = np.array([out, 0.0, height])
         velocity = np.array([push * sine, orbit * out, push * cosine])
-        touch = (out + RADIUS * cosine) / math.tan(half)
+        touch = (out + balls.RADIUS * cosine) / math.tan(half)
         shell = surfaces.cone(half, touch - 0.012, touch + 0.012)
-        scene = scene_of(shell, spring(), model=ball_model())
+        scene = balls.scene_of(shell, balls.spring(), model=ball_model())
         expected = math.sqrt(3) * sine
         duration = 4.7 * 2 * math.pi / (orbit * expected)
-        result = sp.Simulation(scene, PRECISE).run(center, velocity, duration, record_dt=1e-3)
+        result = sp.Simulation(scene, balls.PRECISE).run(center, velocity, duration, record_dt=1e-3)
         # Over whole waves, in which the speed of the orbit goes up and down.
         wave = result.q[:, 2] - 0.5 * (result.q[:, 2].max() + result.q[:, 2].min())
         crossings = downward_crossings(result.t, wave, result.v[:, 2])

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report import surfaces
 from tests import meshes
+from tests.oracle.geometry import Long, gaps
 from tests.shell.surfaces import tetrahedron
 
 Mesh = tuple[Array, NDArray[np.int32]]
@@ -83,25 +84,13 @@ def _enters(a: Array, b: Array, c: Array) -> tuple[Array, NDArray[np.bool_]]:
     return (-b - np.sqrt(np.where(valid, square, 0))) / np.where(a > 0, a, 1), valid
 
 
-def distance(point: Array, corners: Array) -> float:
-    """Distance of a point to triangles with `corners` (m, 3, 3)."""
-    a, ends = corners, np.roll(corners, -1, axis=1)
-    sides = ends - a
-    t = np.clip(_dot(point - a, sides) / _dot(sides, sides), 0, 1)
-    best = np.linalg.norm(point - a - t[..., None] * sides, axis=-1).min()
-    normal = np.cross(sides[:, 0], sides[:, 1])
-    inside = (_dot(np.cross(sides, point - a), normal[:, None]) >= 0).all(axis=1)
-    height = np.abs(_dot(point - a[:, 0], normal)) / np.linalg.norm(normal, axis=1)
-    return float(min(best, height[inside].min(initial=np.inf)))
-
-
 def sweep(start: Array, along: Array, radius: float, corners: Array) -> float:
     """Return how far along the unit vector `along` a sphere first touches triangles (m, 3, 3).
 
     The boundary of the set of centers that touch consists of two offset planes for each triangle,
     a cylinder for each side and a sphere for each corner.
     """
-    if distance(start, corners) <= radius:
+    if gaps(start[None], corners.astype(Long)).min() <= radius:
         return 0.0
     a = corners
     sides = np.roll(corners, -1, axis=1) - a

@@ -8,12 +8,9 @@ from tests.joints.solid_walk import judge_solid, read_step, spheres_of
 from tests.joints.solids import FAMILIES, write_step, write_stl
 from tests.joints.trimmed import TrimmedSolid
 from tests.joints.verdict import Verdict, exact_share
-from tests.joints.walk import chord_error, judge, spheres
-from tests.parts.occ import Rng, checked
+from tests.parts.occ import Rng, checked, placed
 
 PER_PART = 4000
-TRIMMED = tuple(BOXES)
-"""Families that are judged by their trimmed faces."""
 
 CHORD = 3e-4
 """Deflection of STL files over the size."""
@@ -26,25 +23,10 @@ DIGITS = {False: 2e-12, True: 2e-7}
 
 
 def walk_part(family, folder, rng, stl=False, moved=False, most=PER_PART):
-    """Walk over a random part of a family."""
-    if family in BOXES:
-        path = write_step(checked(BOXES[family](rng)), folder / f"{family}.step")
-        return walk_file(path, family, min(PER_PART, most), rng, stl)
-    part = FAMILIES[family](rng)
-    return walk_outline(part.moved(rng) if moved else part, folder, rng, stl, min(PER_PART, most))
-
-
-def walk_outline(part, folder, rng, stl=False, count=PER_PART):
-    """Walk over a part that is judged by its outline."""
-    solid = part.solid()
-    if stl:
-        mesh = write_stl(solid, folder / "part.stl", CHORD * part.size)
-        shell = sp.Shell.from_file(mesh, unit="mm")
-    else:
-        shell = sp.Shell.from_file(write_step(solid, folder / "part.step"))
-    asked, digits = spheres(part, count, rng), DIGITS[stl] * shell.size
-    out = judge(shell, part, asked, digits, chord_error(shell, part))
-    return _named(out, shell)
+    """Walk over a random part of a family, in a random place if `moved`."""
+    solid = checked(BOXES[family](rng)) if family in BOXES else FAMILIES[family](rng).solid()
+    path = write_step(placed(solid, rng, 50.0) if moved else solid, folder / "part.step")
+    return walk_file(path, family, min(PER_PART, most), rng, stl)
 
 
 def walk_file(path: Path, name: str, count: int, rng: Rng, stl: bool = False) -> Verdict:
@@ -59,11 +41,7 @@ def walk_file(path: Path, name: str, count: int, rng: Rng, stl: bool = False) ->
     else:
         shell = sp.Shell.from_file(path)
     rough = 2 * chord  # OpenCASCADE's deflection is no guarantee
-    digits = DIGITS[stl] * trimmed.size
-    return _named(judge_solid(shell, trimmed, name, asked, digits, rough), shell)
-
-
-def _named(verdict: Verdict, shell: sp.Shell) -> Verdict:
+    verdict = judge_solid(shell, trimmed, name, asked, DIGITS[stl] * trimmed.size, rough)
     exact = sum(face.exact for face in shell.faces)
     verdict.part += f" (exact {exact} of {len(shell.faces)}, {100 * exact_share(shell):.1f} %)"
     return verdict

@@ -10,12 +10,20 @@ import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from tests.joints.trimmed import PERSISTENCE, Edge, Minima, TrimmedSolid
 from tests.joints.verdict import MM, Verdict, exact_elements
-from tests.joints.walk import BESIDE, DEPTHS
 from tests.parts.cad_mesh import Ints
 from tests.parts.occ import Rng, Solid
 
 RADII = 0.2, 8.0
 """Of spheres [mm]."""
+
+DEPTHS = 1e-6, 0.9
+"""Of spheres, over the radius."""
+
+BESIDE = 1e-6, 0.5
+"""How far from the joint [mm]."""
+
+APEX = 1e-3
+"""Spheres touch cones farther than that from their axes [mm]."""
 
 NEAR = 1e-3
 """Points of one minimum are nearer than this to each other [radii]."""
@@ -57,12 +65,12 @@ def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> SolidSpheres:
         at, near = rng.uniform(low, high, per), rng.random(per) < 0.35
         # Beside the ends of the edge, where other joints come.
         length = max(np.linalg.norm(np.diff(edge.grid[1], axis=0), axis=1).sum(), 1e-9)
-        hair = np.exp(rng.uniform(*np.log(BESIDE), per)) / MM / length * (high - low)
+        hair = np.exp(rng.uniform(*np.log(BESIDE), per)) / length * (high - low)
         hair = np.minimum(hair, (high - low) / 2)
         at = np.where(near, np.where(rng.random(per) < 0.5, low + hair, high - hair), at)
         points, tangents = edge.at(at)
         into = solid.inward(edge, k, points, tangents)
-        beside = np.exp(rng.uniform(*np.log(BESIDE), per)) / MM
+        beside = np.exp(rng.uniform(*np.log(BESIDE), per))
         if edge in sides[-len(solid.seams) :] and solid.seams:
             beside *= rng.choice([-1, 1], per)
         surface = solid.surfaces[edge.faces[k]]
@@ -86,6 +94,10 @@ def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> SolidSpheres:
         kept = away > r + solid.size / 100
     else:
         kept = np.ones(len(r), bool)
+    for cone in (one for one in solid.surfaces if one.kind == "Cone"):
+        distance, normal = cone.closest(at)
+        foot = at - distance[:, None] * normal
+        kept &= np.linalg.norm(np.cross(foot - cone.point, cone.axis), axis=1) > APEX
     return SolidSpheres(at[kept], r[kept], [joints[k] for k in np.flatnonzero(kept)])
 
 
@@ -192,8 +204,8 @@ def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str
                 return "double", f"weights {total} at {truth.points[k].tolist()}"
     apart = np.linalg.norm(truth.points - truth.points[truth.depths.argmax()], axis=1)
     single = (apart <= NEAR * r) & (np.abs(truth.depths - deepest) <= 1e-9 * r)
-    if single.all() and truth.plane[truth.depths.argmax()]:
-        push = np.linalg.norm((found.weights * found.depths**2) @ found.normals)
+    if single.all() and len(found.depths) == 1 and truth.plane[truth.depths.argmax()]:
+        push = np.linalg.norm(found.depths**2 * found.normals)
         off = abs(push / deepest**2 - 1)
         # The push is the square of a depth that is off by the tolerance.
         if off > 1e-6 + (1 + 2 * tolerance / deepest) ** 2 - 1:

@@ -1,10 +1,10 @@
-"""Parts whose faces meet in every way, with their outlines [mm]: turned and extruded."""
+"""Parts whose faces meet in every way [mm]: outlines of lines and arcs, turned and extruded."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,92 +12,113 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakeWire,
-    BRepBuilderAPI_Transform,
 )
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
 from OCP.BRepTools import BRepTools
 from OCP.GC import GC_MakeArcOfCircle
-from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Vec
 from OCP.Message import Message
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from OCP.StlAPI import StlAPI_Writer
 
 from sphshell_pin.base.arrays import Array
-from tests.joints.profile import Piece, Profile, outline
 from tests.parts import occ
 from tests.parts.occ import Rng, Solid, checked, rough_size
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part: an outline (x, z) turned about z, or if it has a `height` (x, y) extruded along z.
+class Piece:
+    """A line from `begin` to `end`, or the arc about `middle` that turns by `turn` [rad]."""
 
-    `place` (3, 4) moves it from there.
+    begin: Array
+    end: Array
+    middle: Array | None = None
+    turn: float = 0.0
+
+    @property
+    def half(self) -> Array:
+        """The point in the middle of an arc."""
+        c, s = np.cos(self.turn / 2), np.sin(self.turn / 2)
+        return self.middle + np.array([[c, -s], [s, c]]) @ (self.begin - self.middle)
+
+
+@dataclass(frozen=True)
+class Part:
+    """An outline (x, z) turned about z, or if it has a `height` (x, y) extruded along z.
+
+    Its pieces are connected: closed, or with both ends on the axis.
     """
 
     name: str
-    profile: Profile
+    pieces: tuple[Piece, ...]
     height: float = 0.0
-    place: Array = field(default_factory=lambda: np.eye(3, 4))
-
-    @property
-    def turned(self) -> bool:
-        return self.height == 0.0
 
     @property
     def size(self) -> float:
         """Its largest extent, about [mm]."""
-        return 2 * max(float(np.abs(piece.begin).max()) for piece in self.profile.pieces)
+        return 2 * max(float(np.abs(piece.begin).max()) for piece in self.pieces)
 
     def solid(self) -> Solid:
-        """The solid [mm]."""
         wire = BRepBuilderAPI_MakeWire()
-        pieces = list(self.profile.pieces)
-        if not self.profile.closed:
-            pieces.append(Piece(pieces[-1].end, pieces[0].begin))
-        for piece in pieces:
+        first, last = self.pieces[0].begin, self.pieces[-1].end
+        closing = () if np.allclose(first, last, rtol=0.0, atol=1e-12) else (Piece(last, first),)
+        for piece in (*self.pieces, *closing):
             wire.Add(self._edge(piece))
         face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
-        if self.turned:
-            solid = BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(), gp_Dir(0, 0, 1))).Shape()
-        else:
-            solid = BRepPrimAPI_MakePrism(face, gp_Vec(0, 0, self.height)).Shape()
-        move = gp_Trsf()
-        move.SetValues(*self.place.ravel().tolist())
-        return checked(BRepBuilderAPI_Transform(solid, move, True).Shape())
-
-    def in_space(self, flat: Array, angle: Array | float, share: Array | float) -> Array:
-        """Points (n, 3) of those of the outline (n, 2), at angles or at shares of the height."""
-        x, y = flat.T
-        if self.turned:
-            at = np.column_stack([x * np.cos(angle), x * np.sin(angle), y])
-        else:
-            at = np.column_stack([x, y, np.broadcast_to(self.height * np.asarray(share), x.shape)])
-        return at @ self.place[:, :3].T + self.place[:, 3]
-
-    def in_plane(self, points: Array) -> Array:
-        """Points (n, 2) in the plane of the outline of points (n, 3) of a surface."""
-        at = (points - self.place[:, 3]) @ self.place[:, :3]
-        return (
-            np.column_stack([np.hypot(at[:, 0], at[:, 1]), at[:, 2]]) if self.turned else at[:, :2]
-        )
-
-    def moved(self, rng: Rng) -> Part:
-        """The same part, turned at random and moved."""
-        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        turn *= np.linalg.det(turn)
-        return Part(self.name, self.profile, self.height, np.c_[turn, rng.uniform(-50, 50, 3)])
+        if self.height == 0.0:
+            return checked(BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(), gp_Dir(0, 0, 1))).Shape())
+        return checked(BRepPrimAPI_MakePrism(face, gp_Vec(0, 0, self.height)).Shape())
 
     def _edge(self, piece: Piece) -> Solid:
         ends = [self._point(piece.begin), self._point(piece.end)]
         if piece.middle is None:
             return BRepBuilderAPI_MakeEdge(*ends).Edge()
-        half = self._point(piece.at(np.array([piece.length / 2]))[0][0])
-        return BRepBuilderAPI_MakeEdge(GC_MakeArcOfCircle(ends[0], half, ends[1]).Value()).Edge()
+        arc = GC_MakeArcOfCircle(ends[0], self._point(piece.half), ends[1])
+        return BRepBuilderAPI_MakeEdge(arc.Value()).Edge()
 
     def _point(self, at: Array) -> gp_Pnt:
-        return gp_Pnt(at[0], 0.0, at[1]) if self.turned else gp_Pnt(at[0], at[1], 0.0)
+        return gp_Pnt(at[0], at[1], 0.0) if self.height else gp_Pnt(at[0], 0.0, at[1])
+
+
+def outline(corners, radii, missed=None, cut=None, closed=False):
+    """Round or cut corners of a polygon (k, 2).
+
+    missed : angles [rad] by which the arc at a corner misses the tangents of both lines
+    cut : widths of chamfers
+    """
+    corners, missed, cut = np.asarray(corners, float), missed or {}, cut or {}
+    count = len(corners)
+    entry = {k: corners[k] for k in range(count)}
+    leave = dict(entry)
+    between: dict[int, Piece] = {}
+    for k in {*radii, *cut}:
+        a, b, c = corners[k - 1], corners[k], corners[(k + 1) % count]
+        u, v = (b - a) / np.linalg.norm(b - a), (c - b) / np.linalg.norm(c - b)
+        if k in cut:
+            entry[k], leave[k] = b - cut[k] * u, b + cut[k] * v
+            between[k] = Piece(entry[k], leave[k])
+            continue
+        radius, (one, two) = radii[k], missed.get(k, (0.0, 0.0))
+        sense = np.sign(u[0] * v[1] - u[1] * v[0])
+        n, m = sense * np.array([-u[1], u[0]]), sense * np.array([-v[1], v[0]])
+        # The center is off both lines by the radius, less what the arc cuts them.
+        off = radius * np.cos([one, two])
+        middle = b + np.linalg.solve(np.array([n, m]), off)
+        entry[k] = middle - off[0] * n - radius * np.sin(one) * u
+        leave[k] = middle - off[1] * m + radius * np.sin(two) * v
+        p, q = entry[k] - middle, leave[k] - middle
+        turn = float(np.arctan2(p[0] * q[1] - p[1] * q[0], p @ q))
+        between[k] = Piece(entry[k], leave[k], middle, turn)
+    pieces = []
+    for k in range(count):
+        if k in between:
+            pieces.append(between[k])
+        if closed or k < count - 1:
+            begin, end = leave[k], entry[(k + 1) % count]
+            if np.linalg.norm(end - begin) > 1e-12:
+                pieces.append(Piece(begin, end))
+    return tuple(pieces)
 
 
 def write_step(solid: Solid, path: Path) -> Path:
@@ -179,7 +200,7 @@ def dome(radius: float, length: float) -> Part:
         Piece(np.array([radius, 0.0]), np.array([radius, length - radius])),
         Piece(np.array([radius, length - radius]), tip, tip - [0.0, radius], np.pi / 2),
     )
-    return Part(f"dome {radius:g}", Profile(pieces))
+    return Part(f"dome {radius:g}", pieces)
 
 
 def slot(length: float, radius: float, depth: float = 20.0) -> Part:
@@ -218,7 +239,7 @@ def d_shaft(radius: float, cut: float) -> Part:
         Piece(back, ends[1], middle, np.pi - half),
         Piece(ends[1], ends[0]),
     )
-    return Part(f"d-shaft {radius:g} cut {cut:g}", Profile(pieces), 60.0)
+    return Part(f"d-shaft {radius:g} cut {cut:g}", pieces, 60.0)
 
 
 FAMILIES: dict[str, Callable[[Rng], Part]] = {

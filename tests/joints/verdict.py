@@ -17,13 +17,8 @@ FAULTS = {
     "deep": "the deepest contact is too deep",
     "phantom": "a contact is at no minimum of the distance",
     "double": "the weights add up to more than the components of the surface inside the sphere",
-    "energy": "one minimum, of the right depth, and another energy",
     "force": "one minimum, on a plane, and another force",
-    "bridge": "several minima, and another energy or fewer components",
 }
-
-ALLOWED = ("bridge",)
-"""Faults that the documentation states: spheres larger than a hollow fillet."""
 
 
 @dataclass
@@ -34,7 +29,6 @@ class Verdict:
     ----------
     centers, radii : (n, 3) and (n,) [m]; joints : what meets there, one a sphere
     faults : rows by the name of the fault; details : of rows
-    worst : largest error of the depth over the radius, of spheres without fault
     """
 
     part: str
@@ -43,19 +37,15 @@ class Verdict:
     joints: list[str]
     faults: dict[str, list[int]] = field(default_factory=lambda: {name: [] for name in FAULTS})
     details: dict[int, str] = field(default_factory=dict)
-    worst: float = 0.0
 
     def add(self, fault: str, row: int, detail: str) -> None:
         self.faults[fault].append(row)
         self.details[row] = detail
 
     def found(self) -> dict[str, list[str]]:
-        """Faults that are not allowed, with a description of each sphere."""
-        return {
-            name: [self.describe(row) for row in rows]
-            for name, rows in self.faults.items()
-            if rows and name not in ALLOWED
-        }
+        """Faults, with a description of each sphere."""
+        found = self.faults.items()
+        return {name: [self.describe(row) for row in rows] for name, rows in found if rows}
 
     def describe(self, row: int) -> str:
         where = f"center {self.centers[row].tolist()}, radius {float(self.radii[row])}"
@@ -72,10 +62,10 @@ def exact_share(shell: sp.Shell) -> float:
     return float(of_element[exact_elements(shell)].sum() / total) if total else 1.0
 
 
-def exact_elements(shell: sp.Shell, whole: bool = False) -> NDArray[np.bool_]:
-    """Whether each element is exact, or if `whole` all of its face."""
+def exact_elements(shell: sp.Shell) -> NDArray[np.bool_]:
+    """Whether each element is exact."""
     out = np.zeros(len(shell.elements), bool)
     for face in shell.faces:
         out[face.elements] = True
-        out[face.elements if whole and not face.exact else face.curved] = False
+        out[face.curved] = False
     return out

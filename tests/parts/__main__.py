@@ -12,7 +12,6 @@ from importlib.util import find_spec
 from benchmarks.measured import Measured, write
 from tests.parts import tables
 from tests.parts.files import KINDS_OF_FILE
-from tests.parts.judge import Verdict
 from tests.parts.running import Outcome, run
 from tests.parts.solids import FAMILIES, family_of
 
@@ -30,9 +29,8 @@ def main() -> int:
         outcomes.append(outcome)
         report(outcome)
     verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
-    found = sections(verdicts)
-    for one in found:
-        print(f"## {one.title}\n\n{tables.table(one.table)}\n")
+    rows = tables.by_file(verdicts)
+    print(tables.table(rows))
     failed = Counter(f"{family_of(one.number)}: {one.skipped}" for one in outcomes if one.skipped)
     print(f"\n{len(outcomes)} parts, {failed.total()} skipped {dict(failed)}")
     print(f"{time.perf_counter() - begin:.0f} s")
@@ -42,7 +40,8 @@ def main() -> int:
             f"{len(outcomes)} parts of {len(FAMILIES)} families; OpenCASCADE failed on "
             f"{failed.total()}, which were skipped."
         )
-        print(f"wrote {write('mesh_parts', command, [Measured(text=text), *found])}")
+        found = [Measured(text=text), Measured("Kinds of files", table=rows)]
+        print(f"wrote {write('mesh_parts', command, found)}")
     return 1 if any(outcome.refused for outcome in outcomes) else 0
 
 
@@ -81,16 +80,6 @@ def report(outcome: Outcome) -> None:
         print(f"{outcome.number:4d} REFUSED {text}", flush=True)
     if outcome.skipped:
         print(f"{outcome.number:4d} {family_of(outcome.number)} skipped: {outcome.skipped}")
-
-
-def sections(verdicts: list[Verdict]) -> list[Measured]:
-    """Return what the site shows."""
-    found = [Measured("Kinds of files", table=tables.by_file(verdicts))]
-    for name, group in tables.groups(verdicts):
-        faces = tables.by_face(group)
-        if faces:
-            found.append(Measured(f"Triangles by their CAD face: {name}", table=faces))
-    return found
 
 
 if __name__ == "__main__":

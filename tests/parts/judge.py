@@ -1,7 +1,7 @@
 """What one file of a part costs: errors of distances, and of forces on planes."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,7 +11,6 @@ from sphshell_pin import ImpactLaw, Shell
 from sphshell_pin.base.arrays import Array
 from tests.parts.cad_mesh import MM, CadMesh, Ints, coarse_enough, joined, meshed_faces
 from tests.parts.files import KINDS_OF_FILE
-from tests.parts.found import faces_found, share_recognized
 from tests.parts.solids import family_of, random_solid
 from tests.parts.truth import Places, Touches, places_beside, touches_of
 
@@ -69,7 +68,6 @@ class Verdict:
     lost : touches of planes that are not found
     ok : what `health` says; seconds : of processor time to load and curve it
     recognized : share of the triangles in faces that were found
-    found : COUNTS by CAD face; None of a file with other triangles
     """
 
     number: int
@@ -86,7 +84,6 @@ class Verdict:
     ok: bool
     seconds: float
     recognized: float
-    found: Ints | None = field(default=None, repr=False)
 
     @property
     def worse(self) -> bool:
@@ -145,8 +142,13 @@ def judged(part: Part, kind: str) -> Verdict:
         ok=shell.health.ok,
         seconds=seconds,
         recognized=share_recognized(shell),
-        found=faces_found(shell, part.mesh, rows) if (rows >= 0).all() else None,
     )
+
+
+def share_recognized(shell: Shell) -> float:
+    """Share of the triangles in faces that were found."""
+    recognized = [row for face in shell.faces for row in face.elements]
+    return float(np.isin(shell.triangle_element, recognized).mean())
 
 
 def loaded(part: Part, kind: str) -> tuple[Shell, Ints, float]:

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tests.parts.cad_mesh import KINDS
-from tests.parts.found import COUNTS
 from tests.parts.judge import MARGIN, Verdict
 
 FILE_COLUMNS = (
@@ -22,18 +20,6 @@ FILE_COLUMNS = (
     "recognized",
     "ms per 1000 triangles",
 )
-FACE_COLUMNS = (
-    "CAD face",
-    "triangles",
-    "normals off by > 1 degree",
-    "recognized",
-    "of these, same kind",
-    "of these, off by > 1 degree",
-    "of these, within 0.05 degrees",
-    "faces found on a CAD face",
-)
-
-
 Rows = list[Sequence[str]]
 
 
@@ -91,26 +77,6 @@ def forces(verdicts: list[Verdict], method: str) -> str:
 def largest_ratio(verdict: Verdict) -> float:
     """Largest error, curved over flat; flat ones below the margin count as that."""
     return verdict.largest["smooth"] / max(verdict.largest["facets"], MARGIN)
-
-
-def by_face(verdicts: list[Verdict]) -> Rows:
-    """One row for each kind of CAD face."""
-    found = [v.found for v in verdicts if v.found is not None and not v.spoiled]
-    if not found:
-        return []
-    columns = zip(KINDS, np.sum(found, axis=0).T.tolist(), strict=True)
-    return [FACE_COLUMNS, *([kind, *_faces(*counts)] for kind, counts in columns)]
-
-
-def _faces(*counts: int) -> list[str]:
-    def share(part: int, whole: int, digits: int = 4) -> str:
-        return f"{part / whole:.{digits}f}" if whole else "-"
-
-    of = dict(zip(COUNTS, counts, strict=True))
-    count, taken = of["triangles"], of["recognized"]
-    parts = (of["same"], of["recognized off"], of["recognized exact"])
-    cells = [str(count), share(of["off"], count), share(taken, count)]
-    return [*cells, *(share(one, taken) for one in parts), share(of["pieces"], of["faces"], 2)]
 
 
 def line(verdict: Verdict) -> str:

@@ -179,20 +179,6 @@ def test_a_gain_leaves_the_posture_of_the_start_where_it_was(arm) -> None:
 
 
 @pytest.mark.parametrize(
-    ("joint", "value", "fault", "says"),
-    [
-        ("wrist", 0.0, NameNotFound, "shoulder, elbow"),
-        ("elbow", 1.6, InvalidParameter, "limits of the joint, -2 to 1.5 rad"),
-        ("elbow", np.nan, InvalidParameter, "value"),
-    ],
-)
-def test_a_target_that_cannot_be_changes_nothing(arm, joint, value, fault, says) -> None:
-    with pytest.raises(fault, match=says):
-        arm.aim(joint, value)
-    assert [one.value for one in arm.targets] == [0.4, 0.5]
-
-
-@pytest.mark.parametrize(
     "controller", ["", '[controller]\ntype = "gravity-compensation"\n', PD.replace("60.0", "0.0")]
 )
 def test_without_a_posture_there_are_no_targets(tmp_path, controller) -> None:

@@ -86,14 +86,6 @@ def test_changes_by_dotted_key(tmp_path):
     assert scenario.controller.kind == "gravity-compensation"
 
 
-def test_a_point_beside_the_frame_has_three_coordinates():
-    path = shipped_scenarios()["polished_valve"]
-    changed = read_scenario(path, {"controller.offset": "[0, 0, 1e-3]"})
-    assert [*changed.controller.offset] == [0.0, 0.0, 1e-3]
-    with pytest.raises(ScenarioError, match=r"controller.*offset"):
-        read_scenario(path, {"controller.offset": "[0, 1e-3]"})
-
-
 @pytest.mark.parametrize("table", ["[robot]", "[[robot]]"])
 def test_a_key_as_a_fault_tells_it_may_be_set(table, tmp_path):
     path = write(tmp_path, DROP.replace("[robot]", table).replace('name = "ball"', 'name = "a.b"'))

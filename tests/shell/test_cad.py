@@ -10,15 +10,7 @@ pytest.importorskip("OCP")
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.gp import gp_Pnt
 
-from sphshell_pin import Shell
-from sphshell_pin.errors import (
-    InvalidParameter,
-    MissingExtra,
-    NameNotFound,
-    ShellFileError,
-    UnitMissing,
-    UnusableExtra,
-)
+from sphshell_pin import Shell, errors
 from tests.parts.occ import area_and_volume
 from tests.programs import python
 from tests.shell import cad_shapes as shapes
@@ -122,9 +114,9 @@ def test_bodies_and_faces_can_be_chosen_by_name(tmp_path):
     assert barrel.health.area == pytest.approx(2 * np.pi * 0.005 * 0.02, rel=1e-2)
     assert Shell.from_file(path, faces=[7]).health.area == barrel.health.area
     assert set(barrel.face_names) == {"barrel"}
-    with pytest.raises(NameNotFound, match=r"no body 'bolt'; two\.step has: plate, pin"):
+    with pytest.raises(errors.NameNotFound, match=r"no body 'bolt'; two\.step has: plate, pin"):
         Shell.from_file(path, bodies=["bolt"])
-    with pytest.raises(NameNotFound, match="barrel, Face 8, Face 9"):
+    with pytest.raises(errors.NameNotFound, match="barrel, Face 8, Face 9"):
         Shell.from_file(path, bodies=["pin"], faces=["Face 1"])
 
 
@@ -139,7 +131,7 @@ def test_faces_written_one_by_one_are_joined(tmp_path):
 
 def test_brep_files_need_a_unit(tmp_path):
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
-    with pytest.raises(UnitMissing, match=r"box.brep measures 37.42 units"):
+    with pytest.raises(errors.UnitMissing, match=r"box.brep measures 37.42 units"):
         Shell.from_file(path)
 
 
@@ -151,7 +143,7 @@ def test_a_wire_holds_no_surface(tmp_path):
         shapes.write_step(tmp_path / "wire.step", ("wire", edge)),
     ]
     for path in files:
-        with pytest.raises(ShellFileError, match="holds no surface"):
+        with pytest.raises(errors.ShellFileError, match="holds no surface"):
             Shell.from_file(path, "mm")
 
 
@@ -173,7 +165,7 @@ def test_damaged_files_are_told_in_a_sentence(suffix, tmp_path, capfd):
     for name, (data, told) in broken.items():
         path = tmp_path / f"{name}{suffix}"
         path.write_bytes(data)
-        with pytest.raises(ShellFileError, match=told):
+        with pytest.raises(errors.ShellFileError, match=told):
             Shell.from_file(path, "mm")
     assert capfd.readouterr() == ("", "")
 
@@ -182,7 +174,7 @@ def test_damaged_files_are_told_in_a_sentence(suffix, tmp_path, capfd):
 def test_what_would_take_millions_of_triangles_is_refused(make, chord_error, tmp_path):
     """The faces of the box are nearly all flat: a coarse mesh does not grow, the fine one would."""
     told = f"chord_error = {chord_error:g} would take about .* \\[m\\]"
-    with pytest.raises(InvalidParameter, match=told):
+    with pytest.raises(errors.InvalidParameter, match=told):
         load(tmp_path, getattr(shapes, make)(), chord_error=chord_error)
 
 
@@ -190,14 +182,14 @@ def test_what_would_take_millions_of_triangles_is_refused(make, chord_error, tmp
     "options", [{"chord_error": 0.0}, {"sew": -1.0}, {"bodies": "pin"}, {"faces": []}]
 )
 def test_options_out_of_range_are_refused(options, tmp_path):
-    with pytest.raises(InvalidParameter, match=next(iter(options))):
+    with pytest.raises(errors.InvalidParameter, match=next(iter(options))):
         load(tmp_path, shapes.box(), **options)
 
 
 def test_options_of_cad_are_refused_for_meshes(tmp_path):
     path = tmp_path / "part.stl"
     load(tmp_path, shapes.box()).to_file(path)
-    with pytest.raises(InvalidParameter, match="belongs to CAD files"):
+    with pytest.raises(errors.InvalidParameter, match="belongs to CAD files"):
         Shell.from_file(path, "m", chord_error=1e-4)
 
 
@@ -211,7 +203,9 @@ def put_before_the_library(folder, monkeypatch, text):
 def test_without_the_library_the_extra_is_named(tmp_path, monkeypatch):
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     put_before_the_library(tmp_path, monkeypatch, "")
-    with pytest.raises(MissingExtra, match=r"reading .brep files needs .*sphshell-pin\[cad\]"):
+    with pytest.raises(
+        errors.MissingExtra, match=r"reading .brep files needs .*sphshell-pin\[cad\]"
+    ):
         Shell.from_file(path, "mm")
 
 
@@ -228,7 +222,9 @@ def test_without_the_library_the_extra_is_named(tmp_path, monkeypatch):
 def test_a_library_of_the_system_that_is_absent_is_named(reason, told, tmp_path, monkeypatch):
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     put_before_the_library(tmp_path, monkeypatch, f"raise ImportError({reason!r})")
-    with pytest.raises(UnusableExtra, match="installed but cannot be loaded: .*" + told) as caught:
+    with pytest.raises(
+        errors.UnusableExtra, match="installed but cannot be loaded: .*" + told
+    ) as caught:
         Shell.from_file(path, "mm")
     assert caught.value.reason == reason
 

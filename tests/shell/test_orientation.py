@@ -45,13 +45,6 @@ def test_nested_components_alternate():
     assert any("cavity" in sentence for sentence in health.repairs)
 
 
-def test_a_cavity_wound_as_such_is_left_alone():
-    cavity = (0.5 * CUBE + 0.25, [q[::-1] for q in CUBE_QUADS])
-    surface = clean(*joined((CUBE, CUBE_QUADS), cavity))
-    assert surface.health.flipped_elements == 0
-    assert surface.health.volume == pytest.approx(1 - 0.125)
-
-
 def test_two_cubes_with_a_common_edge_are_both_closed():
     surface = clean(*joined((CUBE, CUBE_QUADS), (CUBE + np.array([1.0, 1.0, 0.0]), CUBE_QUADS)))
     health = surface.health

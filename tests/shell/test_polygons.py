@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from sphshell_pin.shell import clean
 
-from .surfaces import CUBE, CUBE_QUADS, areas, by_place, plate
+from .surfaces import areas, by_place
 
 
 def total(surface):
@@ -16,15 +16,6 @@ def total(surface):
 
 def ring(points):
     return np.column_stack([points, np.zeros(len(points))])
-
-
-def test_planar_quads_stay_one_element_of_two_triangles():
-    surface = clean(CUBE, CUBE_QUADS)
-    assert surface.elements.shape == (6, 4)
-    assert surface.triangle_element.tolist() == [k // 2 for k in range(12)]
-    assert surface.health.quads == 6
-    assert surface.health.ok
-    assert not surface.health.repairs
 
 
 @pytest.mark.parametrize(("lift", "split"), [(1e-11, False), (1e-9, True), (0.1, True)])
@@ -97,12 +88,3 @@ def test_outlines_that_cross_themselves_are_reported():
     surface = clean(points, [[0, 1, 2, 3, 4]])
     assert surface.health.tangled_polygons == 1
     assert any("crosses itself" in sentence for sentence in surface.health.problems)
-
-
-def test_mixed_lists_and_padded_arrays_agree():
-    vertices, quads = plate(2)
-    rows = [quads[0].tolist(), quads[1].tolist()[:3], quads[2].tolist()]
-    padded = np.full((3, 6), -1)
-    for k, row in enumerate(rows):
-        padded[k, : len(row)] = row
-    assert by_place(clean(vertices, rows)) == by_place(clean(vertices, padded))

@@ -62,21 +62,6 @@ def test_first_position_is_kept_exactly():
     assert (surface.vertices == points[0]).all(axis=1).any()
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.randoms(use_true_random=False), st.integers(0, 2**32 - 1))
-def test_groups_do_not_depend_on_the_order(random, seed):
-    rng = np.random.default_rng(seed)
-    vertices, quads = plate(3)
-    # Chains of near vertices, some across the cells of the welding grid.
-    soup = vertices[quads].reshape(-1, 3) + rng.uniform(-6e-8, 6e-8, (36, 3))
-    order = list(range(len(soup)))
-    random.shuffle(order)
-    place = np.argsort(order)
-    one = clean(soup, np.arange(36).reshape(-1, 4))
-    two = clean(soup[order], place[np.arange(36).reshape(-1, 4)])
-    assert one.health.welded_vertices == two.health.welded_vertices
-
-
 @pytest.mark.parametrize("offset", [0.0, 1e-12, 1e3])
 def test_a_box_far_from_the_origin_is_welded_alike(offset):
     vertices, quads = plate(3)
@@ -113,11 +98,6 @@ def test_limit_of_area_is_against_the_longest_edge(height, kept):
     assert surface.health.degenerate_elements == (0 if kept else 1)
 
 
-def test_small_but_well_shaped_elements_survive():
-    vertices, triangles = joined(tetrahedron(), tetrahedron(1e-5, (2.0, 0, 0)))
-    assert clean(vertices, triangles).health.elements == 8
-
-
 def test_duplicates_of_both_windings_are_dropped():
     extra = [[3, 2, 0, 1], [2, 3, 1, 0], [0, 4, 5, 1]]
     health = clean(CUBE, CUBE_QUADS + extra).health
@@ -126,13 +106,6 @@ def test_duplicates_of_both_windings_are_dropped():
     assert health.elements == 6
     assert health.degenerate_elements == 0
     assert health.is_closed
-
-
-def test_same_corners_in_another_cycle_are_no_duplicate():
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    health = clean(points, [[0, 1, 2, 3], [0, 2, 1, 3]]).health
-    assert health.duplicate_elements < 2
-    assert health.elements >= 2
 
 
 def test_repeated_corners_make_smaller_elements():

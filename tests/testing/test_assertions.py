@@ -9,7 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, WeakLawWarning
-from sphshell_pin.testing.found import crossed, distances
+from sphshell_pin.testing.found import crossed
 from tests import meshes
 from tests.contact.smooth.surfaces import shell_of
 from tests.models import (
@@ -25,7 +25,6 @@ from tests.models import (
     two_free_bodies,
     two_free_state,
 )
-from tests.oracle.geometry import closest_on_triangles
 
 LAW = sp.ImpactLaw(4e4, 1.5, 20.0, 2e-2)
 FRICTION = sp.CoulombFriction(0.3, 0.1, 0.1, 1.0)
@@ -312,17 +311,6 @@ def test_a_sphere_that_passes_is_told() -> None:
         testing.assert_not_passed_through(replace(free, scene=scene))
     stopped = sp.Simulation(scene, sp.Adaptive()).run(free_q([0, 0, 0.1]), v, 0.1)
     assert testing.assert_not_passed_through(stopped) == 0.0
-
-
-def test_distances_are_those_of_the_oracle() -> None:
-    rng = np.random.default_rng(5)
-    corners = rng.normal(size=(40, 3, 3))
-    points = rng.normal(size=(30, 3))
-    got = distances(points, corners)
-    for point, row in zip(points, got, strict=True):
-        nearest = closest_on_triangles(point, corners.astype(np.longdouble))
-        expected = np.linalg.norm((nearest - point).astype(float), axis=1)
-        assert row == pytest.approx(expected, abs=1e-13)
 
 
 def test_ways_through_triangles() -> None:

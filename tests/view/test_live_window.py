@@ -76,15 +76,6 @@ def test_only_what_moved_is_told(window, canvas):
     assert window.news(early.frame) == (3, None)
 
 
-def test_nothing_of_a_frame_is_told_before_it_is_whole(window, canvas):
-    window.commit()
-    put(canvas["ball"])
-    canvas["ball"].set_transform(place(1.0))
-    assert Browser(window).look().log == []
-    window.commit()
-    assert set(Browser(window).look().objects) == {"/meshcat/ball"}
-
-
 def test_a_slow_browser_gets_the_newest_and_a_late_one_the_whole(window, canvas):
     rng = np.random.default_rng(1)
     fast, slow = Browser(window), Browser(window)

@@ -58,13 +58,6 @@ def test_saddles_and_unknown_patches_are_hidden(pool):
     assert pool([{}, {}], patches, PatchScale(4e6)) == {}
 
 
-def test_the_largest_forces_are_shown(pool):
-    patches = some_patches(*[(1e-3 * k, 1e-3, 4e6) for k in (1, 2, 3)])
-    rows = [{"normal_force": force} for force in (1.0, 0.1, 2.0)]
-    sizes = [np.linalg.norm(one[:3, 0]) for one in pool(rows, patches, PatchScale(4e6)).values()]
-    np.testing.assert_allclose(sorted(sizes), [1e-3, 3e-3])
-
-
 def test_the_scale_follows_the_patches():
     patches = some_patches(*[(1e-3, 1e-3, 1e6)] * 9, (1e-3, 1e-3, 1e9))
     scale = PatchScale.of(patches, 0.5)

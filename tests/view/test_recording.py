@@ -8,21 +8,14 @@ from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.view import write_recording
 from sphshell_pin.view.contact_path import ContactRows
 from sphshell_pin.view.recording import choose_rows
-from tests.view.stand_ins import (
-    a_result,
-    a_scene,
-    ball_configuration,
-    ball_model,
-    ball_on_plate,
-    contact_log,
-    contact_pair,
-    plate,
-)
+from tests.view import stand_ins
 from tests.view.test_page import unpacked
 
 
 def rows_of(t, log=(), fps=10.0, speed=1.0):
-    return choose_rows(np.asarray(t, dtype=float), ContactRows.of(contact_log(log)), fps, speed)
+    return choose_rows(
+        np.asarray(t, dtype=float), ContactRows.of(stand_ins.contact_log(log)), fps, speed
+    )
 
 
 def test_each_frame_shows_the_nearest_recorded_row():
@@ -45,7 +38,7 @@ def test_a_touch_between_two_frames_is_shown_at_its_peak():
 
 
 def test_the_page_holds_the_run(tmp_path):
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     threads = threading.active_count()
     path = write_recording(tmp_path / "new" / "run.html", result, scene, title="Ball <on> plate")
     assert path == tmp_path / "new" / "run.html"
@@ -69,7 +62,7 @@ def test_the_page_holds_the_run(tmp_path):
 
 
 def test_a_run_that_diverged_is_shown_up_to_its_end(tmp_path):
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     result.q[-5:] = np.nan
     result.contacts.normal_force[-1] = np.inf
     result.contacts.point_world[-2] = np.nan
@@ -87,15 +80,17 @@ def test_a_run_that_diverged_is_shown_up_to_its_end(tmp_path):
 
 
 def test_a_run_without_contact_says_so(tmp_path):
-    model = ball_model()
-    scene = a_scene(model, contact_pair(model, "ball", 0.05, plate()))
-    q = [ball_configuration([0, 0, height]) for height in (1.0, 0.9, 0.8)]
-    page = write_recording(tmp_path / "run.html", a_result([0, 0.1, 0.2], q), scene).read_text()
+    model = stand_ins.ball_model()
+    scene = stand_ins.a_scene(model, stand_ins.contact_pair(model, "ball", 0.05, stand_ins.plate()))
+    q = [stand_ins.ball_configuration([0, 0, height]) for height in (1.0, 0.9, 0.8)]
+    page = write_recording(
+        tmp_path / "run.html", stand_ins.a_result([0, 0.1, 0.2], q), scene
+    ).read_text()
     assert "no contact in this run" in page
 
 
 def test_without_meshcat_one_sentence_says_how_to_get_it(tmp_path, monkeypatch):
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     monkeypatch.setitem(sys.modules, "meshcat", None)
     with pytest.raises(MissingExtra, match=r"sphshell-pin\[view\]"):
         write_recording(tmp_path / "run.html", result, scene)
@@ -104,6 +99,6 @@ def test_without_meshcat_one_sentence_says_how_to_get_it(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("name", "value"), [("fps", 0.0), ("fps", np.nan), ("speed", -1.0)])
 def test_a_pace_that_is_not_positive_is_refused(tmp_path, name, value):
-    scene, result = ball_on_plate()
+    scene, result = stand_ins.ball_on_plate()
     with pytest.raises(InvalidParameter, match=name):
         write_recording(tmp_path / "run.html", result, scene, **{name: value})

@@ -2,7 +2,7 @@ import coal
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.view.surface import SurfaceMesh, great_circles, outlined_edges, tube
+from sphshell_pin.view.surface import SurfaceMesh, outlined_edges, tube
 from tests import meshes
 
 
@@ -36,11 +36,3 @@ def test_a_tube_keeps_its_radius_round_a_helix():
     counts = np.unique(edges, axis=0, return_counts=True)[1]
     assert np.count_nonzero(counts == 1) == 2 * 6
     assert counts.max() == 2
-
-
-def test_great_circles_lie_on_the_sphere_in_three_planes():
-    vertices, segments = great_circles(0.3)
-    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 0.3)
-    assert np.linalg.matrix_rank(vertices) == 3
-    steps = np.linalg.norm(vertices[segments[:, 0]] - vertices[segments[:, 1]], axis=1)
-    np.testing.assert_allclose(steps, steps[0])
