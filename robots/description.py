@@ -87,7 +87,9 @@ def add_limits(root: ET.Element) -> Iterator[str]:
         one for one in root.iter("joint") if one.get("type") in kinds and one.find("limit") is None
     ]
     for joint in bare:
-        ET.SubElement(joint, "limit", effort="0", velocity="0")
+        ET.SubElement(joint, "limit")
+    for limit in root.iterfind("joint/limit"):
+        limit.attrib.update({"effort": "0", "velocity": "0"} | limit.attrib)
     if bare:
         yield f"without limits of the joints {_names(bare)}: they have no <limit>"
     for key in ("effort", "velocity"):

@@ -343,9 +343,14 @@ def _check_root(model: pin.Model, file: Path) -> None:
     if least <= 1e-12 * most:
         bodies = [one.name for one in model.frames if one.parentJoint == 1]
         link = next((name for name in bodies if name != model.names[1]), model.names[1])
+        advice = (
+            "give it an <inertial>, or the folder of its meshes, --package-dir, and a --density"
+        )
+        if model.njoints > 2:
+            advice += "; or fix it: without --free-flyer (free_flyer), in new with --base fixed"
         raise RobotError(
             f"{file}: the root link '{link}' is to float but has no mass, nor has what is fixed to "
-            "it: give it an <inertial>, or leave out the free-flyer (--free-flyer, free_flyer)"
+            f"it: {advice}"
         )
 
 

@@ -289,9 +289,11 @@ def pressing(points, **changes):
         Tip("tip", 0.1, np.zeros(3), ""),
         dict.fromkeys(("mass", "slide_mass", "fastest"), 1),
     )
-    stance = SimpleNamespace(tip=tip, **ones, inertia=0.0, joints=4, joint_inertia=np.ones(4))
+    stance = SimpleNamespace(
+        tip=tip, **ones, inertia=0.0, joints=4, joint_inertia=np.ones(4), aside=np.zeros(3)
+    )
     pair = Materials(find_material("rubber"), find_material("steel"))
-    place = SimpleNamespace(stance=stance)
+    place = SimpleNamespace(stance=stance, placement=pin.SE3.Identity())
     return Press(place, Way(np.array(points)), pair, 1.0, 1e-3, **changes)
 
 

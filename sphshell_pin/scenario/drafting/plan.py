@@ -78,8 +78,11 @@ class Press:
     repair: Literal["", "calmed", "cut", "stays"] = ""
 
     def __post_init__(self) -> None:
-        stance, force, self.path = self.place.stance, self.force, self.way.points
-        radius, self.slides = stance.tip.radius, self.way.slides
+        stance, force, self.slides = self.place.stance, self.force, self.way.slides
+        radius = stance.tip.radius
+        # As it comes into the part, its spring shall not pull it back to where it was before.
+        beside = (self.gap + self.materials.depth(force, radius)) * stance.aside
+        self.path = self.way.points + self.place.placement.rotation.T @ beside
         rise = force_rise(radius, force, stance.mass, self.materials)
         self.force_rise = max(0.5 * self.lead_in, rise)
         self.lead_in = 2 * self.force_rise

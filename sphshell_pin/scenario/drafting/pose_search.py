@@ -56,11 +56,13 @@ def repaired(one: Press, fault: Fault) -> Press | None:
     if fault.kind == "force" and not one.repair:
         return replace(one, calm=True, repair="calmed")
     # Up to where it failed the path will do.
-    along = np.cumsum([0.0, *np.linalg.norm(np.diff(one.path, axis=0), axis=1)])
+    along = np.cumsum([0.0, *np.linalg.norm(np.diff(one.way.points, axis=0), axis=1)])
     count = int((along < _CUT * one.speed * (fault.t - one.lead_in)).sum())
     if along[max(count - 1, 0)] < SHORTEST_PATH * one.place.stance.tip.radius:
         return None
-    return replace(one, way=replace(one.way, points=one.path[:count], why=fault.text), repair="cut")
+    return replace(
+        one, way=replace(one.way, points=one.way.points[:count], why=fault.text), repair="cut"
+    )
 
 
 def _still(one: Press, fault: Fault) -> list[Press]:
@@ -71,7 +73,7 @@ def _still(one: Press, fault: Fault) -> list[Press]:
     if fault.kind == "links" and fault.t < one.lead_in:
         return []
     why = f"with a path {fault.text}" if one.slides else one.way.why
-    way = replace(one.way, points=one.path[:1], why=why)
+    way = replace(one.way, points=one.way.points[:1], why=why)
     return [replace(one, way=way, lead_in=_CALM_LEAD_IN, repair="stays")]
 
 

@@ -10,6 +10,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
+from sphshell_pin.robots import joints_without_mass
 from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, unit
 from sphshell_pin.scenario.format.reach import Reach, turn_between
@@ -21,6 +22,8 @@ from sphshell_pin.scenario.format.reach import Reach, turn_between
 _MOBILE, _EASY, _STRAIGHT = 2e-3, 0.1, 0.998
 # Postures: seeds tried, how far from each other [rad or m] they have to be, and how many are taken.
 _SEEDS, _APART, _MOST = 32, 0.3, 4
+# Postures in which the tip's motion is looked at, whether it is along one line.
+_LOOKED = 3
 # Cosine between limb and approach below which the limb is beside the tip or before it.
 _BESIDE = 0.3
 NO_LIMIT = 1e9
@@ -34,10 +37,14 @@ _HEIGHT, _ASTRAY, _TURNED, _FASTEST = 1e-4, 0.1, 0.02, 6.0
 
 
 def joints_aside(model: pin.Model, tips: Sequence[Tip]) -> tuple[str, ...]:
-    """Return the joints that move none of the `tips`."""
+    """Return the joints that move none of the `tips`, and those that move no mass.
+
+    If none of them moved a mass, they would be held without one that could move: none is.
+    """
     # A joint that is held holds those that mimic it, and what it mimics.
     chains = [list(model.supports[joint_of(model, tip.frame)])[1:] for tip in tips]
     on_way = {model.names[j] for chain in chains for j in chain}
+    on_way = on_way.difference(joints_without_mass(model, pin.neutral(model))) or on_way
     moving = {one for name in on_way for one in group_of(model, name)}
     return tuple(name for name in list(model.names)[1:] if name not in moving)
 
@@ -49,6 +56,10 @@ class Limb(Reach):
         self.tip, self.lock = tip, joints_aside(model, [tip])
         super().__init__(model, tip.frame, tip.offset, self.lock)
         self.chain = list(model.supports[model.frames[self.frame].parentJoint])[1:]
+        rng, neutral = np.random.default_rng(0), pin.neutral(model)
+        moves = [self.jacobian(self.seed(neutral, rng))[:3] for _ in range(_LOOKED)]
+        self.on_line = max(_rank(one) for one in moves) == 1
+        """Whether all joints move the tip along one line, in any posture."""
 
     def direction(self) -> Array:
         """Return the unit vector (3,) along the limb to the tip, from what is in `data`.
@@ -85,6 +96,8 @@ class Stance:
         Center of the tip's sphere (3,) [m].
     approach
         Unit (3,): where the tip presses.
+    aside
+        Motion (3,) across the approach that comes with one along it: 0 of a tip that moves freely.
     slide
         Unit (3,) across the approach: where the tip moves best; None where it cannot.
     mass, slide_mass
@@ -107,12 +120,17 @@ class Stance:
         The least motion that joints make, turns of the tip included, as a part of the largest.
     ahead
         Cosine between the approach and the limb that carries the tip; below 0 it is in the way.
+        1 of a tip that moves along one line, wherever its limb is.
     """
 
     def __init__(self, limb: Limb, q: Array, approach: Array) -> None:
-        self.limb, self.tip, self.q, self.approach = limb, limb.tip, q, approach
+        self.limb, self.tip, self.q = limb, limb.tip, q
         model, columns, jacobian = limb.model, limb.columns, limb.jacobian(q)
         linear, angular = jacobian[:3], jacobian[3:]
+        if limb.on_line and linear.any():  # it slides nowhere, and presses that way
+            line = np.linalg.svd(linear)[0][:, 0]
+            approach = line if line @ approach >= 0 else -line
+        self.approach = approach
         self.center = limb.data.oMf[limb.frame].act(limb.offset)
         away = [self.center - limb.data.oMi[j].translation for j in limb.chain]
         self.reach = max((float(np.linalg.norm(one)) for one in away), default=0.0)
@@ -120,7 +138,11 @@ class Stance:
         values = np.linalg.svd(scaled, compute_uv=False)
         self.dexterity = float(values[-1] / values[0]) if values[0] > 0 else 0.0
         ahead = float(limb.direction() @ approach)
-        self.ahead = ahead if len(columns) > 1 else abs(ahead)
+        self.ahead = 1.0 if limb.on_line else ahead
+        # Where joints can move the tip, as near as they can along the approach.
+        ways = np.linalg.svd(linear, full_matrices=False)[0][:, : _rank(linear)]
+        near = ways @ (ways.T @ approach)
+        self.aside = near / max(float(near @ approach), 1e-3) - approach
         mass = mass_matrix(model, q)[np.ix_(columns, columns)]
         self.joint_inertia = np.diag(mass).copy()
         response = np.linalg.solve(mass, jacobian.T)
@@ -130,15 +152,15 @@ class Stance:
         across = np.eye(3) - np.outer(approach, approach)
         sideways, slides = np.linalg.eigh(across @ mobility @ across)
         easiest = float(sideways[-1])
-        self.slide = _upright(slides[:, -1]) if easiest > _MOBILE * top else None
+        slides_there = not limb.on_line and easiest > _MOBILE * top
+        self.slide = _upright(slides[:, -1]) if slides_there else None
         self.mass = 1 / max(along, 1e-9)
         self.slide_mass = self.mass if self.slide is None else 1 / max(easiest, 1e-9)
         # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
-        self.mobility = (min(along, easiest) if len(columns) > 1 else along) / top
+        self.mobility = (along if limb.on_line else min(along, easiest)) / top
         turning = float(np.trace(angular @ response[:, 3:]))
         turns = int(np.linalg.matrix_rank(angular, tol=1e-6))
-        spare = len(columns) - int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max()))
-        self.inertia = turns / turning if spare and turning > 1e-9 else 0.0
+        self.inertia = turns / turning if len(columns) > _rank(linear) and turning > 1e-9 else 0.0
         efforts, dry = model.upperEffortLimit[columns], model.upperDryFrictionLimit[columns]
         stated = (efforts < NO_LIMIT) & (efforts > 0)
         # Motors bear the friction of their joints, too, and the weight of the links.
@@ -168,6 +190,17 @@ class Stance:
         q, off = self.limb.solve(self.q, center, turn=held if self.joints >= 6 else None)
         found = Stance(self.limb, q, self.approach)
         return None if off > _HEIGHT * self.reach or found.mobility < _MOBILE else found
+
+    def can_yield(self) -> bool:
+        """Whether the tip can come into a part by a tenth of its radius within the joints' limits.
+
+        At a limit the stop would bear the force, and not the part.
+        """
+        limb, step = self.limb, np.zeros(self.limb.model.nv)
+        inverse = np.linalg.pinv(limb.jacobian(self.q)[:3], rcond=_MOBILE)
+        step[limb.columns] = inverse @ (0.1 * self.tip.radius * self.approach)
+        pressed = pin.integrate(limb.model, self.q, step)
+        return bool(np.abs(limb.into_limits(pressed) - pressed).max() < 1e-9)
 
     def follows(self, centers: Array, free: Callable[[Array], bool]) -> tuple[int, str]:
         """Return how many of the `centers` (k, 3) the tip reaches one after the other, and why.
@@ -244,6 +277,8 @@ def stances(
         one = Stance(limb, at, approach)
         if off > _HEIGHT * one.reach or one.mobility < least or one.ahead <= _BESIDE:
             continue
+        if not one.can_yield():
+            continue
         away = [np.abs(pin.difference(limb.model, other.q, at)).max() for _, other in found]
         if min(away, default=np.inf) < _APART or not usable(at):
             continue
@@ -260,6 +295,11 @@ def _ease(limb: Limb, q: Array) -> float:
     at = q[limb.bounded]
     room = np.minimum(at - limb.low, limb.high - at) / (limb.high - limb.low)
     return float(np.clip(room / _AT_EASE, 0.0, 1.0).min(initial=1.0))
+
+
+def _rank(linear: Array) -> int:
+    """Return in how many directions joints move the tip, by its Jacobian (3, k)."""
+    return int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max(initial=1e-9)))
 
 
 def _upright(axis: Array) -> Array:
