@@ -290,7 +290,13 @@ def pressing(points, **changes):
         dict.fromkeys(("mass", "slide_mass", "fastest"), 1),
     )
     stance = SimpleNamespace(
-        tip=tip, **ones, inertia=0.0, joints=4, joint_inertia=np.ones(4), aside=np.zeros(3)
+        tip=tip,
+        **ones,
+        inertia=0.0,
+        joints=4,
+        joint_inertia=np.ones(4),
+        aside=np.zeros(3),
+        slide=np.eye(3)[0],
     )
     pair = Materials(find_material("rubber"), find_material("steel"))
     place = SimpleNamespace(stance=stance, placement=pin.SE3.Identity())

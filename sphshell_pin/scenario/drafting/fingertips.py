@@ -31,7 +31,8 @@ _LOWEST, _AS_LOW = "one of its lowest ends", 0.1
 _TOOL_WORDS = ("tcp", "tool", "ee", "eef", "effector", "grasp", "grip", "flange")
 # How many times as heavy as its only limb a body is that carries a wheel, and is no foot of an arm.
 _MUCH = 10.0
-_END_WORDS = ("tip", "tcp", "tool", "foot", "feet", "ankle")
+_FOOT_WORDS = ("foot", "feet", "ankle")
+_END_WORDS = ("tip", "tcp", "tool", *_FOOT_WORDS)
 
 
 def find_tips(
@@ -102,11 +103,13 @@ def other_ends(model: pin.Model, frame: str) -> list[str]:
 def only_turns(model: pin.Model) -> bool:
     """Whether what its body carries only turns, without end: rotors or wheels, and what tilts them.
 
-    Limbs of at most two joints, all without limits, and lighter than the body; a single one much.
+    Limbs of at most two joints, the last without limits, and lighter than the body; a single one
+    much.
     """
     first = 2 if floats(model) else 1
-    depths = [len(model.supports[j]) - first for j in _leaves(model)]
-    endless = all("RUB" in one.shortname() for one in list(model.joints)[first:])
+    leaves = _leaves(model) - {first - 1}
+    depths = [len(model.supports[j]) - first for j in leaves]
+    endless = all("RUB" in model.joints[j].shortname() for j in leaves)
     carried = sum(one.mass for one in list(model.inertias)[first:])
     heavy = model.inertias[first - 1].mass > carried * (1 if len(depths) > 1 else _MUCH)
     return endless and heavy and max(depths, default=3) <= 2
@@ -261,7 +264,7 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
         return [(frame_on_joint(model, joint) or model.names[joint], "what carries the gripper")]
     if len(names) == 1 or (names and model.njoints == 2):
         return [(names[0], "the only end of the robot" if len(names) == 1 else "its only body")]
-    for word in _END_WORDS:
+    for word in _FOOT_WORDS if free else _END_WORDS:
         found = [name for name in names if word in name.lower()]
         if len(found) > 1 and not free:
             return [(_freest(model, found), f"the freest of {len(found)} ends called '{word}'")]

@@ -126,9 +126,9 @@ def _written(asked: Asked) -> NewScenario:
     masses = loaded.assumed
     if masses and asked.density is None:
         masses += ": another with --density"
-    bare = few([repr(one) for one in joints_without_mass(loaded.model, loaded.q0)])
-    bare = bare and f"held, as nothing that they move has a mass: joints {bare}"
-    why = tuple(one for one in (shape, *made.why, masses, bare) if one)
+    idle = few([repr(one) for one in joints_without_mass(loaded.model, loaded.q0)])
+    idle = idle and f"held, as nothing that they move has a mass: joints {idle}"
+    why = tuple(one for one in (shape, *made.why, masses, idle) if one)
     return replace(made, why=why)
 
 

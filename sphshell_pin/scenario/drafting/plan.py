@@ -96,7 +96,9 @@ class Press:
         self.contact = Contact(self.materials, 4 * self.gap / self.first_touch, 0.1 * self.speed)
         self.damped = DAMPED * (CALM if self.calm else 1.0)
         friction = self.contact.mu_static * force
-        stiffness = max(stance.slide_mass * TIP_RATE**2, friction / (TIP_LAG * radius))
+        # What cannot slide follows no path: its mass would be damped more than the contact bears.
+        follows = 0.0 if stance.slide is None else stance.slide_mass * TIP_RATE**2
+        stiffness = max(follows, friction / (TIP_LAG * radius))
         mass = math.sqrt(stance.mass * stance.slide_mass)
         turning = 0.0
         if stance.inertia:

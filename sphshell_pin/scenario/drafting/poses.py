@@ -17,9 +17,8 @@ from sphshell_pin.scenario.format.reach import Reach, turn_between
 
 # Mobility along the approach and across it, as a part of the best one: below the first a posture is
 # singular; the posture that a robot is known to work in is taken from the second on.
-# A heavy arm with a light wrist has 0.01 in its best posture. The last is that of a tip with one
-# coordinate, whose friction bears part of the force otherwise.
-_MOBILE, _EASY, _STRAIGHT = 2e-3, 0.1, 0.998
+# A heavy arm with a light wrist has 0.01 in its best posture.
+_MOBILE, _EASY = 2e-3, 0.1
 # Postures: seeds tried, how far from each other [rad or m] they have to be, and how many are taken.
 _SEEDS, _APART, _MOST = 32, 0.3, 4
 # Postures in which the tip's motion is looked at, whether it is along one line.
@@ -120,13 +119,14 @@ class Stance:
         The least motion that joints make, turns of the tip included, as a part of the largest.
     ahead
         Cosine between the approach and the limb that carries the tip; below 0 it is in the way.
-        1 of a tip that moves along one line, wherever its limb is.
+        Of a tip that moves along one line: between that and the approach that was asked for.
     """
 
     def __init__(self, limb: Limb, q: Array, approach: Array) -> None:
         self.limb, self.tip, self.q = limb, limb.tip, q
         model, columns, jacobian = limb.model, limb.columns, limb.jacobian(q)
         linear, angular = jacobian[:3], jacobian[3:]
+        asked = approach
         if limb.on_line and linear.any():  # it slides nowhere, and presses that way
             line = np.linalg.svd(linear)[0][:, 0]
             approach = line if line @ approach >= 0 else -line
@@ -138,7 +138,7 @@ class Stance:
         values = np.linalg.svd(scaled, compute_uv=False)
         self.dexterity = float(values[-1] / values[0]) if values[0] > 0 else 0.0
         ahead = float(limb.direction() @ approach)
-        self.ahead = 1.0 if limb.on_line else ahead
+        self.ahead = float(asked @ approach) if limb.on_line else ahead
         # Where joints can move the tip, as near as they can along the approach.
         ways = np.linalg.svd(linear, full_matrices=False)[0][:, : _rank(linear)]
         near = ways @ (ways.T @ approach)
@@ -234,18 +234,11 @@ def approaches(limb: Limb, q: Array, directions: Sequence[Sequence[float]]) -> l
     """Return where the tip may press, unit vectors (3,): the `directions` (k, 3) in turn.
 
     After the first one, the axis of the world along which the limb that carries the tip points at
-    q. A tip of a single coordinate presses in the plane of its motion alone.
+    q.
     """
-    axis, way = limb.jacobian(q)[3:], limb.direction()
-    home = tuple(nearest_axis(way))
-    found = [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
-    if axis.shape[1] > 1:
-        return found
-    if not axis.any():
-        return [way, -way]
-    normal = unit(axis[:, 0])
-    flat = [one - normal * (normal @ one) for one in found]
-    return [unit(one) for one in flat if np.linalg.norm(one) > 0.5]
+    limb.jacobian(q)
+    home = tuple(nearest_axis(limb.direction()))
+    return [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
 
 
 def stances(
@@ -263,19 +256,15 @@ def stances(
     place = np.array([0.0, 0.0, height or 0.0])
 
     def along() -> Array:
-        way = limb.direction()
-        if len(limb.columns) == 1 and way @ approach < 0:
-            way = -way
-        return turn_between(way, approach)
+        return turn_between(limb.direction(), approach)
 
-    least = _MOBILE if len(limb.columns) > 1 else _STRAIGHT
     found: list[tuple[float, Stance]] = []
     start = limb.into_limits(q)
     for k in range(_SEEDS):
         seed = limb.seed(start, rng) if k else start
-        at, off = limb.solve(seed, place, rows=rows, turn=along)
+        at, off = limb.solve(seed, place, rows=rows, turn=None if limb.on_line else along)
         one = Stance(limb, at, approach)
-        if off > _HEIGHT * one.reach or one.mobility < least or one.ahead <= _BESIDE:
+        if off > _HEIGHT * one.reach or one.mobility < _MOBILE or one.ahead <= _BESIDE:
             continue
         if not one.can_yield():
             continue
