@@ -80,6 +80,15 @@ def check_tree(root: ET.Element) -> None:
             )
 
 
+def fix_root(root: ET.Element) -> None:
+    """Fix the links of a URDF to its root link that joints of type floating leave free there."""
+    moved = {str(one.get("link")) for one in root.iterfind("joint/child")}
+    for joint in root.iterfind("joint[@type='floating']"):
+        parent = joint.find("parent")
+        if parent is not None and parent.get("link") not in moved:
+            joint.set("type", "fixed")
+
+
 def add_limits(root: ET.Element) -> Iterator[str]:
     """Set limits that urdfdom asks for, or that are negative, to 0, which states none; say so."""
     kinds = ("revolute", "prismatic")

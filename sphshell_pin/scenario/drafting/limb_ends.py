@@ -20,6 +20,8 @@ from sphshell_pin.shell.shell import Shell
 # How far a ball that covers an end may stand out before it, as a part of its radius: else the end
 # is flat, and gets a ball of this part of that radius. Without geometry: as a part of the reach.
 _STANDS_OUT, _BALL, _OF_REACH = 0.25, 1 / 3, 0.01
+# Least radius of a ball on the underside of a body that floats, as a part of its size.
+_OF_BODY = 0.05
 # Points of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's
 # place, as meshes of fingertips stand out of the spheres that stand for them.
 AT_TIP = 1.5
@@ -139,7 +141,9 @@ class LinkGeometry:
         if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
             covering = f"it covers the end of link '{self.link}'"
             return Tip(name, rounded(covers), center, covering, end="round")
-        ball = rounded(_BALL * covers) if radius is None else radius
+        floats = self._model.joints[self._joint].nv == 6
+        least = _OF_BODY * size if floats else 0.0
+        ball = rounded(max(_BALL * covers, least)) if radius is None else radius
         front, still = center + (before + ball) * ahead, ahead if radius is None else None
         return Tip(name, ball, front, f"a ball on the end of link '{self.link}'", still, "flat")
 

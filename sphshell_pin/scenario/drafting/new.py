@@ -17,7 +17,7 @@ from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
-from sphshell_pin.robots import floats, is_path, joints_without_mass
+from sphshell_pin.robots import RobotError, floats, is_path, joints_without_mass
 from sphshell_pin.robots.inertia import few, lacks_masses, lacks_moments
 from sphshell_pin.scenario.drafting.asked import WORDS, Asked
 from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
@@ -80,6 +80,16 @@ def new_scenario(
             raise
         made = _written(replace(asked, against="plastic"))
         note = f"the part is of plastic, as with steel {str(error).partition(';')[0]}"
+        return replace(made, why=(note, *made.why))
+    except RobotError as error:
+        if not asked.mimic:
+            raise
+        try:
+            made = _written(replace(asked, mimic=False))
+        except RobotError:
+            raise error from None
+        said = str(error).partition(";")[0]
+        note = f"joints that are coupled move freely (--no-mimic), as else: {said}"
         return replace(made, why=(note, *made.why))
     except CannotStand as error:
         if asked.base is not None:
