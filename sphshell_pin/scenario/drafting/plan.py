@@ -93,7 +93,9 @@ class Press:
         # Over the gap the mass is moved by 3 force (t / rise)^2, the beginning of the rise: the gap
         # is force t^4 / (4 mass rise^2), the speed four times that by t.
         self.first_touch = (4 * stance.mass * self.force_rise**2 * self.gap / force) ** 0.25
-        self.contact = Contact(self.materials, 4 * self.gap / self.first_touch, 0.1 * self.speed)
+        # What slides as it comes to rest does so at once, where nothing makes it slide later.
+        slip = self.speed * (1.0 if stance.slide is None else 0.1)
+        self.contact = Contact(self.materials, 4 * self.gap / self.first_touch, slip)
         self.damped = DAMPED * (CALM if self.calm else 1.0)
         friction = self.contact.mu_static * force
         # What cannot slide follows no path: its mass would be damped more than the contact bears.

@@ -25,6 +25,8 @@ _SEEDS, _APART, _MOST = 32, 0.3, 4
 _LOOKED = 3
 # Cosine between limb and approach below which the limb is beside the tip or before it.
 _BESIDE = 0.3
+# How far between its motion and its limb a tip may press that moves along a line.
+_BETWEEN = (0.0, 1.0, 2.0)
 NO_LIMIT = 1e9
 """Efforts [N m] and forces [N] beyond this stand for none."""
 # Distance of a joint at ease from its nearer limit, as a part of its range.
@@ -64,13 +66,9 @@ class Limb(Reach):
         """Return the unit vector (3,) along the limb to the tip, from what is in `data`.
 
         To a sphere before its frame as the frame points, else the frame would be dragged beside it;
-        to any other along the line from the last joint that is not inside it. Of a tip with a
-        single coordinate it is the direction of its motion: pressed along another one it jams by
-        friction.
+        to any other along the line from the last joint that is not inside it.
         """
-        pose, motion = self.data.oMf[self.frame], self.moves
-        if motion.shape[1] == 1 and motion.any():
-            return unit(motion[:, 0])
+        pose = self.data.oMf[self.frame]
         # A small ball on a flat end may be far beside the frame.
         way = self.tip.offset if self.tip.ahead is None else self.tip.ahead
         if way.any():
@@ -80,6 +78,20 @@ class Limb(Reach):
             if np.linalg.norm(away) > self.tip.radius:
                 return unit(away)
         return np.array([0.0, 0.0, -1.0])
+
+
+    def pushes(self, approach: Array) -> list[Array]:
+        """Return where the tip presses near an `approach` (3,), in the posture asked for last.
+
+        One that moves along a line presses along it, or between it and the limb: a fingertip.
+        """
+        if not self.on_line:
+            return [approach]
+        line = unit(self.moves[:3][:, np.argmax(np.abs(self.moves[:3]).max(axis=0))])
+        line = line if line @ approach >= 0 else -line
+        forward = self.direction()
+        aside = unit(forward - line * (line @ forward))
+        return [unit(line + k * aside) for k in _BETWEEN if line @ approach > _BESIDE]
 
 
 class Stance:
@@ -119,18 +131,13 @@ class Stance:
         The least motion that joints make, turns of the tip included, as a part of the largest.
     ahead
         Cosine between the approach and the limb that carries the tip; below 0 it is in the way.
-        Of a tip that moves along one line: between that and the approach that was asked for.
+        1 of a tip that moves along one line, unless its limb is behind that.
     """
 
     def __init__(self, limb: Limb, q: Array, approach: Array) -> None:
-        self.limb, self.tip, self.q = limb, limb.tip, q
+        self.limb, self.tip, self.q, self.approach = limb, limb.tip, q, approach
         model, columns, jacobian = limb.model, limb.columns, limb.jacobian(q)
         linear, angular = jacobian[:3], jacobian[3:]
-        asked = approach
-        if limb.on_line and linear.any():  # it slides nowhere, and presses that way
-            line = np.linalg.svd(linear)[0][:, 0]
-            approach = line if line @ approach >= 0 else -line
-        self.approach = approach
         self.center = limb.data.oMf[limb.frame].act(limb.offset)
         away = [self.center - limb.data.oMi[j].translation for j in limb.chain]
         self.reach = max((float(np.linalg.norm(one)) for one in away), default=0.0)
@@ -138,7 +145,7 @@ class Stance:
         values = np.linalg.svd(scaled, compute_uv=False)
         self.dexterity = float(values[-1] / values[0]) if values[0] > 0 else 0.0
         ahead = float(limb.direction() @ approach)
-        self.ahead = float(asked @ approach) if limb.on_line else ahead
+        self.ahead = 1.0 if limb.on_line and ahead > -0.5 else ahead
         # Where joints can move the tip, as near as they can along the approach.
         ways = np.linalg.svd(linear, full_matrices=False)[0][:, : _rank(linear)]
         near = ways @ (ways.T @ approach)
@@ -263,20 +270,19 @@ def stances(
     for k in range(_SEEDS):
         seed = limb.seed(start, rng) if k else start
         at, off = limb.solve(seed, place, rows=rows, turn=None if limb.on_line else along)
-        one = Stance(limb, at, approach)
-        if off > _HEIGHT * one.reach or one.mobility < _MOBILE or one.ahead <= _BESIDE:
-            continue
-        if not one.can_yield():
-            continue
         away = [np.abs(pin.difference(limb.model, other.q, at)).max() for _, other in found]
-        if min(away, default=np.inf) < _APART or not usable(at):
-            continue
-        ease = _ease(limb, at)
-        rank = one.mobility * one.ahead * ease * one.dexterity
-        rank += k == 0 and min(one.mobility, one.dexterity, ease) > _EASY
-        found.append((rank * (one.force > 0), one))
+        limb.jacobian(at)
+        for one in [Stance(limb, at, way) for way in limb.pushes(approach)]:
+            if off > _HEIGHT * one.reach or one.mobility < _MOBILE or one.ahead <= _BESIDE:
+                continue
+            if min(away, default=np.inf) < _APART or not (one.can_yield() and usable(at)):
+                continue
+            ease = _ease(limb, at)
+            rank = one.mobility * one.ahead * ease * one.dexterity
+            rank += k == 0 and min(one.mobility, one.dexterity, ease) > _EASY
+            found.append((rank * (one.force > 0), one))
     found.sort(key=lambda one: -one[0])
-    return [one for _, one in found[:_MOST]]
+    return [one for _, one in found[: _MOST * (len(_BETWEEN) if limb.on_line else 1)]]
 
 
 def _ease(limb: Limb, q: Array) -> float:
