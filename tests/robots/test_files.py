@@ -295,3 +295,12 @@ def test_wrong_mimic_joints_are_named(tmp_path, of, ratio, words):
     file.write_text(file.read_text().replace("</joint>", MIMIC.format(of, ratio) + "</joint>"))
     with pytest.raises(robots.RobotError, match=words):
         robots.load_file(file, mimic=True)
+
+
+def test_a_floating_joint_of_a_urdf_is_fixed_where_the_base_is_to_be(tmp_path):
+    text = arm(tmp_path).read_text()
+    free = '<joint name="f" type="floating"><parent link="world"/><child link="a"/></joint>'
+    text = text.replace("</robot>", f'<link name="world"/>{free}</robot>')
+    (tmp_path / "free.urdf").write_text(text)
+    assert robots.load_file(tmp_path / "free.urdf").model.nv == 7
+    assert robots.load_file(tmp_path / "free.urdf", free_flyer=False).model.nv == 1

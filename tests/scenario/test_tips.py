@@ -428,3 +428,26 @@ def test_a_heavy_body_with_one_caster_floats(load) -> None:
     parts += joint("roll", "fork", "wheel", "continuous", "0 0 0", "0 1 0")
     assert only_turns(load(parts).model)
     assert not only_turns(load(parts.replace("50", "5")).model)
+
+
+def test_of_the_spheres_of_a_finger_the_outermost_is_its_tip(load) -> None:
+    spheres = ball(".01", "0 0 .02"), ball(".01", "0 0 .09"), ball(".01", "0 0 .05")
+    parts = link("palm") + link("finger", "", "0 0 0", *spheres)
+    (tip,) = tips_of(load(parts + joint("j", "palm", "finger", *HINGE)))
+    assert tip.offset[2] == pytest.approx(0.09)
+
+
+def test_couplings_that_no_model_has_leave_their_joints_free(draft, tmp_path: Path) -> None:
+    file = tmp_path / "jaws.xml"
+    file.write_text(
+        """<mujoco><worldbody><body name="arm"><joint name="a" axis="0 1 0"/>
+        <geom type="capsule" size=".02" fromto="0 0 0 0 0 .3"/>
+        <body name="hand" pos="0 0 .3"><joint name="b" axis="0 1 0"/>
+        <geom type="capsule" size=".02" fromto="0 0 0 0 0 .3"/></body></body></worldbody>
+        <tendon><fixed name="t"><joint joint="a" coef="1"/><joint joint="b" coef="1"/></fixed>
+        </tendon>
+        <equality><tendon tendon1="t"/></equality></mujoco>"""
+    )
+    made = draft(file, "plane")
+    assert made.why[0].startswith("joints that are coupled move freely (--no-mimic)")
+    assert not made.built.scenario.robot[0].mimic

@@ -68,7 +68,9 @@ def find_tips(
         find_frame(robot.model, frame)
         known = [one for one in known if one.frame == frame]
     elif not floats(robot.model):
-        known = [one for one in known if joint_of(robot.model, one.frame) in limbs][:1]
+        known = _outermost(
+            [one for one in known if joint_of(robot.model, one.frame) in limbs], robot
+        )
     if known and offset is not None:
         known = [replace(known[0], offset=offset, source=_ASKED)]
     # A smaller sphere than that of the collision geometry would be inside it.
@@ -173,6 +175,18 @@ def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
             f"the end of this link: --frame {tip.frame} --offset {x:g} {y:g} {z:g} --radius "
             f"{end.radius:g}"
         )
+
+
+def _outermost(tips: Sequence[Tip], robot: LoadedRobot) -> list[Tip]:
+    """Return that of the `tips` beside the first one which is farthest from their joint."""
+    frames = [robot.model.frames[find_frame(robot.model, tip.frame)] for tip in tips]
+    away = [
+        float(np.linalg.norm(frame.placement.act(tip.offset)))
+        if frame.parentJoint == frames[0].parentJoint
+        else -1.0
+        for tip, frame in zip(tips, frames, strict=True)
+    ]
+    return [tips[int(np.argmax(away))]] if tips else []
 
 
 def _lowest(robot: LoadedRobot, tips: Sequence[Tip]) -> list[Tip]:

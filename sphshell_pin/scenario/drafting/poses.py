@@ -79,7 +79,6 @@ class Limb(Reach):
                 return unit(away)
         return np.array([0.0, 0.0, -1.0])
 
-
     def pushes(self, approach: Array) -> list[Array]:
         """Return where the tip presses near an `approach` (3,), in the posture asked for last.
 
