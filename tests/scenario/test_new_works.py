@@ -62,6 +62,14 @@ def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, draft)
     assert np.linalg.norm(away - normal * (away @ normal)) < 0.25 * pair.side_i.sphere.radius
 
 
+def test_a_limb_comes_into_a_bowl_from_above(draft):
+    made = draft(PROBE, "bowl")
+    assert any("through the upper half of the bowl" in one for one in made.why)
+    result = run_well(made.built)
+    control = made.built.scenario.controller
+    assert held(made.built, result) == pytest.approx(control.normal_force, rel=0.05)
+
+
 def test_a_hard_tip_settles(draft):
     made = draft(PROBE, "plane", material="steel")
     result, _ = simulate(made.built)

@@ -53,7 +53,8 @@ class Press:
     The sphere begins with the `gap` [m] at the first point of the way and presses with `force` [N],
     from `lead_in` [s] on while it slides. The efforts of motors that are too `weak` are not
     modeled. A `calm` one has more damping, and joints that nothing pulls to a posture. `repair` is
-    what was changed of a draft that failed; "" of the first draft.
+    what was changed of a draft that failed; "" of the first draft. The surface is `hollow` if it is
+    touched from inside.
 
     Attributes
     ----------
@@ -76,6 +77,7 @@ class Press:
     lead_in: float = 0.0
     calm: bool = False
     repair: Literal["", "calmed", "cut", "stays"] = ""
+    hollow: bool = False
 
     def __post_init__(self) -> None:
         stance, force, self.slides = self.place.stance, self.force, self.way.slides
@@ -129,6 +131,8 @@ class Press:
             f"normal force {self.force:g} N, for an effective mass of {stance.mass:.3g} kg at the "
             "tip",
             self.weak and WEAK,
+            self.hollow
+            and "the limb comes in through the upper half of the bowl, which is open to it",
             not way.even and "the force on the surface is the resultant of several",
             f"the tip slides over {mm(way.length)}{farther}"
             if self.slides

@@ -46,7 +46,6 @@ _ADVICE = {
     "links": "take another --place, a smaller part, or a sphere farther out (--frame, --offset)",
     "figure": "take another --law or --radius",
 }
-_ADVICE_BOWL = "the bowl is a whole ball, which the limb would pass: take the file of an open one"
 
 
 def repaired(one: Press, fault: Fault) -> Press | None:
@@ -141,7 +140,8 @@ class PressSearch(Search):
             gap = press_gap(radius, force, stance.mass, pair)
             place = found.with_gap(gap)
             way = find_way(asked, place, self.held, radius, gap, self.room)
-            yield Press(place, way, pair, force, gap, weak=not stance.force)
+            hollow = asked.inside
+            yield Press(place, way, pair, force, gap, weak=not stance.force, hollow=hollow)
 
     def _places(self) -> Iterator[Place]:
         """Yield places of the part before the tip, those on the floor of the robot's base first.
@@ -213,7 +213,7 @@ class PressSearch(Search):
         return CannotReach(
             f"link '{link}' would be in the part, or another one: in each of "
             f"{counted(bench.postures, 'posture')} and {counted(bench.tried, 'place')} on the part "
-            f"that were tried; {_ADVICE_BOWL if self.asked.inside else _ADVICE['links']}",
+            f"that were tried; {_ADVICE['links']}",
             frame,
             other_ends(self.model, frame),
         )
