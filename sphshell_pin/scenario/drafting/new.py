@@ -65,38 +65,39 @@ def new_scenario(
         draft works: the text says what fails in it and what to change.
     """
     asked = Asked(robot, surface, **options)
+
+    def instead(note: str, **changes: Any) -> NewScenario:
+        made = _written(replace(asked, **changes))
+        return replace(made, why=(note, *made.why))
+
     try:
         return _written(asked)
     except CannotReach as error:
         said = str(error).partition(";")[0]
         for other in error.others[:_MOST_ENDS] if asked.frame is None else ():
             with suppress(SphshellError):
-                made = _written(replace(asked, frame=other))
-                note = f"frame '{other}', as with '{error.frame}' {said}"
-                return replace(made, why=(note, *made.why))
+                return instead(f"frame '{other}', as with '{error.frame}' {said}", frame=other)
         raise
     except TooHeavy as error:
         if asked.against is not None:
             raise
-        made = _written(replace(asked, against="plastic"))
-        note = f"the part is of plastic, as with steel {str(error).partition(';')[0]}"
-        return replace(made, why=(note, *made.why))
+        said = str(error).partition(";")[0]
+        return instead(f"the part is of plastic, as with steel {said}", against="plastic")
     except RobotError as error:
         if not asked.mimic:
             raise
+        said = str(error).partition(";")[0]
         try:
-            made = _written(replace(asked, mimic=False))
+            return instead(
+                f"joints that are coupled move freely (--no-mimic), as else: {said}", mimic=False
+            )
         except RobotError:
             raise error from None
-        said = str(error).partition(";")[0]
-        note = f"joints that are coupled move freely (--no-mimic), as else: {said}"
-        return replace(made, why=(note, *made.why))
     except CannotStand as error:
         if asked.base is not None:
             raise
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
-    fixed = _written(replace(asked, base="fixed"))
-    return replace(fixed, why=(note, *fixed.why))
+    return instead(note, base="fixed")
 
 
 def _written(asked: Asked) -> NewScenario:
